@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# Sets up a Debian (12 or newer) machine and runs Steradian.
+#
+#   ./setup.sh          install what is missing, build, render scenes/gallery.json to gallery.exr and gallery.png
+#   ./setup.sh test     install what is missing, run all tests
+#   ./setup.sh install  install what is missing, build, put `steradian` into ~/.cargo/bin
+set -euo pipefail
+cd "$(dirname "$0")"
+
+case "${1:-render}" in
+    render | test | install) ;;
+    -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    *) echo "setup.sh: unknown command '$1' (render, test or install)" >&2; exit 2 ;;
+esac
+
+as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
+
+# What the build needs, as Debian packages: a C compiler, libclang for bindgen, Embree's headers.
+packages=()
+command -v cc >/dev/null || packages+=(build-essential)
+command -v curl >/dev/null || packages+=(curl ca-certificates)
+ls /usr/lib/llvm-*/lib/libclang*.so* >/dev/null 2>&1 || packages+=(libclang-dev)
+[ -e /usr/include/embree3/rtcore.h ] || [ -e /usr/include/embree4/rtcore.h ] || packages+=(libembree-dev)
+if [ ${#packages[@]} -gt 0 ]; then
+    echo "Installing: ${packages[*]}" >&2
+    as_root apt-get update -qq
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${packages[@]}" >/dev/null
+fi
+
+# Rust by rustup (Debian's own rustc is too old).
+[ -e "$HOME/.cargo/env" ] && . "$HOME/.cargo/env"
+if ! command -v cargo >/dev/null; then
+    echo "Installing Rust" >&2
+    curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y --profile minimal
+    . "$HOME/.cargo/env"
+fi
+
+case "${1:-render}" in
+    render) cargo run --release --locked -- render scenes/gallery.json -o gallery.exr -o gallery.png ;;
+    test) cargo test --locked ;;
+    install) cargo install --locked --path . ;;
+esac

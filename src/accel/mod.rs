@@ -1,0 +1,94 @@
+//! Accelerators: which primitive does a ray meet first, and does it meet any? They know bounds, counts and ids, nothing of materials.
+
+mod embree;
+mod linear;
+
+pub use embree::{EmbreeAccel, EmbreeInfo};
+pub use linear::LinearAccel;
+
+use crate::error::Result;
+use crate::geometry::{Geometry, Hit};
+use crate::math::{Aabb, Ray};
+
+/// Which rays of a batch belong together, so that an accelerator may trace them side by side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coherence {
+    /// Every run of 16 rays starts at nearly one point and points nearly one way (camera rays of a pixel block, or their first shadow
+    /// rays).
+    Coherent,
+    /// Nothing is known.
+    Incoherent,
+}
+
+/// Answers ray queries on a fixed geometry.
+///
+/// All entry points accept any ray: one that is not [valid](Ray::is_valid) hits nothing. The answer to a ray of a coherent batch may depend,
+/// within rounding, on the other rays of its run of 16; that of a single or incoherent ray depends on nothing else.
+pub trait Accelerator: Send + Sync {
+    /// The closest hit within the ray's interval.
+    fn intersect(&self, ray: &Ray) -> Option<Hit>;
+
+    /// Whether there is any hit within the ray's interval.
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// [`intersect`](Self::intersect) for each ray, in order. `hits` is as long as `rays`.
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
+        let _ = coherence;
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.intersect(ray);
+        }
+    }
+
+    /// [`occluded`](Self::occluded) for each ray, in order. `occluded` is as long as `rays`.
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
+        let _ = coherence;
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = self.occluded(ray);
+        }
+    }
+
+    /// Bounds of all geometry; empty if there is none.
+    fn bounds(&self) -> Aabb;
+
+    /// Bytes the accelerator holds beside the geometry.
+    fn memory_bytes(&self) -> usize;
+
+    /// Name and version of what traces, with its instruction set, for statistics.
+    fn description(&self) -> String;
+}
+
+/// The accelerators that can be chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AccelKind {
+    /// Embree.
+    #[default]
+    Embree,
+    /// Every primitive for every ray: the oracle.
+    Linear,
+}
+
+impl AccelKind {
+    /// Every kind with the name users choose it by.
+    pub const ALL: [(Self, &'static str); 2] = [(Self::Embree, "embree"), (Self::Linear, "linear")];
+
+    /// The name users choose it by.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(kind, _)| *kind == self).map_or("", |(_, name)| name)
+    }
+
+    /// The kind with this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(_, n)| *n == name).map(|(kind, _)| *kind)
+    }
+}
+
+/// Builds an accelerator of the given kind over `geometry` with `threads` threads (0: all).
+///
+/// # Errors
+/// If Embree reports an error, such as a lack of memory.
+pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box<dyn Accelerator + '_>> {
+    Ok(match kind {
+        AccelKind::Embree => Box::new(EmbreeAccel::new(geometry, threads)?),
+        AccelKind::Linear => Box::new(LinearAccel::new(geometry)),
+    })
+}

@@ -1,0 +1,280 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{ArgAction, Args, Parser, Subcommand};
+use clap_complete::Shell;
+use steradian::accel::AccelKind;
+use steradian::desc::{IntegratorDesc, LayerDesc, SamplerKindDesc, StrategyDesc};
+use steradian::render::Overrides;
+
+use crate::names;
+
+const EXAMPLES: &str = "\
+Examples:
+  steradian render scene.json                      Writes what the scene's \"outputs\" name
+  steradian render scene.json -o a.exr -o a.png    Writes these instead
+  steradian info scene.json                        What is in the scene
+  steradian compare reference.exr test.exr         How far two pictures differ
+
+Exit codes: 0 done, 1 internal failure, 2 wrong usage, 3 scene invalid, 4 file missing, 5 output not writable, 33 out of memory,
+130 interrupted and 143 terminated (with the picture so far written).";
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  steradian render cornell.json --spp 1024 -o cornell.exr
+      1024 samples per pixel into a linear multi-layer EXR.
+  steradian render cornell.json --time-limit 60 --size 1920x1080 -o a.exr -o a.png
+      The best picture a minute can give, as EXR and as PNG.
+  steradian render cornell.json --crop 200,100,64,64 --spp 4096
+      A close look at one part; each pixel is the same as in the whole picture.
+  steradian render cornell.json --integrator ambient_occlusion --spp 16
+      The geometry without materials and lights.
+  steradian render cornell.json --layers Z,N,albedo --float -o cornell.exr
+      Depth, normals and albedo beside the picture, everything in 32 bits.
+  steradian render cornell.json --pixel 120,80 --sample 7
+      What exactly one sample brings; nothing is written.
+  steradian render cornell.json -q --json - | jq .mrays_per_second
+      Statistics for scripts.
+
+Without -o and without \"outputs\" in the scene, SCENE.exr and SCENE.png are written to the working directory.
+Ctrl-C finishes the samples under way and writes the picture; a second one leaves at once.";
+
+/// A fast, accurate CPU renderer.
+#[derive(Debug, Parser)]
+#[command(name = "steradian", version, about, after_help = EXAMPLES, max_term_width = 120)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene to files
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(Box<RenderArgs>),
+    /// Say what is in a scene
+    ///
+    /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info without an error
+    /// renders without an error.
+    Info(InfoArgs),
+    /// Print the JSON Schema of scene files
+    ///
+    /// Editors check and complete scenes with it: save it and name it in the scene's "$schema".
+    #[command(after_help = "Example:\n  steradian schema > scene.schema.json")]
+    Schema,
+    /// Compare a picture with its reference
+    ///
+    /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of (test - reference)² /
+    /// (reference² + 0.01), psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
+    #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
+    Compare(CompareArgs),
+    /// Print completions for a shell
+    #[command(after_help = "Example:\n  steradian completions bash > ~/.local/share/bash-completion/completions/steradian")]
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+}
+
+/// Arguments of `render`.
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// The scene file
+    pub scene: PathBuf,
+
+    /// File to write, .exr or .png; repeat for several. Replaces the scene's "outputs"
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<String>,
+
+    /// Samples per pixel
+    #[arg(long, value_name = "N", help_heading = "Picture")]
+    pub spp: Option<u32>,
+    /// Width and height in pixels, such as 1920x1080
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Picture")]
+    pub size: Option<[u32; 2]>,
+    /// Render only this part, in pixels from the upper left corner
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_list::<u32, 4>, help_heading = "Picture")]
+    pub crop: Option<[u32; 4]>,
+    /// EXR: store these beside the picture
+    #[arg(long, value_name = "LAYERS", value_delimiter = ',', value_parser = names::plain::<LayerDesc>(), help_heading = "Picture")]
+    pub layers: Vec<LayerDesc>,
+    /// EXR: store 32-bit floats instead of 16-bit ones
+    #[arg(long, help_heading = "Picture")]
+    pub float: bool,
+    /// PNG: exposure in stops; 1 is twice as bright
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
+    pub exposure: Option<f32>,
+
+    /// The algorithm
+    #[arg(long, value_name = "NAME", value_parser = names::tagged::<IntegratorDesc>(), help_heading = "Algorithm")]
+    pub integrator: Option<IntegratorDesc>,
+    /// Largest number of segments from the camera; 1 shows only directly visible light
+    #[arg(long, value_name = "N", help_heading = "Algorithm")]
+    pub max_depth: Option<u32>,
+    /// How directions towards lights are found
+    #[arg(long, value_name = "NAME", value_parser = names::plain::<StrategyDesc>(), help_heading = "Algorithm")]
+    pub strategy: Option<StrategyDesc>,
+    /// How samples are chosen
+    #[arg(long, value_name = "NAME", value_parser = names::plain::<SamplerKindDesc>(), help_heading = "Algorithm")]
+    pub sampler: Option<SamplerKindDesc>,
+    /// A different seed gives different noise
+    #[arg(long, value_name = "N", help_heading = "Algorithm")]
+    pub seed: Option<u64>,
+    /// What finds hits
+    #[arg(long, value_name = "NAME", value_parser = accel_parser(), help_heading = "Algorithm")]
+    pub accel: Option<AccelKind>,
+
+    /// Number of threads; 0 stands for all. The picture does not depend on it
+    #[arg(long, value_name = "N", help_heading = "Run")]
+    pub threads: Option<usize>,
+    /// End after this time even if samples are missing
+    #[arg(long, value_name = "SECONDS", help_heading = "Run")]
+    pub time_limit: Option<f64>,
+    /// Write statistics as JSON to this file; - stands for stdout
+    #[arg(long, value_name = "STATS", help_heading = "Run")]
+    pub json: Option<PathBuf>,
+    /// Replay samples of this pixel alone and print what they bring; nothing is written
+    #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", help_heading = "Run")]
+    pub pixel: Option<[u32; 2]>,
+    /// The sample to replay, counted from 0
+    #[arg(long, value_name = "I", requires = "pixel", help_heading = "Run")]
+    pub sample: Option<u32>,
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+/// How much is said on stderr.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct Verbosity {
+    /// Say nothing but errors
+    #[arg(short, long, conflicts_with = "verbose", help_heading = "Run")]
+    pub quiet: bool,
+    /// Say more; repeat for even more
+    #[arg(short, long, action = ArgAction::Count, help_heading = "Run")]
+    pub verbose: u8,
+}
+
+/// Arguments of `info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// The scene file
+    pub scene: PathBuf,
+    /// As JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// The reference, an EXR file
+    pub reference: PathBuf,
+    /// The picture to judge, an EXR file of the same size
+    pub test: PathBuf,
+    /// As JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl RenderArgs {
+    /// What the settings need of the command line.
+    pub fn overrides(&self, default_outputs: Vec<String>) -> Overrides {
+        Overrides {
+            spp: self.spp,
+            size: self.size,
+            crop: self.crop,
+            threads: self.threads,
+            seed: self.seed,
+            integrator: self.integrator,
+            accel: self.accel,
+            sampler: self.sampler,
+            max_depth: self.max_depth,
+            strategy: self.strategy,
+            time_limit: self.time_limit,
+            outputs: self.output.clone(),
+            default_outputs,
+            layers: self.layers.clone(),
+            float: self.float,
+            exposure: self.exposure,
+        }
+    }
+}
+
+fn accel_parser() -> impl TypedValueParser<Value = AccelKind> {
+    let names = AccelKind::ALL.map(|(_, name)| name);
+    PossibleValuesParser::new(names).try_map(|name| AccelKind::from_name(&name).ok_or("unknown accelerator"))
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let parse = || {
+        let (width, height) = text.split_once(['x', 'X'])?;
+        Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
+    };
+    parse().ok_or_else(|| "expected WIDTHxHEIGHT, such as 1920x1080".to_owned())
+}
+
+fn parse_list<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N], String> {
+    let numbers: Option<Vec<T>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| format!("expected {N} whole numbers, separated by commas"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn render(arguments: &[&str]) -> Result<RenderArgs, clap::Error> {
+        let line = ["steradian", "render", "a.json"].iter().chain(arguments);
+        match Cli::try_parse_from(line)?.command {
+            Command::Render(arguments) => Ok(*arguments),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_option_reaches_the_overrides() {
+        let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path --accel linear \
+                    --sampler independent --max-depth 3 --strategy light --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 -vv";
+        let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
+        let o = arguments.overrides(vec!["d.exr".to_owned()]);
+        assert_eq!((o.spp, o.size, o.crop, o.threads, o.seed), (Some(5), Some([20, 10]), Some([1, 2, 3, 4]), Some(2), Some(9)));
+        assert_eq!(
+            (o.accel, o.sampler, o.strategy),
+            (Some(AccelKind::Linear), Some(SamplerKindDesc::Independent), Some(StrategyDesc::Light))
+        );
+        assert_eq!((o.integrator, o.max_depth, o.time_limit), (Some(IntegratorDesc::default()), Some(3), Some(1.5)));
+        assert_eq!((o.layers, o.float, o.exposure), (vec![LayerDesc::Z, LayerDesc::Albedo], true, Some(-1.5)));
+        assert_eq!((o.outputs, o.default_outputs), (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()]));
+        assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
+    }
+
+    #[test]
+    fn wrong_options_are_refused() {
+        for line in [
+            "--spp -1",
+            "--size 20",
+            "--size 20x",
+            "--crop 1,2,3",
+            "--layers Z,Q",
+            "--integrator pathh",
+            "--pixel 1,2",
+            "--sample 3",
+            "-q -v",
+            "--nonsense",
+        ] {
+            let error = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap_err();
+            assert_eq!(error.exit_code(), 2, "{line}");
+        }
+        let message = render(&["--integrator", "pathh"]).unwrap_err().to_string();
+        assert!(message.contains("ambient_occlusion") && message.contains("'path'"), "{message}");
+    }
+}

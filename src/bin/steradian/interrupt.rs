@@ -1,0 +1,41 @@
+//! Ctrl-C and SIGTERM: the first asks the render to stop, so that the picture so far is written; the second ends the program at once.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use steradian::{Error, Result};
+
+/// Exit code after Ctrl-C: 128 and the signal's number, as shells have it.
+const INTERRUPTED: u8 = 130;
+/// Exit code after SIGTERM.
+const TERMINATED: u8 = 143;
+
+/// What the signals have asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Interrupt {
+    /// Becomes true with the first signal.
+    pub stop: Arc<AtomicBool>,
+    code: Arc<AtomicUsize>,
+}
+
+impl Interrupt {
+    /// Starts to listen.
+    pub fn listen() -> Result<Self> {
+        let interrupt = Self::default();
+        for (signal, code) in [(SIGINT, INTERRUPTED), (SIGTERM, TERMINATED)] {
+            // Actions run in the order of their registration: the first signal finds the flag down and only then raises it.
+            let registered = flag::register_conditional_shutdown(signal, i32::from(code), Arc::clone(&interrupt.stop))
+                .and_then(|_| flag::register_usize(signal, Arc::clone(&interrupt.code), usize::from(code)))
+                .and_then(|_| flag::register(signal, Arc::clone(&interrupt.stop)));
+            registered.map_err(|e| Error::Internal(format!("cannot listen to signals: {e}")))?;
+        }
+        Ok(interrupt)
+    }
+
+    /// The exit code of an interrupted run.
+    pub fn exit_code(&self) -> u8 {
+        u8::try_from(self.code.load(Ordering::Relaxed)).ok().filter(|code| *code != 0).unwrap_or(INTERRUPTED)
+    }
+}

@@ -1,0 +1,71 @@
+//! Names of enum variants, taken from the types that the scene format is made of, so that the command line and the format cannot differ.
+
+use std::fmt;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde::de::value::{MapDeserializer, StrDeserializer};
+use serde::de::{Deserialize, DeserializeOwned, Error, IntoDeserializer};
+
+/// The names that deserialisation accepts, caught from its complaint about one it does not.
+#[derive(Debug)]
+struct Names(&'static [&'static str]);
+
+impl fmt::Display for Names {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.join(", "))
+    }
+}
+
+impl std::error::Error for Names {}
+
+impl Error for Names {
+    fn custom<T: fmt::Display>(_: T) -> Self {
+        Self(&[])
+    }
+
+    fn unknown_variant(_: &str, expected: &'static [&'static str]) -> Self {
+        Self(expected)
+    }
+}
+
+fn from_name<T: DeserializeOwned>(name: &str) -> Result<T, Names> {
+    let name: StrDeserializer<'_, Names> = name.into_deserializer();
+    T::deserialize(name)
+}
+
+fn from_type<T: DeserializeOwned>(name: &str) -> Result<T, Names> {
+    T::deserialize(MapDeserializer::new([("type", name)].into_iter()))
+}
+
+fn names<T>(parse: impl Fn(&str) -> Result<T, Names>) -> &'static [&'static str] {
+    parse("?").err().map_or(&[], |Names(names)| names)
+}
+
+/// Parses an enum whose variants are plain names.
+pub fn plain<T: DeserializeOwned + Clone + Send + Sync + 'static>() -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(names(from_name::<T>)).try_map(|name| from_name::<T>(&name))
+}
+
+/// Parses an enum whose variants are objects with a `type`; everything else has its default.
+pub fn tagged<T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static>() -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(names(from_type::<T>)).try_map(|name| from_type::<T>(&name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use steradian::desc::{IntegratorDesc, LayerDesc, SamplerKindDesc};
+
+    #[test]
+    fn names_are_those_of_the_scene_format() {
+        assert_eq!(names(from_name::<LayerDesc>), ["Z", "N", "P", "albedo"]);
+        assert_eq!(names(from_name::<SamplerKindDesc>), ["sobol", "independent"]);
+        let integrators = names(from_type::<IntegratorDesc>);
+        assert_eq!(integrators[..3], ["path", "whitted", "normal"]);
+        for name in integrators {
+            let value = serde_json::to_value(from_type::<IntegratorDesc>(name).unwrap()).unwrap();
+            assert_eq!(value["type"], *name);
+        }
+        assert_eq!(from_type::<IntegratorDesc>("path").unwrap(), IntegratorDesc::default());
+    }
+}

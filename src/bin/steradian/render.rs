@@ -1,0 +1,191 @@
+//! `steradian render`.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use steradian::accel::{self, Accelerator};
+use steradian::camera::Camera;
+use steradian::film::{LayerSet, PixelSample};
+use steradian::math::{Vec2, Vec3};
+use steradian::output::{self, RenderInfo};
+use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Settings, Stats};
+use steradian::{Result, compile, import};
+use tracing_subscriber::filter::LevelFilter;
+
+use crate::args::{RenderArgs, Verbosity};
+use crate::interrupt::Interrupt;
+use crate::progress::Reporter;
+use crate::stats::{self, Run};
+use crate::text;
+
+/// Renders a scene and writes what was asked for; the result is the exit code.
+pub fn run(arguments: &RenderArgs) -> Result<u8> {
+    log_to_stderr(arguments.verbosity);
+    let start = Instant::now();
+    let desc = import::load_scene(&arguments.scene)?;
+    let mut settings = Settings::new(&desc, &arguments.overrides(default_outputs(&arguments.scene)))?;
+    if arguments.pixel.is_none() {
+        check_outputs(&settings, arguments.json.as_deref())?;
+    }
+    let scene = compile::compile(&desc, &arguments.scene)?;
+    let load_seconds = start.elapsed().as_secs_f64();
+
+    let start = Instant::now();
+    let accel = accel::build(settings.accel, &scene.geometry, settings.threads)?;
+    let build_seconds = start.elapsed().as_secs_f64();
+    tracing::info!("{}; {load_seconds:.3} s to load, {build_seconds:.3} s to build", accel.description());
+
+    if let (Some(pixel), Some(sample)) = (arguments.pixel, arguments.sample) {
+        settings.layers = LayerSet::FULL;
+        let value = render::replay(&scene, &*accel, &settings, pixel, sample)?;
+        return text::print(&describe_sample(&value)).map(|()| 0);
+    }
+
+    let interrupt = Interrupt::listen()?;
+    let reporter = Reporter::new(arguments.verbosity.quiet, interrupt.stop.clone(), settings.time_limit);
+    let result = render::render(&scene, &*accel, &settings, &reporter, &interrupt.stop)?;
+    let stats = &result.stats;
+    warn_of_dropped(stats, &reporter);
+
+    let info = RenderInfo {
+        samples_per_pixel: stats.spp_done,
+        render_seconds: stats.render_seconds,
+        world_to_camera: Some(world_to_camera(&scene.camera, settings.size)),
+    };
+    for desc in &settings.outputs {
+        output::write(desc, &result.image, &info)?;
+    }
+    if let Some(path) = &arguments.json {
+        let run = Run { scene: &arguments.scene, load_seconds, build_seconds };
+        stats::write(path, &stats::value(&run, &settings, &*accel, stats))?;
+    }
+    report(&reporter, &settings, &*accel, stats);
+    Ok(if stats.interrupted { interrupt.exit_code() } else { 0 })
+}
+
+/// Warnings of the library; with `-v` what it does, with `-vv` every detail.
+fn log_to_stderr(verbosity: Verbosity) {
+    let level = match (verbosity.quiet, verbosity.verbose) {
+        (true, _) => LevelFilter::ERROR,
+        (false, 0) => LevelFilter::WARN,
+        (false, 1) => LevelFilter::INFO,
+        (false, _) => LevelFilter::DEBUG,
+    };
+    let subscriber = tracing_subscriber::fmt().with_max_level(level).without_time().with_target(false).with_ansi(false);
+    // Fails only if there is a logger already, which then does the work.
+    let _ = subscriber.with_writer(std::io::stderr).try_init();
+}
+
+/// Files named after the scene, in the working directory.
+fn default_outputs(scene: &Path) -> Vec<String> {
+    let stem = scene.file_stem().map_or("picture".into(), |stem| stem.to_string_lossy().into_owned());
+    DEFAULT_EXTENSIONS.iter().map(|extension| format!("{stem}.{extension}")).collect()
+}
+
+/// A slip in a name is found before the render, not after it.
+fn check_outputs(settings: &Settings, stats: Option<&Path>) -> Result<()> {
+    for output in &settings.outputs {
+        output::check_writable(Path::new(&output.file))?;
+    }
+    match stats {
+        Some(path) if path != Path::new("-") => output::check_creatable(path),
+        _ => Ok(()),
+    }
+}
+
+fn warn_of_dropped(stats: &Stats, reporter: &Reporter) {
+    let Some(first) = stats.dropped.first() else { return };
+    let (count, noun) = (stats.nan_samples, if stats.nan_samples == 1 { "sample was" } else { "samples were" });
+    reporter.warn(&format!(
+        "{count} {noun} not finite and dropped (this is a bug; --pixel {},{} --sample {} replays the first)",
+        first.x, first.y, first.sample
+    ));
+}
+
+fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, stats: &Stats) {
+    let seconds = stats.render_seconds.max(1e-9);
+    let ended = match (stats.interrupted, stats.time_limited) {
+        (true, _) => " (interrupted)",
+        (_, true) => " (time limit)",
+        _ => "",
+    };
+    reporter.say(&format!(
+        "{}x{} pixels, {} samples per pixel{ended}, {:.2} s, {:.2} Msamples/s, {:.2} Mrays/s, {} threads, {}",
+        settings.crop.width,
+        settings.crop.height,
+        stats.spp_done,
+        stats.render_seconds,
+        stats.samples as f64 / seconds * 1e-6,
+        stats.rays.total() as f64 / seconds * 1e-6,
+        settings.threads,
+        accel.description(),
+    ));
+    for output in &settings.outputs {
+        reporter.say(&format!("wrote {}", PathBuf::from(&output.file).display()));
+    }
+    if !stats.interrupted {
+        reporter.complete();
+    }
+}
+
+fn describe_sample(sample: &PixelSample) -> String {
+    let triple = |values: [f32; 3]| format!("{} {} {}", values[0], values[1], values[2]);
+    let surface = &sample.surface;
+    [
+        format!("radiance  {}", triple(sample.radiance.to_array())),
+        format!("alpha     {}", sample.alpha),
+        format!("depth     {}", surface.depth),
+        format!("normal    {}", triple(surface.normal.to_array())),
+        format!("position  {}", triple(surface.position.to_array())),
+        format!("albedo    {}", triple(surface.albedo.to_array())),
+    ]
+    .join("\n")
+}
+
+/// World to camera as OpenEXR has it: for row vectors, with +X right, +Y up and +Z forward.
+fn world_to_camera(camera: &Camera, size: [u32; 2]) -> [[f32; 4]; 4] {
+    // The ray through the middle of the upper edge lies in the plane of the view axis and the camera's upright.
+    let forward = camera.axis();
+    let upper = camera.ray(Vec2::new(0.5 * size[0] as f32, 0.0), size, [0.5; 2]).direction;
+    let up = (upper - forward * upper.dot(forward)).normalize_or(Vec3::Y);
+    let axes = [forward.cross(up), up, forward].map(Vec3::as_dvec3);
+    let position = camera.position();
+    let mut rows = [[0.0; 4]; 4];
+    for (column, axis) in axes.iter().enumerate() {
+        for (row, component) in axis.to_array().into_iter().enumerate() {
+            rows[row][column] = component as f32;
+        }
+        rows[3][column] = -axis.dot(position) as f32;
+    }
+    rows[3][3] = 1.0;
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use steradian::math::{DAffine3, DVec3, Transform};
+
+    #[test]
+    fn points_before_the_camera_have_positive_depth_and_the_right_side_is_right() {
+        let turn = DAffine3::from_rotation_y(0.7) * DAffine3::from_rotation_x(-0.4);
+        let place = DAffine3::from_translation(DVec3::new(1.0, 2.0, 3.0)) * turn;
+        let camera = Camera::new(Transform::new(place).unwrap(), 1.0, None);
+        let m = world_to_camera(&camera, [640, 360]);
+        let map = |p: DVec3| -> [f64; 3] {
+            let row = [p.x, p.y, p.z, 1.0];
+            std::array::from_fn(|j| (0..4).map(|i| row[i] * f64::from(m[i][j])).sum())
+        };
+        // Camera space looks along -Z with +X right; OpenEXR's looks along +Z.
+        for p in [DVec3::new(0.0, 0.0, -5.0), DVec3::new(1.0, 0.0, -1.0), DVec3::new(0.0, 1.0, -2.0)] {
+            let measured = map(place.transform_point3(p));
+            let expected = [p.x, p.y, -p.z];
+            assert!(measured.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{measured:?} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn default_outputs_are_named_after_the_scene() {
+        assert_eq!(default_outputs(Path::new("a/b/cornell.json")), ["cornell.exr", "cornell.png"]);
+    }
+}

@@ -1,0 +1,165 @@
+//! Glass, water and the like: reflection and refraction with the exact Fresnel equations, by a plane or by GGX microfacets (Walter et al.,
+//! "Microfacet Models for Refraction through Rough Surfaces").
+//!
+//! Values are for radiance carried towards `wo`: what is refracted carries `1 / eta²`, with `eta` the index of refraction on the side of
+//! `wi` over that on the side of `wo`. With the unnormalised half vector `h = wo + eta wi`, which points from the optically thinner side to
+//! the denser one or back, `wo·m + eta wi·m = ±|h|`, and
+//!
+//! ```text
+//! value = (1 - F) D G2 |wo·m| |wi·m| / (|cos wo| |h|²)
+//! pdf   = (1 - F) (visible normals) eta² |wi·m| / |h|²
+//! ```
+//!
+//! Reflection and refraction share the height-correlated G2, as in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition.
+
+use super::fresnel;
+use super::microfacet::{MIN_COSINE, reflect};
+use super::{BsdfEval, BsdfSample, Ggx};
+use crate::color::Rgb;
+use crate::math::{Vec3, vec3};
+
+/// A boundary between two clear media. The outside is where the normal points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dielectric {
+    /// Index of refraction of the inside over that of the outside.
+    ior: f32,
+    ggx: Ggx,
+}
+
+impl Dielectric {
+    /// A boundary with the index of refraction `ior` inside over outside, positive; smooth where [`Ggx::new`] says so. Since refraction
+    /// turns directions by about `|ior - 1|` times the slope, that also multiplies alpha before it is compared with the limit.
+    pub fn new(ior: f32, alpha: [f32; 2]) -> Self {
+        let turn = (ior - 1.0).abs().min(1.0);
+        let ggx = Ggx::new(alpha);
+        let is_smooth = Ggx::new(alpha.map(|a| a * turn)).is_smooth();
+        Self { ior, ggx: if is_smooth { Ggx::new([0.0; 2]) } else { ggx } }
+    }
+
+    /// Index of refraction beyond the surface over that on the side of `wo`.
+    #[inline]
+    fn eta(&self, wo: Vec3) -> f32 {
+        if wo.z > 0.0 { self.ior } else { 1.0 / self.ior }
+    }
+
+    /// Reflection or refraction by microfacets, zero for a smooth boundary.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        if self.ggx.is_smooth() || wo.z.abs().min(wi.z.abs()) <= MIN_COSINE {
+            return BsdfEval::default();
+        }
+        // Seen from the side of `wo`, which becomes the upper one.
+        let eta = self.eta(wo);
+        let o = vec3(wo.x, wo.y, wo.z.abs());
+        let i = vec3(wi.x, wi.y, wi.z * 1f32.copysign(wo.z));
+        if i.z > 0.0 {
+            let facet = self.ggx.reflection(o, i);
+            let reflectance = fresnel::dielectric(facet.cos, eta).reflectance;
+            return BsdfEval { value: Rgb::splat(reflectance * facet.value), pdf: reflectance * facet.pdf };
+        }
+        self.eval_refraction(o, i, eta)
+    }
+
+    /// Refraction from `i`, on the lower side, towards `o`, on the upper one.
+    #[inline]
+    fn eval_refraction(&self, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
+        let half = o + i * eta;
+        let half = if half.z < 0.0 { -half } else { half };
+        let length_squared = half.length_squared();
+        if length_squared == 0.0 {
+            return BsdfEval::default();
+        }
+        // The microfacet must be seen from above by `o` and from below by `i`.
+        let scale = 1.0 / length_squared.sqrt();
+        let (cos_o, cos_i) = (o.dot(half) * scale, -i.dot(half) * scale);
+        if !(cos_o > 0.0 && cos_i > 0.0) {
+            return BsdfEval::default();
+        }
+        // The cosine of refraction is known: recomputing it by Snell's law would lose its digits near the critical angle.
+        let transmittance = 1.0 - fresnel::dielectric_reflectance(cos_o, cos_i, eta);
+        let (length_o, length_i) = (self.ggx.stretched_length(o), self.ggx.stretched_length(i));
+        let common = 2.0 * transmittance * self.ggx.normal_density(half) * cos_o * cos_i / length_squared;
+        BsdfEval { value: Rgb::splat(common * -i.z / (length_o * -i.z + length_i * o.z)), pdf: common * eta * eta / (o.z + length_o) }
+    }
+
+    /// Reflection if `u_lobe` is below the reflectance, else refraction.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        if wo.z.abs() <= MIN_COSINE {
+            return None;
+        }
+        if self.ggx.is_smooth() {
+            return Some(self.sample_smooth(wo, u_lobe));
+        }
+        let eta = self.eta(wo);
+        let o = vec3(wo.x, wo.y, wo.z.abs());
+        let m = self.ggx.sample_visible_normal(o, u);
+        let cos = o.dot(m).min(1.0);
+        if cos <= 0.0 {
+            return None;
+        }
+        let refraction = fresnel::dielectric(cos, eta);
+        let (mut wi, weight, pdf, is_transmission) = if u_lobe < refraction.reflectance {
+            let i = reflect(o, m, cos);
+            if i.z <= 0.0 {
+                return None;
+            }
+            (i, self.ggx.sampled_shadowing(o, i), refraction.reflectance * self.ggx.reflection_pdf(o, m), false)
+        } else {
+            let i = refract(o, m, cos, refraction.cos_t, eta);
+            if i.z >= 0.0 {
+                return None;
+            }
+            let shadowing = self.ggx.sampled_shadowing(o, vec3(i.x, i.y, -i.z));
+            // |h| = |cos - eta cos_t|; the reflection's density holds 1 / (4 cos), which the Jacobian of refraction replaces.
+            let jacobian = eta * eta * refraction.cos_t / (cos - eta * refraction.cos_t).powi(2);
+            let pdf = (1.0 - refraction.reflectance) * 4.0 * cos * self.ggx.reflection_pdf(o, m) * jacobian;
+            (i, shadowing / (eta * eta), pdf, true)
+        };
+        wi.z *= 1f32.copysign(wo.z);
+        let eta = if is_transmission { eta } else { 1.0 };
+        Some(BsdfSample { wi, weight: Rgb::splat(weight), pdf, is_delta: false, is_transmission, eta })
+    }
+
+    #[inline]
+    fn sample_smooth(&self, wo: Vec3, u_lobe: f32) -> BsdfSample {
+        let eta = self.eta(wo);
+        let refraction = fresnel::dielectric(wo.z.abs().min(1.0), eta);
+        // The choice is made with the reflectance itself, so that it cancels from the weight.
+        if u_lobe < refraction.reflectance {
+            return BsdfSample::mirrored(wo, Rgb::WHITE, refraction.reflectance);
+        }
+        let scale = 1.0 / eta;
+        BsdfSample {
+            wi: vec3(-wo.x * scale, -wo.y * scale, -refraction.cos_t.copysign(wo.z)),
+            weight: Rgb::splat(scale * scale),
+            pdf: 1.0 - refraction.reflectance,
+            is_delta: true,
+            is_transmission: true,
+            eta,
+        }
+    }
+
+    /// Whether the surface is rougher along one tangent than along the other.
+    pub fn is_anisotropic(&self) -> bool {
+        self.ggx.alpha()[0] != self.ggx.alpha()[1]
+    }
+
+    /// Whether the boundary is smooth.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        self.ggx.is_smooth()
+    }
+
+    /// One: nothing is absorbed.
+    pub fn albedo(&self, _wo: Vec3) -> Rgb {
+        Rgb::WHITE
+    }
+}
+
+/// The unit direction that `o` refracts to at the unit normal `m`, for the cosines on both sides.
+#[inline]
+fn refract(o: Vec3, m: Vec3, cos_o: f32, cos_t: f32, eta: f32) -> Vec3 {
+    let scale = 1.0 / eta;
+    m * (cos_o * scale - cos_t) - o * scale
+}

@@ -1,0 +1,171 @@
+//! Fresnel's equations for unpolarised light.
+
+/// Reflectance of a dielectric and where the refracted direction goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refraction {
+    /// Fraction of the power that is reflected; 1 for total internal reflection.
+    pub reflectance: f32,
+    /// Cosine of the refracted direction, not negative; 0 for total internal reflection.
+    pub cos_t: f32,
+}
+
+/// A dielectric seen at `cos_i`, within `[0, 1]`; `eta` is the index of refraction on the far side over that on the near side.
+#[inline]
+pub fn dielectric(cos_i: f32, eta: f32) -> Refraction {
+    // Snell's law; `1 - sin²` is written so that it keeps its digits near the critical angle.
+    let eta2 = eta * eta;
+    let cos2_t = ((eta2 - 1.0) + cos_i * cos_i) / eta2;
+    if cos2_t <= 0.0 {
+        return Refraction { reflectance: 1.0, cos_t: 0.0 };
+    }
+    let cos_t = cos2_t.sqrt();
+    Refraction { reflectance: dielectric_reflectance(cos_i, cos_t, eta), cos_t }
+}
+
+/// Reflectance of a dielectric for the cosines of incidence and refraction, not both zero.
+#[inline]
+pub fn dielectric_reflectance(cos_i: f32, cos_t: f32, eta: f32) -> f32 {
+    let parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    let across = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    0.5 * (parallel * parallel + across * across)
+}
+
+/// Mean reflectance of a dielectric under diffuse light, `2 ∫ F(cos) cos dcos`, for the far side's index over the near side's.
+pub fn dielectric_average(eta: f32) -> f32 {
+    let eta = f64::from(eta);
+    if eta < 1.0 {
+        // The same rays cross both ways, compressed by eta² inside.
+        return (1.0 - (1.0 - average_from_outside(1.0 / eta)) * eta * eta) as f32;
+    }
+    average_from_outside(eta) as f32
+}
+
+/// [`dielectric_average`] for `eta >= 1`, by the midpoint rule.
+fn average_from_outside(eta: f64) -> f64 {
+    const STEPS: u32 = 2048;
+    let reflectance = |cos: f64| {
+        let cos_t = (1.0 - (1.0 - cos * cos) / (eta * eta)).sqrt();
+        let p = (eta * cos - cos_t) / (eta * cos + cos_t);
+        let s = (cos - eta * cos_t) / (cos + eta * cos_t);
+        0.5 * (p * p + s * s)
+    };
+    (0..STEPS).map(|i| (f64::from(i) + 0.5) / f64::from(STEPS)).map(|cos| 2.0 * cos * reflectance(cos)).sum::<f64>() / f64::from(STEPS)
+}
+
+/// A conductor's index of refraction, `eta + i k`, in the form that [`ComplexIndex::reflectance`] needs: one channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ComplexIndex {
+    /// `eta² - k²`.
+    real_squared: f32,
+    /// `(2 eta k)²`.
+    cross_squared: f32,
+}
+
+impl ComplexIndex {
+    /// From the real part and the extinction, relative to the medium outside; both finite and not negative.
+    pub fn new(eta: f32, k: f32) -> Self {
+        Self { real_squared: (eta - k) * (eta + k), cross_squared: (2.0 * eta * k) * (2.0 * eta * k) }
+    }
+
+    /// Reflectance at `cos`, within `[0, 1]`, exact for any complex index.
+    #[inline]
+    pub fn reflectance(&self, cos: f32) -> f32 {
+        let cos2 = cos * cos;
+        let sin2 = 1.0 - cos2;
+        // With (a + ib)² = (eta + ik)² - sin²: the squared modulus a² + b² and 2 a cos.
+        let t0 = self.real_squared - sin2;
+        let modulus = (t0 * t0 + self.cross_squared).sqrt();
+        let twice_a_cos = (2.0 * (modulus + t0)).max(0.0).sqrt() * cos;
+
+        // Perpendicular part; the parallel one is it times (t3 - t4) / (t3 + t4), so that the mean takes one division.
+        let t1 = modulus + cos2;
+        let t3 = cos2 * modulus + sin2 * sin2;
+        let t4 = twice_a_cos * sin2;
+        let denominator = (t1 + twice_a_cos) * (t3 + t4);
+        ((t1 - twice_a_cos) * t3 / denominator.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn glass_reflects_a_twenty_fifth_ahead_and_all_at_grazing() {
+        assert!((dielectric(1.0, 1.5).reflectance - 0.04).abs() < 1e-7);
+        assert!((dielectric(1.0, 1.0 / 1.5).reflectance - 0.04).abs() < 1e-7);
+        assert_eq!(dielectric(0.0, 1.5).reflectance, 1.0);
+        assert!((dielectric(1e-6, 1.5).reflectance - 1.0).abs() < 1e-5);
+        assert!(dielectric(0.3, 1.0).reflectance < 1e-12);
+    }
+
+    #[test]
+    fn snells_law_holds_and_the_critical_angle_reflects_all() {
+        for eta in [1.1f32, 1.5, 3.0, 1.0 / 1.5, 0.3] {
+            for i in 10..=1000 {
+                let cos_i = i as f32 / 1000.0;
+                let refraction = dielectric(cos_i, eta);
+                let sin2_t = (1.0 - f64::from(cos_i).powi(2)) / f64::from(eta).powi(2);
+                if sin2_t >= 1.0 + 1e-6 {
+                    assert_eq!(refraction, Refraction { reflectance: 1.0, cos_t: 0.0 });
+                } else if sin2_t < 1.0 - 1e-3 {
+                    assert!((f64::from(refraction.cos_t) - (1.0 - sin2_t).sqrt()).abs() < 1e-5);
+                    // Reversing the path changes nothing but the rounding, which the steep ends amplify.
+                    assert!((dielectric(refraction.cos_t, 1.0 / eta).reflectance - refraction.reflectance).abs() < 1e-3);
+                }
+                assert!((0.0..=1.0).contains(&refraction.reflectance));
+            }
+        }
+    }
+
+    #[test]
+    fn parallel_light_vanishes_at_brewsters_angle() {
+        // At tan(theta) = eta only the perpendicular half is left: R = ((1 - eta²) / (1 + eta²))² / 2.
+        let eta = 1.5f32;
+        let cos = 1.0 / (1.0 + eta * eta).sqrt();
+        let expected = 0.5 * ((1.0 - eta * eta) / (1.0 + eta * eta)).powi(2);
+        assert!((dielectric(cos, eta).reflectance - expected).abs() < 1e-7);
+    }
+
+    #[test]
+    fn a_conductor_without_extinction_is_a_dielectric() {
+        for eta in [1.0f32, 1.3, 1.5, 2.5, 0.7] {
+            let index = ComplexIndex::new(eta, 0.0);
+            for i in 1..=500 {
+                let cos = i as f32 / 500.0;
+                let (metal, glass) = (index.reflectance(cos), dielectric(cos, eta).reflectance);
+                // Beyond the critical angle both are 1; close to it the root amplifies rounding.
+                assert!((metal - glass).abs() < 1e-3, "{eta} {cos} {metal} {glass}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_conductor_matches_complex_arithmetic() {
+        // R at normal incidence, and at 60° from (a + ib)² = (eta + ik)² - sin² in f64.
+        for (eta, k) in [(0.2f32, 3.9f32), (1.35, 7.47), (3.1, 3.3), (0.05, 0.0), (0.0, 1.0)] {
+            let (n, e) = (f64::from(eta), f64::from(k));
+            let index = ComplexIndex::new(eta, k);
+            let normal = ((n - 1.0).powi(2) + e * e) / ((n + 1.0).powi(2) + e * e);
+            assert!((f64::from(index.reflectance(1.0)) - normal).abs() < 1e-5, "{eta} {k}");
+
+            let (cos, sin2) = (0.5f64, 0.75f64);
+            let (re, im) = (n * n - e * e - sin2, 2.0 * n * e);
+            let modulus = re.hypot(im);
+            let (a, b) = ((0.5 * (modulus + re)).max(0.0).sqrt(), (0.5 * (modulus - re)).max(0.0).sqrt());
+            let across = ((a - cos).powi(2) + b * b) / ((a + cos).powi(2) + b * b);
+            let tilt = sin2 / cos;
+            let parallel = across * ((a - tilt).powi(2) + b * b) / ((a + tilt).powi(2) + b * b);
+            assert!((f64::from(index.reflectance(0.5)) - 0.5 * (across + parallel)).abs() < 1e-5, "{eta} {k}");
+        }
+        assert_eq!(ComplexIndex::new(0.2, 3.9).reflectance(0.0), 1.0);
+        assert!(ComplexIndex::new(0.0, 0.0).reflectance(1.0).is_finite());
+    }
+
+    #[test]
+    fn averages_of_glass_match_the_closed_form() {
+        assert!((dielectric_average(1.5) - 0.091_78).abs() < 1e-5);
+        assert!((dielectric_average(1.0 / 1.5) - 0.596_35).abs() < 1e-5);
+        assert!(dielectric_average(1.0).abs() < 1e-6);
+    }
+}

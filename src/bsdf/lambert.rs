@@ -1,0 +1,50 @@
+//! Ideal diffuse reflection.
+
+use std::f32::consts::FRAC_1_PI;
+
+use super::{BsdfEval, BsdfSample};
+use crate::color::Rgb;
+use crate::math::Vec3;
+use crate::sampling::warp;
+
+/// Ideal diffuse reflection on both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lambert {
+    /// Fraction of light reflected, each channel within `[0, 1]`.
+    pub albedo: Rgb,
+}
+
+impl Lambert {
+    /// `albedo / pi |cos|` for directions on the same side.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        if wo.z * wi.z <= 0.0 {
+            return BsdfEval::default();
+        }
+        let pdf = FRAC_1_PI * wi.z.abs();
+        BsdfEval { value: self.albedo * pdf, pdf }
+    }
+
+    /// A direction on the side of `wo`, by the cosine.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, _u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let mut wi = warp::cosine_hemisphere(u);
+        if wo.z == 0.0 || wi.z == 0.0 {
+            return None;
+        }
+        let pdf = warp::cosine_hemisphere_pdf(wi.z);
+        wi.z = wi.z.copysign(wo.z);
+        Some(BsdfSample { wi, weight: self.albedo, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+    }
+
+    /// Never.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        false
+    }
+
+    /// The albedo.
+    pub fn albedo(&self, _wo: Vec3) -> Rgb {
+        self.albedo
+    }
+}

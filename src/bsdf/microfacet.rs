@@ -1,0 +1,152 @@
+//! The GGX distribution of microfacet normals with Smith's shadowing.
+//!
+//! With the stretched length `s(w) = |(ax wx, ay wy, wz)|` of a direction, everything is algebra:
+//!
+//! ```text
+//! G1(w)              = 2 wz / (wz + s(w))
+//! G2(o, i)           = 2 oz iz / (s(o) iz + s(i) oz)                (height-correlated)
+//! visible normals    = G1(o) D(m) (o·m) / oz = 2 D(m) (o·m) / (oz + s(o))
+//! ```
+//!
+//! (Walter et al., "Microfacet Models for Refraction through Rough Surfaces"; Heitz, "Understanding the Masking-Shadowing Function in
+//! Microfacet-Based BRDFs".) Directions are unit, local, on the upper side (`z > 0`).
+
+use std::f32::consts::FRAC_1_PI;
+
+use crate::math::{Vec3, sin_cos_turns, vec3};
+
+/// A GGX distribution; alpha along x and y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ggx {
+    /// Width of the distribution of slopes along x and y: both zero, or both within `[SMOOTH_ALPHA, 1]`.
+    alpha: [f32; 2],
+}
+
+/// Alpha below which a surface counts as smooth. The rounding of a direction, 1e-7, turns a microfacet normal by as much: of a lobe of
+/// width 1e-4 that is a thousandth, and a narrower one would have no digits left.
+pub const SMOOTH_ALPHA: f32 = 1e-4;
+
+/// A direction whose cosine is not above this lies in the surface: below, products of cosines and alpha would underflow.
+pub(super) const MIN_COSINE: f32 = 1e-30;
+
+/// Reflection by a microfacet between two directions, all but the Fresnel factor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FacetReflection {
+    /// `D G2 / (4 oz)`: the value with its cosine, for a reflectance of 1.
+    pub value: f32,
+    /// Density per solid angle of reflecting at a visible normal.
+    pub pdf: f32,
+    /// Cosine between either direction and the microfacet normal.
+    pub cos: f32,
+}
+
+impl Ggx {
+    /// The distribution for `alpha` within `[0, 1]`; smooth if both are below [`SMOOTH_ALPHA`].
+    pub fn new(alpha: [f32; 2]) -> Self {
+        if alpha[0].max(alpha[1]) < SMOOTH_ALPHA {
+            return Self { alpha: [0.0; 2] };
+        }
+        Self { alpha: alpha.map(|a| a.clamp(SMOOTH_ALPHA, 1.0)) }
+    }
+
+    /// Alpha along x and y.
+    #[inline]
+    pub fn alpha(&self) -> [f32; 2] {
+        self.alpha
+    }
+
+    /// Whether the surface is a plane mirror; nothing else may then be asked.
+    #[inline]
+    pub fn is_smooth(&self) -> bool {
+        self.alpha[0] == 0.0
+    }
+
+    /// Density of microfacet normals: microfacet area per surface area and solid angle around `m`, which need not be unit.
+    #[inline]
+    pub fn normal_density(&self, m: Vec3) -> f32 {
+        let [ax, ay] = self.alpha;
+        let a = ax * ay;
+        let stretched = vec3(m.x * ay, m.y * ax, m.z * a).length_squared();
+        // Zero only where the squares underflow.
+        if stretched == 0.0 {
+            return 0.0;
+        }
+        let ratio = a * m.length_squared() / stretched;
+        FRAC_1_PI * a * ratio * ratio
+    }
+
+    /// Length of `w` stretched by alpha.
+    #[inline]
+    pub fn stretched_length(&self, w: Vec3) -> f32 {
+        vec3(self.alpha[0] * w.x, self.alpha[1] * w.y, w.z).length()
+    }
+
+    /// Fraction of the microfacets facing `w` that are not masked.
+    #[inline]
+    pub fn g1(&self, w: Vec3) -> f32 {
+        2.0 * w.z / (w.z + self.stretched_length(w))
+    }
+
+    /// Fraction of the microfacets that both directions see; both on the upper side.
+    #[inline]
+    pub fn g2(&self, o: Vec3, i: Vec3) -> f32 {
+        2.0 * o.z * i.z / (self.stretched_length(o) * i.z + self.stretched_length(i) * o.z)
+    }
+
+    /// `G2(o, i) / G1(o)`: what is left to weigh a sample of visible normals with.
+    #[inline]
+    pub fn sampled_shadowing(&self, o: Vec3, i: Vec3) -> f32 {
+        let length = self.stretched_length(o);
+        i.z * (o.z + length) / (length * i.z + self.stretched_length(i) * o.z)
+    }
+
+    /// A normal among those visible from `o`, with density [`Ggx::visible_normal_pdf`] (Dupuy and Benyoub, "Sampling Visible GGX Normals
+    /// with Spherical Caps"). Unit; `o·m` is positive but for rounding.
+    #[inline]
+    pub fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
+        let [ax, ay] = self.alpha;
+        // The hemisphere's configuration: there a reflected direction is uniform on the cap z > -w.z.
+        let w = vec3(ax * o.x, ay * o.y, o.z).normalize();
+        // z + w.z and 1 - z², without the cancellation that z itself would bring at grazing angles.
+        let above = (1.0 - u[1]) * (1.0 + w.z);
+        let radius = (u[1] * (1.0 + w.z) * (above + (1.0 - w.z))).sqrt();
+        let (sin, cos) = sin_cos_turns(u[0]);
+        vec3(ax * (radius * cos + w.x), ay * (radius * sin + w.y), above).normalize()
+    }
+
+    /// Density per solid angle of [`Ggx::sample_visible_normal`]; `m` unit.
+    #[inline]
+    pub fn visible_normal_pdf(&self, o: Vec3, m: Vec3) -> f32 {
+        if m.z <= 0.0 {
+            return 0.0;
+        }
+        2.0 * self.normal_density(m) * o.dot(m).max(0.0) / (o.z + self.stretched_length(o))
+    }
+
+    /// Reflection between two directions of the upper side.
+    #[inline]
+    pub(super) fn reflection(&self, o: Vec3, i: Vec3) -> FacetReflection {
+        let half = o + i;
+        let density = self.normal_density(half);
+        let (length_o, length_i) = (self.stretched_length(o), self.stretched_length(i));
+        FacetReflection {
+            value: 0.5 * density * i.z / (length_o * i.z + length_i * o.z),
+            // The Jacobian 1 / (4 o·m) cancels the cosine of the visible normals.
+            pdf: 0.5 * density / (o.z + length_o),
+            // |o + i|² = 2 (1 + o·i) = 4 (o·m)².
+            cos: (0.5 * half.length()).min(1.0),
+        }
+    }
+
+    /// Density per solid angle of reflecting `o` at the unit normal `m`.
+    #[inline]
+    pub(super) fn reflection_pdf(&self, o: Vec3, m: Vec3) -> f32 {
+        0.5 * self.normal_density(m) / (o.z + self.stretched_length(o))
+    }
+}
+
+/// `w` reflected at the plane with unit normal `m`, where `cos = w·m`.
+#[inline]
+pub(super) fn reflect(w: Vec3, m: Vec3, cos: f32) -> Vec3 {
+    m * (2.0 * cos) - w
+}

@@ -1,0 +1,115 @@
+//! Scattering at a point, in the local frame: `z` is the shading normal, directions are unit and point away from the surface.
+//!
+//! Every value carries the cosine: `f(wo, wi) |cos wi|`. Densities are per solid angle. Materials are two-sided: `wo.z < 0` sees the
+//! back, which an opaque BSDF treats as its front and a dielectric as its inside.
+
+mod conductor;
+mod dielectric;
+pub mod fresnel;
+mod lambert;
+mod microfacet;
+mod mirror;
+mod plastic;
+#[cfg(test)]
+mod tests;
+
+pub use conductor::Conductor;
+pub use dielectric::Dielectric;
+pub use lambert::Lambert;
+pub use microfacet::{Ggx, SMOOTH_ALPHA};
+pub use mirror::Mirror;
+pub use plastic::Plastic;
+
+use crate::color::Rgb;
+use crate::math::Vec3;
+
+/// A scattered direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BsdfSample {
+    /// The direction, unit, local.
+    pub wi: Vec3,
+    /// `f |cos| / pdf`, all lobes counted; for a delta lobe the factor on radiance.
+    pub weight: Rgb,
+    /// Density per solid angle, all non-delta lobes counted; for a delta lobe the probability of having chosen it (only to compare: it is
+    /// no density).
+    pub pdf: f32,
+    /// Whether the direction came from a delta lobe: light sampling cannot find it.
+    pub is_delta: bool,
+    /// Whether the direction crosses the surface.
+    pub is_transmission: bool,
+    /// Index of refraction on the side of `wi` over that on the side of `wo`; 1 for reflection. Roulette undoes the radiance scaling of
+    /// refraction with its square.
+    pub eta: f32,
+}
+
+/// Value and density for a pair of directions; delta lobes contribute to neither.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BsdfEval {
+    /// `f(wo, wi) |cos wi|`.
+    pub value: Rgb,
+    /// Density per solid angle with which [`Bsdf::sample`] chooses `wi`.
+    pub pdf: f32,
+}
+
+/// Scattering at one point: all parameters are numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bsdf {
+    /// Ideal diffuse reflection.
+    Lambert(Lambert),
+    /// Ideal specular reflection with a given reflectance.
+    Mirror(Mirror),
+    /// Metal, smooth or rough.
+    Conductor(Conductor),
+    /// Glass, smooth or rough.
+    Dielectric(Dielectric),
+    /// A diffuse base under a smooth or rough dielectric coat.
+    Plastic(Plastic),
+}
+
+macro_rules! each {
+    ($self:expr, $bsdf:ident => $body:expr) => {
+        match $self {
+            Bsdf::Lambert($bsdf) => $body,
+            Bsdf::Mirror($bsdf) => $body,
+            Bsdf::Conductor($bsdf) => $body,
+            Bsdf::Dielectric($bsdf) => $body,
+            Bsdf::Plastic($bsdf) => $body,
+        }
+    };
+}
+
+impl Bsdf {
+    /// Value and density for `wi`; zero for delta lobes.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        each!(self, bsdf => bsdf.eval(wo, wi))
+    }
+
+    /// A direction chosen with density [`BsdfEval::pdf`]; `u_lobe` chooses among lobes, `u` within one. `None` where the sample fails or
+    /// carries nothing.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        each!(self, bsdf => bsdf.sample(wo, u_lobe, u))
+    }
+
+    /// Whether every lobe is a delta: light sampling is then pointless.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        each!(self, bsdf => bsdf.is_delta())
+    }
+
+    /// Whether scattering depends on the direction of the frame's tangents.
+    pub fn is_anisotropic(&self) -> bool {
+        match self {
+            Self::Lambert(_) | Self::Mirror(_) => false,
+            Self::Conductor(bsdf) => bsdf.is_anisotropic(),
+            Self::Dielectric(bsdf) => bsdf.is_anisotropic(),
+            Self::Plastic(bsdf) => bsdf.is_anisotropic(),
+        }
+    }
+
+    /// An estimate of the fraction of light scattered, for the albedo layer.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        each!(self, bsdf => bsdf.albedo(wo))
+    }
+}

@@ -1,0 +1,52 @@
+//! Every BSDF against statistics and closed forms.
+
+mod energy;
+mod limits;
+mod microfacet;
+mod sampling;
+
+use super::*;
+use crate::math::vec3;
+
+/// Alphas from sharp to fully rough, one of them anisotropic.
+const ALPHAS: [[f32; 2]; 5] = [[0.05; 2], [0.15; 2], [0.5; 2], [1.0; 2], [0.3, 0.1]];
+
+/// A direction by its cosine and azimuth in turns; negative cosines look at the inside.
+fn direction(cos: f32, turns: f32) -> Vec3 {
+    let sin = (1.0 - cos * cos).sqrt();
+    let (y, x) = crate::math::sin_cos_turns(turns);
+    vec3(sin * x, sin * y, cos)
+}
+
+/// A gold-like metal.
+fn gold(alpha: [f32; 2]) -> Bsdf {
+    Bsdf::Conductor(Conductor::new(Rgb::new(0.18, 0.42, 1.37), Rgb::new(3.42, 2.35, 1.77), alpha, Rgb::WHITE))
+}
+
+/// A metal that reflects all.
+fn perfect_metal(alpha: [f32; 2]) -> Bsdf {
+    Bsdf::Conductor(Conductor::new(Rgb::BLACK, Rgb::WHITE, alpha, Rgb::WHITE))
+}
+
+fn glass(alpha: [f32; 2]) -> Bsdf {
+    Bsdf::Dielectric(Dielectric::new(1.5, alpha))
+}
+
+fn white_plastic(alpha: [f32; 2]) -> Bsdf {
+    Bsdf::Plastic(Plastic::new(Rgb::WHITE, 1.5, alpha))
+}
+
+fn blue_plastic(alpha: [f32; 2]) -> Bsdf {
+    Bsdf::Plastic(Plastic::new(Rgb::new(0.1, 0.2, 0.7), 1.5, alpha))
+}
+
+/// Every kind at every alpha, all but deltas, with a name.
+fn rough_bsdfs() -> Vec<(String, Bsdf)> {
+    let mut all = vec![("lambert".to_owned(), Bsdf::Lambert(Lambert { albedo: Rgb::new(0.2, 0.5, 0.9) }))];
+    for alpha in ALPHAS {
+        all.push((format!("conductor {alpha:?}"), gold(alpha)));
+        all.push((format!("dielectric {alpha:?}"), glass(alpha)));
+        all.push((format!("plastic {alpha:?}"), blue_plastic(alpha)));
+    }
+    all
+}

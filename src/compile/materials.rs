@@ -1,0 +1,199 @@
+//! Materials and textures: names to ids, parameters to BSDFs.
+
+use std::collections::HashMap;
+
+use super::Files;
+use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
+use crate::color::Rgb;
+use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, SceneDesc, TextureDesc};
+use crate::error::Result;
+use crate::id::{MaterialId, TextureId};
+use crate::import::ObjMaterial;
+use crate::material::{ColorInput, Material};
+use crate::math::Vec2;
+use crate::texture::{Checker, Texture};
+
+/// Real and imaginary part of the index of refraction for red, green and blue (650, 550 and 450 nm; refractiveindex.info: Johnson and Christy
+/// for noble metals, iron, chromium and titanium; Rakic for aluminium and tungsten; Querry for brass).
+const METALS: &[(&str, [f32; 3], [f32; 3])] = &[
+    ("aluminium", [1.657, 0.880, 0.521], [9.224, 6.270, 4.837]),
+    ("brass", [0.444, 0.527, 1.094], [3.695, 2.765, 1.829]),
+    ("chromium", [3.107, 3.181, 2.323], [3.331, 3.329, 3.135]),
+    ("copper", [0.200, 0.924, 1.102], [3.912, 2.452, 2.142]),
+    ("gold", [0.143, 0.375, 1.442], [3.983, 2.386, 1.603]),
+    ("iron", [2.911, 2.950, 2.585], [3.089, 2.932, 2.767]),
+    ("silver", [0.155, 0.116, 0.138], [4.828, 3.122, 2.147]),
+    ("titanium", [2.741, 2.542, 2.267], [3.814, 3.435, 3.039]),
+    ("tungsten", [4.370, 3.300, 2.999], [3.500, 2.605, 2.731]),
+];
+
+/// All materials and textures, with their names.
+pub struct MaterialTable {
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    names: HashMap<String, MaterialId>,
+}
+
+impl MaterialTable {
+    /// The id of the material for shapes that name none: diffuse, albedo 1/2.
+    pub const DEFAULT: MaterialId = MaterialId(0);
+
+    pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
+        let mut textures = Vec::new();
+        let mut inputs = HashMap::new();
+        for (name, texture) in &desc.textures {
+            inputs.insert(name.as_str(), compile_texture(files, &format!("textures.{name}"), texture, &mut textures)?);
+        }
+        let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
+        let mut table = Self { materials: vec![default], textures, names: HashMap::new() };
+        let compiler = Compiler { files, inputs };
+        for (name, material) in &desc.materials {
+            let material = compiler.material(&format!("materials.{name}"), material)?;
+            let id = table.push(material);
+            table.names.insert(name.clone(), id);
+        }
+        Ok(table)
+    }
+
+    /// Adds a material without a name.
+    pub fn push(&mut self, material: Material) -> MaterialId {
+        self.materials.push(material);
+        MaterialId::new(self.materials.len() - 1)
+    }
+
+    /// The id of a name, or of the default.
+    pub fn find(&self, files: &Files, path: &str, name: Option<&str>) -> Result<MaterialId> {
+        let Some(name) = name else {
+            return Ok(Self::DEFAULT);
+        };
+        let found = self.names.get(name).copied();
+        found.ok_or_else(|| files.unknown(&format!("{path}.material"), "material", name, self.names.keys().map(String::as_str)))
+    }
+}
+
+fn compile_texture(files: &Files, path: &str, desc: &TextureDesc, textures: &mut Vec<Texture>) -> Result<ColorInput> {
+    let color = |key: &str, value: [f32; 3]| files.reflectance(&format!("{path}.{key}"), value).map(Rgb::from);
+    Ok(match desc {
+        TextureDesc::Constant { color: value } => ColorInput::Constant(color("color", *value)?),
+        TextureDesc::Checker { color0, color1, scale } => {
+            if !scale.iter().all(|s| s.is_finite()) {
+                return Err(files.error(&format!("{path}.scale"), "is not finite"));
+            }
+            let colors = [color("color0", *color0)?, color("color1", *color1)?];
+            textures.push(Texture::Checker(Checker { colors, scale: Vec2::from(*scale) }));
+            ColorInput::Texture(TextureId::new(textures.len() - 1))
+        }
+    })
+}
+
+struct Compiler<'a> {
+    files: &'a Files,
+    inputs: HashMap<&'a str, ColorInput>,
+}
+
+impl Compiler<'_> {
+    fn material(&self, path: &str, desc: &MaterialDesc) -> Result<Material> {
+        let files = self.files;
+        Ok(match desc {
+            MaterialDesc::Diffuse { albedo } => match self.color(&format!("{path}.albedo"), albedo)? {
+                ColorInput::Constant(albedo) => Lambert { albedo }.into(),
+                albedo @ ColorInput::Texture(_) => Material::Diffuse { albedo },
+            },
+            MaterialDesc::Mirror { reflectance } => {
+                Mirror { reflectance: self.constant(&format!("{path}.reflectance"), reflectance)? }.into()
+            }
+            MaterialDesc::Conductor { metal, eta, k, roughness, alpha, tint } => {
+                let (eta, k) = self.metal(path, metal.as_deref(), *eta, *k)?;
+                let tint = self.constant(&format!("{path}.tint"), tint)?;
+                Conductor::new(eta.into(), k.into(), self.alpha(path, *roughness, *alpha)?, tint).into()
+            }
+            MaterialDesc::Dielectric { ior, roughness, alpha } => {
+                files.within(&format!("{path}.ior"), f64::from(*ior), 0.1, 10.0)?;
+                Dielectric::new(*ior, self.alpha(path, *roughness, *alpha)?).into()
+            }
+            MaterialDesc::Plastic { albedo, ior, roughness, alpha } => {
+                if !(*ior > 1.0 && *ior <= 10.0) {
+                    return Err(files.error(&format!("{path}.ior"), format!("must be above 1 and at most 10, not {ior}")));
+                }
+                let alpha = self.alpha(path, *roughness, *alpha)?;
+                match self.color(&format!("{path}.albedo"), albedo)? {
+                    ColorInput::Constant(albedo) => Plastic::new(albedo, *ior, alpha).into(),
+                    albedo @ ColorInput::Texture(_) => Material::Plastic { base: Plastic::new(Rgb::BLACK, *ior, alpha), albedo },
+                }
+            }
+        })
+    }
+
+    fn color(&self, path: &str, desc: &ColorDesc) -> Result<ColorInput> {
+        Ok(match desc {
+            ColorDesc::Grey(v) => ColorInput::Constant(self.files.reflectance(path, [*v; 3])?.into()),
+            ColorDesc::Rgb(v) => ColorInput::Constant(self.files.reflectance(path, *v)?.into()),
+            ColorDesc::Texture { texture } => {
+                let found = self.inputs.get(texture.as_str()).copied();
+                found.ok_or_else(|| self.files.unknown(path, "texture", texture, self.inputs.keys().copied()))?
+            }
+        })
+    }
+
+    fn constant(&self, path: &str, desc: &ColorDesc) -> Result<Rgb> {
+        match self.color(path, desc)? {
+            ColorInput::Constant(color) => Ok(color),
+            ColorInput::Texture(_) => Err(self.files.error(path, "must be a colour: only `albedo` can vary with a texture")),
+        }
+    }
+
+    fn metal(&self, path: &str, metal: Option<&str>, eta: Option<[f32; 3]>, k: Option<[f32; 3]>) -> Result<([f32; 3], [f32; 3])> {
+        match (metal, eta, k) {
+            (Some(name), None, None) => {
+                let found = METALS.iter().find(|(metal, ..)| *metal == name).map(|&(_, eta, k)| (eta, k));
+                found.ok_or_else(|| self.files.unknown(&format!("{path}.metal"), "metal", name, METALS.iter().map(|m| m.0)))
+            }
+            (None, Some(eta), Some(k)) => {
+                if !eta.iter().all(|&e| e > 0.0 && e.is_finite()) {
+                    return Err(self.files.error(&format!("{path}.eta"), format!("{eta:?} must be finite and above 0")));
+                }
+                Ok((eta, self.files.emitted(&format!("{path}.k"), k)?))
+            }
+            _ => Err(self.files.error(path, "give either `metal`, or both `eta` and `k`")),
+        }
+    }
+
+    /// GGX alpha along u and v; zero for a smooth surface.
+    fn alpha(&self, path: &str, roughness: Option<RoughnessDesc>, alpha: Option<RoughnessDesc>) -> Result<[f32; 2]> {
+        let pair = |desc: RoughnessDesc| match desc {
+            RoughnessDesc::Isotropic(a) => [a; 2],
+            RoughnessDesc::Anisotropic(a) => a,
+        };
+        let checked = |key: &str, desc: RoughnessDesc| {
+            let values = pair(desc);
+            for value in values {
+                self.files.within(&format!("{path}.{key}"), f64::from(value), 0.0, 1.0)?;
+            }
+            Ok(values)
+        };
+        match (roughness, alpha) {
+            (None, None) => Ok([0.0; 2]),
+            (Some(roughness), None) => Ok(checked("roughness", roughness)?.map(|r| r * r)),
+            (None, Some(alpha)) => checked("alpha", alpha),
+            (Some(_), Some(_)) => Err(self.files.error(path, "give either `roughness` or `alpha`")),
+        }
+    }
+}
+
+/// The nearest material for what an MTL says: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9, or `d` below 1/2, is glass of index Ni; a
+/// specular colour with an exponent is plastic with alpha = sqrt(2 / (Ns + 2)); everything else is diffuse with Kd.
+pub fn from_mtl(mtl: &ObjMaterial) -> Material {
+    let color =
+        |c: Option<[f32; 3]>, default: f32| c.map_or(Rgb::splat(default), |c| Rgb::from(c).map(|v| if v > 0.0 { v.min(1.0) } else { 0.0 }));
+    let diffuse = color(mtl.diffuse, 0.5);
+    let specular = color(mtl.specular, 0.0);
+    let ior = mtl.ior.filter(|&n| n > 1.0 && n <= 10.0).unwrap_or(1.5);
+    let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9)) || mtl.opacity.is_some_and(|d| d < 0.5);
+    let exponent = mtl.shininess.filter(|&n| n > 0.0);
+    match (mtl.illumination, exponent) {
+        (Some(5), _) => Mirror { reflectance: if specular.is_black() { Rgb::WHITE } else { specular } }.into(),
+        _ if is_glass => Dielectric::new(ior, [0.0; 2]).into(),
+        (_, Some(n)) if !specular.is_black() => Plastic::new(diffuse, ior, [(2.0 / (n + 2.0)).sqrt(); 2]).into(),
+        _ => Lambert { albedo: diffuse }.into(),
+    }
+}

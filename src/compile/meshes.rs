@@ -1,0 +1,184 @@
+//! Meshes: buffers from files or the scene itself to placed, checked [`Mesh`]es.
+
+use std::collections::HashMap;
+
+use super::Files;
+use crate::desc::{MeshDesc, MeshShadingDesc};
+use crate::error::{Error, Result};
+use crate::geometry::{Mesh, MeshError};
+use crate::import::{self, AssetError, MeshData, ObjMaterial};
+use crate::math::{DVec3, Transform, Vec3};
+
+/// A mesh as given, with the material that its file names.
+pub struct LoadedMesh {
+    pub data: MeshData,
+    pub material: Option<ObjMaterial>,
+}
+
+/// The meshes of a shape: several where an OBJ has several materials.
+pub fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
+    let place = format!("{path}.file");
+    match (&desc.file, &desc.positions, &desc.triangles) {
+        (Some(file), None, None) if desc.normals.is_none() && desc.uvs.is_none() => {
+            let asset = files.asset(file);
+            let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
+            let loaded = match extension.as_deref() {
+                Some("ply") => import::read_ply(&asset).map(|data| vec![LoadedMesh { data, material: None }]),
+                Some("obj") => import::read_obj(&asset, desc.material.is_none())
+                    .map(|meshes| meshes.into_iter().map(|mesh| LoadedMesh { data: mesh.mesh, material: mesh.material }).collect()),
+                _ => Err(AssetError::Malformed("meshes are .obj or .ply files".into())),
+            };
+            loaded.map_err(|e| files.asset_error(&place, &asset, e))
+        }
+        (None, Some(positions), Some(triangles)) => {
+            let data = MeshData {
+                positions: positions.clone(),
+                triangles: triangles.clone(),
+                normals: desc.normals.clone(),
+                uvs: desc.uvs.clone(),
+            };
+            Ok(vec![LoadedMesh { data, material: None }])
+        }
+        _ => Err(files.error(path, "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals` and `uvs`)")),
+    }
+}
+
+/// How a mesh is placed.
+#[derive(Clone, Copy)]
+pub struct Placement<'a> {
+    pub transform: &'a Transform,
+    pub shading: MeshShadingDesc,
+    pub reverse_normal: bool,
+}
+
+/// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the front. Triangles
+/// without area are dropped with a warning. `file` is where the mesh came from.
+pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, placement: Placement) -> Result<Mesh> {
+    let refuse = |error: MeshError| match file {
+        Some(file) => {
+            Error::Asset { scene: files.scene.clone(), path: format!("{path}.file"), asset: files.asset(file), message: error.to_string() }
+        }
+        None => files.error(path, error.to_string()),
+    };
+    let count = data.positions.len();
+    if let Some((triangle, index)) = out_of_range(&data) {
+        return Err(refuse(MeshError::Index { triangle, index, count }));
+    }
+    let transform = placement.transform;
+    let is_identity = *transform == Transform::IDENTITY;
+    let mut positions = data.positions;
+    if !is_identity {
+        for p in &mut positions {
+            *p = transform.point(DVec3::from(p.map(f64::from))).as_vec3().to_array();
+        }
+    }
+    let mut triangles = data.triangles;
+    if transform.swaps_handedness() != placement.reverse_normal {
+        triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    let before = triangles.len();
+    triangles.retain(|t| has_area(t.map(|i| Vec3::from(positions[i as usize]))));
+    let dropped = before - triangles.len();
+    if dropped > 0 {
+        if triangles.is_empty() {
+            return Err(files.error(path, format!("all {before} triangles of the mesh have no area")));
+        }
+        tracing::warn!("{}: {path}: {dropped} of {before} triangles have no area and were dropped", files.scene.display());
+    }
+
+    let normals = match placement.shading {
+        MeshShadingDesc::Flat => None,
+        MeshShadingDesc::Auto | MeshShadingDesc::Smooth => match data.normals {
+            Some(normals) => Some(place_normals(normals, transform, placement.reverse_normal)),
+            None if placement.shading == MeshShadingDesc::Smooth => Some(smooth_normals(&positions, &triangles)),
+            None => None,
+        },
+    };
+    Mesh::new(positions, triangles, normals, data.uvs).map_err(refuse)
+}
+
+fn out_of_range(data: &MeshData) -> Option<(usize, u32)> {
+    let count = data.positions.len();
+    let bad = |(i, t): (usize, &[u32; 3])| t.iter().find(|&&v| v as usize >= count).map(|&v| (i, v));
+    data.triangles.iter().enumerate().find_map(bad)
+}
+
+/// Whether three corners span an area; NaN counts as area, so that the mesh is refused for it and not merely thinned.
+fn has_area([a, b, c]: [Vec3; 3]) -> bool {
+    let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
+    (b - a).cross(c - a) != DVec3::ZERO
+}
+
+fn place_normals(mut normals: Vec<[f32; 3]>, transform: &Transform, reverse: bool) -> Vec<[f32; 3]> {
+    let sign = if reverse { -1.0 } else { 1.0 };
+    for n in &mut normals {
+        let moved = transform.normal(DVec3::from(n.map(f64::from))) * sign;
+        // Zero and NaN stay as they are; the first falls back to the flat normal, the second is refused.
+        *n = if moved.length_squared() > 0.0 { moved.normalize().as_vec3().to_array() } else { *n };
+    }
+    normals
+}
+
+/// Normals averaged over the triangles around each position, weighted by the angle there (Thürmer and Wüthrich, "Computing Vertex Normals
+/// from Polygonal Facets"). Vertices at one position share their normal.
+fn smooth_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
+    let mut first_at = HashMap::with_capacity(positions.len());
+    // Adding zero makes -0 and 0 the same.
+    let key = |p: &[f32; 3]| p.map(|x| (x + 0.0).to_bits());
+    let shared: Vec<usize> = positions.iter().enumerate().map(|(i, p)| *first_at.entry(key(p)).or_insert(i)).collect();
+    let mut sums = vec![DVec3::ZERO; positions.len()];
+    for triangle in triangles {
+        let corners = triangle.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
+        let Some(n) = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize() else {
+            continue;
+        };
+        for k in 0..3 {
+            let (to_next, to_last) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
+            sums[shared[triangle[k] as usize]] += n * to_next.angle_between(to_last);
+        }
+    }
+    shared.iter().map(|&i| sums[i].normalize_or_zero().as_vec3().to_array()).collect()
+}
+
+/// The cube `[-1, 1]³`: two triangles a face, with uv on each.
+pub fn cube() -> MeshData {
+    let mut mesh = MeshData { uvs: Some(Vec::new()), ..MeshData::default() };
+    for axis in 0..3 {
+        for side in [-1.0f32, 1.0] {
+            let first = mesh.positions.len() as u32;
+            for (u, v) in [(0.0f32, 0.0f32), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+                let mut p = [0.0; 3];
+                p[axis] = side;
+                p[(axis + 1) % 3] = (2.0 * u - 1.0) * side;
+                p[(axis + 2) % 3] = 2.0 * v - 1.0;
+                mesh.positions.push(p);
+                mesh.uvs.get_or_insert_default().push([u, v]);
+            }
+            mesh.push_polygon(&[first, first + 1, first + 2, first + 3]);
+        }
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cubes_faces_look_outward() {
+        let cube = cube();
+        assert_eq!(cube.triangles.len(), 12);
+        for t in &cube.triangles {
+            let [a, b, c] = t.map(|i| Vec3::from(cube.positions[i as usize]));
+            assert!((b - a).cross(c - a).dot(a + b + c) > 0.0);
+        }
+    }
+
+    #[test]
+    fn smooth_normals_of_a_cube_point_along_its_diagonals() {
+        let cube = cube();
+        for (p, n) in cube.positions.iter().zip(smooth_normals(&cube.positions, &cube.triangles)) {
+            assert!((Vec3::from(*p).normalize() - Vec3::from(n)).length() < 1e-6);
+        }
+    }
+}

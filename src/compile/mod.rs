@@ -1,0 +1,136 @@
+//! What the user wrote to a scene ready to render: names become ids, meshes are loaded and placed, and whatever makes no sense is refused
+//! with its place. The only module that sees both [`SceneDesc`] and [`Scene`].
+
+mod camera;
+mod check;
+mod lights;
+mod materials;
+mod meshes;
+mod objects;
+mod settings;
+mod shapes;
+mod summary;
+mod transforms;
+
+pub use settings::check_settings;
+pub use summary::Summary;
+
+use std::path::{Path, PathBuf};
+
+use crate::bsdf::Bsdf;
+use crate::desc::{IntegratorDesc, SceneDesc};
+use crate::error::{Error, Result};
+use crate::geometry::{Geometry, Shape};
+use crate::import::AssetError;
+use crate::light::{Light, LightSet};
+use crate::material::Material;
+use crate::scene::{Features, Scene, Surface};
+
+use materials::MaterialTable;
+
+/// Compiles a scene; the files it names are looked up beside `scene_file`.
+///
+/// # Errors
+/// [`Error::Scene`], [`Error::Asset`] or [`Error::Missing`], each with the place in the scene.
+pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
+    check_settings(desc, scene_file)?;
+    let files = Files { scene: scene_file.into() };
+    let camera = camera::compile(&files, &desc.camera)?;
+    let materials = MaterialTable::new(&files, desc)?;
+    let mut builder = Builder { files, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: Vec::new() };
+    builder.add_world(desc)?;
+    for (i, light) in desc.lights.iter().enumerate() {
+        let light = lights::compile(&builder.files, &format!("lights[{i}]"), light)?;
+        builder.lights.push(light);
+    }
+    builder.finish(desc, camera)
+}
+
+/// Where the scene lies; makes errors and finds assets.
+#[derive(Clone, Debug)]
+struct Files {
+    scene: PathBuf,
+}
+
+impl Files {
+    /// An error at a place of the scene.
+    fn error(&self, path: &str, message: impl Into<String>) -> Error {
+        Error::Scene { file: self.scene.clone(), path: path.into(), message: message.into() }
+    }
+
+    /// Where an asset lies.
+    fn asset(&self, name: &str) -> PathBuf {
+        self.scene.parent().unwrap_or(Path::new("")).join(name)
+    }
+
+    /// An error about an asset that `path` names.
+    fn asset_error(&self, path: &str, asset: &Path, error: AssetError) -> Error {
+        error.at(&self.scene, path, asset)
+    }
+
+    /// The error for a name that does not exist, with a suggestion.
+    fn unknown<'a>(&self, path: &str, what: &str, name: &str, known: impl IntoIterator<Item = &'a str>) -> Error {
+        let hint = crate::import::closest_name(name, known).map_or(String::new(), |near| format!(" (did you mean \"{near}\"?)"));
+        self.error(path, format!("no {what} named \"{name}\"{hint}"))
+    }
+}
+
+/// A scene under construction.
+struct Builder {
+    files: Files,
+    materials: MaterialTable,
+    geometry: Geometry,
+    /// By shape.
+    surfaces: Vec<Surface>,
+    lights: Vec<Light>,
+}
+
+impl Builder {
+    fn finish(self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
+        let files = &self.files;
+        let lights = LightSet::new(self.lights, &self.geometry);
+        let sky = !lights.at_infinity().is_empty();
+        if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky {
+            return Err(files.error("shapes", "there is nothing to see: no shapes, no instances and no environment"));
+        }
+        if lights.is_empty() && needs_light(&desc.integrator) {
+            let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
+            return Err(files.error("lights", message));
+        }
+        let materials = self.materials.materials;
+        let has_bsdf = |test: fn(&Bsdf) -> bool| materials.iter().any(|m| matches!(m, Material::Constant(bsdf) if test(bsdf)));
+        let features = Features {
+            lights: !lights.is_empty(),
+            environment: sky,
+            analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
+            instances: !self.geometry.instances.is_empty(),
+            textures: materials.iter().any(|m| !matches!(m, Material::Constant(_))),
+            delta_materials: materials.iter().any(Material::is_delta),
+            anisotropic: has_bsdf(Bsdf::is_anisotropic),
+            lens: camera.lens().is_some(),
+        };
+        Ok(Scene {
+            geometry: self.geometry,
+            surfaces: self.surfaces,
+            materials,
+            textures: self.materials.textures,
+            lights,
+            camera,
+            features,
+        })
+    }
+}
+
+/// Whether an integrator shows nothing without a light.
+fn needs_light(integrator: &IntegratorDesc) -> bool {
+    match integrator {
+        IntegratorDesc::Path { .. } => true,
+        IntegratorDesc::Whitted { ambient, .. } => ambient.iter().all(|&a| a == 0.0),
+        IntegratorDesc::Normal
+        | IntegratorDesc::ShadingNormal
+        | IntegratorDesc::Uv
+        | IntegratorDesc::Depth
+        | IntegratorDesc::PrimitiveId
+        | IntegratorDesc::AmbientOcclusion { .. } => false,
+    }
+}

@@ -1,0 +1,87 @@
+//! Checks of film, sampler and integrator, which compilation does not use.
+
+use std::path::Path;
+
+use super::Files;
+use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, OutputDesc, SceneDesc};
+use crate::error::Result;
+
+/// The largest width and height of a picture.
+const MAX_SIZE: u32 = 65_536;
+
+/// Checks the numbers that say how to render.
+///
+/// # Errors
+/// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.
+pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
+    let files = Files { scene: scene_file.into() };
+    check_film(&files, &desc.film)?;
+    if desc.sampler.spp == 0 {
+        return Err(files.error("sampler.spp", "must be at least 1"));
+    }
+    check_integrator(&files, &desc.integrator)?;
+    for (i, output) in desc.outputs.iter().enumerate() {
+        check_output(&files, &format!("outputs[{i}]"), output)?;
+    }
+    Ok(())
+}
+
+fn check_film(files: &Files, film: &FilmDesc) -> Result<()> {
+    for (key, value) in [("film.width", film.width), ("film.height", film.height)] {
+        if value == 0 || value > MAX_SIZE {
+            return Err(files.error(key, format!("must be from 1 to {MAX_SIZE}, not {value}")));
+        }
+    }
+    if let Some([x, y, width, height]) = film.crop {
+        let inside = |start: u32, length: u32, size: u32| length > 0 && start.checked_add(length).is_some_and(|end| end <= size);
+        if !inside(x, width, film.width) || !inside(y, height, film.height) {
+            let message = format!("[{x}, {y}, {width}, {height}] must have an area and lie within {} x {}", film.width, film.height);
+            return Err(files.error("film.crop", message));
+        }
+    }
+    let radius = match film.filter {
+        FilterDesc::Box { radius } | FilterDesc::Tent { radius } | FilterDesc::BlackmanHarris { radius } => radius,
+        FilterDesc::Gaussian { radius, sigma } => {
+            files.positive("film.filter.sigma", f64::from(sigma))?;
+            radius
+        }
+        FilterDesc::Mitchell { radius, b, c } => {
+            files.within("film.filter.b", f64::from(b), 0.0, 1.0)?;
+            files.within("film.filter.c", f64::from(c), 0.0, 1.0)?;
+            radius
+        }
+    };
+    if !(radius > 0.0 && radius <= 64.0) {
+        return Err(files.error("film.filter.radius", format!("must be above 0 and at most 64 pixels, not {radius}")));
+    }
+    Ok(())
+}
+
+fn check_integrator(files: &Files, integrator: &IntegratorDesc) -> Result<()> {
+    match *integrator {
+        IntegratorDesc::Path { max_depth: 0, .. } => return Err(files.error("integrator.max_depth", "must be at least 1")),
+        IntegratorDesc::Path { rr_depth: 0, .. } => return Err(files.error("integrator.rr_depth", "must be at least 1")),
+        IntegratorDesc::Whitted { max_depth, ambient } => {
+            if max_depth == 0 || max_depth > 64 {
+                return Err(files.error("integrator.max_depth", format!("must be from 1 to 64, not {max_depth}")));
+            }
+            files.emitted("integrator.ambient", ambient)?;
+        }
+        IntegratorDesc::AmbientOcclusion { distance: Some(distance) } => {
+            files.positive("integrator.distance", f64::from(distance))?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+fn check_output(files: &Files, path: &str, output: &OutputDesc) -> Result<()> {
+    let extension = Path::new(&output.file).extension().map(|e| e.to_string_lossy().to_lowercase());
+    if !matches!(extension.as_deref(), Some("exr" | "png")) {
+        return Err(files.error(&format!("{path}.file"), format!("\"{}\" must end in .exr or .png", output.file)));
+    }
+    if !output.exposure.is_finite() {
+        return Err(files.error(&format!("{path}.exposure"), "is not finite"));
+    }
+    Ok(())
+}

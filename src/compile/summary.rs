@@ -1,0 +1,123 @@
+//! What a compiled scene consists of, for people and programs.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::geometry::{Analytic, Shape};
+use crate::light::Light;
+use crate::scene::Scene;
+
+/// Counts, bounds and features of a scene.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Triangles stored.
+    pub triangles: usize,
+    /// Triangles as seen, those of objects counted once for each instance.
+    pub triangles_instanced: u64,
+    /// Triangle meshes.
+    pub meshes: usize,
+    /// Analytic shapes by kind.
+    pub shapes: BTreeMap<&'static str, usize>,
+    /// Objects that instances share.
+    pub objects: usize,
+    /// Instances.
+    pub instances: usize,
+    /// Lights by kind; each emissive triangle counts.
+    pub lights: BTreeMap<&'static str, usize>,
+    /// Materials, the default one included.
+    pub materials: usize,
+    /// Textures.
+    pub textures: usize,
+    /// Smallest and largest coordinates, in world units; absent if there is no shape.
+    pub bounds: Option<[[f32; 3]; 2]>,
+    /// Bytes of mesh buffers and tables.
+    pub geometry_bytes: usize,
+    /// What the scene uses.
+    pub features: Vec<&'static str>,
+}
+
+impl Summary {
+    /// Of a compiled scene.
+    pub fn new(scene: &Scene) -> Self {
+        let geometry = &scene.geometry;
+        let mut shapes = BTreeMap::new();
+        let (mut triangles, mut meshes) = (0, 0);
+        for shape in &geometry.shapes {
+            match shape {
+                Shape::Mesh(mesh) => {
+                    triangles += mesh.triangles().len();
+                    meshes += 1;
+                }
+                Shape::Analytic(placed) => *shapes.entry(kind_of(&placed.shape)).or_default() += 1,
+            }
+        }
+        let mut lights = BTreeMap::new();
+        for light in scene.lights.lights() {
+            let kind = match light {
+                Light::Area(_) => "area",
+                Light::Point(_) => "point",
+                Light::Spot(_) => "spot",
+                Light::Directional(_) => "directional",
+                Light::Environment(_) => "environment",
+            };
+            *lights.entry(kind).or_default() += 1;
+        }
+        let bounds = geometry.bounds();
+        Self {
+            triangles,
+            triangles_instanced: seen_triangles(scene),
+            meshes,
+            shapes,
+            objects: geometry.objects.len(),
+            instances: geometry.instances.len(),
+            lights,
+            materials: scene.materials.len(),
+            textures: scene.textures.len(),
+            bounds: (!bounds.is_empty()).then(|| [bounds.min.to_array(), bounds.max.to_array()]),
+            geometry_bytes: geometry.memory_bytes(),
+            features: features(scene),
+        }
+    }
+}
+
+fn kind_of(shape: &Analytic) -> &'static str {
+    match shape {
+        Analytic::Sphere(_) => "sphere",
+        Analytic::Quad(_) => "quad",
+        Analytic::Disk(_) => "disk",
+        Analytic::Frustum(_) => "cylinder or cone",
+        Analytic::Revolution(_) => "revolution",
+    }
+}
+
+fn seen_triangles(scene: &Scene) -> u64 {
+    let geometry = &scene.geometry;
+    let count = |ids: &[crate::id::ShapeId]| -> u64 {
+        let triangles = |id: &crate::id::ShapeId| match geometry.shape(*id) {
+            Shape::Mesh(mesh) => mesh.triangles().len() as u64,
+            Shape::Analytic(_) => 0,
+        };
+        ids.iter().map(triangles).sum()
+    };
+    let objects: Vec<u64> = geometry.objects.iter().map(|object| count(&object.shapes)).collect();
+    count(&geometry.world) + geometry.instances.iter().map(|instance| objects[instance.object.index()]).sum::<u64>()
+}
+
+fn features(scene: &Scene) -> Vec<&'static str> {
+    let f = &scene.features;
+    [
+        (f.lights, "lights"),
+        (f.environment, "environment"),
+        (f.analytic_shapes, "analytic shapes"),
+        (f.instances, "instances"),
+        (f.textures, "textures"),
+        (f.delta_materials, "mirror or glass"),
+        (f.anisotropic, "anisotropic materials"),
+        (f.lens, "lens"),
+    ]
+    .into_iter()
+    .filter(|(used, _)| *used)
+    .map(|(_, name)| name)
+    .collect()
+}

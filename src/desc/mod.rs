@@ -1,0 +1,73 @@
+//! What the user writes: the scene file as plain data. The doc comments here are the manual of the format, and its JSON Schema
+//! (`steradian schema`) is made from the same types.
+//!
+//! World: right-handed, +Y up by custom; the camera looks along its local -Z with +Y up. Angles are in degrees and say so. Colours are
+//! linear Rec.709. Unknown keys are errors. Comments (`//` and `/* */`) are allowed.
+
+mod camera;
+mod light;
+mod material;
+mod output;
+mod settings;
+mod shape;
+mod transform;
+
+pub use camera::{CameraDesc, LensDesc};
+pub use light::{DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
+pub use material::{ColorDesc, MaterialDesc, RoughnessDesc, TextureDesc};
+pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
+pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
+pub use shape::{
+    ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, ObjectDesc, ProfileDesc, QuadDesc,
+    RevolutionDesc, ShapeCommon, ShapeDesc, SphereDesc,
+};
+pub use transform::{ScaleDesc, TransformDesc, TransformStepDesc};
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A scene: what to render, how, and where to write it.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneDesc {
+    /// Link to the JSON Schema, for editors; not used otherwise.
+    #[serde(rename = "$schema", default, skip_serializing_if = "Option::is_none")]
+    pub schema: Option<String>,
+    /// Free text.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comment: Option<String>,
+    /// Size of the picture and the pixel filter.
+    #[serde(default)]
+    pub film: FilmDesc,
+    /// The camera.
+    pub camera: CameraDesc,
+    /// The algorithm.
+    #[serde(default)]
+    pub integrator: IntegratorDesc,
+    /// Samples per pixel and how they are chosen.
+    #[serde(default)]
+    pub sampler: SamplerDesc,
+    /// Textures by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub textures: BTreeMap<String, TextureDesc>,
+    /// Materials by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub materials: BTreeMap<String, MaterialDesc>,
+    /// Shapes in the world.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<ShapeDesc>,
+    /// Objects by name: groups of shapes that are drawn only where an instance places them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub objects: BTreeMap<String, ObjectDesc>,
+    /// Placements of objects in the world.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub instances: Vec<InstanceDesc>,
+    /// Lights that are not shapes. (A shape becomes a light by its `emission`.)
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lights: Vec<LightDesc>,
+    /// Files to write; the command line's `-o` replaces them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<OutputDesc>,
+}

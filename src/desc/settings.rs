@@ -1,0 +1,205 @@
+//! Film, sampler and integrator as written.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The picture's size and its pixel filter.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FilmDesc {
+    /// Width in pixels. Default: 640.
+    pub width: u32,
+    /// Height in pixels. Default: 360.
+    pub height: u32,
+    /// Render only `[x, y, width, height]`, in pixels from the upper left corner.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub crop: Option<[u32; 4]>,
+    /// The pixel filter.
+    pub filter: FilterDesc,
+}
+
+impl Default for FilmDesc {
+    fn default() -> Self {
+        Self { width: 640, height: 360, crop: None, filter: FilterDesc::default() }
+    }
+}
+
+/// A pixel filter; radii are in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum FilterDesc {
+    /// The same weight within the radius.
+    Box {
+        /// Half the width. Default: 0.5.
+        #[serde(default = "box_radius")]
+        radius: f32,
+    },
+    /// Weight falls linearly to zero.
+    Tent {
+        /// Default: 1.
+        #[serde(default = "tent_radius")]
+        radius: f32,
+    },
+    /// A truncated Gaussian that reaches zero at the radius.
+    Gaussian {
+        /// Default: 1.5.
+        #[serde(default = "gaussian_radius")]
+        radius: f32,
+        /// Standard deviation. Default: 0.5.
+        #[serde(default = "gaussian_sigma")]
+        sigma: f32,
+    },
+    /// The Blackman-Harris window.
+    BlackmanHarris {
+        /// Default: 1.5.
+        #[serde(default = "gaussian_radius")]
+        radius: f32,
+    },
+    /// Mitchell and Netravali's cubic; it has negative lobes.
+    Mitchell {
+        /// Default: 2.
+        #[serde(default = "mitchell_radius")]
+        radius: f32,
+        /// Default: 1/3.
+        #[serde(default = "third")]
+        b: f32,
+        /// Default: 1/3.
+        #[serde(default = "third")]
+        c: f32,
+    },
+}
+
+impl Default for FilterDesc {
+    fn default() -> Self {
+        Self::BlackmanHarris { radius: gaussian_radius() }
+    }
+}
+
+fn box_radius() -> f32 {
+    0.5
+}
+
+fn tent_radius() -> f32 {
+    1.0
+}
+
+fn gaussian_radius() -> f32 {
+    1.5
+}
+
+fn gaussian_sigma() -> f32 {
+    0.5
+}
+
+fn mitchell_radius() -> f32 {
+    2.0
+}
+
+fn third() -> f32 {
+    1.0 / 3.0
+}
+
+/// Samples per pixel and how they are chosen.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SamplerDesc {
+    /// How samples are chosen.
+    #[serde(rename = "type")]
+    pub kind: SamplerKindDesc,
+    /// Samples per pixel. Default: 64.
+    pub spp: u32,
+    /// A different seed gives different noise.
+    pub seed: u64,
+}
+
+impl Default for SamplerDesc {
+    fn default() -> Self {
+        Self { kind: SamplerKindDesc::Sobol, spp: 64, seed: 0 }
+    }
+}
+
+/// How samples are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SamplerKindDesc {
+    /// Owen-scrambled Sobol points, decorrelated between pixels.
+    #[default]
+    Sobol,
+    /// Independent random numbers.
+    Independent,
+}
+
+/// The algorithm.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum IntegratorDesc {
+    /// Path tracing: all light that arrives over any number of bounces.
+    Path {
+        /// Largest number of segments from the camera; 1 shows only directly visible light. Default: 64.
+        #[serde(default = "default_max_depth")]
+        max_depth: u32,
+        /// Segments before Russian roulette may end a path. Default: 5.
+        #[serde(default = "default_rr_depth")]
+        rr_depth: u32,
+        /// How directions towards lights are found.
+        #[serde(default)]
+        strategy: StrategyDesc,
+    },
+    /// Whitted's ray tracing: mirror reflection, refraction, hard shadows, and an ambient term.
+    Whitted {
+        /// Largest number of segments from the camera. Default: 8.
+        #[serde(default = "whitted_depth")]
+        max_depth: u32,
+        /// Radiance of the ambient light that every diffuse surface reflects. Default: 0.
+        #[serde(default)]
+        ambient: [f32; 3],
+    },
+    /// The geometric normal as a colour, `(n + 1) / 2`.
+    Normal,
+    /// The shading normal as a colour, `(n + 1) / 2`.
+    ShadingNormal,
+    /// Surface parameters as red and green.
+    Uv,
+    /// Depth along the view axis, in world units.
+    Depth,
+    /// A colour for each primitive.
+    PrimitiveId,
+    /// The fraction of a cosine-weighted hemisphere that is free.
+    AmbientOcclusion {
+        /// Only what is nearer than this counts, in world units; unlimited if not given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        distance: Option<f32>,
+    },
+}
+
+impl Default for IntegratorDesc {
+    fn default() -> Self {
+        Self::Path { max_depth: default_max_depth(), rr_depth: default_rr_depth(), strategy: StrategyDesc::default() }
+    }
+}
+
+fn default_max_depth() -> u32 {
+    64
+}
+
+fn default_rr_depth() -> u32 {
+    5
+}
+
+fn whitted_depth() -> u32 {
+    8
+}
+
+/// How directions towards lights are found. All give the same picture; they differ in noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StrategyDesc {
+    /// Both of the below, combined by multiple importance sampling.
+    #[default]
+    Mis,
+    /// By sampling lights, wherever that is possible.
+    Light,
+    /// By chance, when a scattered ray meets a light. (Point, spot and sharp directional lights are still sampled: nothing else finds
+    /// them.)
+    Bsdf,
+}

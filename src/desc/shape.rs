@@ -1,0 +1,250 @@
+//! Shapes, objects and instances as written.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::TransformDesc;
+
+/// Declares the shapes: a struct for each, the fields that all share, and the enum over them.
+macro_rules! shapes {
+    ($($(#[$doc:meta])* $variant:ident($name:ident) { $($(#[$field_doc:meta])* $field:ident: $type:ty,)* })*) => {
+        $(
+            $(#[$doc])*
+            #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+            #[serde(deny_unknown_fields)]
+            pub struct $name {
+                $($(#[$field_doc])* pub $field: $type,)*
+                /// Free text, used in messages.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub name: Option<String>,
+                /// A material by name. Default: diffuse with albedo 0.5.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub material: Option<String>,
+                /// Where the shape stands.
+                #[serde(default)]
+                pub transform: TransformDesc,
+                /// Light that the shape gives off.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub emission: Option<EmissionDesc>,
+                /// Whether the front is the side against the shape's own normal.
+                #[serde(default)]
+                pub reverse_normal: bool,
+            }
+        )*
+
+        /// A shape in the world or in an object.
+        #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+        #[serde(tag = "type", rename_all = "snake_case")]
+        pub enum ShapeDesc {
+            $($(#[$doc])* $variant($name),)*
+        }
+
+        impl ShapeDesc {
+            /// What all shapes share.
+            pub fn common(&self) -> ShapeCommon<'_> {
+                match self {
+                    $(Self::$variant(shape) => ShapeCommon {
+                        name: shape.name.as_deref(),
+                        material: shape.material.as_deref(),
+                        transform: &shape.transform,
+                        emission: shape.emission.as_ref(),
+                        reverse_normal: shape.reverse_normal,
+                    },)*
+                }
+            }
+        }
+    };
+}
+
+/// What all shapes share.
+#[derive(Clone, Copy, Debug)]
+pub struct ShapeCommon<'a> {
+    /// Free text.
+    pub name: Option<&'a str>,
+    /// A material by name.
+    pub material: Option<&'a str>,
+    /// Where the shape stands.
+    pub transform: &'a TransformDesc,
+    /// Light that the shape gives off.
+    pub emission: Option<&'a EmissionDesc>,
+    /// Whether the front is the side against the shape's own normal.
+    pub reverse_normal: bool,
+}
+
+shapes! {
+    /// A triangle mesh from a file, or inline by `positions` and `triangles`.
+    Mesh(MeshDesc) {
+        /// An OBJ (with its MTL) or PLY file (binary or ASCII), relative to the scene file.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        file: Option<String>,
+        /// Inline: positions of the vertices.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        positions: Option<Vec<[f32; 3]>>,
+        /// Inline: corners of each triangle as indices from 0, counter-clockwise seen from the front.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        triangles: Option<Vec<[u32; 3]>>,
+        /// Inline: a normal for each vertex.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        normals: Option<Vec<[f32; 3]>>,
+        /// Inline: a uv for each vertex.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        uvs: Option<Vec<[f32; 2]>>,
+        /// How normals are found. Default: given ones are interpolated, else the mesh is flat.
+        #[serde(default)]
+        shading: MeshShadingDesc,
+    }
+    /// A sphere about the origin, or the part of it between two heights and within an angle about +z.
+    Sphere(SphereDesc) {
+        /// Radius, above 0. Default: 1.
+        #[serde(default = "one")]
+        radius: f64,
+        /// Smallest z kept. Default: all.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        z_min: Option<f64>,
+        /// Largest z kept. Default: all.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        z_max: Option<f64>,
+        /// Largest angle kept, from +x towards +y, in degrees. Default: 360.
+        #[serde(default = "full_turn")]
+        phi_max_degrees: f64,
+    }
+    /// A parallelogram; the normal is `edge_u` x `edge_v`. Default: the square `[-1, 1]²` at z = 0 with normal +z.
+    Quad(QuadDesc) {
+        /// One corner.
+        #[serde(default = "quad_origin")]
+        origin: [f64; 3],
+        /// The edge along which u grows.
+        #[serde(default = "quad_edge_u")]
+        edge_u: [f64; 3],
+        /// The edge along which v grows.
+        #[serde(default = "quad_edge_v")]
+        edge_v: [f64; 3],
+    }
+    /// The cube `[-1, 1]³` with normals outward.
+    Cube(CubeDesc) {}
+    /// A disk, ring or sector at z = 0 about the origin, with normal +z. u is the angle over `phi_max`; v runs from the inner to the outer
+    /// radius.
+    Disk(DiskDesc) {
+        /// Outer radius, above 0. Default: 1.
+        #[serde(default = "one")]
+        radius: f64,
+        /// Inner radius, from 0 to below `radius`. Default: 0.
+        #[serde(default)]
+        inner_radius: f64,
+        /// Largest angle kept, from +x towards +y, in degrees. Default: 360.
+        #[serde(default = "full_turn")]
+        phi_max_degrees: f64,
+    }
+    /// A cylinder about +z from z = 0 to `height`, without caps, with normals outward. u is the angle over `phi_max`; v is `z / height`.
+    Cylinder(CylinderDesc) {
+        /// Radius, above 0. Default: 1.
+        #[serde(default = "one")]
+        radius: f64,
+        /// Height, above 0. Default: 1.
+        #[serde(default = "one")]
+        height: f64,
+        /// Largest angle kept, from +x towards +y, in degrees. Default: 360.
+        #[serde(default = "full_turn")]
+        phi_max_degrees: f64,
+    }
+    /// A cone about +z with its base at z = 0 and its apex (or, with a `top_radius`, its upper rim) at `height`, without caps, with
+    /// normals outward. u is the angle over `phi_max`; v is `z / height`.
+    Cone(ConeDesc) {
+        /// Radius of the base. Default: 1.
+        #[serde(default = "one")]
+        radius: f64,
+        /// Radius at the top; above 0 makes a frustum. Default: 0.
+        #[serde(default)]
+        top_radius: f64,
+        /// Height, above 0. Default: 1.
+        #[serde(default = "one")]
+        height: f64,
+        /// Largest angle kept, from +x towards +y, in degrees. Default: 360.
+        #[serde(default = "full_turn")]
+        phi_max_degrees: f64,
+    }
+    /// A surface of revolution: a profile curve in the xy plane turned about +y. x is the distance from the axis and must not be
+    /// negative. u is the angle over `phi_max`; v is the curve's parameter. A profile that runs towards +y has normals outward.
+    Revolution(RevolutionDesc) {
+        /// The profile.
+        profile: ProfileDesc,
+        /// Largest angle kept, from +z towards +x, in degrees. Default: 360.
+        #[serde(default = "full_turn")]
+        phi_max_degrees: f64,
+    }
+}
+
+/// A profile curve of points `[x, y]`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ProfileDesc {
+    /// Joined cubic Bezier curves: 3n + 1 control points.
+    Bezier(Vec<[f64; 2]>),
+    /// A uniform cubic B-spline: at least 4 control points. The curve does not reach its end points unless they are tripled.
+    BSpline(Vec<[f64; 2]>),
+}
+
+/// How a mesh's normals are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MeshShadingDesc {
+    /// Given normals are interpolated; without them the mesh is flat.
+    #[default]
+    Auto,
+    /// Flat, even where normals are given.
+    Flat,
+    /// Smooth: given normals, or angle-weighted ones.
+    Smooth,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn full_turn() -> f64 {
+    360.0
+}
+
+fn quad_origin() -> [f64; 3] {
+    [-1.0, -1.0, 0.0]
+}
+
+fn quad_edge_u() -> [f64; 3] {
+    [2.0, 0.0, 0.0]
+}
+
+fn quad_edge_v() -> [f64; 3] {
+    [0.0, 2.0, 0.0]
+}
+
+/// Light given off by a shape.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EmissionDesc {
+    /// Radiance, linear RGB.
+    pub radiance: [f32; 3],
+    /// Whether both sides emit; otherwise only the front does.
+    #[serde(default)]
+    pub two_sided: bool,
+}
+
+/// A group of shapes, and instances of other objects.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ObjectDesc {
+    /// Shapes of the group.
+    pub shapes: Vec<ShapeDesc>,
+    /// Other objects inside this one; any depth, no cycles.
+    pub instances: Vec<InstanceDesc>,
+}
+
+/// A placement of an object.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InstanceDesc {
+    /// The object's name.
+    pub object: String,
+    /// Where it stands.
+    #[serde(default)]
+    pub transform: TransformDesc,
+}

@@ -1,0 +1,52 @@
+//! Transforms as written.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A list of steps, applied in the order written: the first acts on the shape first.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct TransformDesc(pub Vec<TransformStepDesc>);
+
+/// One step of a transform.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum TransformStepDesc {
+    /// Move by `[x, y, z]`.
+    Translate([f64; 3]),
+    /// Turn about an axis through the origin, counter-clockwise when looking against the axis.
+    Rotate {
+        /// The axis; any length.
+        axis: [f64; 3],
+        /// The angle in degrees.
+        degrees: f64,
+    },
+    /// Scale by one factor, or by `[x, y, z]`.
+    Scale(ScaleDesc),
+    /// Move the origin to `from` and turn -Z towards `to` with +Y towards `up`.
+    LookAt {
+        /// Where the origin goes.
+        from: [f64; 3],
+        /// What -Z points at.
+        to: [f64; 3],
+        /// What +Y points towards. Default: +Y.
+        #[serde(default = "y_axis")]
+        up: [f64; 3],
+    },
+    /// A 4x4 matrix by rows; it multiplies column vectors, so the translation is the last column. The last row must be 0 0 0 1.
+    Matrix([[f64; 4]; 4]),
+}
+
+/// One factor, or one for each axis.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ScaleDesc {
+    /// The same along every axis.
+    Uniform(f64),
+    /// Along x, y, z.
+    PerAxis([f64; 3]),
+}
+
+fn y_axis() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}

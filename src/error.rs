@@ -1,0 +1,112 @@
+//! The one error type of the library. Every variant says where the fault is; nothing here prints or exits.
+
+use std::path::PathBuf;
+
+/// What kind of fault ended the work; the binary maps each to an exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// The command line asks for something impossible.
+    Usage,
+    /// The scene (or a file it names) is malformed or makes no sense.
+    Scene,
+    /// A file that the scene names does not exist or cannot be read.
+    AssetMissing,
+    /// An output cannot be written.
+    Output,
+    /// Memory ran out.
+    OutOfMemory,
+    /// Anything else: a device fault, a failed comparison.
+    Internal,
+}
+
+/// An error with its place.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The command line asks for something impossible.
+    #[error("{0}")]
+    Usage(String),
+    /// A fault in a scene's text: `scene.json:3:14: shapes[2].radius: ...`.
+    #[error("{}:{line}:{column}: {message}", file.display())]
+    Parse {
+        /// The scene file.
+        file: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong, with the path inside the scene.
+        message: String,
+    },
+    /// A fault in what a scene says: `scene.json: shapes[3].material: no material named "gold"`.
+    #[error("{}: {path}: {message}", file.display())]
+    Scene {
+        /// The scene file.
+        file: PathBuf,
+        /// Where in the scene, such as `shapes[3].material`.
+        path: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// A fault inside a file that the scene loads.
+    #[error("{}: {path}: {}: {message}", scene.display(), asset.display())]
+    Asset {
+        /// The scene file.
+        scene: PathBuf,
+        /// Where the scene names the asset.
+        path: String,
+        /// The asset.
+        asset: PathBuf,
+        /// What is wrong, with the line or element where known.
+        message: String,
+    },
+    /// A file does not exist or cannot be read.
+    #[error("{}: {message}", file.display())]
+    Missing {
+        /// The file.
+        file: PathBuf,
+        /// Why it cannot be read, and where the scene names it.
+        message: String,
+    },
+    /// A file that is read (an image to compare, say) is malformed.
+    #[error("{}: {message}", file.display())]
+    Malformed {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// An output cannot be written.
+    #[error("cannot write {}: {message}", file.display())]
+    Output {
+        /// The output.
+        file: PathBuf,
+        /// Why.
+        message: String,
+    },
+    /// Embree reported an error.
+    #[error("Embree: {0}")]
+    Embree(String),
+    /// Memory ran out.
+    #[error("out of memory: {0}")]
+    OutOfMemory(String),
+    /// Anything else.
+    #[error("{0}")]
+    Internal(String),
+}
+
+impl Error {
+    /// The kind of fault.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Usage(_) => ErrorKind::Usage,
+            Self::Parse { .. } | Self::Scene { .. } | Self::Asset { .. } | Self::Malformed { .. } => ErrorKind::Scene,
+            Self::Missing { .. } => ErrorKind::AssetMissing,
+            Self::Output { .. } => ErrorKind::Output,
+            Self::OutOfMemory(_) => ErrorKind::OutOfMemory,
+            Self::Embree(_) | Self::Internal(_) => ErrorKind::Internal,
+        }
+    }
+}
+
+/// A result with the library's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;

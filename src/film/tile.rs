@@ -1,0 +1,324 @@
+//! The film as independent tiles that sum samples in double precision.
+
+use super::{Crop, Image, Layer, LayerInfo, LayerKind, LayerSet, PixelSample};
+use crate::error::{Error, Result};
+
+/// How many dropped samples a tile remembers; it counts all of them.
+const DROPPED_KEPT: usize = 16;
+
+/// Depth where nothing was hit.
+const MISS_DEPTH: f32 = 1e10;
+
+/// A sample that was dropped because it was not finite; it can be replayed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DroppedSample {
+    /// Column in the full picture.
+    pub x: u32,
+    /// Row in the full picture.
+    pub y: u32,
+    /// Index of the sample.
+    pub sample: u32,
+}
+
+/// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own.
+///
+/// A sample's order of arrival at its pixel is the order of summation: whoever adds samples in the order of their indices gets the same
+/// picture with any number of threads.
+#[derive(Clone, Debug)]
+pub struct FilmTile {
+    area: Crop,
+    active: Crop,
+    layers: LayerSet,
+    /// Radiance and alpha.
+    color: Vec<[f64; 4]>,
+    /// Samples of each pixel that were kept.
+    samples: Vec<u32>,
+    /// With `w` the weight: sums of `(w - 1)` times radiance and alpha, then of `w - 1`. Empty until a weight differs from 1.
+    corrections: Vec<[f64; 5]>,
+    /// All other layers, a pixel's values side by side. Empty without such layers, and so is `hits`.
+    beside: Vec<f64>,
+    hits: Vec<u32>,
+    dropped_count: u64,
+    dropped: Vec<DroppedSample>,
+}
+
+impl FilmTile {
+    fn new(area: Crop, active: Crop, layers: LayerSet) -> Self {
+        let pixels = area.area() as usize;
+        let stride = channels_beside(layers);
+        Self {
+            area,
+            active,
+            layers,
+            color: vec![[0.0; 4]; pixels],
+            samples: vec![0; pixels],
+            corrections: Vec::new(),
+            beside: vec![0.0; pixels * stride],
+            hits: vec![0; if stride > 0 { pixels } else { 0 }],
+            dropped_count: 0,
+            dropped: Vec::new(),
+        }
+    }
+
+    /// The upper left corner in the full picture.
+    pub fn origin(&self) -> [u32; 2] {
+        [self.area.x, self.area.y]
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        [self.area.width, self.area.height]
+    }
+
+    /// The pixels that reach the picture: those within the film's crop, in coordinates of the full picture. Never empty.
+    pub fn active(&self) -> Crop {
+        self.active
+    }
+
+    /// The index of a pixel of the full picture, which lies within the tile.
+    #[inline]
+    pub fn index(&self, x: u32, y: u32) -> usize {
+        (y - self.area.y) as usize * self.area.width as usize + (x - self.area.x) as usize
+    }
+
+    /// Adds a sample to the pixel with this index (row by row within the tile); `sample` is the sample's index, `weight` the filter's.
+    /// A sample that is not finite is dropped and counted, and `false` returned.
+    #[inline]
+    pub fn add(&mut self, pixel: usize, sample: u32, value: &PixelSample, weight: f32) -> bool {
+        let color = [value.radiance.r, value.radiance.g, value.radiance.b, value.alpha];
+        // A sum is finite only if every term is, save for an overflow, which is no use either.
+        if !(color[0] + color[1] + color[2] + color[3] + weight).is_finite() {
+            self.drop_sample(pixel, sample);
+            return false;
+        }
+        if self.layers.needs_surface() && !self.add_beside(pixel, value) {
+            self.drop_sample(pixel, sample);
+            return false;
+        }
+        let sum = &mut self.color[pixel];
+        for (sum, value) in sum.iter_mut().zip(color) {
+            *sum += f64::from(value);
+        }
+        if weight != 1.0 {
+            self.correct(pixel, color, f64::from(weight) - 1.0);
+        }
+        self.samples[pixel] += 1;
+        true
+    }
+
+    /// Adds to the layers beside the colour; `false` (and nothing is added) if a value is not finite.
+    fn add_beside(&mut self, pixel: usize, value: &PixelSample) -> bool {
+        if value.alpha <= 0.0 {
+            return true;
+        }
+        let stride = channels_beside(self.layers);
+        let mut values = [0.0; MAX_CHANNELS_BESIDE];
+        let mut start = 0;
+        for info in self.layers.beside_color() {
+            (info.read)(&value.surface, &mut values[start..start + info.channels.len()]);
+            start += info.channels.len();
+        }
+        if !values.iter().all(|v| v.is_finite()) {
+            return false;
+        }
+        let sums = &mut self.beside[pixel * stride..(pixel + 1) * stride];
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += f64::from(value);
+        }
+        self.hits[pixel] += 1;
+        true
+    }
+
+    #[cold]
+    fn drop_sample(&mut self, pixel: usize, sample: u32) {
+        self.dropped_count += 1;
+        if self.dropped.len() < DROPPED_KEPT {
+            let (row, column) = (pixel as u32 / self.area.width, pixel as u32 % self.area.width);
+            self.dropped.push(DroppedSample { x: self.area.x + column, y: self.area.y + row, sample });
+        }
+    }
+
+    fn correct(&mut self, pixel: usize, color: [f32; 4], excess: f64) {
+        if self.corrections.is_empty() {
+            self.corrections = vec![[0.0; 5]; self.samples.len()];
+        }
+        let sums = &mut self.corrections[pixel];
+        for (sum, value) in sums.iter_mut().zip(color) {
+            *sum += excess * f64::from(value);
+        }
+        sums[4] += excess;
+    }
+
+    /// The pixel's radiance and alpha.
+    ///
+    /// With `n` samples `v` of weight `w` and their plain mean `m`, the estimate is `m + mean(w (v - m))`. If all weights are 1, that is the
+    /// mean. With negative lobes a constant stays exactly constant, as it does when dividing by the sum of weights, with the same bias of
+    /// order `1 / n`, but without a sum of weights near zero in a denominator.
+    fn color_at(&self, pixel: usize) -> [f32; 4] {
+        let n = f64::from(self.samples[pixel]);
+        if n == 0.0 {
+            return [0.0; 4];
+        }
+        let mut mean = self.color[pixel].map(|sum| sum / n);
+        if let Some(sums) = self.corrections.get(pixel) {
+            let excess = sums[4] / n;
+            for (mean, sum) in mean.iter_mut().zip(sums) {
+                *mean += sum / n - excess * *mean;
+            }
+        }
+        mean.map(to_f32)
+    }
+
+    /// A layer's values at a pixel; `first` is the layer's first channel within those beside the colour.
+    fn beside_at(&self, pixel: usize, info: &LayerInfo, first: usize, out: &mut [f32]) {
+        let hits = f64::from(self.hits[pixel]);
+        let first = pixel * channels_beside(self.layers) + first;
+        let sums = &self.beside[first..first + info.channels.len()];
+        let divisor = match info.kind {
+            LayerKind::Z | LayerKind::P => hits,
+            LayerKind::N => sums.iter().map(|sum| sum * sum).sum::<f64>().sqrt(),
+            LayerKind::Color | LayerKind::Albedo => f64::from(self.samples[pixel]),
+        };
+        if info.kind == LayerKind::Z && hits == 0.0 {
+            out.fill(MISS_DEPTH);
+        } else if divisor > 0.0 {
+            for (out, sum) in out.iter_mut().zip(sums) {
+                *out = to_f32(sum / divisor);
+            }
+        }
+    }
+}
+
+/// Rounded; what `f32` cannot hold becomes its largest number, so that a file never holds an infinity.
+fn to_f32(x: f64) -> f32 {
+    (x as f32).clamp(f32::MIN, f32::MAX)
+}
+
+const MAX_CHANNELS_BESIDE: usize = {
+    let (mut total, mut i) = (0, 1);
+    while i < LayerKind::ALL.len() {
+        total += LayerKind::ALL[i].channels.len();
+        i += 1;
+    }
+    total
+};
+
+fn channels_beside(layers: LayerSet) -> usize {
+    layers.beside_color().map(|info| info.channels.len()).sum()
+}
+
+/// The film: the tiles that a picture's crop touches.
+#[derive(Clone, Debug)]
+pub struct Film {
+    size: [u32; 2],
+    crop: Crop,
+    layers: LayerSet,
+    tiles: Vec<FilmTile>,
+}
+
+impl Film {
+    /// A black film for the part `crop` of a picture of `size` pixels. Tiles of `tile_size` pixels (at least 1) lie on the full picture's
+    /// grid, so a pixel's tile does not depend on the crop.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the crop is empty or reaches beyond the picture; [`Error::OutOfMemory`] if the film cannot be held.
+    pub fn new(size: [u32; 2], crop: Crop, layers: &LayerSet, tile_size: u32) -> Result<Self> {
+        if !crop.fits(size) {
+            let Crop { x, y, width, height } = crop;
+            return Err(Error::Usage(format!("crop {x},{y},{width},{height} does not fit a picture of {}x{} pixels", size[0], size[1])));
+        }
+        let layers = *layers;
+        let tile_size = tile_size.max(1);
+        check_memory(&crop, layers)?;
+        let mut tiles = Vec::new();
+        for row in crop.y / tile_size..=(crop.y + crop.height - 1) / tile_size {
+            for column in crop.x / tile_size..=(crop.x + crop.width - 1) / tile_size {
+                let cell = Crop { x: column * tile_size, y: row * tile_size, width: tile_size, height: tile_size };
+                let area = cell.intersection(&Crop::full(size));
+                tiles.push(FilmTile::new(area, area.intersection(&crop), layers));
+            }
+        }
+        Ok(Self { size, crop, layers, tiles })
+    }
+
+    /// Width and height of the full picture.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The part that is rendered.
+    pub fn crop(&self) -> Crop {
+        self.crop
+    }
+
+    /// What is stored.
+    pub fn layers(&self) -> LayerSet {
+        self.layers
+    }
+
+    /// The tiles, row by row.
+    pub fn tiles(&self) -> &[FilmTile] {
+        &self.tiles
+    }
+
+    /// The tiles, row by row, to be filled.
+    pub fn tiles_mut(&mut self) -> &mut [FilmTile] {
+        &mut self.tiles
+    }
+
+    /// How many samples were not finite and therefore dropped.
+    pub fn dropped_count(&self) -> u64 {
+        self.tiles.iter().map(|tile| tile.dropped_count).sum()
+    }
+
+    /// The first dropped samples, in the order of the tiles.
+    pub fn dropped(&self) -> Vec<DroppedSample> {
+        self.tiles.iter().flat_map(|tile| &tile.dropped).take(DROPPED_KEPT).copied().collect()
+    }
+
+    /// The picture of the samples so far; a pixel without samples is black and without a surface.
+    ///
+    /// Colour and alpha are means over all samples and albedo is too (a miss counts as black); depth and position are means over the
+    /// samples that hit something; normals are averaged over those and normalised. Layers beside the colour have the filter's absolute
+    /// value as weight.
+    pub fn resolve(&self) -> Image {
+        let pixels = self.crop.area() as usize;
+        let mut layers: Vec<Layer> =
+            self.layers.iter().map(|info| Layer { kind: info.kind, data: vec![0.0; pixels * info.channels.len()] }).collect();
+        for tile in &self.tiles {
+            let active = tile.active;
+            for y in active.y..active.y + active.height {
+                for x in active.x..active.x + active.width {
+                    let from = tile.index(x, y);
+                    let to = (y - self.crop.y) as usize * self.crop.width as usize + (x - self.crop.x) as usize;
+                    let mut first = 0;
+                    for layer in &mut layers {
+                        let info = layer.kind.info();
+                        let out = &mut layer.data[to * info.channels.len()..(to + 1) * info.channels.len()];
+                        if layer.kind == LayerKind::Color {
+                            out.copy_from_slice(&tile.color_at(from));
+                        } else {
+                            tile.beside_at(from, info, first, out);
+                            first += info.channels.len();
+                        }
+                    }
+                }
+            }
+        }
+        Image { size: self.size, crop: self.crop, layers }
+    }
+}
+
+/// Asks for the film's memory in one piece first: many small requests would be granted long past what the machine has.
+fn check_memory(crop: &Crop, layers: LayerSet) -> Result<()> {
+    let beside = channels_beside(layers);
+    let pixel = size_of::<[f64; 4]>() + size_of::<u32>() * (1 + usize::from(beside > 0)) + size_of::<f64>() * beside;
+    let bytes = usize::try_from(u128::from(crop.area()) * pixel as u128).unwrap_or(usize::MAX);
+    Vec::<u8>::new()
+        .try_reserve_exact(bytes)
+        .map_err(|_| Error::OutOfMemory(format!("a film of {}x{} pixels needs {} MiB", crop.width, crop.height, bytes >> 20)))
+}
+
+#[cfg(test)]
+#[path = "tile_tests.rs"]
+mod tests;

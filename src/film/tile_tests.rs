@@ -1,0 +1,199 @@
+use super::*;
+
+use crate::color::Rgb;
+use crate::desc::FilterDesc;
+use crate::film::{Filter, SurfaceSample};
+use crate::math::Vec3;
+
+/// A small generator (splitmix64), enough for tests.
+struct Rng(u64);
+
+impl Rng {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+fn gray(v: f32) -> PixelSample {
+    PixelSample { radiance: Rgb::splat(v), alpha: 1.0, surface: SurfaceSample::default() }
+}
+
+fn one_pixel(layers: LayerSet) -> Film {
+    Film::new([1, 1], Crop::full([1, 1]), &layers, 16).unwrap()
+}
+
+fn color(film: &Film) -> [f32; 4] {
+    film.resolve().pixel(LayerKind::Color, 0, 0).unwrap().try_into().unwrap()
+}
+
+/// M3: radiance 1 stays 1 with every filter, tile size and crop, however few the samples.
+#[test]
+fn a_constant_stays_constant() {
+    let filters = [
+        FilterDesc::Box { radius: 0.5 },
+        FilterDesc::Tent { radius: 1.0 },
+        FilterDesc::Gaussian { radius: 1.5, sigma: 0.5 },
+        FilterDesc::BlackmanHarris { radius: 1.5 },
+        FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0 },
+        FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 1.0 },
+    ];
+    let mut rng = Rng(1);
+    for (desc, tile_size) in filters.iter().flat_map(|f| [1, 7, 64].map(|size| (f, size))) {
+        let filter = Filter::new(desc);
+        for crop in [Crop::full([20, 13]), Crop { x: 3, y: 5, width: 11, height: 7 }] {
+            let mut film = Film::new([20, 13], crop, &LayerSet::COLOR, tile_size).unwrap();
+            for tile in film.tiles_mut() {
+                for pixel in 0..tile.area.area() as usize {
+                    for sample in 0..(1 + pixel as u32 % 5) {
+                        let weight = filter.sample([rng.next() as f32, rng.next() as f32]).weight;
+                        assert!(tile.add(pixel, sample, &gray(1.0), weight));
+                    }
+                }
+            }
+            let image = film.resolve();
+            assert_eq!(image.layers[0].data.len(), crop.area() as usize * 4);
+            for value in &image.layers[0].data {
+                assert!((value - 1.0).abs() <= 2e-6, "{desc:?}, tiles of {tile_size}: {value}");
+            }
+        }
+    }
+}
+
+/// A step edge through the filter's negative lobe: the mean over many pixels is the filter's integral over the bright side.
+#[test]
+fn negative_lobes_overshoot_at_an_edge_without_bias() {
+    let desc = FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0 };
+    let filter = Filter::new(&desc);
+    let mut film = one_pixel(LayerSet::COLOR);
+    let edge = -1.0;
+    let n = 1024;
+    for i in 0..n {
+        for j in 0..16 {
+            let s = filter.sample([(i as f32 + 0.5) / n as f32, (j as f32 + 0.5) / 16.0]);
+            film.tiles_mut()[0].add(0, i * 16 + j, &gray(if s.offset.x > edge { 1.0 } else { 0.0 }), s.weight);
+        }
+    }
+    // The integral over [1, 2] of the outer cubic for B = C = 1/3 is -5/288; the whole is 1 in units of half the radius.
+    let expected = 1.0 + 5.0 / 288.0;
+    let measured = color(&film)[0];
+    assert!((f64::from(measured) - expected).abs() < 5e-4, "{measured} {expected}");
+}
+
+/// M6: what is not finite is dropped, counted, remembered by its place, and never reaches the picture.
+#[test]
+fn samples_that_are_not_finite_are_dropped_and_counted() {
+    let layers = LayerSet::FULL;
+    let mut film = Film::new([4, 4], Crop::full([4, 4]), &layers, 4).unwrap();
+    let tile = &mut film.tiles_mut()[0];
+    let pixel = tile.index(2, 1);
+    assert!(tile.add(pixel, 0, &gray(0.25), 1.0));
+    let bad_depth = PixelSample { surface: SurfaceSample { depth: f32::NAN, ..Default::default() }, ..gray(1.0) };
+    let mut bad =
+        vec![gray(f32::NAN), gray(f32::INFINITY), gray(f32::NEG_INFINITY), PixelSample { alpha: f32::NAN, ..gray(1.0) }, bad_depth];
+    bad.push(PixelSample { radiance: Rgb::new(1.0, f32::INFINITY, f32::NEG_INFINITY), ..gray(0.0) });
+    for (i, sample) in bad.iter().enumerate() {
+        assert!(!tile.add(pixel, i as u32 + 1, sample, 1.0));
+    }
+    assert!(!tile.add(pixel, 90, &gray(1.0), f32::NAN));
+    for i in 0..100 {
+        tile.add(0, i, &gray(f32::NAN), 1.0);
+    }
+    assert_eq!(film.dropped_count(), bad.len() as u64 + 101);
+    assert_eq!(film.dropped().len(), DROPPED_KEPT);
+    assert_eq!(film.dropped()[0], DroppedSample { x: 2, y: 1, sample: 1 });
+    let image = film.resolve();
+    assert_eq!(image.pixel(LayerKind::Color, 2, 1), Some(&[0.25, 0.25, 0.25, 1.0][..]));
+    assert!(image.layers.iter().all(|layer| layer.data.iter().all(|v| v.is_finite())));
+}
+
+/// M7: a million samples; the error of a sum in `f32` would be some 1e-4.
+#[test]
+fn a_million_samples_sum_exactly_enough() {
+    let mut film = one_pixel(LayerSet::COLOR);
+    let mut rng = Rng(2);
+    let (mut exact, mut compensation) = (0.0f64, 0.0f64);
+    let n = 1_000_000;
+    for i in 0..n {
+        let v = (rng.next() * 1e3f64.powf(rng.next())) as f32;
+        film.tiles_mut()[0].add(0, i, &gray(v), 1.0);
+        let y = f64::from(v) - compensation;
+        let t = exact + y;
+        compensation = (t - exact) - y;
+        exact = t;
+    }
+    let mean = exact / f64::from(n);
+    let error = (f64::from(color(&film)[0]) - mean).abs() / mean;
+    assert!(error <= 1e-7);
+}
+
+/// M5: nothing is clamped. One sample in 1e6 of radiance 1e6 has mean 1.
+#[test]
+fn rare_bright_samples_keep_their_share() {
+    let mut film = one_pixel(LayerSet::COLOR);
+    for i in 0..1_000_000 {
+        film.tiles_mut()[0].add(0, i, &gray(if i == 123_456 { 1e6 } else { 0.0 }), 1.0);
+    }
+    assert_eq!(color(&film)[0], 1.0);
+
+    // Pareto with exponent 1.8 has mean 1.8 / 0.8 and no variance: medians of means keep the test sharp.
+    let mut rng = Rng(3);
+    let mut means: Vec<f64> = (0..201)
+        .map(|_| {
+            let mut film = one_pixel(LayerSet::COLOR);
+            let mut direct = 0.0;
+            for i in 0..2000 {
+                let v = (1.0 - rng.next()).powf(-1.0 / 1.8) as f32;
+                direct += f64::from(v);
+                film.tiles_mut()[0].add(0, i, &gray(v), 1.0);
+            }
+            let mean = f64::from(color(&film)[0]);
+            assert!((mean - direct / 2000.0).abs() < 1e-6 * mean);
+            mean
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    assert!((means[100] - 2.25).abs() < 0.12, "{}", means[100]);
+}
+
+#[test]
+fn layers_average_what_was_hit() {
+    let surface =
+        |depth, x: f32, n: Vec3, albedo| SurfaceSample { depth, position: Vec3::new(x, 0.0, 1.0), normal: n, albedo: Rgb::splat(albedo) };
+    let mut film = Film::new([2, 1], Crop::full([2, 1]), &LayerSet::FULL, 8).unwrap();
+    let tile = &mut film.tiles_mut()[0];
+    tile.add(0, 0, &PixelSample { surface: surface(2.0, 1.0, Vec3::X, 0.5), ..gray(1.0) }, 1.0);
+    tile.add(0, 1, &PixelSample { surface: surface(4.0, 3.0, Vec3::Y, 0.7), ..gray(1.0) }, 1.0);
+    tile.add(0, 2, &PixelSample::default(), 1.0);
+    tile.add(1, 0, &PixelSample::default(), 1.0);
+    let image = film.resolve();
+    let at = |kind, x| image.pixel(kind, x, 0).unwrap().to_vec();
+    assert_eq!(at(LayerKind::Z, 0), [3.0]);
+    assert_eq!(at(LayerKind::P, 0), [2.0, 0.0, 1.0]);
+    assert!((at(LayerKind::N, 0)[1] - 0.5f32.sqrt()).abs() < 1e-7);
+    assert!((at(LayerKind::Albedo, 0)[0] - 0.4).abs() < 1e-7);
+    assert!((at(LayerKind::Color, 0)[3] - 2.0 / 3.0).abs() < 1e-7);
+    assert_eq!((at(LayerKind::Z, 1), at(LayerKind::N, 1), at(LayerKind::P, 1)), (vec![1e10], vec![0.0; 3], vec![0.0; 3]));
+}
+
+#[test]
+fn tiles_lie_on_the_full_pictures_grid() {
+    let crop = Crop { x: 15, y: 17, width: 10, height: 20 };
+    let film = Film::new([40, 40], crop, &LayerSet::COLOR, 16).unwrap();
+    let origins: Vec<_> = film.tiles().iter().map(FilmTile::origin).collect();
+    assert_eq!(origins, [[0, 16], [16, 16], [0, 32], [16, 32]]);
+    assert_eq!(film.tiles()[3].size(), [16, 8]);
+    assert_eq!(film.tiles().iter().map(|tile| tile.active().area()).sum::<u64>(), crop.area());
+    assert!(film.tiles().iter().all(|tile| tile.beside.is_empty() && tile.hits.is_empty() && tile.corrections.is_empty()));
+}
+
+#[test]
+fn impossible_films_are_refused() {
+    let wide = Crop { x: 8, y: 0, width: 3, height: 1 };
+    assert!(matches!(Film::new([10, 10], wide, &LayerSet::COLOR, 16), Err(Error::Usage(_))));
+    let huge = [2_000_000_000, 2_000_000_000];
+    assert!(matches!(Film::new(huge, Crop::full(huge), &LayerSet::COLOR, 16), Err(Error::OutOfMemory(_))));
+}

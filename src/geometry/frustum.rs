@@ -1,0 +1,193 @@
+//! Cylinders, cones and frusta without caps, and their sectors: one routine for all.
+//!
+//! Object space: about +z between `z = 0`, where the radius is `radius`, and `z = height`, where it is `top_radius`;
+//! `0 <= phi <= phi_max` with phi from +x towards +y. The normal points away from the axis.
+//!
+//! `uv = (phi / phi_max, z / height)`.
+
+use super::sector::{Sector, direction_from_axis};
+use super::shape_error::{not_negative, positive};
+use super::{LocalHit, LocalSurface, ShapeError, ShapeSample};
+use crate::math::{Bounds, DVec3, RayF64, dvec3, solve_quadratic};
+
+/// The side of a cylinder, a cone or a frustum.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frustum {
+    radius: f64,
+    top_radius: f64,
+    height: f64,
+    sector: Sector,
+    /// Length of a straight line on the surface from bottom to top.
+    slant: f64,
+    area: f64,
+}
+
+impl Frustum {
+    /// A frustum; a `top_radius` of zero makes a cone. `phi_max` in radians.
+    ///
+    /// # Errors
+    /// Unless the radii are finite and not negative with one above zero, the height is finite and above zero and `0 < phi_max <= 2 pi`.
+    pub fn new(radius: f64, top_radius: f64, height: f64, phi_max: f64) -> Result<Self, ShapeError> {
+        not_negative("radius", radius)?;
+        not_negative("top radius", top_radius)?;
+        positive("height", height)?;
+        if radius == 0.0 && top_radius == 0.0 {
+            return Err(ShapeError::NoRadius);
+        }
+        let sector = Sector::new(phi_max)?;
+        let slant = (top_radius - radius).hypot(height);
+        let area = 0.5 * sector.phi_max() * (radius + top_radius) * slant;
+        Ok(Self { radius, top_radius, height, sector, slant, area })
+    }
+
+    /// A cylinder; `phi_max` in radians.
+    ///
+    /// # Errors
+    /// Unless radius and height are finite and above zero and `0 < phi_max <= 2 pi`.
+    pub fn cylinder(radius: f64, height: f64, phi_max: f64) -> Result<Self, ShapeError> {
+        positive("radius", radius)?;
+        Self::new(radius, radius, height, phi_max)
+    }
+
+    /// The radius at `z = 0` and at `z = height`.
+    pub fn radii(&self) -> [f64; 2] {
+        [self.radius, self.top_radius]
+    }
+
+    /// The height.
+    pub fn height(&self) -> f64 {
+        self.height
+    }
+
+    /// Whether all angles are kept.
+    pub fn is_full_turn(&self) -> bool {
+        self.sector.is_full()
+    }
+
+    /// The first hit within the ray's interval.
+    #[inline]
+    pub fn intersect(&self, ray: &RayF64) -> Option<LocalHit> {
+        // height² (x² + y²) = (radius * height + (top_radius - radius) z)², homogeneous in the height: nothing is divided by.
+        let (o, d) = (ray.origin, ray.direction);
+        let spread = self.top_radius - self.radius;
+        let q = self.radius * self.height + spread * o.z;
+        let squared = self.height * self.height;
+        let a = squared * (d.x * d.x + d.y * d.y) - spread * spread * d.z * d.z;
+        let half_b = squared * (o.x * d.x + o.y * d.y) - spread * q * d.z;
+        let c = squared * (o.x * o.x + o.y * o.y) - q * q;
+        let roots = solve_quadratic(a, half_b, c)?;
+
+        // The clip in z also removes the other half of the double cone.
+        let accept = |t: f64| {
+            let p = ray.at(t);
+            ray.contains(t) && t.is_finite() && 0.0 <= p.z && p.z <= self.height && self.sector.contains(p.x, p.y)
+        };
+        if accept(roots.near) {
+            return Some(LocalHit { t: roots.near, profile: 0.0 });
+        }
+        accept(roots.far).then_some(LocalHit { t: roots.far, profile: 0.0 })
+    }
+
+    /// The surface at a hit of `ray`. At an apex the normal is that of the line on the cone at the ray's own angle, or at phi = 0.
+    #[inline]
+    pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
+        let raw = ray.at(hit.t);
+        let toward = direction_from_axis(raw.x, raw.y);
+        let z = raw.z.clamp(0.0, self.height);
+        let v = z / self.height;
+        let spread = self.top_radius - self.radius;
+        let p = (toward * (self.radius + spread * v)).extend(z);
+        LocalSurface {
+            p,
+            n: self.normal(toward.x, toward.y),
+            dp_du: dvec3(-p.y, p.x, 0.0) * self.sector.phi_max(),
+            dp_dv: (toward * spread).extend(self.height),
+            uv: [self.sector.fraction(raw.x, raw.y), v],
+            pdf_area: 1.0 / self.area,
+        }
+    }
+
+    #[inline]
+    fn normal(&self, cos: f64, sin: f64) -> DVec3 {
+        dvec3(self.height * cos, self.height * sin, self.radius - self.top_radius) / self.slant
+    }
+
+    /// Exact bounds.
+    pub fn bounds(&self) -> Bounds {
+        let ring = self.sector.bounds(self.radius.min(self.top_radius), self.radius.max(self.top_radius));
+        Bounds { min: ring.min.extend(0.0), max: ring.max.extend(self.height) }
+    }
+
+    /// Surface area.
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// A point distributed uniformly by area.
+    pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
+        // The density along the side is proportional to the radius; inverted without dividing by the difference of the radii.
+        let (bottom, top) = (self.radius, self.top_radius);
+        let radius = (bottom * bottom + u[1] * (top * top - bottom * bottom)).max(0.0).sqrt();
+        let sum = bottom + radius;
+        let v = if sum > 0.0 { (u[1] * (bottom + top) / sum).min(1.0) } else { 0.0 };
+        let toward = self.sector.direction(u[0]);
+        ShapeSample {
+            p: (toward * (bottom + (top - bottom) * v)).extend(v * self.height),
+            n: self.normal(toward.x, toward.y),
+            pdf_area: 1.0 / self.area,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ray(origin: DVec3, direction: DVec3) -> RayF64 {
+        RayF64 { origin, direction, t_min: 0.0, t_max: f64::INFINITY }
+    }
+
+    #[test]
+    fn parameters_that_make_no_frustum_are_refused() {
+        assert_eq!(Frustum::new(0.0, 0.0, 1.0, 1.0), Err(ShapeError::NoRadius));
+        assert!(Frustum::new(1.0, -0.5, 1.0, 1.0).is_err());
+        assert!(Frustum::new(1.0, 0.5, 0.0, 1.0).is_err());
+        assert!(Frustum::new(1.0, f64::INFINITY, 1.0, 1.0).is_err());
+        assert!(Frustum::cylinder(0.0, 1.0, 1.0).is_err());
+        assert!(Frustum::new(0.0, 0.5, 1.0, 1.0).is_ok(), "a cone that stands on its apex");
+    }
+
+    #[test]
+    fn a_ray_parallel_to_the_axis_of_a_cylinder_misses_without_a_nan() {
+        let cylinder = Frustum::cylinder(1.0, 2.0, 6.0).unwrap();
+        for x in [0.0, -0.0, 0.3, 1.0, 2.0] {
+            for dx in [0.0, -0.0] {
+                assert_eq!(cylinder.intersect(&ray(dvec3(x, 0.0, -1.0), dvec3(dx, -dx, 1.0))), None, "{x}");
+            }
+        }
+        assert_eq!(cylinder.intersect(&ray(DVec3::ZERO, DVec3::ZERO)), None);
+    }
+
+    #[test]
+    fn a_cone_has_a_normal_at_its_apex() {
+        let cone = Frustum::new(1.0, 0.0, 2.0, 6.0).unwrap();
+        for direction in [DVec3::X, DVec3::Y, dvec3(1.0, 0.2, -0.1)] {
+            let r = ray(dvec3(0.0, 0.0, 2.0) - 3.0 * direction, direction);
+            let hit = LocalHit { t: 3.0, profile: 0.0 };
+            let s = cone.surface(&r, &hit);
+            assert!((s.n.length() - 1.0).abs() < 1e-15 && s.p.is_finite() && s.dp_dv.is_finite(), "{s:?}");
+            assert!((0.0..=1.0).contains(&s.uv[0]) && s.uv[1] > 1.0 - 1e-14);
+        }
+    }
+
+    #[test]
+    fn the_other_half_of_the_double_cone_is_not_hit() {
+        let cone = Frustum::new(1.0, 0.0, 1.0, 6.2).unwrap();
+        assert_eq!(cone.intersect(&ray(dvec3(-3.0, 0.1, 1.5), DVec3::X)), None);
+        let hit = cone.intersect(&ray(dvec3(-3.0, 0.0, 0.5), DVec3::X)).unwrap();
+        assert!((hit.t - 2.5).abs() < 1e-15);
+        // Parallel to a line on the cone: one root is infinite.
+        let hit = cone.intersect(&ray(dvec3(2.0, 0.0, -2.0), dvec3(-1.0, 0.0, 1.0))).unwrap();
+        assert!((hit.t - 2.5).abs() < 1e-15);
+    }
+}

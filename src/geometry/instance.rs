@@ -1,0 +1,81 @@
+//! Objects and their instances: one level; deeper nesting is flattened before it gets here.
+
+use super::{Hit, Shape, SurfaceInteraction};
+use crate::id::{ObjectId, ShapeId};
+use crate::math::float::UNIT_ROUNDOFF;
+use crate::math::{Aabb, Bounds, Ray, Transform, Vec3};
+
+/// A group of shapes in a space of its own.
+#[derive(Clone, Debug, Default)]
+pub struct Object {
+    /// The shapes of the group.
+    pub shapes: Vec<ShapeId>,
+}
+
+/// One placement of an object in the world.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// What is placed.
+    pub object: ObjectId,
+    /// Where.
+    pub transform: Transform,
+}
+
+impl Instance {
+    /// World bounds of this instance of an object with the given bounds.
+    pub fn bounds(&self, object: &Aabb) -> Aabb {
+        if object.is_empty() {
+            return Aabb::EMPTY;
+        }
+        let exact = Bounds { min: object.min.as_dvec3(), max: object.max.as_dvec3() };
+        exact.transformed(&self.transform.world_from_object).padded()
+    }
+
+    /// `ray` in the object's space, rounded to `f32` as accelerators trace it; `t` keeps its meaning.
+    #[inline]
+    pub fn object_ray(&self, ray: &Ray) -> Ray {
+        Ray {
+            origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
+            direction: self.transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
+            ..*ray
+        }
+    }
+
+    /// The interaction of a hit of the world-space `ray` with a shape of the object.
+    pub fn interaction(&self, shape: &Shape, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        let local_ray = self.object_ray(ray);
+        let local = match shape {
+            Shape::Mesh(mesh) => mesh.interaction(&local_ray, hit),
+            Shape::Analytic(placed) => placed.interaction(&local_ray, hit),
+        }?;
+        let t = &self.transform;
+        let n_local = local.n_g.as_dvec3();
+        let n_world = t.normal(n_local);
+        let n_g = n_world.normalize().as_vec3();
+        let n_s = t.normal(local.n_s.as_dvec3()).normalize().as_vec3();
+        let p = t.point(local.p);
+
+        // The accelerator inverts the matrix and moves the ray in f32: 4 units of roundoff of each term, seen along the normal.
+        let inverse = &t.object_from_world;
+        let m = &inverse.matrix3;
+        let moved = m.x_axis.abs() * p.x.abs() + m.y_axis.abs() * p.y.abs() + m.z_axis.abs() * p.z.abs() + inverse.translation.abs();
+        let stretch = 1.0 / n_world.length();
+        let along = n_local.abs().dot(moved) * stretch;
+        let error =
+            4.0 * UNIT_ROUNDOFF * along + f64::from(local.error) * stretch + UNIT_ROUNDOFF * n_local.abs().dot(local.p.abs()) * stretch;
+
+        Some(SurfaceInteraction {
+            p,
+            error: error as f32,
+            n_g,
+            n_s: if n_s.dot(n_g) < 0.0 { -n_s } else { n_s },
+            dp_du: finite_or_zero(t.vector(local.dp_du.as_dvec3()).as_vec3()),
+            instance: hit.instance,
+            ..local
+        })
+    }
+}
+
+fn finite_or_zero(v: Vec3) -> Vec3 {
+    if v.is_finite() { v } else { Vec3::ZERO }
+}

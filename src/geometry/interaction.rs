@@ -1,0 +1,134 @@
+//! A point on a surface with all that shading needs, and the rays that start there.
+//!
+//! Secondary rays start at the hit point moved off the surface by a bound of the rounding errors made so far: no tolerance in scene units.
+//! The bound has a part for rounding the origin to `f32` (the half-ulp box) and, where an accelerator computes in `f32`, a part for that.
+
+use crate::geometry::Hit;
+use crate::id::{InstanceId, PrimId, ShapeId};
+use crate::math::float::{UNIT_ROUNDOFF, round_toward};
+use crate::math::{DVec3, Ray, Vec2, Vec3};
+
+/// A point on a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceInteraction {
+    /// The point, in world space.
+    pub p: DVec3,
+    /// Distance along the ray that found it, in units of its direction.
+    pub t: f32,
+    /// Bound on the error of the surface's position as an accelerator sees it, along the normal, beyond the rounding of `p` to `f32`.
+    pub error: f32,
+    /// Unit geometric normal, towards the front of the surface.
+    pub n_g: Vec3,
+    /// Unit shading normal, in the hemisphere of `n_g`.
+    pub n_s: Vec3,
+    /// Change of the point with `u`; any length, zero where the surface has no parametrisation.
+    pub dp_du: Vec3,
+    /// Surface parameters; see each shape.
+    pub uv: Vec2,
+    /// The shape.
+    pub shape: ShapeId,
+    /// The primitive of the shape.
+    pub prim: PrimId,
+    /// The instance, or [`Hit::NO_INSTANCE`].
+    pub instance: InstanceId,
+}
+
+/// The far end of a shadow ray: a sampled point on a light.
+#[derive(Clone, Copy, Debug)]
+pub struct SpawnTarget {
+    /// The point, in world space.
+    pub p: DVec3,
+    /// Unit geometric normal at the point; zero for a point in space.
+    pub n: Vec3,
+    /// As [`SurfaceInteraction::error`].
+    pub error: f32,
+}
+
+impl SurfaceInteraction {
+    /// The ids of this interaction as a hit would name them.
+    pub fn ids(&self) -> (InstanceId, ShapeId, PrimId) {
+        (self.instance, self.shape, self.prim)
+    }
+
+    /// Whether the surface was reached through an instance.
+    pub fn is_instanced(&self) -> bool {
+        self.instance != Hit::NO_INSTANCE
+    }
+
+    /// A ray from here in `direction` without an end.
+    #[inline]
+    pub fn spawn(&self, direction: Vec3) -> Ray {
+        let side = direction.dot(self.n_g);
+        Ray::new(offset_origin(self.p, self.n_g, self.error, side), direction)
+    }
+
+    /// A ray from here to just before `target`: `t` runs from 0 to the largest number below 1.
+    #[inline]
+    pub fn spawn_to(&self, target: &SpawnTarget) -> Ray {
+        let toward = (target.p - self.p).as_vec3();
+        let origin = offset_origin(self.p, self.n_g, self.error, toward.dot(self.n_g));
+        // The end moves off the light towards us, also by the rounding of the direction.
+        let side = -toward.dot(target.n);
+        let n = target.n.as_dvec3().abs();
+        let end_error = f64::from(target.error) + UNIT_ROUNDOFF * n.dot(toward.as_dvec3().abs());
+        let end = offset_point(target.p, target.n, end_error, side);
+        let direction = (end - origin.as_dvec3()).as_vec3();
+        Ray { t_max: 1f32.next_down(), ..Ray::new(origin, direction) }
+    }
+}
+
+/// `p` moved along `n` to the given side by the half-ulp box plus `error`, in `f64`.
+#[inline]
+fn offset_point(p: DVec3, n: Vec3, error: f64, side: f32) -> DVec3 {
+    let n = n.as_dvec3();
+    let delta = UNIT_ROUNDOFF * n.abs().dot(p.abs()) + error;
+    p + n * delta.copysign(f64::from(side))
+}
+
+/// [`offset_point`] rounded to `f32`, away from the surface.
+#[inline]
+fn offset_origin(p: DVec3, n: Vec3, error: f32, side: f32) -> Vec3 {
+    let q = offset_point(p, n, f64::from(error), side);
+    let away = n * 1f32.copysign(side);
+    Vec3::new(round_toward(q.x, f64::from(away.x)), round_toward(q.y, f64::from(away.y)), round_toward(q.z, f64::from(away.z)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(p: DVec3, n: Vec3) -> SurfaceInteraction {
+        SurfaceInteraction {
+            p,
+            t: 1.0,
+            error: 0.0,
+            n_g: n,
+            n_s: n,
+            dp_du: Vec3::ZERO,
+            uv: Vec2::ZERO,
+            shape: ShapeId(0),
+            prim: PrimId(0),
+            instance: Hit::NO_INSTANCE,
+        }
+    }
+
+    #[test]
+    fn origins_lie_on_the_side_of_the_direction() {
+        let n = Vec3::new(0.48, 0.6, 0.64);
+        for scale in [1e-6, 1.0, 1e6] {
+            let p = DVec3::new(0.1234, -5.678, 3.21) * scale;
+            for side in [1f32, -1.0] {
+                let origin = point(p, n).spawn(n * side).origin;
+                assert!((origin.as_dvec3() - p).dot(n.as_dvec3()) * f64::from(side) > 0.0, "{scale} {side}");
+                assert!((origin.as_dvec3() - p).length() < 6.0 * f64::from(f32::EPSILON) * p.length(), "{scale} {side}");
+            }
+        }
+    }
+
+    #[test]
+    fn shadow_rays_end_before_the_light() {
+        let target = SpawnTarget { p: DVec3::new(0.3, 7.0, 0.2), n: -Vec3::Y, error: 0.0 };
+        let ray = point(DVec3::new(1.0, 0.1, 2.0), Vec3::Y).spawn_to(&target);
+        assert!(ray.origin.y > 0.1 && f64::from(ray.at(ray.t_max).y) < 7.0);
+    }
+}

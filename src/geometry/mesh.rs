@@ -1,0 +1,258 @@
+//! Triangle meshes: positions, corners, and optionally normals and uv per vertex.
+
+pub use super::triangle::TrianglePoints;
+use super::{Hit, SurfaceInteraction};
+use crate::id::PrimId;
+use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
+use crate::math::{Aabb, Ray, Vec2, Vec3};
+
+/// Why a mesh is refused; indices count from 0.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// No triangles at all.
+    #[error("the mesh has no triangles")]
+    Empty,
+    /// A position that is not finite, or too large for `f32` ray tracing.
+    #[error("vertex {0} is not finite or exceeds 1.8e18")]
+    Position(usize),
+    /// A normal that is not finite.
+    #[error("the normal of vertex {0} is not finite")]
+    Normal(usize),
+    /// A uv that is not finite.
+    #[error("the uv of vertex {0} is not finite")]
+    Uv(usize),
+    /// A corner that names no vertex.
+    #[error("triangle {triangle} refers to vertex {index}, but there are only {count}")]
+    Index {
+        /// The triangle.
+        triangle: usize,
+        /// The vertex it names.
+        index: u32,
+        /// The number of vertices.
+        count: usize,
+    },
+    /// Normals or uvs that do not match the positions in number.
+    #[error("{what}: {count} for {vertices} vertices")]
+    Count {
+        /// Which attribute.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+        /// How many there must be.
+        vertices: usize,
+    },
+}
+
+/// An indexed triangle mesh, validated: every number is finite, every index in range.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// One more than there are vertices: Embree reads 16 bytes of the last.
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    normals: Option<Vec<[f32; 3]>>,
+    uvs: Option<Vec<[f32; 2]>>,
+}
+
+impl Mesh {
+    /// A mesh from its buffers.
+    ///
+    /// # Errors
+    /// If a number is not finite, an index out of range, an attribute's count wrong, or there is no triangle.
+    pub fn new(
+        mut positions: Vec<[f32; 3]>,
+        triangles: Vec<[u32; 3]>,
+        normals: Option<Vec<[f32; 3]>>,
+        uvs: Option<Vec<[f32; 2]>>,
+    ) -> Result<Self, MeshError> {
+        let vertices = positions.len();
+        if triangles.is_empty() {
+            return Err(MeshError::Empty);
+        }
+        if let Some(i) = positions.iter().position(|p| !p.iter().all(|x| x.abs() < EMBREE_LARGE)) {
+            return Err(MeshError::Position(i));
+        }
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&index) = corners.iter().find(|&&i| i as usize >= vertices) {
+                return Err(MeshError::Index { triangle, index, count: vertices });
+            }
+        }
+        if let Some(normals) = &normals {
+            if normals.len() != vertices {
+                return Err(MeshError::Count { what: "normals", count: normals.len(), vertices });
+            }
+            if let Some(i) = normals.iter().position(|n| !n.iter().all(|x| x.is_finite())) {
+                return Err(MeshError::Normal(i));
+            }
+        }
+        if let Some(uvs) = &uvs {
+            if uvs.len() != vertices {
+                return Err(MeshError::Count { what: "uvs", count: uvs.len(), vertices });
+            }
+            if let Some(i) = uvs.iter().position(|uv| !uv.iter().all(|x| x.is_finite())) {
+                return Err(MeshError::Uv(i));
+            }
+        }
+        positions.push([0.0; 3]);
+        positions.shrink_to_fit();
+        Ok(Self { positions, triangles, normals, uvs })
+    }
+
+    /// The vertices' positions.
+    #[inline]
+    pub fn positions(&self) -> &[[f32; 3]] {
+        &self.positions[..self.positions.len() - 1]
+    }
+
+    /// The positions and one unused vertex behind them, so that 16 bytes of each may be read.
+    pub fn padded_positions(&self) -> &[[f32; 3]] {
+        &self.positions
+    }
+
+    /// The corners of each triangle as vertex indices.
+    #[inline]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Whether normals are interpolated.
+    pub fn has_normals(&self) -> bool {
+        self.normals.is_some()
+    }
+
+    /// Whether the mesh has uv coordinates.
+    pub fn has_uvs(&self) -> bool {
+        self.uvs.is_some()
+    }
+
+    /// The corners of one triangle.
+    #[inline]
+    pub fn triangle_points(&self, prim: PrimId) -> TrianglePoints {
+        let [a, b, c] = self.triangles[prim.index()];
+        let at = |i: u32| Vec3::from(self.positions[i as usize]);
+        TrianglePoints { a: at(a), b: at(b), c: at(c) }
+    }
+
+    /// Bounds of all triangles.
+    pub fn bounds(&self) -> Aabb {
+        self.triangles.iter().flatten().fold(Aabb::EMPTY, |b, &i| b.extended(Vec3::from(self.positions[i as usize])))
+    }
+
+    /// Bytes of the buffers.
+    pub fn memory_bytes(&self) -> usize {
+        let normals = self.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
+        let uvs = self.uvs.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
+        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs
+    }
+
+    /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
+    #[inline]
+    pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        let points = self.triangle_points(hit.prim);
+
+        // The hit point in f64, on the plane of the triangle.
+        let cross = points.cross();
+        let origin = ray.origin.as_dvec3();
+        let direction = ray.direction.as_dvec3();
+        let t = cross.dot(points.a.as_dvec3() - origin) / cross.dot(direction);
+        if !(t > 0.0 && t < f64::INFINITY) {
+            return None;
+        }
+        let p = origin + direction * t;
+        let n_g = (cross / cross.length()).as_vec3();
+
+        // Embree subtracts the origin from the corners and forms the normal in f32: 4 units of roundoff of the extent seen from here.
+        let p32 = p.as_vec3();
+        let reach = (points.a - p32).abs().max((points.b - p32).abs()).max((points.c - p32).abs());
+        let error = 4.0 * UNIT_ROUNDOFF as f32 * reach.max_element();
+
+        let shading = self.shading(hit, &points, n_g);
+        Some(SurfaceInteraction {
+            p,
+            t: t as f32,
+            error,
+            n_g,
+            n_s: shading.n_s,
+            dp_du: shading.dp_du,
+            uv: shading.uv,
+            shape: hit.shape,
+            prim: hit.prim,
+            instance: hit.instance,
+        })
+    }
+
+    /// Interpolated attributes at a hit.
+    #[inline]
+    fn shading(&self, hit: &Hit, points: &TrianglePoints, n_g: Vec3) -> ShadingAttributes {
+        let [a, b, c] = self.triangles[hit.prim.index()].map(|i| i as usize);
+        let (u, v) = (hit.u, hit.v);
+        let w = 1.0 - u - v;
+
+        let n_s = match &self.normals {
+            None => n_g,
+            Some(normals) => {
+                let n = Vec3::from(normals[a]) * w + Vec3::from(normals[b]) * u + Vec3::from(normals[c]) * v;
+                let length_squared = n.length_squared();
+                // A vanishing interpolated normal (opposite corners) falls back to the flat one, as does a NaN.
+                if length_squared > 1e-12 {
+                    let n = n / length_squared.sqrt();
+                    // A mesh may be wound against its normals: the shading normal follows the front.
+                    if n.dot(n_g) < 0.0 { -n } else { n }
+                } else {
+                    n_g
+                }
+            }
+        };
+
+        match &self.uvs {
+            None => ShadingAttributes { n_s, dp_du: points.b - points.a, uv: Vec2::new(u, v) },
+            Some(uvs) => {
+                let (uv_a, uv_b, uv_c) = (Vec2::from(uvs[a]), Vec2::from(uvs[b]), Vec2::from(uvs[c]));
+                let (d1, d2) = (uv_b - uv_a, uv_c - uv_a);
+                let determinant = d1.x * d2.y - d1.y * d2.x;
+                let dp_du = ((points.b - points.a) * d2.y - (points.c - points.a) * d1.y) / determinant;
+                let dp_du = if dp_du.is_finite() { dp_du } else { points.b - points.a };
+                ShadingAttributes { n_s, dp_du, uv: uv_a * w + uv_b * u + uv_c * v }
+            }
+        }
+    }
+}
+
+struct ShadingAttributes {
+    n_s: Vec3,
+    dp_du: Vec3,
+    uv: Vec2,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::id::ShapeId;
+
+    fn triangle() -> Mesh {
+        Mesh::new(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]], None, None).unwrap()
+    }
+
+    #[test]
+    fn malformed_buffers_are_refused_with_their_place() {
+        let p = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        assert_eq!(Mesh::new(p.clone(), vec![], None, None).unwrap_err(), MeshError::Empty);
+        let far = Mesh::new(p.clone(), vec![[0, 1, 3]], None, None).unwrap_err();
+        assert_eq!(far, MeshError::Index { triangle: 0, index: 3, count: 3 });
+        let mut nan = p.clone();
+        nan[1][2] = f32::NAN;
+        assert_eq!(Mesh::new(nan, vec![[0, 1, 2]], None, None).unwrap_err(), MeshError::Position(1));
+        assert!(Mesh::new(p.clone(), vec![[0, 1, 2]], Some(vec![[0.0; 3]]), None).is_err());
+        assert!(Mesh::new(p, vec![[0, 1, 2]], None, Some(vec![[f32::NAN; 2]; 3])).is_err());
+    }
+
+    #[test]
+    fn a_hit_behind_the_origin_is_false() {
+        let hit = Hit { t: 0.0, u: 0.2, v: 0.2, shape: ShapeId(0), prim: PrimId(0), instance: Hit::NO_INSTANCE };
+        let away = Ray::new(Vec3::new(0.2, 0.2, 1e-7), Vec3::Z);
+        assert!(triangle().interaction(&away, &hit).is_none());
+        let toward = Ray::new(Vec3::new(0.2, 0.2, 1e-7), -Vec3::Z);
+        let si = triangle().interaction(&toward, &hit).unwrap();
+        assert_eq!(si.n_g, Vec3::Z);
+        assert_eq!(si.p.z, 0.0);
+    }
+}

@@ -1,0 +1,162 @@
+//! Shapes and everything an accelerator sees of a scene: bounds, counts, ids and intersection; nothing of materials or lights.
+
+mod disk;
+mod frustum;
+mod hit;
+mod instance;
+mod interaction;
+mod mesh;
+mod placed;
+mod profile;
+mod quad;
+mod revolution;
+mod sector;
+mod shape_error;
+mod sphere;
+#[cfg(test)]
+mod testing;
+mod triangle;
+
+pub use disk::Disk;
+pub use frustum::Frustum;
+pub use hit::Hit;
+pub use instance::{Instance, Object};
+pub use interaction::{SpawnTarget, SurfaceInteraction};
+pub use mesh::{Mesh, MeshError, TrianglePoints};
+pub use placed::{Analytic, LocalHit, LocalSurface, Placed, PlacedPoint, ShapeSample};
+pub use profile::Profile;
+pub use quad::Quad;
+pub use revolution::Revolution;
+pub use sector::Sector;
+pub use shape_error::ShapeError;
+pub use sphere::Sphere;
+pub use triangle::{TriangleHit, TriangleSample};
+
+use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
+use crate::math::{Aabb, Ray};
+
+/// A triangle mesh or one analytic surface.
+///
+/// Analytic surfaces are stored in place: a box would cost a cache miss at every hit, and there are few shapes.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// Triangles, with positions in the space the shape is placed in.
+    Mesh(Mesh),
+    /// A surface given by a formula, with its transform.
+    Analytic(Placed),
+}
+
+impl Shape {
+    /// How many primitives the shape has: triangles, or one.
+    pub fn prim_count(&self) -> usize {
+        match self {
+            Self::Mesh(mesh) => mesh.triangles().len(),
+            Self::Analytic(_) => 1,
+        }
+    }
+
+    /// Bounds of one primitive, fit for an accelerator (outward, padded on analytic shapes).
+    pub fn prim_bounds(&self, prim: PrimId) -> Aabb {
+        match self {
+            Self::Mesh(mesh) => mesh.triangle_points(prim).bounds(),
+            Self::Analytic(placed) => placed.bounds().padded(),
+        }
+    }
+
+    /// Bounds of the whole shape.
+    pub fn bounds(&self) -> Aabb {
+        match self {
+            Self::Mesh(mesh) => mesh.bounds(),
+            Self::Analytic(placed) => placed.bounds().padded(),
+        }
+    }
+
+    /// The hit of `ray` (in the space the shape is placed in) with one primitive. `occluded` queries use this very function.
+    #[inline]
+    pub fn intersect_prim(&self, ray: &Ray, shape: ShapeId, prim: PrimId) -> Option<Hit> {
+        let instance = Hit::NO_INSTANCE;
+        match self {
+            Self::Mesh(mesh) => {
+                let hit = mesh.triangle_points(prim).intersect(ray)?;
+                Some(Hit { t: hit.t, u: hit.u, v: hit.v, shape, prim, instance })
+            }
+            Self::Analytic(placed) => {
+                let hit = placed.intersect(ray)?;
+                Some(Hit { t: hit.t as f32, u: 0.0, v: 0.0, shape, prim, instance })
+            }
+        }
+    }
+}
+
+/// All geometry of a scene: shapes in the world, and objects that instances place any number of times.
+#[derive(Clone, Debug, Default)]
+pub struct Geometry {
+    /// Every shape, those of objects included.
+    pub shapes: Vec<Shape>,
+    /// The shapes that stand in the world directly.
+    pub world: Vec<ShapeId>,
+    /// Groups of shapes.
+    pub objects: Vec<Object>,
+    /// Placements of objects in the world.
+    pub instances: Vec<Instance>,
+}
+
+impl Geometry {
+    /// The shape with this id.
+    #[inline]
+    pub fn shape(&self, id: ShapeId) -> &Shape {
+        &self.shapes[id.index()]
+    }
+
+    /// The instance with this id.
+    #[inline]
+    pub fn instance(&self, id: InstanceId) -> &Instance {
+        &self.instances[id.index()]
+    }
+
+    /// The object with this id.
+    #[inline]
+    pub fn object(&self, id: ObjectId) -> &Object {
+        &self.objects[id.index()]
+    }
+
+    /// Bounds of everything; empty if there is nothing.
+    pub fn bounds(&self) -> Aabb {
+        let world = self.world.iter().fold(Aabb::EMPTY, |b, &id| b.union(&self.shape(id).bounds()));
+        self.instances.iter().fold(world, |b, instance| {
+            let object = self.object(instance.object);
+            let inside = object.shapes.iter().fold(Aabb::EMPTY, |b, &id| b.union(&self.shape(id).bounds()));
+            b.union(&instance.bounds(&inside))
+        })
+    }
+
+    /// Bytes of mesh buffers and tables.
+    pub fn memory_bytes(&self) -> usize {
+        let shapes: usize = self
+            .shapes
+            .iter()
+            .map(|shape| match shape {
+                Shape::Mesh(mesh) => mesh.memory_bytes(),
+                Shape::Analytic(_) => 0,
+            })
+            .sum();
+        shapes + self.shapes.len() * size_of::<Shape>() + self.instances.len() * size_of::<Instance>()
+    }
+
+    /// Everything that shading needs about a hit of `ray`, with the hit point recomputed in `f64`.
+    ///
+    /// `None` if the exact distance is not positive: the hit is a rounding artefact of the accelerator, and the caller looks again from
+    /// [`step_past`](crate::math::float::step_past) of `hit.t`.
+    #[inline]
+    pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        if hit.instance == Hit::NO_INSTANCE {
+            match self.shape(hit.shape) {
+                Shape::Mesh(mesh) => mesh.interaction(ray, hit),
+                Shape::Analytic(placed) => placed.interaction(ray, hit),
+            }
+        } else {
+            self.instance(hit.instance).interaction(self.shape(hit.shape), ray, hit)
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! Analytic surfaces and their placement.
+//!
+//! Contract of every analytic shape, all in its own space and in `f64`: `intersect` gives the first hit within the ray's interval that
+//! passes the clips; `surface` gives the reprojected point, unit normal, derivatives and uv there; `bounds` and `area` are those of the
+//! clipped part; `sample` covers exactly that part and `pdf_area` is its density.
+//!
+//! Errors of an intersection are those of `f64` relative to the coordinates of the ray's origin in the shape's space. [`Placed`] therefore
+//! moves the origin along the ray to the shape before it asks, so that they are relative to the shape's size.
+
+use super::{Disk, Frustum, Hit, Quad, Revolution, Sphere, SurfaceInteraction};
+use crate::math::float::F64_CHAIN_ERROR;
+use crate::math::{Bounds, DAffine3, DVec3, Ray, RayF64, Transform, Vec2, Vec3};
+
+/// A surface given by a formula.
+#[derive(Clone, Debug)]
+pub enum Analytic {
+    /// Sphere, or the part of it within z and phi limits.
+    Sphere(Sphere),
+    /// Parallelogram.
+    Quad(Quad),
+    /// Disk, ring, or a sector of either.
+    Disk(Disk),
+    /// Cylinder, cone or frustum without caps, or a sector.
+    Frustum(Frustum),
+    /// Surface of revolution.
+    Revolution(Revolution),
+}
+
+/// A hit in a shape's own space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalHit {
+    /// Distance in units of the ray's direction.
+    pub t: f64,
+    /// Profile parameter of a surface of revolution, `segment + s`; zero on other shapes.
+    pub profile: f64,
+}
+
+/// A point of a shape in the shape's own space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalSurface {
+    /// The point, moved exactly onto the surface.
+    pub p: DVec3,
+    /// Unit normal.
+    pub n: DVec3,
+    /// Change of the point with u.
+    pub dp_du: DVec3,
+    /// Change of the point with v.
+    pub dp_dv: DVec3,
+    /// Surface parameters, both in `[0, 1]`.
+    pub uv: [f64; 2],
+    /// Density of [`Analytic::sample`] here, with respect to area in the shape's own space.
+    pub pdf_area: f64,
+}
+
+/// A point chosen on a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShapeSample {
+    /// The point.
+    pub p: DVec3,
+    /// Unit normal.
+    pub n: DVec3,
+    /// Density with respect to area.
+    pub pdf_area: f64,
+}
+
+macro_rules! each {
+    ($self:expr, $shape:ident => $body:expr) => {
+        match $self {
+            Analytic::Sphere($shape) => $body,
+            Analytic::Quad($shape) => $body,
+            Analytic::Disk($shape) => $body,
+            Analytic::Frustum($shape) => $body,
+            Analytic::Revolution($shape) => $body,
+        }
+    };
+}
+
+impl Analytic {
+    /// The first hit within the ray's interval.
+    #[inline]
+    pub fn intersect(&self, ray: &RayF64) -> Option<LocalHit> {
+        each!(self, shape => shape.intersect(ray))
+    }
+
+    /// The surface at a hit of `ray`.
+    #[inline]
+    pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
+        each!(self, shape => shape.surface(ray, hit))
+    }
+
+    /// Exact bounds.
+    pub fn bounds(&self) -> Bounds {
+        each!(self, shape => shape.bounds())
+    }
+
+    /// Surface area.
+    pub fn area(&self) -> f64 {
+        each!(self, shape => shape.area())
+    }
+
+    /// A point chosen on the surface; `u` in the unit square.
+    pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
+        each!(self, shape => shape.sample(u))
+    }
+}
+
+/// An analytic surface with its transform.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// The surface in its own space.
+    pub shape: Analytic,
+    /// Where it stands.
+    pub transform: Transform,
+    /// Whether the front is the side against the shape's own normal.
+    pub reverse_normal: bool,
+    /// The middle of the shape in its own space, and where the transform puts it.
+    center: DVec3,
+    placed_center: DVec3,
+    /// Bound on the error of a point of the placed surface in `f64`. Rays that start on the surface must clear it even where the
+    /// coordinate along the normal is zero and rounding to `f32` gives no distance.
+    error: f32,
+}
+
+/// A ray in a shape's own space whose origin is the point of the original ray near the shape's centre.
+#[derive(Clone, Copy, Debug)]
+struct CenteredRay {
+    ray: RayF64,
+    /// `t` of the original ray at the origin of this one.
+    shift: f64,
+}
+
+impl Placed {
+    /// A surface with its transform.
+    pub fn new(shape: Analytic, transform: Transform) -> Self {
+        let bounds = shape.bounds();
+        let center = 0.5 * bounds.min + 0.5 * bounds.max;
+        let placed = bounds.transformed(&transform.world_from_object);
+        let error = (F64_CHAIN_ERROR * placed.min.abs().max(placed.max.abs()).max_element()) as f32;
+        Self { shape, transform, reverse_normal: false, center, placed_center: transform.point(center), error }
+    }
+
+    /// `ray` in the shape's own space, accurate relative to the size of the shape however far away the ray starts.
+    #[inline]
+    fn centered_ray(&self, ray: &Ray) -> CenteredRay {
+        let direction = ray.direction.as_dvec3();
+        let from_center = ray.origin.as_dvec3() - self.placed_center;
+
+        // With 24 bits, the shift times the direction (also 24 bits) is exact, and the sum rounds at the size of the result.
+        let to_closest = -from_center.dot(direction) / direction.length_squared();
+        let shift = f64::from_bits(to_closest.to_bits() & !((1 << 29) - 1));
+        let near_center = from_center + direction * shift;
+
+        let ray = RayF64 {
+            origin: self.center + self.transform.inverse_vector(near_center),
+            direction: self.transform.inverse_vector(direction),
+            t_min: f64::from(ray.t_min) - shift,
+            t_max: f64::from(ray.t_max) - shift,
+        };
+        CenteredRay { ray, shift }
+    }
+
+    /// The first hit of a ray in the space the shape is placed in.
+    #[inline]
+    pub fn intersect(&self, ray: &Ray) -> Option<LocalHit> {
+        let centered = self.centered_ray(ray);
+        let hit = self.shape.intersect(&centered.ray)?;
+        Some(LocalHit { t: hit.t + centered.shift, ..hit })
+    }
+
+    /// Bounds, which turn with the shape (rather than its box) where it makes a full turn; to be [padded](Bounds::padded) for an
+    /// accelerator.
+    pub fn bounds(&self) -> Bounds {
+        let map = &self.transform.world_from_object;
+        let boxed = self.shape.bounds().transformed(map);
+        match &self.shape {
+            // A sphere's box does not grow when it turns.
+            Analytic::Sphere(sphere) if sphere.is_full() => {
+                let m = map.matrix3.transpose();
+                let reach = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length()) * sphere.radius();
+                let center = self.transform.point(DVec3::ZERO);
+                Bounds { min: center - reach, max: center + reach }
+            }
+            Analytic::Disk(disk) if disk.is_full_turn() => circle_bounds(map, DVec3::ZERO, [DVec3::X, DVec3::Y].map(|v| v * disk.radius())),
+            Analytic::Frustum(frustum) if frustum.is_full_turn() => {
+                let [bottom, top] = frustum.radii().map(|r| [DVec3::X * r, DVec3::Y * r]);
+                let (a, b) = (circle_bounds(map, DVec3::ZERO, bottom), circle_bounds(map, DVec3::Z * frustum.height(), top));
+                Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }
+            }
+            Analytic::Revolution(revolution) if revolution.is_full_turn() => {
+                let rims = revolution.rims().map(|[r, y]| circle_bounds(map, DVec3::Y * y, [DVec3::Z * r, DVec3::X * r]));
+                let hull = rims.fold(Bounds::EMPTY, |all, b| Bounds { min: all.min.min(b.min), max: all.max.max(b.max) });
+                Bounds { min: hull.min.max(boxed.min), max: hull.max.min(boxed.max) }
+            }
+            _ => boxed,
+        }
+    }
+
+    /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
+    pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        // The hit itself, whatever the end of the ray is. Through an instance, accelerators move the ray in `f32`, so their distance is
+        // not one of this ray.
+        let t_max = if hit.instance == Hit::NO_INSTANCE { hit.t.next_up() } else { f32::INFINITY };
+        let centered = self.centered_ray(&Ray { t_max, ..*ray });
+        let local_hit = self.shape.intersect(&centered.ray)?;
+        let t = local_hit.t + centered.shift;
+        if t <= 0.0 {
+            return None;
+        }
+        let surface = self.shape.surface(&centered.ray, &local_hit);
+        let placed = self.place(surface.p, surface.n, surface.pdf_area);
+        Some(SurfaceInteraction {
+            p: placed.p,
+            t: t as f32,
+            error: self.error,
+            n_g: placed.n,
+            n_s: placed.n,
+            dp_du: self.transform.vector(surface.dp_du).as_vec3(),
+            uv: Vec2::new(surface.uv[0] as f32, surface.uv[1] as f32),
+            shape: hit.shape,
+            prim: hit.prim,
+            instance: hit.instance,
+        })
+    }
+
+    /// A point chosen on the surface, placed; `u` in the unit square.
+    #[inline]
+    pub fn sample_area(&self, u: [f32; 2]) -> PlacedPoint {
+        let sample = self.shape.sample([f64::from(u[0]), f64::from(u[1])]);
+        self.place(sample.p, sample.n, sample.pdf_area)
+    }
+
+    /// The density (with respect to placed area) with which [`Placed::sample_area`] finds the point where `ray` hits; `None` on a miss.
+    pub fn pdf_area(&self, ray: &Ray) -> Option<f64> {
+        let centered = self.centered_ray(ray);
+        let hit = self.shape.intersect(&centered.ray)?;
+        let surface = self.shape.surface(&centered.ray, &hit);
+        Some(self.place(surface.p, surface.n, surface.pdf_area).pdf_area)
+    }
+
+    /// [`Placed::pdf_area`] at a point known to be on the surface, from its unit normal (of either side) alone; `None` for surfaces whose
+    /// sampling is not uniform by area in their own space.
+    #[inline]
+    pub fn pdf_area_from_normal(&self, n: Vec3) -> Option<f64> {
+        if matches!(self.shape, Analytic::Revolution(_)) {
+            return None;
+        }
+        // With M the linear part and m the object normal, M^-T m = n / |M^T n|.
+        let length = self.transform.world_from_object.matrix3.transpose().mul_vec3(n.as_dvec3()).length();
+        Some(length / (self.shape.area() * self.transform.determinant().abs()))
+    }
+
+    #[inline]
+    fn place(&self, p: DVec3, n: DVec3, pdf_area: f64) -> PlacedPoint {
+        let normal = self.transform.normal(n);
+        let length = normal.length();
+        // The inverse transpose keeps the side even where the transform reflects.
+        let sign = if self.reverse_normal { -1.0 } else { 1.0 };
+        PlacedPoint {
+            p: self.transform.point(p),
+            n: (normal * (sign / length)).as_vec3(),
+            pdf_area: pdf_area / (self.transform.determinant().abs() * length),
+        }
+    }
+}
+
+/// Exact bounds of a circle, given by its centre and two perpendicular radii, after an affine map.
+fn circle_bounds(map: &DAffine3, center: DVec3, radii: [DVec3; 2]) -> Bounds {
+    let center = map.transform_point3(center);
+    let [a, b] = radii.map(|v| map.transform_vector3(v));
+    let reach = DVec3::new(a.x.hypot(b.x), a.y.hypot(b.y), a.z.hypot(b.z));
+    Bounds { min: center - reach, max: center + reach }
+}
+
+/// A point of a placed shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedPoint {
+    /// The point.
+    pub p: DVec3,
+    /// Unit normal, towards the front.
+    pub n: Vec3,
+    /// Density of sampling with respect to area.
+    pub pdf_area: f64,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,206 @@
+//! PLY files, ASCII and binary: element `vertex` with x y z, optionally nx ny nz and u v (or s t), and element `face` with a list of vertex
+//! indices. Polygons become fans.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
+
+use super::{AssetError, MeshData};
+
+/// Reads a PLY file.
+///
+/// # Errors
+/// If the file is missing, malformed, ends early, or has no vertices or faces.
+pub fn read_ply(path: &Path) -> Result<MeshData, AssetError> {
+    let file = File::open(path).map_err(|e| AssetError::missing(path, &e))?;
+    parse_ply(BufReader::with_capacity(1 << 20, file))
+}
+
+fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
+    let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a valid PLY file: {e}"));
+    let mut reader = Reader::new(source);
+    let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(|e| malformed(&e))?;
+    let mut mesh = MeshData::default();
+    for (name, element) in &header.elements {
+        match name.as_str() {
+            "vertex" => {
+                let vertices = read_elements::<Vertex>(&mut reader, element, &header).map_err(|e| malformed(&e))?;
+                take_vertices(&mut mesh, &vertices, element);
+            }
+            "face" => {
+                for face in read_elements::<Face>(&mut reader, element, &header).map_err(|e| malformed(&e))? {
+                    if let Some(bad) = face.negative {
+                        return Err(AssetError::Malformed(format!("a face refers to vertex {bad}")));
+                    }
+                    mesh.push_polygon(&face.corners);
+                }
+            }
+            _ => {
+                read_elements::<DefaultElement>(&mut reader, element, &header).map_err(|e| malformed(&e))?;
+            }
+        }
+    }
+    if mesh.positions.is_empty() {
+        return Err(AssetError::Malformed("the file has no vertices".into()));
+    }
+    Ok(mesh)
+}
+
+fn read_elements<E: PropertyAccess>(
+    reader: &mut Reader<impl BufRead>,
+    element: &ElementDef,
+    header: &Header,
+) -> ply_rs_bw::parser::Result<Vec<E>> {
+    Parser::<E>::new().read_payload_for_element(reader, element, header)
+}
+
+fn take_vertices(mesh: &mut MeshData, vertices: &[Vertex], element: &ElementDef) {
+    let has = |names: &[&str]| names.iter().all(|name| element.properties.contains_key(*name));
+    mesh.positions = vertices.iter().map(|v| v.position).collect();
+    if has(&["nx", "ny", "nz"]) {
+        mesh.normals = Some(vertices.iter().map(|v| v.normal).collect());
+    }
+    if has(&["u", "v"]) || has(&["s", "t"]) || has(&["texture_u", "texture_v"]) {
+        mesh.uvs = Some(vertices.iter().map(|v| v.uv).collect());
+    }
+}
+
+#[derive(Default)]
+struct Vertex {
+    position: [f32; 3],
+    normal: [f32; 3],
+    uv: [f32; 2],
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let Some(value) = number(&property) else {
+            return PropertyAccessResult::Ignored;
+        };
+        let place = match name {
+            "x" => &mut self.position[0],
+            "y" => &mut self.position[1],
+            "z" => &mut self.position[2],
+            "nx" => &mut self.normal[0],
+            "ny" => &mut self.normal[1],
+            "nz" => &mut self.normal[2],
+            "u" | "s" | "texture_u" => &mut self.uv[0],
+            "v" | "t" | "texture_v" => &mut self.uv[1],
+            _ => return PropertyAccessResult::Ignored,
+        };
+        *place = value;
+        PropertyAccessResult::Set
+    }
+}
+
+/// A single number of any type.
+fn number(property: &Property) -> Option<f32> {
+    Some(match *property {
+        Property::Char(x) => f32::from(x),
+        Property::UChar(x) => f32::from(x),
+        Property::Short(x) => f32::from(x),
+        Property::UShort(x) => f32::from(x),
+        Property::Int(x) => x as f32,
+        Property::UInt(x) => x as f32,
+        Property::Float(x) => x,
+        Property::Double(x) => x as f32,
+        _ => return None,
+    })
+}
+
+#[derive(Default)]
+struct Face {
+    corners: Vec<u32>,
+    negative: Option<i64>,
+}
+
+impl Face {
+    fn take(&mut self, index: impl Into<i64>) {
+        let index = index.into();
+        match u32::try_from(index) {
+            Ok(index) => self.corners.push(index),
+            Err(_) => self.negative = Some(index),
+        }
+    }
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if !matches!(name, "vertex_indices" | "vertex_index") {
+            return PropertyAccessResult::Ignored;
+        }
+        match property {
+            Property::ListInt(list) => list.into_iter().for_each(|i| self.take(i)),
+            Property::ListUInt(list) => list.into_iter().for_each(|i| self.take(i)),
+            Property::ListShort(list) => list.into_iter().for_each(|i| self.take(i)),
+            Property::ListUShort(list) => list.into_iter().for_each(|i| self.take(i)),
+            Property::ListChar(list) => list.into_iter().for_each(|i| self.take(i)),
+            Property::ListUChar(list) => list.into_iter().for_each(|i| self.take(i)),
+            _ => return PropertyAccessResult::Ignored,
+        }
+        PropertyAccessResult::Set
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float s\nproperty float t\n\
+                          element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+    fn expected() -> MeshData {
+        MeshData {
+            positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            normals: None,
+            uvs: Some(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
+        }
+    }
+
+    fn ascii() -> String {
+        format!("ply\nformat ascii 1.0\n{HEADER}0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3\n")
+    }
+
+    fn binary(order: &str, float: fn(f32) -> [u8; 4], int: fn(i32) -> [u8; 4]) -> Vec<u8> {
+        let mut out = format!("ply\nformat {order} 1.0\n{HEADER}").into_bytes();
+        let mesh = expected();
+        for (p, uv) in mesh.positions.iter().zip(mesh.uvs.unwrap()) {
+            p.iter().chain(&uv).for_each(|&x| out.extend(float(x)));
+        }
+        out.push(4);
+        (0..4).for_each(|i| out.extend(int(i)));
+        out
+    }
+
+    #[test]
+    fn all_encodings_give_the_same_mesh() {
+        assert_eq!(parse_ply(ascii().as_bytes()).unwrap(), expected());
+        let little = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
+        assert_eq!(parse_ply(little.as_slice()).unwrap(), expected());
+        let big = binary("binary_big_endian", f32::to_be_bytes, i32::to_be_bytes);
+        assert_eq!(parse_ply(big.as_slice()).unwrap(), expected());
+    }
+
+    #[test]
+    fn truncated_files_are_errors() {
+        let whole = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
+        for length in [0, 3, 40, whole.len() - 60, whole.len() - 1] {
+            assert!(parse_ply(&whole[..length]).is_err(), "{length} bytes");
+        }
+        let text = ascii();
+        assert!(parse_ply(&text.as_bytes()[..text.len() - 12]).is_err());
+        assert!(parse_ply(text.replace("0 1 2 3", "0 1 2 -3").as_bytes()).is_err());
+    }
+}

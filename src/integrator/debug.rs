@@ -1,0 +1,114 @@
+//! Views of a scene without light transport, and ambient occlusion.
+
+use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions, surface_sample};
+use crate::accel::Coherence;
+use crate::color::Rgb;
+use crate::film::PixelSample;
+use crate::geometry::SurfaceInteraction;
+use crate::math::{Frame, Ray, Vec3};
+use crate::sampling::{Sampler, warp};
+
+/// What a [`DebugView`] shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// The geometric normal, `(n + 1) / 2`.
+    Normal,
+    /// The shading normal, `(n + 1) / 2`.
+    ShadingNormal,
+    /// Surface parameters as red and green.
+    Uv,
+    /// Depth along the view axis.
+    Depth,
+    /// A colour for each primitive.
+    PrimitiveId,
+}
+
+impl View {
+    fn color(self, world: &World, at: &SurfaceInteraction) -> Rgb {
+        let from_normal = |n: Vec3| Rgb::new(0.5 * n.x + 0.5, 0.5 * n.y + 0.5, 0.5 * n.z + 0.5);
+        match self {
+            Self::Normal => from_normal(at.n_g),
+            Self::ShadingNormal => from_normal(at.n_s),
+            Self::Uv => Rgb::new(at.uv.x, at.uv.y, 0.0),
+            Self::Depth => Rgb::splat(world.scene.camera.depth(at.p)),
+            Self::PrimitiveId => {
+                let (instance, shape, prim) = at.ids();
+                color_of(instance.0 ^ shape.0.wrapping_mul(0x9e37_79b9) ^ prim.0.wrapping_mul(0x85eb_ca6b))
+            }
+        }
+    }
+}
+
+/// A bright colour that differs between neighbouring ids.
+fn color_of(id: u32) -> Rgb {
+    let mut h = id.wrapping_add(0x9e37_79b9);
+    h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d);
+    h = (h ^ (h >> 15)).wrapping_mul(0x846c_a68b);
+    h ^= h >> 16;
+    let channel = |shift: u32| 0.1 + 0.9 * ((h >> shift) & 0xff) as f32 / 255.0;
+    Rgb::new(channel(0), channel(8), channel(16))
+}
+
+/// Shows one property of the first surface.
+pub struct DebugView {
+    /// What to show.
+    pub view: View,
+    /// What the layers need.
+    pub needs: SurfaceNeeds,
+}
+
+impl Integrator for DebugView {
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
+        for_each_first_surface(world, samples, out, counts, |_, ray, at| PixelSample {
+            radiance: self.view.color(world, at),
+            alpha: 1.0,
+            surface: surface_sample(world, self.needs, at, ray.direction),
+        });
+    }
+}
+
+/// The fraction of a cosine-weighted hemisphere from which nothing blocks the light.
+pub struct AmbientOcclusion {
+    /// Only what is nearer counts.
+    pub distance: f32,
+    /// Where random numbers come from.
+    pub sampler: Sampler,
+    /// What the layers need.
+    pub needs: SurfaceNeeds,
+}
+
+impl Integrator for AmbientOcclusion {
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
+        let mut shadow_rays = 0;
+        for_each_first_surface(world, samples, out, counts, |sample, ray, at| {
+            let u = self.sampler.sample_4d(sample.seed, sample.sample, dimensions::bsdf(0));
+            let toward_viewer = if at.n_s.dot(ray.direction) > 0.0 { -at.n_s } else { at.n_s };
+            let direction = Frame::from_normal(toward_viewer).to_world(warp::cosine_hemisphere([u[1], u[2]]));
+            shadow_rays += 1;
+            let free = !world.accel.occluded(&Ray { t_max: self.distance, ..at.spawn(direction) });
+            PixelSample {
+                radiance: Rgb::splat(f32::from(u8::from(free))),
+                alpha: 1.0,
+                surface: surface_sample(world, self.needs, at, ray.direction),
+            }
+        });
+        counts.shadow += shadow_rays;
+    }
+}
+
+/// Traces all camera rays side by side and fills `out` from `shade`, with nothing where a ray leaves the scene.
+fn for_each_first_surface(
+    world: &World,
+    samples: &[CameraSample],
+    out: &mut [PixelSample],
+    counts: &mut RayCounts,
+    mut shade: impl FnMut(&CameraSample, &Ray, &SurfaceInteraction) -> PixelSample,
+) {
+    let rays: Vec<Ray> = samples.iter().map(|sample| sample.ray).collect();
+    let mut hits = vec![None; rays.len()];
+    world.accel.intersect_batch(&rays, &mut hits, Coherence::Coherent);
+    counts.camera += rays.len() as u64;
+    for (((sample, ray), hit), out) in samples.iter().zip(&rays).zip(hits).zip(out) {
+        *out = world.resolve(ray, hit).map_or_else(PixelSample::default, |at| shade(sample, ray, &at));
+    }
+}

@@ -1,0 +1,133 @@
+//! Light transport: from camera rays to what each sample of a pixel brings.
+//!
+//! Integrators take a batch of camera samples (one sample of every pixel of a tile) and work through it stage by stage: trace all rays,
+//! shade all hits, trace all shadow rays. Accelerators can then trace rays side by side that belong together, and each stage's code and
+//! data stay in the caches. `docs/wavefront.md` has the figures behind this choice.
+
+mod debug;
+mod path;
+mod whitted;
+mod world;
+
+pub use debug::{AmbientOcclusion, DebugView, View};
+pub use path::{PathIntegrator, Strategy};
+pub use whitted::Whitted;
+pub use world::World;
+
+use crate::desc::{IntegratorDesc, StrategyDesc};
+use crate::film::{PixelSample, SurfaceSample};
+use crate::geometry::SurfaceInteraction;
+use crate::math::Ray;
+use crate::sampling::{PixelSeed, Sampler};
+
+/// Sets of four dimensions of the sampler, by purpose.
+pub mod dimensions {
+    /// Film position (two) and lens position (two).
+    pub const CAMERA: u32 = 0;
+
+    /// Choice of a light (one) and a direction towards it (two), at the vertex with this many bounces before it.
+    pub const fn light(bounce: u32) -> u32 {
+        1 + 2 * bounce
+    }
+
+    /// Choice of a lobe (one), a direction (two) and roulette (one), at the vertex with this many bounces before it.
+    pub const fn bsdf(bounce: u32) -> u32 {
+        2 + 2 * bounce
+    }
+}
+
+/// One sample of one pixel on its way into the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraSample {
+    /// The camera ray.
+    pub ray: Ray,
+    /// The pixel's seed.
+    pub seed: PixelSeed,
+    /// The index of the sample within the pixel.
+    pub sample: u32,
+}
+
+/// Rays traced, by purpose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayCounts {
+    /// From the camera.
+    pub camera: u64,
+    /// From a surface, looking for the closest hit.
+    pub indirect: u64,
+    /// Towards a light.
+    pub shadow: u64,
+}
+
+impl RayCounts {
+    /// All rays.
+    pub fn total(&self) -> u64 {
+        self.camera + self.indirect + self.shadow
+    }
+
+    /// Adds the counts of another batch.
+    pub fn add(&mut self, other: &Self) {
+        self.camera += other.camera;
+        self.indirect += other.indirect;
+        self.shadow += other.shadow;
+    }
+}
+
+/// Which parts of [`SurfaceSample`] are wanted; the rest is not computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SurfaceNeeds {
+    /// Any of depth, normal, position.
+    pub geometry: bool,
+    /// Albedo.
+    pub albedo: bool,
+}
+
+/// Computes what each camera sample brings.
+pub trait Integrator: Send + Sync {
+    /// Fills `out`, one entry for each of `samples`, and counts rays.
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts);
+}
+
+/// The integrator with these parameters, drawing from `sampler`.
+pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Box<dyn Integrator> {
+    let view = |view| Box::new(DebugView { view, needs }) as Box<dyn Integrator>;
+    match *desc {
+        IntegratorDesc::Path { max_depth, rr_depth, strategy } => {
+            Box::new(PathIntegrator { max_depth, rr_depth, strategy: strategy.into(), sampler, needs })
+        }
+        IntegratorDesc::Whitted { max_depth, ambient } => Box::new(Whitted { max_depth, ambient: ambient.into(), needs }),
+        IntegratorDesc::Normal => view(View::Normal),
+        IntegratorDesc::ShadingNormal => view(View::ShadingNormal),
+        IntegratorDesc::Uv => view(View::Uv),
+        IntegratorDesc::Depth => view(View::Depth),
+        IntegratorDesc::PrimitiveId => view(View::PrimitiveId),
+        IntegratorDesc::AmbientOcclusion { distance } => {
+            Box::new(AmbientOcclusion { distance: distance.unwrap_or(f32::INFINITY), sampler, needs })
+        }
+    }
+}
+
+impl From<StrategyDesc> for Strategy {
+    fn from(desc: StrategyDesc) -> Self {
+        match desc {
+            StrategyDesc::Mis => Self::Mis,
+            StrategyDesc::Light => Self::Light,
+            StrategyDesc::Bsdf => Self::Bsdf,
+        }
+    }
+}
+
+/// What the layers need of the first surface.
+fn surface_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInteraction, direction: crate::math::Vec3) -> SurfaceSample {
+    let mut sample = SurfaceSample::default();
+    if needs.geometry {
+        sample.depth = world.scene.camera.depth(at.p);
+        sample.normal = at.n_s;
+        sample.position = at.p.as_vec3();
+    }
+    if needs.albedo {
+        let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
+        let frame = crate::math::Frame::from_normal(at.n_s);
+        sample.albedo = bsdf.albedo(frame.to_local(-direction));
+    }
+    sample
+}

@@ -1,0 +1,327 @@
+//! Path tracing with next-event estimation and multiple importance sampling, a batch of paths at a time.
+//!
+//! One round lengthens every living path by a segment: trace, shade (emission, choice of a light, choice of a direction), trace shadow
+//! rays, drop dead paths. Each path draws its numbers from its own (pixel, sample, bounce), so a path is the same in any batch.
+
+use std::cell::RefCell;
+
+use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions, surface_sample};
+use crate::accel::Coherence;
+use crate::bsdf::{Bsdf, BsdfSample};
+use crate::color::Rgb;
+use crate::film::PixelSample;
+use crate::geometry::{Hit, SurfaceInteraction};
+use crate::light::{Light, ShadowTarget};
+use crate::math::{DVec3, Frame, Ray, Vec3};
+use crate::sampling::{PixelSeed, Sampler, power_heuristic};
+
+/// How directions towards lights are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strategy {
+    /// Sampling lights and sampling the BSDF, combined.
+    #[default]
+    Mis,
+    /// Sampling lights wherever possible.
+    Light,
+    /// Sampling the BSDF wherever possible.
+    Bsdf,
+}
+
+/// Path tracing.
+#[derive(Clone, Debug)]
+pub struct PathIntegrator {
+    /// Largest number of segments from the camera; 1 shows only directly visible light.
+    pub max_depth: u32,
+    /// Segments before Russian roulette may end a path.
+    pub rr_depth: u32,
+    /// How directions towards lights are found.
+    pub strategy: Strategy,
+    /// Where random numbers come from.
+    pub sampler: Sampler,
+    /// What the layers need.
+    pub needs: SurfaceNeeds,
+}
+
+/// A path under way.
+#[derive(Clone, Copy, Debug)]
+struct Path {
+    /// Product of all weights so far.
+    throughput: Rgb,
+    /// Density with which the last direction was chosen, or infinity if light sampling could not have found it.
+    pdf: f32,
+    /// Product of the squared relative indices of refraction passed: roulette must not mistake their radiance scaling for absorption.
+    eta_squared: f32,
+    /// Its place in the batch.
+    slot: u32,
+    seed: PixelSeed,
+    sample: u32,
+    /// Where the last direction was chosen, for the density of light sampling.
+    from: DVec3,
+}
+
+/// Light that reaches a path if its shadow ray is free.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    contribution: Rgb,
+    slot: u32,
+}
+
+/// Buffers of one thread, kept between batches.
+#[derive(Default)]
+struct Scratch {
+    paths: Vec<Path>,
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+    shadow_rays: Vec<Ray>,
+    occluded: Vec<bool>,
+    pending: Vec<Pending>,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+impl Integrator for PathIntegrator {
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
+        SCRATCH.with_borrow_mut(|scratch| self.render(world, samples, out, counts, scratch));
+    }
+}
+
+impl PathIntegrator {
+    fn render(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts, scratch: &mut Scratch) {
+        scratch.paths.clear();
+        scratch.rays.clear();
+        for (slot, sample) in samples.iter().enumerate() {
+            out[slot] = PixelSample::default();
+            scratch.rays.push(sample.ray);
+            scratch.paths.push(Path {
+                throughput: Rgb::WHITE,
+                pdf: f32::INFINITY,
+                eta_squared: 1.0,
+                slot: slot as u32,
+                seed: sample.seed,
+                sample: sample.sample,
+                from: DVec3::ZERO,
+            });
+        }
+
+        for bounce in 0..self.max_depth {
+            let count = scratch.rays.len();
+            if count == 0 {
+                break;
+            }
+            let coherence = if bounce == 0 { Coherence::Coherent } else { Coherence::Incoherent };
+            *(if bounce == 0 { &mut counts.camera } else { &mut counts.indirect }) += count as u64;
+            scratch.hits.clear();
+            scratch.hits.resize(count, None);
+            world.accel.intersect_batch(&scratch.rays, &mut scratch.hits, coherence);
+
+            self.shade_all(world, bounce, out, scratch);
+
+            let shadows = scratch.shadow_rays.len();
+            counts.shadow += shadows as u64;
+            scratch.occluded.clear();
+            scratch.occluded.resize(shadows, false);
+            world.accel.occluded_batch(&scratch.shadow_rays, &mut scratch.occluded, coherence);
+            for (pending, occluded) in scratch.pending.iter().zip(&scratch.occluded) {
+                if !occluded {
+                    out[pending.slot as usize].radiance += pending.contribution;
+                }
+            }
+        }
+    }
+
+    /// Shades every living path's hit; afterwards the scratch holds the paths that go on, their rays, and the shadow rays to trace.
+    fn shade_all(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
+        let Scratch { paths, rays, hits, shadow_rays, pending, .. } = scratch;
+        shadow_rays.clear();
+        pending.clear();
+        let mut alive = 0;
+        for i in 0..paths.len() {
+            let mut path = paths[i];
+            let ray = rays[i];
+            let sample = &mut out[path.slot as usize];
+            let Some(at) = world.resolve(&ray, hits[i]) else {
+                sample.radiance += path.throughput * self.escaped(world, &path, ray.direction);
+                continue;
+            };
+            if bounce == 0 {
+                sample.alpha = 1.0;
+                if self.needs != SurfaceNeeds::default() {
+                    sample.surface = surface_sample(world, self.needs, &at, ray.direction);
+                }
+            }
+            sample.radiance += path.throughput * self.emitted(world, &path, &ray, &at);
+            if bounce + 1 >= self.max_depth {
+                continue;
+            }
+
+            let vertex = Vertex::new(world, &at, &ray);
+            if let Some(shadow) = self.sample_light(world, &path, &vertex, bounce) {
+                shadow_rays.push(shadow.ray);
+                pending.push(Pending { contribution: shadow.contribution, slot: path.slot });
+            }
+            if let Some(next) = self.scatter(world, &mut path, &vertex, bounce) {
+                paths[alive] = path;
+                rays[alive] = next;
+                alive += 1;
+            }
+        }
+        paths.truncate(alive);
+        rays.truncate(alive);
+    }
+
+    /// Weight of light that was found by following `direction`, against finding it by sampling the light with density `light_pdf`.
+    #[inline]
+    fn found_by_chance(&self, path: &Path, light_pdf: f32) -> f32 {
+        if path.pdf == f32::INFINITY {
+            return 1.0;
+        }
+        match self.strategy {
+            Strategy::Mis => power_heuristic(path.pdf, light_pdf),
+            Strategy::Light => 0.0,
+            Strategy::Bsdf => 1.0,
+        }
+    }
+
+    /// Light from infinity along `direction`.
+    fn escaped(&self, world: &World, path: &Path, direction: Vec3) -> Rgb {
+        let mut radiance = Rgb::BLACK;
+        for &id in world.scene.lights.at_infinity() {
+            let found = world.scene.lights.get(id).eval_at_infinity(direction);
+            if !found.radiance.is_black() {
+                radiance += found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id));
+            }
+        }
+        radiance
+    }
+
+    /// Light that the surface itself gives off against `ray`.
+    #[inline]
+    fn emitted(&self, world: &World, path: &Path, ray: &Ray, at: &SurfaceInteraction) -> Rgb {
+        let Some(id) = world.scene.surface(at.shape).light(at.prim) else {
+            return Rgb::BLACK;
+        };
+        let Light::Area(light) = world.scene.lights.get(id) else {
+            return Rgb::BLACK;
+        };
+        let radiance = light.radiance(at, -ray.direction);
+        if radiance.is_black() || path.pdf == f32::INFINITY || self.strategy != Strategy::Mis {
+            return radiance * self.found_by_chance(path, 0.0);
+        }
+        let light_pdf = light.pdf(&world.scene.geometry, path.from, ray, at) * world.scene.lights.pmf(id);
+        radiance * self.found_by_chance(path, light_pdf)
+    }
+
+    /// A shadow ray towards a light, with what it brings if it is free.
+    #[inline]
+    fn sample_light(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32) -> Option<ShadowRay> {
+        if vertex.bsdf.is_delta() || world.scene.lights.is_empty() {
+            return None;
+        }
+        let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::light(bounce));
+        let choice = world.scene.lights.choose(u[0])?;
+        let light = world.scene.lights.get(choice.id);
+        let sample = light.sample(&world.scene.geometry, vertex.at.p, [u[1], u[2]])?;
+        if self.strategy == Strategy::Bsdf && !sample.is_delta {
+            return None;
+        }
+        let eval = vertex.eval(sample.wi)?;
+        let pdf = sample.pdf * choice.pmf;
+        let weight = match self.strategy {
+            Strategy::Mis if !sample.is_delta => power_heuristic(pdf, eval.pdf),
+            _ => 1.0,
+        };
+        let contribution = path.throughput * eval.value * sample.radiance * (weight / pdf);
+        if contribution.is_black() {
+            return None;
+        }
+        let ray = match &sample.target {
+            ShadowTarget::Point(target) => vertex.at.spawn_to(target),
+            ShadowTarget::Infinity => vertex.at.spawn(sample.wi),
+        };
+        Some(ShadowRay { ray, contribution })
+    }
+
+    /// The next ray of a path, unless the path ends here.
+    #[inline]
+    fn scatter(&self, world: &World, path: &mut Path, vertex: &Vertex, bounce: u32) -> Option<Ray> {
+        let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::bsdf(bounce));
+        let (sample, direction) = vertex.sample(u[0], [u[1], u[2]])?;
+        path.throughput *= sample.weight;
+        path.eta_squared *= sample.eta * sample.eta;
+
+        // Russian roulette: the survivors carry the weight of the dead. The chance is not capped, so a path that lost nothing goes on.
+        if bounce + 1 >= self.rr_depth {
+            let survival = path.throughput.max_channel() * path.eta_squared;
+            if survival < 1.0 {
+                if u[3] >= survival {
+                    return None;
+                }
+                path.throughput *= 1.0 / survival;
+            }
+        }
+        if path.throughput.is_black() {
+            return None;
+        }
+
+        let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
+        path.pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
+        path.from = vertex.at.p;
+        Some(vertex.at.spawn(direction))
+    }
+}
+
+/// A shadow ray and what it brings if it is free.
+struct ShadowRay {
+    ray: Ray,
+    contribution: Rgb,
+}
+
+/// A surface point with its scattering and the frame for it.
+struct Vertex<'a> {
+    at: &'a SurfaceInteraction,
+    bsdf: Bsdf,
+    frame: Frame,
+    wo: Vec3,
+    /// Cosine between the direction back and the geometric normal.
+    cos_geometric: f32,
+}
+
+impl<'a> Vertex<'a> {
+    #[inline]
+    fn new(world: &World, at: &'a SurfaceInteraction, ray: &Ray) -> Self {
+        let back = -ray.direction;
+        let cos_geometric = back.dot(at.n_g);
+        // Near silhouettes an interpolated normal may face away although the surface faces us; the flat one is right there.
+        let n_s = if back.dot(at.n_s) * cos_geometric > 0.0 { at.n_s } else { at.n_g };
+        let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
+        let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
+        Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric }
+    }
+
+    /// Whether the shading frame and the geometry agree on which side a direction lies; where they do not, light would leak through.
+    #[inline]
+    fn sides_agree(&self, local: Vec3, world: Vec3) -> bool {
+        let reflected_in_frame = local.z * self.wo.z > 0.0;
+        let reflected_in_geometry = world.dot(self.at.n_g) * self.cos_geometric > 0.0;
+        reflected_in_frame == reflected_in_geometry
+    }
+
+    #[inline]
+    fn eval(&self, direction: Vec3) -> Option<crate::bsdf::BsdfEval> {
+        let wi = self.frame.to_local(direction);
+        if !self.sides_agree(wi, direction) {
+            return None;
+        }
+        let eval = self.bsdf.eval(self.wo, wi);
+        (!eval.value.is_black()).then_some(eval)
+    }
+
+    #[inline]
+    fn sample(&self, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Vec3)> {
+        let sample = self.bsdf.sample(self.wo, u_lobe, u)?;
+        let direction = self.frame.to_world(sample.wi);
+        self.sides_agree(sample.wi, direction).then_some((sample, direction))
+    }
+}

@@ -1,0 +1,97 @@
+//! Whitted's ray tracing: mirror reflection, refraction, hard shadows and an ambient term ("An Improved Illumination Model for Shaded
+//! Display").
+
+use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sample};
+use crate::bsdf::Bsdf;
+use crate::color::Rgb;
+use crate::film::PixelSample;
+use crate::geometry::SurfaceInteraction;
+use crate::light::{Light, ShadowTarget};
+use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::{Frame, Ray};
+
+/// Whitted's ray tracing. Area lights shine from their middle, so shadows are hard; scattering that is neither mirror-like nor lit by a
+/// light contributes only through the ambient term.
+pub struct Whitted {
+    /// Largest number of segments from the camera.
+    pub max_depth: u32,
+    /// Radiance of the ambient light.
+    pub ambient: Rgb,
+    /// What the layers need.
+    pub needs: SurfaceNeeds,
+}
+
+impl Integrator for Whitted {
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
+        counts.camera += samples.len() as u64;
+        for (sample, out) in samples.iter().zip(out) {
+            *out = match world.closest(&sample.ray) {
+                Some(at) => PixelSample {
+                    radiance: self.shade(world, &sample.ray, &at, 1, counts),
+                    alpha: 1.0,
+                    surface: surface_sample(world, self.needs, &at, sample.ray.direction),
+                },
+                None => PixelSample { radiance: world.radiance_at_infinity(sample.ray.direction), ..PixelSample::default() },
+            };
+        }
+    }
+}
+
+impl Whitted {
+    /// Radiance leaving `at` against `ray`, which is the segment number `depth` of its path.
+    fn shade(&self, world: &World, ray: &Ray, at: &SurfaceInteraction, depth: u32, counts: &mut RayCounts) -> Rgb {
+        let mut radiance = world.emitted(at, -ray.direction);
+        if depth >= self.max_depth {
+            return radiance;
+        }
+        let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
+        let frame = Frame::from_normal(at.n_s);
+        let wo = frame.to_local(-ray.direction);
+
+        if !bsdf.is_delta() {
+            radiance += self.ambient * bsdf.albedo(wo);
+            for light in world.scene.lights.lights() {
+                radiance += direct_light(world, at, &frame, &bsdf, wo, light, counts);
+            }
+        }
+
+        // Both delta lobes, each without the division by its probability: u at either end of [0, 1) chooses reflection and refraction.
+        let first = bsdf.sample(wo, 0.0, [0.5; 2]).filter(|s| s.is_delta);
+        let second = bsdf.sample(wo, ONE_MINUS_EPSILON, [0.5; 2]).filter(|s| s.is_delta && Some(s.wi) != first.map(|f| f.wi));
+        for lobe in [first, second].into_iter().flatten() {
+            let next = at.spawn(frame.to_world(lobe.wi));
+            counts.indirect += 1;
+            let arriving = match world.closest(&next) {
+                Some(hit) => self.shade(world, &next, &hit, depth + 1, counts),
+                None => world.radiance_at_infinity(next.direction),
+            };
+            radiance += arriving * lobe.weight * lobe.pdf;
+        }
+        radiance
+    }
+}
+
+/// Light that arrives from the middle of one light and is scattered towards `wo`.
+fn direct_light(
+    world: &World,
+    at: &SurfaceInteraction,
+    frame: &Frame,
+    bsdf: &Bsdf,
+    wo: crate::math::Vec3,
+    light: &Light,
+    counts: &mut RayCounts,
+) -> Rgb {
+    let Some(sample) = light.sample(&world.scene.geometry, at.p, [0.5; 2]) else {
+        return Rgb::BLACK;
+    };
+    let scattered = bsdf.eval(wo, frame.to_local(sample.wi)).value * sample.radiance / sample.pdf;
+    if scattered.is_black() {
+        return scattered;
+    }
+    counts.shadow += 1;
+    let shadow = match &sample.target {
+        ShadowTarget::Point(target) => at.spawn_to(target),
+        ShadowTarget::Infinity => at.spawn(sample.wi),
+    };
+    if world.accel.occluded(&shadow) { Rgb::BLACK } else { scattered }
+}

@@ -1,0 +1,90 @@
+//! A scene with its accelerator: rays in, surface interactions out.
+
+use crate::accel::Accelerator;
+use crate::color::Rgb;
+use crate::geometry::{Hit, SurfaceInteraction};
+use crate::light::Light;
+use crate::math::float::step_past;
+use crate::math::{Aabb, Ray, Vec3};
+use crate::scene::Scene;
+
+/// How often a ray looks again behind hits that turn out to be rounding artefacts. Stacks of so many coplanar surfaces do not occur.
+const MAX_RETRACES: u32 = 64;
+
+/// A scene and the accelerator over its geometry.
+pub struct World<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The accelerator.
+    pub accel: &'a dyn Accelerator,
+    bounds: Aabb,
+}
+
+impl<'a> World<'a> {
+    /// A scene with its accelerator.
+    pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator) -> Self {
+        Self { scene, accel, bounds: accel.bounds() }
+    }
+
+    /// The surface that a ray meets first.
+    pub fn closest(&self, ray: &Ray) -> Option<SurfaceInteraction> {
+        self.resolve(ray, self.accel.intersect(ray))
+    }
+
+    /// The surface at the hit that the accelerator found for `ray`. A hit whose exact distance is not positive is an artefact of `f32`
+    /// rounding near the ray's origin; the ray then looks again behind it.
+    #[inline]
+    pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
+        let hit = hit?;
+        let at = self.scene.geometry.interaction(ray, &hit);
+        if at.is_some() { at } else { self.retrace(ray, hit) }
+    }
+
+    #[cold]
+    fn retrace(&self, ray: &Ray, mut hit: Hit) -> Option<SurfaceInteraction> {
+        let mut ray = *ray;
+        for _ in 0..MAX_RETRACES {
+            ray.t_min = step_past(hit.t);
+            hit = self.accel.intersect(&ray)?;
+            if let Some(at) = self.scene.geometry.interaction(&ray, &hit) {
+                return Some(at);
+            }
+        }
+        None
+    }
+
+    /// Light that the surface gives off towards `wo` (unit, away from it).
+    pub fn emitted(&self, at: &SurfaceInteraction, wo: Vec3) -> Rgb {
+        let light = self.scene.surface(at.shape).light(at.prim).map(|id| self.scene.lights.get(id));
+        match light {
+            Some(Light::Area(light)) => light.radiance(at, wo),
+            _ => Rgb::BLACK,
+        }
+    }
+
+    /// Light that arrives from infinity along the unit `direction`.
+    pub fn radiance_at_infinity(&self, direction: Vec3) -> Rgb {
+        self.scene
+            .lights
+            .at_infinity()
+            .iter()
+            .fold(Rgb::BLACK, |sum, &id| sum + self.scene.lights.get(id).eval_at_infinity(direction).radiance)
+    }
+
+    /// A camera ray that starts far outside the scene, moved along itself (in `f64`) to just before the scene's box: accelerators compute
+    /// in `f32` and lose as many digits as the origin is far away.
+    #[inline]
+    pub fn approach(&self, ray: Ray) -> Ray {
+        let nearest = ray.origin.clamp(self.bounds.min, self.bounds.max);
+        let gap = (nearest - ray.origin).length();
+        let extent = self.bounds.size().max_element();
+        // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
+        if !(gap > extent && gap < f32::INFINITY) {
+            return ray;
+        }
+        let origin = ray.origin.as_dvec3();
+        let direction = ray.direction.as_dvec3();
+        let distance = f64::from(gap - 0.5 * extent) / direction.length();
+        Ray { origin: (origin + direction * distance).as_vec3(), ..ray }
+    }
+}

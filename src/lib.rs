@@ -1,0 +1,47 @@
+//! Steradian: a fast, accurate CPU renderer.
+//!
+//! Data flows one way; a later stage never reads an earlier one:
+//!
+//! ```text
+//! scene.json -- import --> desc::SceneDesc -- compile --> scene::Scene --+--> accel::build(kind, &scene.geometry)
+//! .obj .ply .exr           (plain serde data)            (indices only)  +--> World { &scene, &accel }
+//!                                                                             --> integrator --> PixelSample
+//!                                                                             --> Film --> output::{exr, png}
+//! ```
+//!
+//! A module imports only from lower layers (`tests/tidy.rs` enforces the table):
+//!
+//! | # | modules |
+//! |---|---|
+//! | 0 | `id`, `error` |
+//! | 1 | `math`, `desc` |
+//! | 2 | `color`, `sampling`, `import` |
+//! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film` |
+//! | 4 | `accel`, `material`, `light`, `output` |
+//! | 5 | `scene` |
+//! | 6 | `integrator`, `compile` |
+//! | 7 | `render` |
+//! | 9 | `bin/steradian` |
+
+pub mod accel;
+pub mod bsdf;
+pub mod camera;
+pub mod color;
+pub mod compile;
+pub mod desc;
+pub mod error;
+pub mod film;
+pub mod geometry;
+pub mod id;
+pub mod import;
+pub mod integrator;
+pub mod light;
+pub mod material;
+pub mod math;
+pub mod output;
+pub mod render;
+pub mod sampling;
+pub mod scene;
+pub mod texture;
+
+pub use error::{Error, ErrorKind, Result};

@@ -1,0 +1,236 @@
+//! Light from surfaces.
+
+mod parallelogram;
+mod sphere;
+mod triangle;
+
+use std::f64::consts::PI;
+
+use parallelogram::ParallelogramEmitter;
+use sphere::SphereEmitter;
+use triangle::{TriangleEmitter, triangle_error};
+
+use super::{LightSample, ShadowTarget};
+use crate::color::Rgb;
+use crate::geometry::{Analytic, Geometry, Mesh, Placed, Shape, SpawnTarget, SurfaceInteraction};
+use crate::id::{PrimId, ShapeId};
+use crate::math::float::UNIT_ROUNDOFF;
+use crate::math::{DVec3, Ray, Vec3};
+
+/// Light given off by a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance.
+    pub radiance: Rgb,
+    /// Whether the back emits too.
+    pub two_sided: bool,
+}
+
+/// An emissive analytic shape, one triangle of an emissive mesh, or a mesh of two triangles that make up a parallelogram.
+///
+/// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by area.
+#[derive(Clone, Debug)]
+pub struct AreaLight {
+    /// The shape.
+    pub shape: ShapeId,
+    /// The triangle, or 0.
+    pub prim: PrimId,
+    /// What it emits.
+    pub emission: Emission,
+    form: Form,
+}
+
+/// What is known of the surface before any point asks.
+#[derive(Clone, Debug)]
+enum Form {
+    Sphere(SphereEmitter),
+    Parallelogram(ParallelogramEmitter),
+    Triangle(TriangleEmitter),
+    /// Any analytic shape, by its own sampling; of this world area.
+    Placed {
+        area: f64,
+    },
+}
+
+/// A point of an emitter as seen from another point.
+struct SurfaceSample {
+    p: DVec3,
+    /// Unit normal, towards the front.
+    n: Vec3,
+    /// Unit direction to the point.
+    wi: Vec3,
+    /// Density per solid angle.
+    pdf: f32,
+}
+
+impl SurfaceSample {
+    /// The point `q` with the unit normal `n`, found with a density per area, as seen from `p`; `None` if it is seen edge-on.
+    #[inline]
+    fn from_area(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> Option<Self> {
+        let toward = q - p;
+        let distance_squared = toward.length_squared();
+        let distance = distance_squared.sqrt();
+        let pdf = (pdf_area * distance_squared * distance / n.dot(toward).abs()) as f32;
+        // A NaN, where both points are one, is no sample either.
+        (pdf > 0.0 && pdf < f32::INFINITY).then(|| Self { p: q, n: n.as_vec3(), wi: (toward * (1.0 / distance)).as_vec3(), pdf })
+    }
+
+    /// The density of [`from_area`](Self::from_area), 0 where that gives nothing.
+    #[inline]
+    fn pdf_from_area(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> f32 {
+        let toward = q - p;
+        let distance_squared = toward.length_squared();
+        let pdf = (pdf_area * distance_squared * distance_squared.sqrt() / n.dot(toward).abs()) as f32;
+        if pdf > 0.0 && pdf < f32::INFINITY { pdf } else { 0.0 }
+    }
+}
+
+impl AreaLight {
+    /// The light of one primitive of a shape that stands in the world (not within an object).
+    pub fn new(shape: ShapeId, prim: PrimId, emission: Emission, geometry: &Geometry) -> Self {
+        let form = match geometry.shape(shape) {
+            Shape::Mesh(mesh) => Form::Triangle(TriangleEmitter::new(&mesh.triangle_points(prim))),
+            Shape::Analytic(placed) => Form::analytic(placed),
+        };
+        Self { shape, prim, emission, form }
+    }
+
+    /// The lights of a shape that stands in the world: one for each triangle of a mesh in their order, or a single one for an analytic
+    /// shape and for a mesh of two triangles that make up a parallelogram.
+    ///
+    /// The `single_light` of the scene's surface is to be set if there is only one.
+    pub fn for_shape(shape: ShapeId, emission: Emission, geometry: &Geometry) -> Vec<Self> {
+        let first = PrimId(0);
+        if let Shape::Mesh(mesh) = geometry.shape(shape) {
+            if let Some(form) = Form::two_triangles(mesh) {
+                return vec![Self { shape, prim: first, emission, form }];
+            }
+            return (0..mesh.triangles().len()).map(|i| Self::new(shape, PrimId::new(i), emission, geometry)).collect();
+        }
+        vec![Self::new(shape, first, emission, geometry)]
+    }
+
+    /// Radiance leaving the point towards `wo` (unit, away from the surface).
+    #[inline]
+    pub fn radiance(&self, at: &SurfaceInteraction, wo: Vec3) -> Rgb {
+        if self.emission.two_sided || at.n_g.dot(wo) > 0.0 { self.emission.radiance } else { Rgb::BLACK }
+    }
+
+    /// Light that arrives at `p` from a chosen point of the surface; `None` where `p` sees the dark side.
+    #[inline]
+    pub fn sample(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<LightSample> {
+        let both = self.emission.two_sided;
+        let (sample, error) = match &self.form {
+            Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
+            Form::Parallelogram(quad) if both || quad.sees_front(p) => (quad.sample(p, u)?, quad.error),
+            Form::Triangle(triangle) if both || triangle.sees_front(p) => (triangle.sample(p, u)?, triangle.error),
+            Form::Placed { .. } => {
+                let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
+                let point = placed.sample_area(u);
+                let sample = SurfaceSample::from_area(p, point.p, point.n.as_dvec3(), point.pdf_area)?;
+                if !both && sample.wi.dot(sample.n) >= 0.0 {
+                    return None;
+                }
+                (sample, 0.0)
+            }
+            _ => return None,
+        };
+        let target = ShadowTarget::Point(SpawnTarget { p: sample.p, n: sample.n, error });
+        Some(LightSample { wi: sample.wi, radiance: self.emission.radiance, pdf: sample.pdf, is_delta: false, target })
+    }
+
+    /// Density per solid angle with which [`sample`](Self::sample) from `p` would have chosen the direction of `ray` (unit), which starts
+    /// at `p` and hit this light at `at`; zero on the dark side.
+    #[inline]
+    pub fn pdf(&self, geometry: &Geometry, p: DVec3, ray: &Ray, at: &SurfaceInteraction) -> f32 {
+        if !self.emission.two_sided && at.n_g.dot(ray.direction) >= 0.0 {
+            return 0.0;
+        }
+        match &self.form {
+            Form::Sphere(sphere) => sphere.pdf(p, at.p),
+            Form::Parallelogram(quad) => quad.pdf(p, at.p),
+            Form::Triangle(triangle) => triangle.pdf(p, at.p),
+            Form::Placed { .. } => {
+                let Shape::Analytic(placed) = geometry.shape(self.shape) else { return 0.0 };
+                // Where the normal does not tell how densely the shape is sampled, the hit itself must.
+                let pdf_area = placed.pdf_area_from_normal(at.n_g).or_else(|| placed.pdf_area(ray));
+                pdf_area.map_or(0.0, |pdf_area| SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), pdf_area))
+            }
+        }
+    }
+
+    /// Area of the surface, in the world.
+    pub fn area(&self) -> f64 {
+        match &self.form {
+            Form::Sphere(sphere) => sphere.area(),
+            Form::Parallelogram(quad) => quad.area(),
+            Form::Triangle(triangle) => triangle.area(),
+            Form::Placed { area } => *area,
+        }
+    }
+
+    /// Emitted power, as luminance.
+    pub fn power(&self) -> f64 {
+        let sides = if self.emission.two_sided { 2.0 } else { 1.0 };
+        sides * PI * self.area() * f64::from(self.emission.radiance.luminance())
+    }
+}
+
+impl Form {
+    fn analytic(placed: &Placed) -> Self {
+        match (&placed.shape, placed.transform.uniform_scale()) {
+            (Analytic::Sphere(sphere), Some(scale)) if sphere.is_full() => Self::Sphere(SphereEmitter {
+                center: placed.transform.point(DVec3::ZERO),
+                radius: sphere.radius() * scale,
+                inward: placed.reverse_normal,
+            }),
+            (Analytic::Quad(quad), _) => {
+                let map = &placed.transform;
+                let front = placed.sample_area([0.5; 2]).n.as_dvec3();
+                ParallelogramEmitter::new(map.point(quad.origin()), map.vector(quad.edge_u()), map.vector(quad.edge_v()), front, 0.0)
+                    .map_or(Self::Placed { area: 0.0 }, Self::Parallelogram)
+            }
+            _ => Self::Placed { area: placed_area(placed) },
+        }
+    }
+
+    /// Two triangles that share an edge, look to the same side and make up a parallelogram.
+    fn two_triangles(mesh: &Mesh) -> Option<Self> {
+        if mesh.triangles().len() != 2 {
+            return None;
+        }
+        let (first, second) = (mesh.triangle_points(PrimId(0)), mesh.triangle_points(PrimId(1)));
+        let (corners, others) = ([first.a, first.b, first.c], [second.a, second.b, second.c]);
+
+        // The corner that the second triangle does not have, and the shared edge, run in opposite orders if both look to the same side.
+        let lone = (0..3).find(|&i| !others.contains(&corners[i]))?;
+        let (corner, next, last) = (corners[lone], corners[(lone + 1) % 3], corners[(lone + 2) % 3]);
+        let back = (0..3).find(|&i| others[i] == last && others[(i + 1) % 3] == next)?;
+        let opposite = others[(back + 2) % 3];
+
+        // Closed up to the rounding of its corners, which counts as an error of the surface.
+        let (origin, far) = (corner.as_dvec3(), opposite.as_dvec3());
+        let (edge_u, edge_v) = (next.as_dvec3() - origin, last.as_dvec3() - origin);
+        let gap = (origin + edge_u + edge_v - far).abs().max_element();
+        let largest = [origin, far, next.as_dvec3(), last.as_dvec3()].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        if gap > 4.0 * UNIT_ROUNDOFF * largest {
+            return None;
+        }
+        let error = triangle_error(&first).max(triangle_error(&second)) + gap as f32;
+        ParallelogramEmitter::new(origin, edge_u, edge_v, first.cross(), error).map(Self::Parallelogram)
+    }
+}
+
+/// World area of any analytic shape: the mean of its inverse density.
+fn placed_area(placed: &Placed) -> f64 {
+    let n = 64;
+    let middle = |i: u32| (i as f32 + 0.5) / n as f32;
+    let sum: f64 = (0..n * n).map(|i| 1.0 / placed.sample_area([middle(i % n), middle(i / n)]).pdf_area).sum();
+    let area = sum / f64::from(n * n);
+    if area.is_finite() { area } else { 0.0 }
+}
+
+#[cfg(test)]
+mod analytic_tests;
+#[cfg(test)]
+mod tests;

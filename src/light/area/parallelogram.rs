@@ -1,0 +1,209 @@
+//! Parallelograms: rectangles are sampled by the solid angle they fill (Ureña, Fajardo, King, "An Area-Preserving Parametrization for
+//! Spherical Rectangles"), all others by area.
+
+use super::SurfaceSample;
+use crate::math::DVec3;
+
+/// A parallelogram in the world.
+#[derive(Clone, Debug)]
+pub(super) struct ParallelogramEmitter {
+    corner: DVec3,
+    /// Unit vectors along the edges.
+    axis_u: DVec3,
+    axis_v: DVec3,
+    length_u: f64,
+    length_v: f64,
+    /// Unit normal, towards the front.
+    normal: DVec3,
+    area: f64,
+    /// Bound on the error of the surface's position as an accelerator sees it.
+    pub error: f32,
+    is_rectangle: bool,
+}
+
+/// Cosine between edges up to which a parallelogram counts as a rectangle; densities are off by about as much.
+const RIGHT_ANGLE: f64 = 1e-5;
+
+/// Below this solid angle the parametrisation loses digits.
+const SMALLEST_SOLID_ANGLE: f64 = 1e-6;
+
+/// Up to this ratio of the largest and the smallest squared distance, sampling by area is as good: the density varies by
+/// less than a half, and a sample costs an eighth.
+const FAR_RATIO: f64 = 1.3;
+
+/// The rectangle as seen from a point: coordinates of its sides along its edges, the distance of its plane, squared distances of its
+/// corners.
+struct View {
+    x0: f64,
+    x1: f64,
+    y0: f64,
+    y1: f64,
+    height: f64,
+    /// Squared distances of the corners (x0, y0), (x1, y0), (x1, y1) and (x0, y1).
+    corners: [f64; 4],
+}
+
+impl ParallelogramEmitter {
+    /// From a corner, two edges and a vector on the front side; `None` if there is no area.
+    pub fn new(corner: DVec3, edge_u: DVec3, edge_v: DVec3, front: DVec3, error: f32) -> Option<Self> {
+        let cross = edge_u.cross(edge_v);
+        let area = cross.length();
+        let (length_u, length_v) = (edge_u.length(), edge_v.length());
+        if !(area > 0.0 && area.is_finite()) {
+            return None;
+        }
+        let normal = cross / area;
+        Some(Self {
+            corner,
+            axis_u: edge_u / length_u,
+            axis_v: edge_v / length_v,
+            length_u,
+            length_v,
+            normal: if normal.dot(front) < 0.0 { -normal } else { normal },
+            area,
+            error,
+            is_rectangle: edge_u.dot(edge_v).abs() <= RIGHT_ANGLE * length_u * length_v,
+        })
+    }
+
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Whether `p` sees the front.
+    #[inline]
+    pub fn sees_front(&self, p: DVec3) -> bool {
+        self.normal.dot(p - self.corner) > 0.0
+    }
+
+    #[inline]
+    fn view(&self, p: DVec3) -> View {
+        let d = self.corner - p;
+        let (x0, y0) = (d.dot(self.axis_u), d.dot(self.axis_v));
+        let (x1, y1, height) = (x0 + self.length_u, y0 + self.length_v, d.dot(self.normal).abs());
+        let squared = |x: f64, y: f64| x * x + y * y + height * height;
+        View { x0, x1, y0, y1, height, corners: [squared(x0, y0), squared(x1, y0), squared(x1, y1), squared(x0, y1)] }
+    }
+
+    /// A point as seen from `p`; `None` in the plane.
+    #[inline]
+    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+        let view = self.view(p);
+        let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };
+        let Some(solid_angle) = by_solid_angle else {
+            let q = self.point(f64::from(u[0]) * self.length_u, f64::from(u[1]) * self.length_v);
+            return SurfaceSample::from_area(p, q, self.normal, 1.0 / self.area);
+        };
+        let [x, y] = view.sample(solid_angle, u);
+        let q = self.point(x - view.x0, y - view.y0);
+        let toward = q - p;
+        let wi = (toward * (1.0 / toward.length())).as_vec3();
+        Some(SurfaceSample { p: q, n: self.normal.as_vec3(), wi, pdf: (1.0 / solid_angle) as f32 })
+    }
+
+    /// The point at distances from the corner along the edges.
+    #[inline]
+    fn point(&self, along_u: f64, along_v: f64) -> DVec3 {
+        self.corner + self.axis_u * along_u + self.axis_v * along_v
+    }
+
+    /// Density per solid angle with which `sample` from `p` finds the point `q`.
+    #[inline]
+    pub fn pdf(&self, p: DVec3, q: DVec3) -> f32 {
+        let by_solid_angle = if self.is_rectangle { self.view(p).usable_solid_angle() } else { None };
+        match by_solid_angle {
+            Some(solid_angle) => (1.0 / solid_angle) as f32,
+            None => SurfaceSample::pdf_from_area(p, q, self.normal, 1.0 / self.area),
+        }
+    }
+
+    #[cfg(test)]
+    pub fn solid_angle(&self, p: DVec3) -> f64 {
+        self.view(p).solid_angle()
+    }
+
+    #[cfg(test)]
+    pub fn is_sampled_by_solid_angle(&self, p: DVec3) -> bool {
+        self.is_rectangle && self.view(p).usable_solid_angle().is_some()
+    }
+}
+
+impl View {
+    /// Solid angle of the rectangle, to `f32` precision at any size: Van Oosterom and Strackee's formula for both of its triangles, whose
+    /// half-angles add up as the arguments of complex numbers, so that nothing cancels.
+    #[inline]
+    fn solid_angle(&self) -> f64 {
+        let View { x0, x1, y0, y1, height, corners } = *self;
+        let h2 = height * height;
+        let [l00, l10, l11, l01] = corners.map(f64::sqrt);
+        let dot = |xa: f64, ya: f64, xb: f64, yb: f64| xa * xb + ya * yb + h2;
+        // Both triangles have the same volume with the point; they share the diagonal from 00 to 11.
+        let volume = height * (x1 - x0) * (y1 - y0);
+        let diagonal = dot(x0, y0, x1, y1);
+        let lower = l00 * l10 * l11 + dot(x0, y0, x1, y0) * l11 + diagonal * l10 + dot(x1, y0, x1, y1) * l00;
+        let upper = l00 * l11 * l01 + diagonal * l01 + dot(x0, y0, x0, y1) * l11 + dot(x1, y1, x0, y1) * l00;
+        let imaginary = volume * (lower + upper);
+        let real = lower * upper - volume * volume;
+        // Scaled into the range of f32.
+        let scale = 1.0 / imaginary.abs().max(real.abs());
+        2.0 * f64::from(((imaginary * scale) as f32).atan2((real * scale) as f32))
+    }
+
+    /// The solid angle if the parametrisation is to be used.
+    #[inline]
+    fn usable_solid_angle(&self) -> Option<f64> {
+        // Along each axis the rectangle reaches from 0 or the nearer side to the farther side.
+        let (near_x, near_y) = (self.x0.max(-self.x1).max(0.0), self.y0.max(-self.y1).max(0.0));
+        let nearest = near_x * near_x + near_y * near_y + self.height * self.height;
+        let [a, b, c, d] = self.corners;
+        if a.max(b).max(c.max(d)) < FAR_RATIO * nearest {
+            return None;
+        }
+        let solid_angle = self.solid_angle();
+        (solid_angle > SMALLEST_SOLID_ANGLE).then_some(solid_angle)
+    }
+
+    /// A point distributed uniformly by solid angle.
+    #[inline]
+    fn sample(&self, solid_angle: f64, u: [f32; 2]) -> [f64; 2] {
+        let View { x0, x1, y0, y1, height, corners } = *self;
+        let h2 = height * height;
+        let (l00, l01) = (corners[0].sqrt(), corners[3].sqrt());
+
+        // Cosines of the side planes' normals with the plane's normal; the sines are the height times the reciprocals.
+        let reciprocal = |a: f64| 1.0 / (a * a + h2).sqrt();
+        let (r_x0, r_y0, r_y1) = (reciprocal(x0), reciprocal(y0), reciprocal(y1));
+        let (b_x0, b_y0, b_y1) = (x0 * r_x0, y0 * r_y0, y1 * r_y1);
+
+        // The inner angles at the corners (x0, y1) and (x0, y0), between the planes of the sides that meet there.
+        let (cos_2, cos_3) = (b_y1 * b_x0, -b_x0 * b_y0);
+        let (sin_2, sin_3) = (height * l01 * r_y1 * r_x0, height * l00 * r_x0 * r_y0);
+        // k = 2 pi minus both.
+        let cos_k = cos_2 * cos_3 - sin_2 * sin_3;
+        let sin_k = -(sin_2 * cos_3 + cos_2 * sin_3);
+
+        // The angle a = k + u S, by half-angles so that small ones keep their digits.
+        let (s, c) = (0.5 * u[0] * solid_angle as f32).sin_cos();
+        let (s, c) = (f64::from(s), f64::from(c));
+        let norm = 1.5 - 0.5 * (s * s + c * c);
+        let (s, c) = (s * norm, c * norm);
+        let (sin_u, cos_u) = (2.0 * s * c, 1.0 - 2.0 * s * s);
+        let cos_a = cos_k * cos_u - sin_k * sin_u;
+        let sin_a = sin_k * cos_u + cos_k * sin_u;
+
+        // x: the side plane that cuts off the solid angle u S. Its cosine is 1 / sqrt(f² + b²).
+        let f = (-cos_a * b_y0 - b_y1) / sin_a;
+        let s_y0 = height * r_y0;
+        let excess = f * f - s_y0 * s_y0;
+        let x = if excess > 0.0 { (height / excess.sqrt()).copysign(f) } else { f64::INFINITY.copysign(f) };
+        let x = x.clamp(x0, x1);
+
+        // y: uniform in the sine of the elevation. In f32: it rounds the choice of the point, not the point.
+        let (d2, y0, y1) = ((x * x + h2) as f32, y0 as f32, y1 as f32);
+        let (lower, upper) = (y0 / (d2 + y0 * y0).sqrt(), y1 / (d2 + y1 * y1).sqrt());
+        let sine = lower + u[1] * (upper - lower);
+        let y = f64::from(sine * (d2 / ((1.0 - sine) * (1.0 + sine))).sqrt());
+        // A NaN (the sine is 1) takes the limit too.
+        [x, if y < self.y1 { y.max(self.y0) } else { self.y1 }]
+    }
+}

@@ -1,0 +1,331 @@
+use std::f64::consts::{PI, TAU};
+
+use super::*;
+use crate::geometry::Hit;
+use crate::light::test_support::{Random, assert_chi_squared};
+
+const WHITE: Emission = Emission { radiance: Rgb::WHITE, two_sided: false };
+
+fn scene(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Geometry {
+    let mesh = Mesh::new(positions.to_vec(), triangles.to_vec(), None, None).unwrap();
+    Geometry { shapes: vec![Shape::Mesh(mesh)], world: vec![ShapeId(0)], ..Geometry::default() }
+}
+
+/// A rectangle at z = 1 that looks down, with x in [-0.3, 0.7] and y in [-0.5, 0.5].
+fn ceiling() -> Geometry {
+    scene(&[[-0.3, -0.5, 1.0], [-0.3, 0.5, 1.0], [0.7, 0.5, 1.0], [0.7, -0.5, 1.0]], &[[0, 1, 2], [0, 2, 3]])
+}
+
+/// Irradiance at `p` on a surface with normal `n`, by a stratified grid of samples from all lights.
+pub(super) fn irradiance(lights: &[AreaLight], geometry: &Geometry, p: DVec3, n: DVec3) -> f64 {
+    let grid = 300;
+    let mut sum = 0.0;
+    for light in lights {
+        for i in 0..grid * grid {
+            let u = [((i % grid) as f32 + 0.5) / grid as f32, ((i / grid) as f32 + 0.5) / grid as f32];
+            if let Some(s) = light.sample(geometry, p, u) {
+                sum += f64::from(s.radiance.g) * n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf);
+            }
+        }
+    }
+    sum / f64::from(grid * grid)
+}
+
+/// Asserts that shadow targets lie on the light and that its hits have the density of the samples.
+pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p: DVec3, tolerance: f32) {
+    let mut random = Random(7);
+    let (mut hits, n) = (0, 2000);
+    let p = p.as_vec3().as_dvec3();
+    for _ in 0..n {
+        let Some(s) = light.sample(geometry, p, random.pair()) else { continue };
+        let ray = Ray::new(p.as_vec3(), s.wi);
+        let shape = geometry.shape(light.shape);
+        // Curved shapes may be met earlier than at the sample: it is then shadowed, or the hit is another point.
+        let found = (0..shape.prim_count()).filter_map(|i| shape.intersect_prim(&ray, light.shape, PrimId::new(i)));
+        let Some(hit) = found.min_by(|a, b| a.t.total_cmp(&b.t)) else { continue };
+        let Some(at) = geometry.interaction(&ray, &hit) else { continue };
+        let ShadowTarget::Point(target) = s.target else { panic!("an area light is not at infinity") };
+        if (at.p - target.p).length() > 1e-5 * (target.p - p).length() {
+            continue;
+        }
+        // Seen edge-on, the rounding of the direction decides: it moves the point by d / cos, and the cosine by as much on a curved surface.
+        let cos = f64::from(at.n_g.dot(s.wi));
+        if cos * cos < 4e-3 * (target.p - p).length() {
+            continue;
+        }
+        hits += 1;
+        let pdf = light.pdf(geometry, p, &ray, &at);
+        assert!((pdf - s.pdf).abs() <= tolerance * s.pdf, "{pdf} {} at {:?}", s.pdf, at.p);
+        assert_eq!(light.radiance(&at, -s.wi), s.radiance);
+    }
+    assert!(hits > n / 20, "{hits}");
+}
+
+/// Asserts that what flows through a sphere around a light is its power.
+pub(super) fn assert_power_flows_out(geometry: &Geometry, light: &AreaLight, center: DVec3, radius: f64, tolerance: f64) {
+    let mut random = Random(11);
+    let n = 100_000;
+    let mut sum = 0.0;
+    for _ in 0..n {
+        let outward = random.direction();
+        if let Some(s) = light.sample(geometry, center + outward * radius, random.pair()) {
+            sum += f64::from(s.radiance.luminance()) * -outward.dot(s.wi.as_dvec3()) / f64::from(s.pdf);
+        }
+    }
+    let flux = sum / f64::from(n) * 4.0 * PI * radius * radius;
+    assert!((flux / light.power() - 1.0).abs() < tolerance, "{flux} {}", light.power());
+}
+
+/// Distances from 1.0001 to 1e7 radii.
+fn distances() -> impl Iterator<Item = f64> {
+    (0..=100).map(|i| 1.0 + 1e-4 * (1e11f64).powf(f64::from(i) / 100.0))
+}
+
+#[test]
+fn far_spheres_do_not_cancel() {
+    let sphere = SphereEmitter { center: DVec3::new(0.1, 0.2, 0.3), radius: 2.5, inward: false };
+    for d in distances() {
+        let p = sphere.center + DVec3::new(0.48, -0.6, 0.64) * (d * sphere.radius);
+        let half_angle = 1f64.atan2(((d - 1.0) * (d + 1.0)).sqrt());
+        let solid_angle = 4.0 * PI * (0.5 * half_angle).sin().powi(2);
+        let s = sphere.sample(p, [0.4, 0.3]).unwrap();
+        // The rounding of p and of the result to f32 is all there is, except next to the surface.
+        assert!((f64::from(s.pdf) * solid_angle - 1.0).abs() < 1e-6, "{d}");
+        assert_eq!(s.pdf, sphere.pdf(p, s.p));
+    }
+}
+
+#[test]
+fn directions_to_a_sphere_are_uniform_and_meet_it_at_the_sample() {
+    for d in [1.000_1, 1.05, 2.0, 50.0, 1e5] {
+        let sphere = SphereEmitter { center: DVec3::new(-3.0, 1.0, 2.0), radius: 0.7, inward: false };
+        let p = sphere.center + DVec3::new(0.36, 0.8, -0.48) * (0.7 * d);
+        let axis = (sphere.center - p).normalize();
+        let (x, y) = axis.any_orthonormal_pair();
+        let one_minus_cos_max = 2.0 * (0.5 * (1.0 / d).asin()).sin().powi(2);
+        let (mut counts, mut random) = (vec![0u32; 16 * 16], Random(1));
+        for _ in 0..100_000 {
+            let s = sphere.sample(p, random.pair()).unwrap();
+            assert!(((s.p - sphere.center).length() / 0.7 - 1.0).abs() < 1e-13);
+            let toward = s.p - p;
+            assert!((toward.normalize() - s.wi.as_dvec3()).length() < 2e-7 && s.n.as_dvec3().dot(toward) <= 1e-7 * toward.length());
+
+            // Equal areas of the cone; the chord keeps the digits of small angles.
+            let w = toward.normalize();
+            let one_minus_cos = 0.5 * (w - axis).length_squared();
+            let i = (one_minus_cos / one_minus_cos_max * 16.0) as usize;
+            let j = ((w.dot(y).atan2(w.dot(x)) / TAU + 1.0).fract() * 16.0) as usize;
+            counts[i.min(15) * 16 + j.min(15)] += 1;
+        }
+        assert_chi_squared(&counts, &[1.0 / 256.0; 256], &format!("sphere at {d}"));
+    }
+}
+
+#[test]
+fn a_point_inside_a_sphere_light_is_lit_without_nan() {
+    let sphere = SphereEmitter { center: DVec3::new(5.0, 0.0, 1.0), radius: 2.0, inward: true };
+    for d in [0.0, 0.5, 0.9, 1.0] {
+        let p = sphere.center + DVec3::new(0.0, 0.6, 0.8) * (2.0 * d);
+        assert!(sphere.sees_front(p));
+        let n = 300;
+        let mut sum = 0.0;
+        for i in 0..n * n {
+            let u = [((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32];
+            let s = sphere.sample(p, u).unwrap();
+            assert!(s.pdf.is_finite() && s.wi.is_finite() && (sphere.pdf(p, s.p) / s.pdf - 1.0).abs() < 1e-5);
+            sum += 1.0 / f64::from(s.pdf);
+        }
+        // From the inside the sphere fills all directions, from the surface half of them.
+        let exact = if d < 1.0 { 4.0 * PI } else { TAU };
+        assert!((sum / f64::from(n * n) / exact - 1.0).abs() < 5e-3, "{d}: {sum}");
+    }
+    let outward = SphereEmitter { inward: false, ..sphere };
+    assert!(!outward.sees_front(outward.center));
+}
+
+#[test]
+fn a_sphere_light_gives_the_closed_form_irradiance() {
+    // E = pi L (R / d)² cos, with the whole sphere above the horizon.
+    let light = AreaLight {
+        shape: ShapeId(0),
+        prim: PrimId(0),
+        emission: WHITE,
+        form: Form::Sphere(SphereEmitter { center: DVec3::new(1.2, 0.0, 1.6), radius: 0.5, inward: false }),
+    };
+    let e = irradiance(&[light], &Geometry::default(), DVec3::ZERO, DVec3::Z);
+    assert!((e / (PI * 0.0625 * 0.8) - 1.0).abs() < 1e-4, "{e}");
+}
+
+#[test]
+fn a_rectangle_light_gives_lamberts_irradiance() {
+    let geometry = ceiling();
+    let one = AreaLight::for_shape(ShapeId(0), WHITE, &geometry);
+    let two: Vec<_> = (0..2).map(|i| AreaLight::new(ShapeId(0), PrimId(i), WHITE, &geometry)).collect();
+    assert_eq!(one.len(), 1);
+    // Lambert's formula for polygons: E = L / 2 sum acos(a·b) n·(a x b) / |a x b|.
+    for lights in [&one, &two] {
+        let e = irradiance(lights, &geometry, DVec3::ZERO, DVec3::Z);
+        assert!((e / 0.718_688_9 - 1.0).abs() < 1e-4, "{e}");
+    }
+    assert!(one[0].sample(&geometry, DVec3::new(0.0, 0.0, 1.5), [0.5; 2]).is_none());
+    assert!(one[0].sample(&geometry, DVec3::new(3.0, 0.0, 1.0), [0.5; 2]).is_none());
+    let both = AreaLight { emission: Emission { two_sided: true, ..WHITE }, ..one[0].clone() };
+    assert!(both.sample(&geometry, DVec3::new(0.0, 0.0, 1.5), [0.5; 2]).is_some());
+    assert_eq!(both.power(), 2.0 * one[0].power());
+}
+
+#[test]
+fn spherical_rectangles_are_sampled_uniformly() {
+    let (corner, u, v) = (DVec3::new(-1.0, -0.5, 0.0), DVec3::new(3.0, 0.0, 0.0), DVec3::new(0.0, 2.0, 0.0));
+    let quad = ParallelogramEmitter::new(corner, u, v, DVec3::Z, 0.0).unwrap();
+    for p in [[0.3, 0.4, 1.0], [0.3, 0.4, 0.02], [5.0, -7.0, 3.0], [40.0, 3.0, 0.5], [0.0, 0.0, 300.0], [-1.0, -0.5, 0.1], [2.1, 0.0, 1e-3]]
+    {
+        let p = DVec3::from(p);
+        let n = 12;
+        // What each cell fills of the whole.
+        let cell = |i: usize| {
+            let at = corner + u * ((i % n) as f64 / n as f64) + v * ((i / n) as f64 / n as f64);
+            ParallelogramEmitter::new(at, u / n as f64, v / n as f64, DVec3::Z, 0.0).unwrap().solid_angle(p)
+        };
+        let cells: Vec<f64> = (0..n * n).map(cell).collect();
+        let whole = quad.solid_angle(p);
+        assert!((cells.iter().sum::<f64>() / whole - 1.0).abs() < 1e-5, "{p}");
+        let probabilities: Vec<f64> = cells.iter().map(|c| c / whole).collect();
+
+        let (mut counts, mut random) = (vec![0u32; n * n], Random(3));
+        if !quad.is_sampled_by_solid_angle(p) {
+            assert!(p.length() > 30.0);
+            let sum: f64 = (0..100_000).map(|_| 1.0 / f64::from(quad.sample(p, random.pair()).unwrap().pdf)).sum();
+            assert!((sum / 1e5 / whole - 1.0).abs() < 1e-3);
+            continue;
+        }
+        for _ in 0..100_000 {
+            let s = quad.sample(p, random.pair()).unwrap();
+            assert!((f64::from(s.pdf) * whole - 1.0).abs() < 1e-6 && s.pdf == quad.pdf(p, s.p), "{p}");
+            let at = [(s.p.x + 1.0) / 3.0, (s.p.y + 0.5) / 2.0].map(|x| ((x * n as f64) as usize).min(n - 1));
+            counts[at[1] * n + at[0]] += 1;
+        }
+        assert_chi_squared(&counts, &probabilities, &format!("rectangle from {p}"));
+    }
+}
+
+#[test]
+fn solid_angles_of_rectangles_are_exact() {
+    let square = |size: f64| {
+        let corner = DVec3::new(-0.5 * size, -0.5 * size, 1.0);
+        ParallelogramEmitter::new(corner, DVec3::X * size, DVec3::Y * size, -DVec3::Z, 0.0).unwrap()
+    };
+    for size in [1e-9f64, 1e-3, 1.0, 2.0, 1e3, 1e9] {
+        // On the axis: 4 asin(a² / (a² + h²)), which is 4 atan(a² / (h sqrt(2 a² + h²))).
+        let a = 0.5 * size;
+        let exact = 4.0 * (a * a / (2.0 * a * a + 1.0).sqrt()).atan();
+        let found = square(size).solid_angle(DVec3::ZERO);
+        assert!((found / exact - 1.0).abs() < 1e-6, "{size}: {found} {exact}");
+    }
+    // A face of a cube from its centre: a sixth of the sphere.
+    assert!((square(2.0).solid_angle(DVec3::ZERO) / (4.0 * PI / 6.0) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn hits_have_the_density_of_samples() {
+    let rectangle = ceiling();
+    let skewed = scene(&[[0.0, 0.0, 2.0], [0.5, 1.0, 2.0], [1.5, 1.0, 2.5], [1.0, 0.0, 2.5]], &[[0, 1, 2], [0, 2, 3]]);
+    for geometry in [rectangle, skewed] {
+        let mut lights = AreaLight::for_shape(ShapeId(0), WHITE, &geometry);
+        assert_eq!(lights.len(), 1);
+        lights.extend((0..2).map(|i| AreaLight::new(ShapeId(0), PrimId(i), WHITE, &geometry)));
+        for light in &lights {
+            for p in [DVec3::ZERO, DVec3::new(0.2, 0.1, 0.9), DVec3::new(7.0, -5.0, -2.0)] {
+                assert_samples_are_hits(&geometry, light, p, 1e-4);
+            }
+            assert_power_flows_out(&geometry, light, DVec3::new(0.2, 0.0, 1.0), 6.0, 0.03);
+        }
+    }
+}
+
+#[test]
+fn each_light_has_its_own_area() {
+    let mut geometry = ceiling();
+    let small = scene(&[[0.0, 0.0, 2.0], [0.0, 0.1, 2.0], [0.1, 0.1, 2.0], [0.1, 0.0, 2.0]], &[[0, 1, 2], [0, 2, 3]]);
+    geometry.shapes.extend(small.shapes);
+    let [large, small] = [0, 1].map(|i| AreaLight::for_shape(ShapeId(i), WHITE, &geometry).remove(0));
+    assert!((large.area() - 1.0).abs() < 1e-6 && (small.area() - 0.01).abs() < 1e-8);
+    assert!((small.power() / (0.01 * PI) - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn only_parallelograms_are_single_lights() {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.2, 1.1, 0.0], [1.0, 1.0, 1e-3]];
+    let count = |triangles: &[[u32; 3]]| AreaLight::for_shape(ShapeId(0), WHITE, &scene(&corners, triangles)).len();
+    for rotation in 0..3 {
+        let turned = |t: [u32; 3]| [t[rotation], t[(rotation + 1) % 3], t[(rotation + 2) % 3]];
+        assert_eq!(count(&[[0, 1, 2], turned([0, 2, 3])]), 1);
+        assert_eq!(count(&[turned([0, 1, 3]), [1, 2, 3]]), 1);
+        // The second looks the other way, or the corners are none of a parallelogram.
+        assert_eq!(count(&[[0, 1, 2], turned([0, 3, 2])]), 2);
+        assert_eq!(count(&[[0, 1, 3], turned([1, 4, 3])]), 2);
+        assert_eq!(count(&[[0, 1, 3], turned([1, 5, 3])]), 2);
+        assert_eq!(count(&[[0, 1, 2], turned([0, 1, 2])]), 2);
+    }
+    assert_eq!(count(&[[0, 1, 2]]), 1);
+    assert_eq!(count(&[[0, 1, 2], [0, 2, 3], [0, 1, 4]]), 3);
+}
+
+#[test]
+fn triangles_without_area_give_no_light() {
+    let geometry = scene(&[[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], &[[0, 1, 2], [0, 0, 1]]);
+    for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry) {
+        let both = AreaLight { emission: Emission { two_sided: true, ..WHITE }, ..light };
+        assert!(both.sample(&geometry, DVec3::new(0.3, 0.2, 1.0), [0.3, 0.6]).is_none());
+        assert_eq!(both.power(), 0.0);
+    }
+}
+
+#[test]
+fn a_shadow_ray_reaches_the_light_it_was_made_for() {
+    let geometry = ceiling();
+    for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry) {
+        let mut random = Random(5);
+        for _ in 0..20_000 {
+            let distance = 10f64.powf(f64::from(random.next()) * 7.0 - 3.0);
+            let p = DVec3::new(0.1, 0.2, 1.0 - distance);
+            let Some(s) = light.sample(&geometry, p, random.pair()) else { continue };
+            let ShadowTarget::Point(target) = s.target else { panic!("an area light is not at infinity") };
+            let from = SurfaceInteraction {
+                p,
+                t: 1.0,
+                error: 0.0,
+                n_g: Vec3::Z,
+                n_s: Vec3::Z,
+                dp_du: Vec3::ZERO,
+                uv: crate::math::Vec2::ZERO,
+                shape: ShapeId(9),
+                prim: PrimId(0),
+                instance: Hit::NO_INSTANCE,
+            };
+            let ray = from.spawn_to(&target);
+            let blocked = (0..2).any(|i| geometry.shape(ShapeId(0)).intersect_prim(&ray, ShapeId(0), PrimId(i)).is_some());
+            assert!(!blocked, "{distance}");
+        }
+    }
+}
+
+#[test]
+fn a_point_almost_in_a_rectangle_sees_it_evenly() {
+    let quad = ParallelogramEmitter::new(DVec3::new(-1.0, -0.5, 0.0), DVec3::X * 3.0, DVec3::Y * 2.0, DVec3::Z, 0.0).unwrap();
+    // Above the inside the rectangle fills a hemisphere, above an edge half of it, above a corner a quarter.
+    for (x, y, from, to) in [(0.3, 0.4, -PI, PI), (-1.0, 0.4, -0.5 * PI, 0.5 * PI), (-1.0, -0.5, 0.0, 0.5 * PI), (1.5, 1.5, -PI, 0.0)] {
+        for height in [1e-12, 1e-8, 1e-5] {
+            let p = DVec3::new(x, y, height);
+            let (mut counts, mut random) = (vec![0u32; 256], Random(3));
+            for _ in 0..30_000 {
+                let s = quad.sample(p, random.pair()).unwrap();
+                assert!((f64::from(s.pdf) * (to - from) - 1.0).abs() < 1e-4);
+                let d = (s.p - p).normalize();
+                let (i, j) = ((-d.z * 16.0) as usize, ((d.y.atan2(d.x) - from) / (to - from) * 16.0) as usize);
+                counts[i.min(15) * 16 + j.min(15)] += 1;
+            }
+            assert_chi_squared(&counts, &[1.0 / 256.0; 256], &format!("rectangle from {p}"));
+        }
+    }
+}

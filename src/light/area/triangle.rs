@@ -1,0 +1,69 @@
+//! Triangles, sampled by area.
+
+use super::SurfaceSample;
+use crate::geometry::TrianglePoints;
+use crate::math::DVec3;
+use crate::math::float::UNIT_ROUNDOFF;
+
+/// A triangle of a mesh.
+#[derive(Clone, Debug)]
+pub(super) struct TriangleEmitter {
+    corner: DVec3,
+    edge_u: DVec3,
+    edge_v: DVec3,
+    /// Unit normal, towards the front; zero if there is no area.
+    normal: DVec3,
+    area: f64,
+    /// Bound on the error of the surface's position as an accelerator sees it.
+    pub error: f32,
+}
+
+/// The error that [`SurfaceInteraction::error`](crate::geometry::SurfaceInteraction::error) states for a hit of a triangle, for all its
+/// points: four units of roundoff of its extent.
+pub(super) fn triangle_error(points: &TrianglePoints) -> f32 {
+    4.0 * UNIT_ROUNDOFF as f32 * points.bounds().size().max_element()
+}
+
+impl TriangleEmitter {
+    pub fn new(points: &TrianglePoints) -> Self {
+        let corner = points.a.as_dvec3();
+        let cross = points.cross();
+        Self {
+            corner,
+            edge_u: points.b.as_dvec3() - corner,
+            edge_v: points.c.as_dvec3() - corner,
+            normal: cross.normalize_or_zero(),
+            area: 0.5 * cross.length(),
+            error: triangle_error(points),
+        }
+    }
+
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Whether `p` sees the front.
+    #[inline]
+    pub fn sees_front(&self, p: DVec3) -> bool {
+        self.normal.dot(p - self.corner) > 0.0
+    }
+
+    /// A point as seen from `p`; `None` in the plane.
+    #[inline]
+    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+        // Low-distortion map (Heitz, "A Low-Distortion Map Between Triangle and Square").
+        let (mut b, mut c) = (0.5 * f64::from(u[0]), 0.5 * f64::from(u[1]));
+        if c > b {
+            c += c - b;
+        } else {
+            b += b - c;
+        }
+        SurfaceSample::from_area(p, self.corner + self.edge_u * b + self.edge_v * c, self.normal, 1.0 / self.area)
+    }
+
+    /// Density per solid angle with which `sample` from `p` finds the point `q`.
+    #[inline]
+    pub fn pdf(&self, p: DVec3, q: DVec3) -> f32 {
+        SurfaceSample::pdf_from_area(p, q, self.normal, 1.0 / self.area)
+    }
+}

@@ -1,0 +1,170 @@
+//! All lights of a scene, and which one a path looks at.
+
+use super::Light;
+use crate::geometry::Geometry;
+use crate::id::LightId;
+use crate::sampling::AliasTable;
+
+/// A light chosen by [`LightSet::choose`].
+#[derive(Clone, Copy, Debug)]
+pub struct LightChoice {
+    /// The light.
+    pub id: LightId,
+    /// Probability of the choice.
+    pub pmf: f32,
+    /// What is left of the random number, uniform in `[0, 1)`.
+    pub u: f32,
+}
+
+/// All lights of a scene and the probability with which each is chosen.
+///
+/// A light is chosen in proportion to its power, but not without limits. What a light at infinity gives to a scene depends on the scene's
+/// size more than on what the camera sees; so if there are both lights at infinity and others, either kind has at least a quarter of the
+/// choices. Within a kind a twentieth of the choices is spread evenly, so that no light of positive power starves beside a strong one.
+#[derive(Clone, Debug, Default)]
+pub struct LightSet {
+    lights: Vec<Light>,
+    table: Option<AliasTable>,
+    at_infinity: Vec<LightId>,
+}
+
+/// Least share of the choices for lights at infinity, and for all others, if both exist.
+const LEAST_SHARE: f64 = 0.25;
+
+/// Share of the choices that does not ask for power.
+const EVEN_SHARE: f64 = 0.05;
+
+impl LightSet {
+    /// All lights of a scene; [`LightId`]s count in the order given.
+    pub fn new(lights: Vec<Light>, geometry: &Geometry) -> Self {
+        let bounds = geometry.bounds();
+        let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().as_dvec3().length() };
+        let power = |light: &Light| {
+            let power = light.power(radius);
+            if power > 0.0 && power.is_finite() { power } else { 0.0 }
+        };
+        let powers: Vec<f64> = lights.iter().map(power).collect();
+        let far: Vec<bool> = lights.iter().map(Light::is_at_infinity).collect();
+        let table = AliasTable::new(&probabilities(&powers, &far));
+        let at_infinity = (0..lights.len()).filter(|&i| lights[i].is_visible_at_infinity()).map(LightId::new).collect();
+        Self { lights, table, at_infinity }
+    }
+
+    /// All lights, by [`LightId`].
+    pub fn lights(&self) -> &[Light] {
+        &self.lights
+    }
+
+    /// The light with this id.
+    #[inline]
+    pub fn get(&self, id: LightId) -> &Light {
+        &self.lights[id.index()]
+    }
+
+    /// Whether there are no lights at all.
+    pub fn is_empty(&self) -> bool {
+        self.lights.is_empty()
+    }
+
+    /// A light, `u` in `[0, 1)`; `None` if there are none that emit.
+    #[inline]
+    pub fn choose(&self, u: f32) -> Option<LightChoice> {
+        let table = self.table.as_ref()?;
+        let chosen = table.sample(u);
+        Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index), u: chosen.u })
+    }
+
+    /// Probability with which a light is chosen.
+    #[inline]
+    pub fn pmf(&self, id: LightId) -> f32 {
+        self.table.as_ref().map_or(0.0, |table| table.pmf(id.index()))
+    }
+
+    /// The lights that rays leaving the scene can see: environments, and directional lights with an angle.
+    #[inline]
+    pub fn at_infinity(&self) -> &[LightId] {
+        &self.at_infinity
+    }
+}
+
+/// The probability of each light from its power and whether it is at infinity; all zero if no light has power.
+fn probabilities(powers: &[f64], far: &[bool]) -> Vec<f64> {
+    // Relative to the strongest, no sum overflows.
+    let strongest = powers.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let total = |kind: bool| powers.iter().zip(far).filter(|(_, f)| **f == kind).map(|(p, _)| p / strongest).sum::<f64>();
+    let count = |kind: bool| powers.iter().zip(far).filter(|(p, f)| **f == kind && **p > 0.0).count() as f64;
+    let (near_total, far_total) = (total(false), total(true));
+    let far_share = if count(true) == 0.0 {
+        0.0
+    } else if count(false) == 0.0 {
+        1.0
+    } else {
+        (far_total / (near_total + far_total)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE)
+    };
+    let kind = |is_far: bool| {
+        let (share, total) = if is_far { (far_share, far_total) } else { (1.0 - far_share, near_total) };
+        (share, total, count(is_far))
+    };
+    let (near, far_kind) = (kind(false), kind(true));
+    let probability = |(&power, &is_far): (&f64, &bool)| {
+        let (share, total, count) = if is_far { far_kind } else { near };
+        // A kind of no more than underflowing powers is spread evenly.
+        let by_power = if total > 0.0 { power / strongest / total } else { 1.0 / count };
+        if power > 0.0 { share * ((1.0 - EVEN_SHARE) * by_power + EVEN_SHARE / count) } else { 0.0 }
+    };
+    powers.iter().zip(far).map(probability).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::Rgb;
+    use crate::light::{DirectionalLight, Environment, PointLight};
+    use crate::math::DVec3;
+
+    fn point(intensity: f32) -> Light {
+        Light::Point(PointLight { position: DVec3::ZERO, intensity: Rgb::splat(intensity) })
+    }
+
+    fn set(lights: Vec<Light>) -> LightSet {
+        LightSet::new(lights, &Geometry::default())
+    }
+
+    #[test]
+    fn probabilities_add_up_and_are_those_of_the_choice() {
+        let sun = Light::Directional(DirectionalLight::new(-DVec3::Y, Rgb::splat(3.0), 0.01));
+        let sky = Light::Environment(Environment::Constant(Rgb::splat(1e-9)));
+        let lights = set(vec![point(1.0), sun, point(0.0), point(1e-30), sky, point(50.0)]);
+        let n = 1 << 20;
+        let mut count = [0u32; 6];
+        for i in 0..n {
+            let choice = lights.choose(i as f32 / n as f32).unwrap();
+            assert_eq!(choice.pmf, lights.pmf(choice.id));
+            count[choice.id.index()] += 1;
+        }
+        let mut sum = 0.0;
+        for (i, &c) in count.iter().enumerate() {
+            let pmf = lights.pmf(LightId::new(i));
+            assert!((c as f32 / n as f32 - pmf).abs() < 1e-5, "{i}");
+            assert_eq!(pmf > 0.0, i != 2, "{i}");
+            sum += pmf;
+        }
+        assert!((sum - 1.0).abs() < 1e-6);
+        assert!(lights.pmf(LightId(1)) + lights.pmf(LightId(4)) >= 0.249);
+        assert_eq!(lights.at_infinity(), [LightId(1), LightId(4)]);
+    }
+
+    #[test]
+    fn equal_lights_are_chosen_equally() {
+        let lights = set(vec![point(2.0); 5]);
+        assert!((0..5).all(|i| (lights.pmf(LightId(i)) - 0.2).abs() < 1e-7));
+    }
+
+    #[test]
+    fn a_sharp_sun_is_not_visible_and_no_light_is_no_choice() {
+        let lights = set(vec![Light::Directional(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0))]);
+        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0)) == 1.0);
+        assert!(LightSet::default().choose(0.5).is_none() && LightSet::default().is_empty());
+        assert!(set(vec![point(0.0)]).choose(0.5).is_none());
+    }
+}

@@ -1,0 +1,18 @@
+//! Vectors (from glam), rays, boxes, frames, transforms, roots and the one home of tolerances.
+
+mod aabb;
+pub mod bernstein;
+pub mod float;
+mod frame;
+mod ray;
+mod roots;
+mod transform;
+mod trig;
+
+pub use aabb::{Aabb, Bounds};
+pub use frame::Frame;
+pub use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3, dvec2, dvec3, vec2, vec3};
+pub use ray::{Ray, RayF64};
+pub use roots::{Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, solve_quadratic};
+pub use transform::Transform;
+pub use trig::{sin_cos_eighth, sin_cos_turns};

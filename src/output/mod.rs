@@ -1,0 +1,67 @@
+//! Picture files. Every file is written aside in its folder and renamed into place, so a reader never sees half of one.
+
+mod atomic;
+mod compare;
+mod exr;
+mod png;
+
+pub use self::exr::{read_exr, write_exr};
+pub use atomic::{check_creatable, check_writable, write_atomically};
+pub use compare::{Comparison, compare};
+pub use png::write_png;
+
+use std::path::Path;
+
+use crate::desc::OutputDesc;
+use crate::error::{Error, Result};
+use crate::film::Image;
+
+/// The kinds of files that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// OpenEXR: linear, with layers and metadata.
+    Exr,
+    /// PNG: 8 bits, sRGB-encoded.
+    Png,
+}
+
+impl Format {
+    /// Every format with its extension.
+    pub const ALL: [(Self, &'static str); 2] = [(Self::Exr, "exr"), (Self::Png, "png")];
+
+    /// The format that a file's extension names, in upper or lower case.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if there is none.
+    pub fn from_path(path: &Path) -> Result<Self> {
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_ascii_lowercase();
+        Self::ALL.iter().find(|(_, name)| *name == extension).map(|(format, _)| *format).ok_or_else(|| {
+            let known: Vec<String> = Self::ALL.iter().map(|(_, name)| format!(".{name}")).collect();
+            let what = if extension.is_empty() { "no extension".to_owned() } else { format!("the extension .{extension}") };
+            Error::Usage(format!("output {} has {what}; known are {}", path.display(), known.join(" and ")))
+        })
+    }
+}
+
+/// What a file tells of the rendering.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderInfo {
+    /// Samples per pixel.
+    pub samples_per_pixel: u32,
+    /// Wall-clock time of the rendering in seconds.
+    pub render_seconds: f64,
+    /// World to camera, for row vectors (the translation in the last row); camera space has +X right, +Y up, +Z forward.
+    pub world_to_camera: Option<[[f32; 4]; 4]>,
+}
+
+/// Writes `image` where and how `output` says.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown extension; [`Error::Output`] if the file cannot be written, in which case nothing is left behind.
+pub fn write(output: &OutputDesc, image: &Image, info: &RenderInfo) -> Result<()> {
+    let path = Path::new(&output.file);
+    match Format::from_path(path)? {
+        Format::Exr => write_exr(path, image, output, info),
+        Format::Png => write_png(path, image, output.exposure),
+    }
+}

@@ -1,0 +1,263 @@
+//! The render loop: passes over tiles, on any number of threads, with the same result for every number.
+//!
+//! A batch is one sample index of one tile of the full film's grid, whatever the crop, the threads or the passes; so every sample can be
+//! replayed alone, and any split of the work gives the same picture bit for bit.
+
+mod progress;
+mod settings;
+
+pub use progress::{Progress, Silent};
+pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings};
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use crate::accel::Accelerator;
+use crate::error::{Error, Result};
+use crate::film::{DroppedSample, Film, FilmTile, Filter, Image, LayerKind, PixelSample};
+use crate::integrator::{self, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
+use crate::math::Vec2;
+use crate::sampling::Sampler;
+use crate::scene::Scene;
+
+/// Width and height of a tile in pixels. A batch of 256 paths fills whole 16-wide packets and keeps its state in the second-level cache.
+pub const TILE_SIZE: u32 = 16;
+
+/// Camera rays of a block of this many pixels each way are traced side by side.
+const BLOCK_SIZE: u32 = 4;
+
+/// A pass aims at this time: long enough to cost nothing, short enough that an interrupt is answered soon.
+const PASS_TIME: Duration = Duration::from_millis(500);
+
+/// What a render did.
+#[derive(Clone, Debug, Default)]
+pub struct Stats {
+    /// Wall-clock seconds of the render loop.
+    pub render_seconds: f64,
+    /// Samples in the picture: pixels times samples per pixel.
+    pub samples: u64,
+    /// Samples per pixel done.
+    pub spp_done: u32,
+    /// Rays by purpose.
+    pub rays: RayCounts,
+    /// Samples that were NaN or infinite and were dropped.
+    pub nan_samples: u64,
+    /// The first few of them.
+    pub dropped: Vec<DroppedSample>,
+    /// Whether a stop was asked for before all samples were done.
+    pub interrupted: bool,
+    /// Whether the time limit ended the render.
+    pub time_limited: bool,
+}
+
+/// A picture with its statistics.
+#[derive(Clone, Debug)]
+pub struct RenderResult {
+    /// The picture.
+    pub image: Image,
+    /// What it took.
+    pub stats: Stats,
+}
+
+/// Everything that a batch needs and that does not change during a render.
+struct Job<'a> {
+    world: World<'a>,
+    integrator: Box<dyn Integrator>,
+    sampler: Sampler,
+    filter: Filter,
+    size: [u32; 2],
+}
+
+impl<'a> Job<'a> {
+    fn new(scene: &'a Scene, accel: &'a dyn Accelerator, settings: &Settings) -> Self {
+        let sampler = Sampler::new(settings.sampler, settings.seed);
+        let wanted = |kind| settings.layers.contains(kind);
+        let needs = SurfaceNeeds {
+            geometry: wanted(LayerKind::Z) || wanted(LayerKind::N) || wanted(LayerKind::P),
+            albedo: wanted(LayerKind::Albedo),
+        };
+        Self {
+            world: World::new(scene, accel),
+            integrator: integrator::build(&settings.integrator, sampler, needs),
+            sampler,
+            filter: Filter::new(&settings.filter),
+            size: settings.size,
+        }
+    }
+
+    /// Renders one sample of every pixel of the tile with this origin; `out` is in [slot order](pixel_of_slot).
+    fn render_batch(&self, origin: [u32; 2], sample: u32, batch: &mut Batch, counts: &mut RayCounts) {
+        batch.samples.clear();
+        for slot in 0..TILE_SIZE * TILE_SIZE {
+            let [dx, dy] = pixel_of_slot(slot);
+            let (x, y) = (origin[0] + dx, origin[1] + dy);
+            let seed = self.sampler.pixel(x, y);
+            let u = self.sampler.sample_4d(seed, sample, dimensions::CAMERA);
+            let filter = self.filter.sample([u[0], u[1]]);
+            let film = Vec2::new(x as f32 + 0.5 + filter.offset.x, y as f32 + 0.5 + filter.offset.y);
+            let ray = self.world.scene.camera.ray(film, self.size, [u[2], u[3]]);
+            batch.samples.push(CameraSample { ray: self.world.approach(ray), seed, sample });
+            batch.weights[slot as usize] = filter.weight;
+        }
+        self.integrator.render_batch(&self.world, &batch.samples, &mut batch.out, counts);
+    }
+
+    /// Renders the samples `first .. first + count` of every pixel of a tile.
+    fn render_tile(&self, tile: &mut FilmTile, first: u32, count: u32, batch: &mut Batch) -> RayCounts {
+        let mut counts = RayCounts::default();
+        let active = tile.active();
+        for sample in first..first + count {
+            self.render_batch(tile.origin(), sample, batch, &mut counts);
+            for (slot, (out, &weight)) in (0..).zip(batch.out.iter().zip(&batch.weights)) {
+                let [dx, dy] = pixel_of_slot(slot);
+                let (x, y) = (tile.origin()[0] + dx, tile.origin()[1] + dy);
+                if active.contains(x, y) {
+                    tile.add(tile.index(x, y), sample, out, weight);
+                }
+            }
+        }
+        counts
+    }
+}
+
+/// Buffers of one batch.
+struct Batch {
+    samples: Vec<CameraSample>,
+    weights: Vec<f32>,
+    out: Vec<PixelSample>,
+}
+
+impl Batch {
+    fn new() -> Self {
+        let count = (TILE_SIZE * TILE_SIZE) as usize;
+        Self { samples: Vec::with_capacity(count), weights: vec![1.0; count], out: vec![PixelSample::default(); count] }
+    }
+}
+
+/// The pixel within its tile of a batch's slot: runs of 16 slots are blocks of 4 x 4 pixels.
+#[inline]
+fn pixel_of_slot(slot: u32) -> [u32; 2] {
+    let (block, within) = (slot / (BLOCK_SIZE * BLOCK_SIZE), slot % (BLOCK_SIZE * BLOCK_SIZE));
+    let blocks = TILE_SIZE / BLOCK_SIZE;
+    [block % blocks * BLOCK_SIZE + within % BLOCK_SIZE, block / blocks * BLOCK_SIZE + within / BLOCK_SIZE]
+}
+
+/// The slot of a pixel within its tile; inverts [`pixel_of_slot`].
+fn slot_of_pixel([x, y]: [u32; 2]) -> u32 {
+    let blocks = TILE_SIZE / BLOCK_SIZE;
+    let block = y / BLOCK_SIZE * blocks + x / BLOCK_SIZE;
+    block * BLOCK_SIZE * BLOCK_SIZE + y % BLOCK_SIZE * BLOCK_SIZE + x % BLOCK_SIZE
+}
+
+/// Renders a scene. When `stop` becomes true, or the time limit passes, the pass under way is finished and what there is becomes the
+/// picture.
+///
+/// # Errors
+/// If the threads cannot be started or the film does not fit in memory.
+pub fn render(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    settings: &Settings,
+    progress: &dyn Progress,
+    stop: &AtomicBool,
+) -> Result<RenderResult> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(settings.threads)
+        .build()
+        .map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))?;
+    let job = Job::new(scene, accel, settings);
+    let mut film = Film::new(settings.size, settings.crop, &settings.layers, TILE_SIZE)?;
+    let mut stats = Stats::default();
+    let pixels = u64::from(settings.crop.width) * u64::from(settings.crop.height);
+    progress.start(settings.spp, pixels);
+
+    let start = Instant::now();
+    let mut pass_samples = 1;
+    while stats.spp_done < settings.spp {
+        if stop.load(Ordering::Relaxed) {
+            stats.interrupted = true;
+            break;
+        }
+        if settings.time_limit.is_some_and(|limit| stats.spp_done > 0 && start.elapsed() >= limit) {
+            stats.time_limited = true;
+            break;
+        }
+        let count = pass_samples.min(settings.spp - stats.spp_done);
+        let pass_start = Instant::now();
+        stats.rays.add(&render_pass(&job, &pool, &mut film, stats.spp_done, count, progress));
+        stats.spp_done += count;
+        let remaining = settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed()));
+        pass_samples = next_pass(count, pass_start.elapsed(), remaining);
+    }
+    stats.render_seconds = start.elapsed().as_secs_f64();
+    progress.finish();
+
+    stats.samples = pixels * u64::from(stats.spp_done);
+    stats.nan_samples = film.dropped_count();
+    stats.dropped = film.dropped();
+    Ok(RenderResult { image: film.resolve(), stats })
+}
+
+/// Renders `count` samples of every pixel, from sample `first` on.
+fn render_pass(job: &Job, pool: &rayon::ThreadPool, film: &mut Film, first: u32, count: u32, progress: &dyn Progress) -> RayCounts {
+    pool.install(|| {
+        film.tiles_mut()
+            .par_iter_mut()
+            .with_max_len(1)
+            .map_init(Batch::new, |batch, tile| {
+                let counts = job.render_tile(tile, first, count, batch);
+                progress.tile_done(u64::from(count) * tile.active().area());
+                counts
+            })
+            .reduce(RayCounts::default, |mut a, b| {
+                a.add(&b);
+                a
+            })
+    })
+}
+
+/// How many samples the next pass should have, after one of `count` took `elapsed`.
+fn next_pass(count: u32, elapsed: Duration, remaining: Option<Duration>) -> u32 {
+    let target = remaining.map_or(PASS_TIME, |r| r.min(PASS_TIME)).as_secs_f64();
+    let fitting = f64::from(count) * target / elapsed.as_secs_f64().max(1e-6);
+    (fitting as u32).clamp(1, count.saturating_mul(4))
+}
+
+/// What one sample of one pixel brings, before the filter's weight: exactly what it brought to the picture.
+///
+/// # Errors
+/// If the pixel lies outside the film.
+pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel: [u32; 2], sample: u32) -> Result<PixelSample> {
+    let [width, height] = settings.size;
+    if pixel[0] >= width || pixel[1] >= height {
+        return Err(Error::Usage(format!("--pixel {},{}: the film has {width}x{height} pixels", pixel[0], pixel[1])));
+    }
+    let job = Job::new(scene, accel, settings);
+    let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
+    let mut batch = Batch::new();
+    job.render_batch(origin, sample, &mut batch, &mut RayCounts::default());
+    Ok(batch.out[slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]) as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_and_pixels_are_one_to_one() {
+        for slot in 0..TILE_SIZE * TILE_SIZE {
+            assert_eq!(slot_of_pixel(pixel_of_slot(slot)), slot);
+        }
+        let first_block: Vec<_> = (0..16).map(pixel_of_slot).collect();
+        assert!(first_block.iter().all(|p| p[0] < 4 && p[1] < 4));
+    }
+
+    #[test]
+    fn passes_grow_towards_their_time_and_fit_what_remains() {
+        assert_eq!(next_pass(1, Duration::from_millis(1), None), 4);
+        assert_eq!(next_pass(8, Duration::from_secs(8), None), 1);
+        assert_eq!(next_pass(8, Duration::from_millis(100), Some(Duration::from_millis(50))), 4);
+    }
+}

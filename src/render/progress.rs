@@ -1,0 +1,28 @@
+//! How a render tells what it is doing.
+
+/// Listens to a render. Every method may be called from any thread; all do nothing by default.
+pub trait Progress: Sync {
+    /// The render starts: so many samples per pixel at most, of so many pixels.
+    fn start(&self, samples_per_pixel: u32, pixels: u64) {
+        let _ = (samples_per_pixel, pixels);
+    }
+
+    /// A tile got this many more samples, all pixels together.
+    fn tile_done(&self, samples: u64) {
+        let _ = samples;
+    }
+
+    /// No more samples will come. The picture is not written yet.
+    fn finish(&self) {}
+
+    /// Something the user should know.
+    fn warn(&self, message: &str) {
+        let _ = message;
+    }
+}
+
+/// Tells nobody.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {}

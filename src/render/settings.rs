@@ -1,0 +1,338 @@
+//! Everything a render needs beside the scene: what the scene file says, with the command line's changes.
+
+use std::num::NonZero;
+use std::time::Duration;
+
+use crate::accel::AccelKind;
+use crate::desc::{FilterDesc, IntegratorDesc, LayerDesc, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc};
+use crate::error::{Error, Result};
+use crate::film::{Crop, LayerSet};
+use crate::sampling::SamplerKind;
+
+/// Extensions of the files written if neither the scene nor the command line names one.
+pub const DEFAULT_EXTENSIONS: [&str; 2] = ["exr", "png"];
+
+/// Largest width and height: beyond it, `f32` film coordinates would be coarser than 1/256 of a pixel.
+const MAX_SIDE: u32 = 1 << 16;
+
+/// More threads than this are a slip of the keyboard.
+const MAX_THREADS: usize = 4096;
+
+/// How a scene is rendered.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Width and height of the full picture in pixels.
+    pub size: [u32; 2],
+    /// The part that is rendered.
+    pub crop: Crop,
+    /// The pixel filter.
+    pub filter: FilterDesc,
+    /// How samples are chosen.
+    pub sampler: SamplerKind,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// A different seed gives different noise.
+    pub seed: u64,
+    /// The algorithm.
+    pub integrator: IntegratorDesc,
+    /// What finds hits.
+    pub accel: AccelKind,
+    /// Number of threads, at least 1.
+    pub threads: usize,
+    /// The render ends after this time even if samples are missing.
+    pub time_limit: Option<Duration>,
+    /// The files to write.
+    pub outputs: Vec<OutputDesc>,
+    /// Every layer that an output asks for.
+    pub layers: LayerSet,
+}
+
+/// What the command line changes; everything else is as the scene says.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    /// `--spp`.
+    pub spp: Option<u32>,
+    /// `--size`: width and height.
+    pub size: Option<[u32; 2]>,
+    /// `--crop`: x, y, width, height.
+    pub crop: Option<[u32; 4]>,
+    /// `--threads`; 0 stands for all.
+    pub threads: Option<usize>,
+    /// `--seed`.
+    pub seed: Option<u64>,
+    /// `--integrator`, with default parameters; those of the scene are kept if it has the same one.
+    pub integrator: Option<IntegratorDesc>,
+    /// `--accel`.
+    pub accel: Option<AccelKind>,
+    /// `--sampler`.
+    pub sampler: Option<SamplerKindDesc>,
+    /// `--max-depth`.
+    pub max_depth: Option<u32>,
+    /// `--strategy`.
+    pub strategy: Option<StrategyDesc>,
+    /// `--time-limit`, in seconds.
+    pub time_limit: Option<f64>,
+    /// `--output`: these files in place of the scene's.
+    pub outputs: Vec<String>,
+    /// The files if neither the scene nor the command line names one.
+    pub default_outputs: Vec<String>,
+    /// `--layers`: for every EXR output.
+    pub layers: Vec<LayerDesc>,
+    /// `--float`: for every EXR output.
+    pub float: bool,
+    /// `--exposure`: for every PNG output.
+    pub exposure: Option<f32>,
+}
+
+impl Settings {
+    /// The settings of a scene with the command line's changes.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the option if a change is impossible.
+    pub fn new(desc: &SceneDesc, overrides: &Overrides) -> Result<Self> {
+        let size = size(desc, overrides)?;
+        let outputs = outputs(desc, overrides)?;
+        let layers = outputs.iter().flat_map(|output| &output.layers).collect();
+        let sampler = match overrides.sampler.unwrap_or(desc.sampler.kind) {
+            SamplerKindDesc::Sobol => SamplerKind::Sobol,
+            SamplerKindDesc::Independent => SamplerKind::Independent,
+        };
+        if overrides.spp == Some(0) {
+            return Err(usage("--spp 0: a picture needs at least one sample per pixel"));
+        }
+        Ok(Self {
+            size,
+            crop: crop(desc, overrides, size)?,
+            filter: desc.film.filter,
+            sampler,
+            spp: overrides.spp.unwrap_or(desc.sampler.spp),
+            seed: overrides.seed.unwrap_or(desc.sampler.seed),
+            integrator: integrator(desc, overrides)?,
+            accel: overrides.accel.unwrap_or_default(),
+            threads: threads(overrides)?,
+            time_limit: time_limit(overrides)?,
+            outputs,
+            layers,
+        })
+    }
+}
+
+fn usage(message: impl Into<String>) -> Error {
+    Error::Usage(message.into())
+}
+
+fn size(desc: &SceneDesc, overrides: &Overrides) -> Result<[u32; 2]> {
+    let Some([width, height]) = overrides.size else { return Ok([desc.film.width, desc.film.height]) };
+    if [width, height].iter().any(|side| *side == 0 || *side > MAX_SIDE) {
+        return Err(usage(format!("--size {width}x{height}: width and height range from 1 to {MAX_SIDE}")));
+    }
+    Ok([width, height])
+}
+
+/// A crop that the scene alone is to blame for is left to the scene's own checks, which name its place.
+fn crop(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2]) -> Result<Crop> {
+    let Some([x, y, width, height]) = overrides.crop.or(desc.film.crop) else { return Ok(Crop::full(size)) };
+    let crop = Crop { x, y, width, height };
+    if !crop.fits(size) {
+        let numbers = format!("{x},{y},{width},{height}");
+        let picture = format!("a picture of {}x{} pixels", size[0], size[1]);
+        if overrides.crop.is_some() {
+            return Err(usage(format!("--crop {numbers} is empty or reaches beyond {picture}")));
+        }
+        if overrides.size.is_some() {
+            return Err(usage(format!("--size: the scene's crop {numbers} reaches beyond {picture}; give --crop too")));
+        }
+    }
+    Ok(crop)
+}
+
+fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc> {
+    let mut integrator = match overrides.integrator {
+        Some(chosen) if std::mem::discriminant(&chosen) != std::mem::discriminant(&desc.integrator) => chosen,
+        _ => desc.integrator,
+    };
+    if let Some(depth) = overrides.max_depth {
+        match &mut integrator {
+            IntegratorDesc::Path { max_depth, .. } | IntegratorDesc::Whitted { max_depth, .. } if depth > 0 => *max_depth = depth,
+            IntegratorDesc::Path { .. } | IntegratorDesc::Whitted { .. } => {
+                return Err(usage("--max-depth 0: depth counts from 1, directly visible light"));
+            }
+            _ => return Err(usage("--max-depth: only the integrators path and whitted follow light over several segments")),
+        }
+    }
+    if let Some(chosen) = overrides.strategy {
+        let IntegratorDesc::Path { strategy, .. } = &mut integrator else {
+            return Err(usage("--strategy: only the integrator path has strategies"));
+        };
+        *strategy = chosen;
+    }
+    Ok(integrator)
+}
+
+fn threads(overrides: &Overrides) -> Result<usize> {
+    match overrides.threads.unwrap_or(0) {
+        0 => Ok(std::thread::available_parallelism().map_or(1, NonZero::get)),
+        threads if threads > MAX_THREADS => Err(usage(format!("--threads {threads}: at most {MAX_THREADS}"))),
+        threads => Ok(threads),
+    }
+}
+
+fn time_limit(overrides: &Overrides) -> Result<Option<Duration>> {
+    let Some(seconds) = overrides.time_limit else { return Ok(None) };
+    let limit = Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero());
+    limit.map(Some).ok_or_else(|| usage(format!("--time-limit {seconds}: a number of seconds above 0")))
+}
+
+fn outputs(desc: &SceneDesc, overrides: &Overrides) -> Result<Vec<OutputDesc>> {
+    let by_name = |names: &[String]| -> Vec<OutputDesc> { names.iter().map(OutputDesc::new).collect() };
+    let mut outputs = if !overrides.outputs.is_empty() {
+        by_name(&overrides.outputs)
+    } else if !desc.outputs.is_empty() {
+        desc.outputs.clone()
+    } else {
+        by_name(&overrides.default_outputs)
+    };
+    for (i, output) in outputs.iter().enumerate() {
+        if outputs[..i].iter().any(|other| other.file == output.file) {
+            return Err(usage(format!("two outputs have the name {}", output.file)));
+        }
+    }
+    let has_extension = |output: &OutputDesc, extension: &str| output.file.to_ascii_lowercase().ends_with(extension);
+    let needs = |option: &str, asked: bool, extension: &str| {
+        if asked && !outputs.iter().any(|output| has_extension(output, extension)) {
+            return Err(usage(format!("{option} has no effect: no output is an {extension} file")));
+        }
+        Ok(())
+    };
+    needs("--layers", !overrides.layers.is_empty(), ".exr")?;
+    needs("--float", overrides.float, ".exr")?;
+    needs("--exposure", overrides.exposure.is_some(), ".png")?;
+    if overrides.exposure.is_some_and(|stops| !stops.is_finite()) {
+        return Err(usage("--exposure: a finite number of stops"));
+    }
+    for output in &mut outputs {
+        if has_extension(output, ".exr") {
+            if !overrides.layers.is_empty() {
+                output.layers.clone_from(&overrides.layers);
+            }
+            if overrides.float {
+                output.pixel_type = PixelTypeDesc::Float;
+            }
+        }
+        if let Some(stops) = overrides.exposure.filter(|_| has_extension(output, ".png")) {
+            output.exposure = stops;
+        }
+    }
+    Ok(outputs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::LayerKind;
+
+    fn scene(text: &str) -> SceneDesc {
+        serde_json::from_str(text).unwrap()
+    }
+
+    fn refusal(desc: &SceneDesc, overrides: &Overrides) -> String {
+        match Settings::new(desc, overrides) {
+            Err(Error::Usage(message)) => message,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    const SCENE: &str = r#"{
+        "camera": {},
+        "film": { "width": 100, "height": 50, "crop": [10, 20, 30, 30] },
+        "sampler": { "type": "independent", "spp": 16, "seed": 3 },
+        "integrator": { "type": "path", "max_depth": 9, "rr_depth": 3 },
+        "outputs": [{ "file": "a.exr", "layers": ["N"] }, { "file": "b.png", "exposure": 1 }]
+    }"#;
+
+    #[test]
+    fn without_changes_the_scene_decides() {
+        let s = Settings::new(&scene(SCENE), &Overrides::default()).unwrap();
+        assert_eq!((s.size, s.crop), ([100, 50], Crop { x: 10, y: 20, width: 30, height: 30 }));
+        assert_eq!((s.sampler, s.spp, s.seed), (SamplerKind::Independent, 16, 3));
+        assert!(matches!(s.integrator, IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis }));
+        assert_eq!(s.layers, [LayerKind::N].into_iter().collect());
+        assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::Embree, None, 2));
+        assert!(s.threads >= 1);
+    }
+
+    #[test]
+    fn the_command_line_wins() {
+        let overrides = Overrides {
+            spp: Some(7),
+            size: Some([200, 80]),
+            crop: Some([0, 0, 5, 6]),
+            threads: Some(3),
+            seed: Some(1),
+            integrator: Some(IntegratorDesc::default()),
+            accel: Some(AccelKind::Linear),
+            sampler: Some(SamplerKindDesc::Sobol),
+            max_depth: Some(4),
+            strategy: Some(StrategyDesc::Light),
+            time_limit: Some(1.5),
+            layers: vec![LayerDesc::Z, LayerDesc::Albedo],
+            float: true,
+            exposure: Some(-2.0),
+            ..Overrides::default()
+        };
+        let s = Settings::new(&scene(SCENE), &overrides).unwrap();
+        assert_eq!((s.size, s.crop, s.threads), ([200, 80], Crop { x: 0, y: 0, width: 5, height: 6 }, 3));
+        assert_eq!((s.sampler, s.spp, s.seed, s.accel), (SamplerKind::Sobol, 7, 1, AccelKind::Linear));
+        // The same integrator: parameters that are not changed stay the scene's.
+        assert_eq!(s.integrator, IntegratorDesc::Path { max_depth: 4, rr_depth: 3, strategy: StrategyDesc::Light });
+        assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));
+        assert_eq!(
+            (s.outputs[0].layers.as_slice(), s.outputs[0].pixel_type),
+            (&[LayerDesc::Z, LayerDesc::Albedo][..], PixelTypeDesc::Float)
+        );
+        assert_eq!((s.outputs[1].exposure, s.outputs[1].layers.len()), (-2.0, 0));
+        assert!(s.layers.contains(LayerKind::Albedo) && !s.layers.contains(LayerKind::N));
+    }
+
+    #[test]
+    fn outputs_come_from_the_command_line_then_the_scene_then_the_default() {
+        let default_outputs = vec!["stem.exr".to_owned(), "stem.png".to_owned()];
+        let named = Overrides { outputs: vec!["c.png".to_owned()], default_outputs: default_outputs.clone(), ..Overrides::default() };
+        let files = |desc: &SceneDesc, overrides: &Overrides| -> Vec<String> {
+            Settings::new(desc, overrides).unwrap().outputs.into_iter().map(|output| output.file).collect()
+        };
+        assert_eq!(files(&scene(SCENE), &named), ["c.png"]);
+        let unnamed = Overrides { outputs: Vec::new(), ..named };
+        assert_eq!(files(&scene(SCENE), &unnamed), ["a.exr", "b.png"]);
+        assert_eq!(files(&scene(r#"{ "camera": {} }"#), &unnamed), default_outputs);
+    }
+
+    #[test]
+    fn impossible_changes_are_refused_by_the_options_name() {
+        let desc = scene(SCENE);
+        let d = Overrides::default;
+        let cases = [
+            ("--spp", Overrides { spp: Some(0), ..d() }),
+            ("--size", Overrides { size: Some([0, 5]), ..d() }),
+            ("--size", Overrides { size: Some([1 << 20, 5]), ..d() }),
+            ("--size", Overrides { size: Some([20, 20]), ..d() }),
+            ("--crop", Overrides { crop: Some([90, 0, 11, 5]), ..d() }),
+            ("--crop", Overrides { crop: Some([0, 0, 0, 5]), ..d() }),
+            ("--threads", Overrides { threads: Some(1 << 20), ..d() }),
+            ("--max-depth", Overrides { max_depth: Some(0), ..d() }),
+            ("--max-depth", Overrides { max_depth: Some(3), integrator: Some(IntegratorDesc::Normal), ..d() }),
+            ("--strategy", Overrides { strategy: Some(StrategyDesc::Bsdf), integrator: Some(IntegratorDesc::Uv), ..d() }),
+            ("--time-limit", Overrides { time_limit: Some(0.0), ..d() }),
+            ("--time-limit", Overrides { time_limit: Some(f64::NAN), ..d() }),
+            ("--layers", Overrides { layers: vec![LayerDesc::Z], outputs: vec!["a.png".to_owned()], ..d() }),
+            ("--float", Overrides { float: true, outputs: vec!["a.png".to_owned()], ..d() }),
+            ("--exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
+            ("--exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),
+            ("two outputs", Overrides { outputs: vec!["a.png".to_owned(), "a.png".to_owned()], ..d() }),
+        ];
+        for (option, overrides) in cases {
+            let message = refusal(&desc, &overrides);
+            assert!(message.starts_with(option), "{message}");
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! Random numbers, warps beside their densities, discrete and piecewise-constant distributions, weights that combine strategies.
+
+mod discrete;
+mod mis;
+mod piecewise;
+mod sampler;
+#[cfg(test)]
+pub(crate) mod statistics;
+pub mod warp;
+
+pub use discrete::{AliasTable, DiscreteSample};
+pub use mis::power_heuristic;
+pub use piecewise::{Piecewise2d, PiecewiseCell, PiecewiseSample};
+pub use sampler::{PixelSeed, Sampler, SamplerKind};

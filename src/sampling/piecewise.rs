@@ -1,0 +1,278 @@
+//! Piecewise-constant densities on the unit square, sampled by inversion so that stratified numbers stay stratified.
+
+use crate::math::float::ONE_MINUS_EPSILON;
+
+/// The whole of a cumulative table. Tables count in units of `1 / WHOLE`: the density is then exactly that of the sampling, and a cell of
+/// positive weight never rounds to nothing.
+const WHOLE: u32 = u32::MAX;
+
+/// A point chosen by a [`Piecewise2d`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PiecewiseSample {
+    /// The point in `[0, 1)²`.
+    pub uv: [f32; 2],
+    /// Density with respect to area of the unit square.
+    pub pdf: f32,
+}
+
+/// A cell chosen by a [`Piecewise2d`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PiecewiseCell {
+    /// The column.
+    pub x: usize,
+    /// The row.
+    pub y: usize,
+    /// Where in the cell, in `[0, 1)²`.
+    pub within: [f32; 2],
+    /// Probability of the cell.
+    pub pmf: f32,
+}
+
+/// A density on `[0, 1)²` that is constant on each cell of a grid; rows run along u, row 0 is at v = 0.
+#[derive(Clone, Debug)]
+pub struct Piecewise2d {
+    width: usize,
+    height: usize,
+    rows: Table,
+    columns: Table,
+}
+
+/// Cumulative distributions of equal length, one after another, each with a guide to where in it a number falls.
+#[derive(Clone, Debug)]
+struct Table {
+    len: usize,
+    /// `len + 1` limits for each distribution, from 0 to [`WHOLE`].
+    limits: Vec<u32>,
+    /// For the distributions: bits that a number keeps as index into the guide.
+    guide_shift: u32,
+    /// First index whose upper limit lies above each multiple of `1 << guide_shift`, and one entry more.
+    guide: Vec<u32>,
+}
+
+#[derive(Clone, Copy)]
+struct Inverse {
+    index: usize,
+    within: f32,
+    pmf: f64,
+}
+
+impl Table {
+    fn new(len: usize, count: usize) -> Self {
+        // About four entries share a guide entry.
+        let guide_bits = usize::BITS - (len / 4).leading_zeros();
+        let guide_shift = u32::BITS - guide_bits.clamp(1, 16);
+        Self { len, limits: Vec::with_capacity((len + 1) * count), guide_shift, guide: Vec::with_capacity(((1 << guide_bits) + 1) * count) }
+    }
+
+    fn guide_len(&self) -> usize {
+        (1 << (u32::BITS - self.guide_shift)) + 1
+    }
+
+    /// Adds one distribution. Each positive weight has at least one unit; those and the rest, in proportion, fill the whole. Without any
+    /// positive weight the limits stay 0.
+    fn push(&mut self, weights: impl Iterator<Item = f64> + Clone) {
+        let positive = weights.clone().filter(|w| *w > 0.0).count();
+        let total: f64 = weights.clone().sum();
+        let free = f64::from(WHOLE) - positive as f64;
+        let start = self.limits.len();
+        let (mut units, mut sum) = (0u64, 0.0);
+        self.limits.push(0);
+        for w in weights {
+            if w > 0.0 {
+                units += 1;
+                sum += w;
+            }
+            let limit = if total > 0.0 { units + (sum / total * free).round() as u64 } else { 0 };
+            self.limits.push(limit.min(u64::from(WHOLE)) as u32);
+        }
+
+        let limits = &self.limits[start..];
+        let mut index = 0;
+        for k in 0..self.guide_len() as u64 - 1 {
+            let floor = k << self.guide_shift;
+            while index + 1 < self.len && u64::from(limits[index + 1]) <= floor {
+                index += 1;
+            }
+            self.guide.push(index as u32);
+        }
+        self.guide.push(self.len as u32 - 1);
+    }
+
+    #[inline]
+    fn limits(&self, which: usize) -> &[u32] {
+        &self.limits[which * (self.len + 1)..][..=self.len]
+    }
+
+    #[inline]
+    fn pmf(&self, which: usize, index: usize) -> f64 {
+        let limits = self.limits(which);
+        f64::from(limits[index + 1] - limits[index]) * (1.0 / f64::from(WHOLE))
+    }
+
+    /// Inverts a distribution at `u` in `[0, 1)`: the cell with `lower <= u < upper`.
+    #[inline]
+    fn invert(&self, which: usize, u: f32) -> Inverse {
+        let limits = self.limits(which);
+        let guide = &self.guide[which * self.guide_len()..][..self.guide_len()];
+        let x = f64::from(u) * f64::from(WHOLE);
+        let unit = x as u32;
+        let k = (unit >> self.guide_shift) as usize;
+        let (first, last) = (guide[k] as usize, guide[k + 1] as usize);
+        let index = first + limits[first + 1..=last].partition_point(|&upper| upper <= unit);
+        let lower = limits[index];
+        let mass = f64::from(limits[index + 1] - lower);
+        let within = ((x - f64::from(lower)) / mass) as f32;
+        Inverse { index, within: within.min(ONE_MINUS_EPSILON), pmf: mass * (1.0 / f64::from(WHOLE)) }
+    }
+}
+
+impl Piecewise2d {
+    /// The density in proportion to `width * height` weights, by rows; `None` if the count is wrong, one is negative or not finite, or all
+    /// are zero.
+    pub fn new(width: usize, height: usize, weights: &[f32]) -> Option<Self> {
+        let fits = width.checked_mul(height) == Some(weights.len()) && width.max(height) < u32::MAX as usize / 2;
+        if !fits || !weights.iter().all(|w| w.is_finite() && *w >= 0.0) || !weights.iter().any(|w| *w > 0.0) {
+            return None;
+        }
+        let mut columns = Table::new(width, height);
+        let mut sums = Vec::with_capacity(height);
+        for row in weights.chunks_exact(width) {
+            let row = row.iter().map(|&w| f64::from(w));
+            sums.push(row.clone().sum::<f64>());
+            columns.push(row);
+        }
+        let mut rows = Table::new(height, 1);
+        rows.push(sums.into_iter());
+        Some(Self { width, height, rows, columns })
+    }
+
+    /// A cell with its probability and a uniform point inside; `u` in `[0, 1)²`. The first number chooses the column, the second the row.
+    #[inline]
+    pub fn sample_cell(&self, u: [f32; 2]) -> PiecewiseCell {
+        let row = self.rows.invert(0, u[1]);
+        let column = self.columns.invert(row.index, u[0]);
+        PiecewiseCell { x: column.index, y: row.index, within: [column.within, row.within], pmf: (row.pmf * column.pmf) as f32 }
+    }
+
+    /// The probability of a cell.
+    #[inline]
+    pub fn pmf(&self, x: usize, y: usize) -> f32 {
+        (self.rows.pmf(0, y) * self.columns.pmf(y, x)) as f32
+    }
+
+    /// A point with its density; `u` in `[0, 1)²`.
+    #[inline]
+    pub fn sample(&self, u: [f32; 2]) -> PiecewiseSample {
+        let cell = self.sample_cell(u);
+        let place = |i: usize, within: f32, n: usize| {
+            let limit = |i: usize| (i as f64 / n as f64) as f32;
+            let x = ((i as f64 + f64::from(within)) / n as f64) as f32;
+            // Rounding must not carry the point into a neighbour of another density.
+            x.clamp(limit(i), limit(i + 1).next_down())
+        };
+        let uv = [place(cell.x, cell.within[0], self.width), place(cell.y, cell.within[1], self.height)];
+        PiecewiseSample { uv, pdf: self.density(cell.pmf) }
+    }
+
+    /// The density at `uv`, which is taken into `[0, 1]²`.
+    #[inline]
+    pub fn pdf(&self, uv: [f32; 2]) -> f32 {
+        let cell = |x: f32, n: usize| {
+            let i = ((x.max(0.0) * n as f32) as usize).min(n - 1);
+            // The limits are those of `sample`, rounded the same way.
+            let limit = |i: usize| (i as f64 / n as f64) as f32;
+            if x < limit(i) {
+                i.saturating_sub(1)
+            } else if i + 1 < n && x >= limit(i + 1) {
+                i + 1
+            } else {
+                i
+            }
+        };
+        self.density(self.pmf(cell(uv[0], self.width), cell(uv[1], self.height)))
+    }
+
+    #[inline]
+    fn density(&self, pmf: f32) -> f32 {
+        pmf * (self.width * self.height) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies_equal_weights_and_densities_agree() {
+        let (width, height) = (37, 11);
+        let weights: Vec<f32> = (0..width * height).map(|i| ((i * i) % 23) as f32 * if i / width == 4 { 0.0 } else { 1.0 }).collect();
+        let total: f32 = weights.iter().sum();
+        let density = Piecewise2d::new(width, height, &weights).unwrap();
+        let n = 2048;
+        let mut count = vec![0u32; width * height];
+        for i in 0..n * n {
+            let u = [(i % n) as f32 / n as f32, (i / n) as f32 / n as f32];
+            let s = density.sample(u);
+            let at = [(s.uv[0] * width as f32) as usize, (s.uv[1] * height as f32) as usize];
+            count[(at[1] * width + at[0]).min(width * height - 1)] += 1;
+            assert!(s.pdf > 0.0 && s.uv[0] < 1.0 && s.uv[1] < 1.0);
+            assert_eq!(density.pdf(s.uv), s.pdf, "{u:?} {:?}", s.uv);
+        }
+        for (i, &c) in count.iter().enumerate() {
+            let (share, exact) = (f64::from(c) / f64::from(n as u32 * n as u32), f64::from(weights[i] / total));
+            // The grid resolves each of the two inversions to one step.
+            assert!((share - exact).abs() < 2.0 / f64::from(n as u32), "{i}: {share} {exact}");
+            let pmf = density.pmf(i % width, i / width);
+            assert!((f64::from(pmf) - exact).abs() <= 1e-6 * exact.max(1e-3), "{i}: {pmf} {exact}");
+        }
+    }
+
+    #[test]
+    fn the_density_integrates_to_one() {
+        let weights: Vec<f32> = (0..64 * 32).map(|i| if i % 7 == 0 { 1e6 } else { 1e-6 * (i % 5) as f32 }).collect();
+        let density = Piecewise2d::new(64, 32, &weights).unwrap();
+        let sum: f64 = (0..64 * 32).map(|i| f64::from(density.pmf(i % 64, i / 64))).sum();
+        assert!((sum - 1.0).abs() < 1e-6);
+        // Weights too small for the table keep a positive density.
+        for (i, w) in weights.iter().enumerate() {
+            assert_eq!(density.pmf(i % 64, i / 64) > 0.0, *w > 0.0);
+        }
+    }
+
+    #[test]
+    fn corners_of_the_square_choose_cells_of_positive_weight() {
+        let mut weights = vec![0.0; 9 * 5];
+        for hot in [0, 8, 22, 36, 44] {
+            weights.fill(0.0);
+            weights[hot] = 3.0;
+            let density = Piecewise2d::new(9, 5, &weights).unwrap();
+            for u in [[0.0, 0.0], [ONE_MINUS_EPSILON; 2], [0.0, ONE_MINUS_EPSILON], [0.3, 0.6]] {
+                let cell = density.sample_cell(u);
+                assert_eq!((cell.y * 9 + cell.x, cell.pmf), (hot, 1.0));
+                let s = density.sample(u);
+                assert_eq!((s.pdf, density.pdf(s.uv)), (45.0, 45.0));
+            }
+        }
+    }
+
+    #[test]
+    fn inversion_keeps_order() {
+        let weights: Vec<f32> = (0..1000).map(|i| ((i * 7919) % 101) as f32).collect();
+        let density = Piecewise2d::new(1000, 1, &weights).unwrap();
+        let mut last = -1.0;
+        for i in 0..100_000 {
+            let x = density.sample([i as f32 / 1e5, 0.5]).uv[0];
+            assert!(x >= last);
+            last = x;
+        }
+    }
+
+    #[test]
+    fn weights_that_are_no_density_are_refused() {
+        assert!(Piecewise2d::new(2, 2, &[1.0; 3]).is_none());
+        assert!(Piecewise2d::new(2, 2, &[0.0; 4]).is_none());
+        assert!(Piecewise2d::new(2, 1, &[1.0, -1.0]).is_none());
+        assert!(Piecewise2d::new(2, 1, &[1.0, f32::NAN]).is_none());
+        assert!(Piecewise2d::new(0, 0, &[]).is_none());
+    }
+}

@@ -1,0 +1,82 @@
+//! A scene ready to render: tables and ids, no names and no paths.
+
+use crate::camera::Camera;
+use crate::geometry::Geometry;
+use crate::id::{LightId, MaterialId, PrimId, ShapeId};
+use crate::light::LightSet;
+use crate::material::Material;
+use crate::texture::Texture;
+
+/// How a shape looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Its material.
+    pub material: MaterialId,
+    /// The light of its first primitive if it emits; the others follow.
+    pub first_light: Option<LightId>,
+    /// Whether all primitives are one light: an analytic shape, or two triangles that make up a parallelogram.
+    pub single_light: bool,
+}
+
+impl Surface {
+    /// The light of one primitive.
+    #[inline]
+    pub fn light(&self, prim: PrimId) -> Option<LightId> {
+        let offset = if self.single_light { 0 } else { prim.0 };
+        self.first_light.map(|first| LightId(first.0 + offset))
+    }
+}
+
+/// What a scene uses; what it does not use costs nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Features {
+    /// Some shape emits or there is a light.
+    pub lights: bool,
+    /// Some light is at infinity and visible to rays that leave the scene.
+    pub environment: bool,
+    /// Some shape is analytic.
+    pub analytic_shapes: bool,
+    /// Objects are placed by instances.
+    pub instances: bool,
+    /// Some material is textured.
+    pub textures: bool,
+    /// Some material has only delta lobes.
+    pub delta_materials: bool,
+    /// Some material is anisotropic: shading frames follow the surface's u direction.
+    pub anisotropic: bool,
+    /// The camera has a lens.
+    pub lens: bool,
+}
+
+/// A scene ready to render.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// All shapes.
+    pub geometry: Geometry,
+    /// How each shape looks, by [`ShapeId`].
+    pub surfaces: Vec<Surface>,
+    /// Materials, by [`MaterialId`].
+    pub materials: Vec<Material>,
+    /// Textures, by [`TextureId`](crate::id::TextureId).
+    pub textures: Vec<Texture>,
+    /// Lights and their choice.
+    pub lights: LightSet,
+    /// The camera.
+    pub camera: Camera,
+    /// What the scene uses.
+    pub features: Features,
+}
+
+impl Scene {
+    /// How a shape looks.
+    #[inline]
+    pub fn surface(&self, shape: ShapeId) -> &Surface {
+        &self.surfaces[shape.index()]
+    }
+
+    /// The material of a shape.
+    #[inline]
+    pub fn material(&self, shape: ShapeId) -> &Material {
+        &self.materials[self.surface(shape).material.index()]
+    }
+}

@@ -1,0 +1,162 @@
+//! The layer table and the rules of the house, enforced on the source text.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Modules by layer: a module imports only from lower layers, never sideways; its own folder is free.
+const LAYERS: &[(u32, &[&str])] = &[
+    (0, &["id", "error"]),
+    (1, &["math", "desc"]),
+    (2, &["color", "sampling", "import"]),
+    (3, &["geometry", "texture", "bsdf", "camera", "film"]),
+    (4, &["accel", "material", "light", "output"]),
+    (5, &["scene"]),
+    (6, &["integrator", "compile"]),
+    (7, &["render"]),
+];
+
+/// Imports narrower than the layer number allows.
+const NARROW: &[(&str, &[&str])] = &[
+    ("accel", &["geometry", "math", "error", "id"]),
+    ("output", &["film", "color", "error", "desc", "math"]),
+    ("scene", &["camera", "geometry", "id", "light", "material", "texture", "math", "color"]),
+];
+
+const MAX_LINES: usize = 500;
+const UNSAFE_HOME: &str = "src/accel/embree/";
+
+struct Source {
+    path: String,
+    text: String,
+}
+
+impl Source {
+    /// The module directly below `src` that the file belongs to.
+    fn module(&self) -> &str {
+        let inside = self.path.strip_prefix("src/").unwrap_or(&self.path);
+        inside.split('/').next().unwrap_or(inside).trim_end_matches(".rs")
+    }
+
+    /// Lines of code with their numbers, without line comments; test modules included.
+    fn code(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.text.lines().enumerate().map(|(i, line)| (i + 1, line.split("//").next().unwrap_or("")))
+    }
+}
+
+fn collect(folder: &Path, out: &mut Vec<PathBuf>) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        if path.is_dir() {
+            collect(&path, out);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+fn sources(folders: &[&str]) -> Vec<Source> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut paths = Vec::new();
+    for folder in folders {
+        collect(&root.join(folder), &mut paths);
+    }
+    paths
+        .iter()
+        .map(|path| Source {
+            path: path.strip_prefix(root).unwrap().to_string_lossy().replace('\\', "/"),
+            text: fs::read_to_string(path).unwrap(),
+        })
+        .collect()
+}
+
+fn layer(module: &str) -> Option<u32> {
+    LAYERS.iter().find(|(_, modules)| modules.contains(&module)).map(|(layer, _)| *layer)
+}
+
+#[test]
+fn modules_import_only_from_lower_layers() {
+    let mut faults = Vec::new();
+    for source in sources(&["src"]) {
+        let module = source.module();
+        if source.path.starts_with("src/bin/") || module == "lib" {
+            continue;
+        }
+        let own = layer(module).unwrap_or_else(|| panic!("{}: module {module} is not in the layer table", source.path));
+        for (line, code) in source.code() {
+            for import in code.split("crate::").skip(1) {
+                let target: String = import.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                if target == module || target.is_empty() {
+                    continue;
+                }
+                // The crate root re-exports only the error type.
+                let target = if ["Error", "ErrorKind", "Result"].contains(&target.as_str()) { "error" } else { &target };
+                let allowed = layer(target).is_some_and(|l| l < own);
+                let narrow = NARROW.iter().find(|(m, _)| *m == module).is_none_or(|(_, list)| list.contains(&target));
+                if !allowed || !narrow {
+                    faults.push(format!("{}:{line}: {module} imports {target}", source.path));
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+#[test]
+fn files_stay_below_the_line_limit() {
+    let long: Vec<_> = sources(&["src", "tests", "benches", "examples"])
+        .iter()
+        .map(|s| (s.path.clone(), s.text.lines().count()))
+        .filter(|(_, lines)| *lines > MAX_LINES)
+        .collect();
+    assert!(long.is_empty(), "over {MAX_LINES} lines: {long:?}");
+}
+
+#[test]
+fn unsafe_stays_in_its_home_and_says_why() {
+    let mut faults = Vec::new();
+    for source in sources(&["src"]) {
+        let lines: Vec<&str> = source.text.lines().collect();
+        for (line, code) in source.code() {
+            let blocks = code.contains("unsafe {") || code.contains("unsafe impl");
+            if !(blocks || code.contains("unsafe fn") || code.contains("unsafe extern")) {
+                continue;
+            }
+            if !source.path.starts_with(UNSAFE_HOME) {
+                faults.push(format!("{}:{line}: unsafe outside {UNSAFE_HOME}", source.path));
+            } else if blocks && !lines[line.saturating_sub(8)..line].iter().any(|l| l.contains("// SAFETY:")) {
+                faults.push(format!("{}:{line}: no SAFETY comment", source.path));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+#[test]
+fn the_library_neither_prints_nor_exits() {
+    let mut faults = Vec::new();
+    for source in sources(&["src"]).iter().filter(|s| !s.path.starts_with("src/bin/")) {
+        for (line, code) in source.code() {
+            let words = ["println!", "eprintln!", "print!(", "eprint!(", "process::exit", "process::abort", "todo!(", "unimplemented!("];
+            if let Some(word) = words.iter().find(|word| code.contains(*word)) {
+                faults.push(format!("{}:{line}: {word}", source.path));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+#[test]
+fn tolerances_live_in_one_place() {
+    // Powers of ten that look like distances: `1e-4` and the like next to an origin, a t_min or an offset.
+    let mut faults = Vec::new();
+    for source in sources(&["src"]).iter().filter(|s| s.path != "src/math/float.rs") {
+        for (line, code) in source.code() {
+            let small = ["1e-3", "1e-4", "1e-5", "0.001", "0.0001"].iter().any(|n| code.contains(n));
+            let place = ["t_min", "origin", "offset", "epsilon", "EPSILON"].iter().any(|n| code.contains(n));
+            if small && place {
+                faults.push(format!("{}:{line}: {}", source.path, code.trim()));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
