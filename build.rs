@@ -1,73 +1,82 @@
-//! Finds Embree, makes bindings to it and compiles the C shim.
+//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name.
 
+use std::env;
 use std::path::{Path, PathBuf};
-use std::process::{Command, exit};
 
-/// Ends the build with one line that says what to install.
-fn fail(message: &str) -> ! {
-    println!("cargo::error={message}");
-    exit(1)
-}
+/// Major versions this crate is written for, the one it is measured with first. Debian 12 has 3, Debian 13 has 4.
+const EMBREE_VERSIONS: [u32; 2] = [3, 4];
 
-/// The library to link, by the newest header on the compiler's search path.
-fn find_embree(compiler: &cc::Tool) -> &'static str {
-    let has = |header: &str| {
-        let source = PathBuf::from(std::env::var("OUT_DIR").unwrap_or_default()).join("probe.c");
-        let text = format!("#include <{header}>\n");
-        std::fs::write(&source, text).is_ok()
-            && Command::new(compiler.path()).arg("-fsyntax-only").arg(&source).output().is_ok_and(|o| o.status.success())
-    };
-    if has("embree4/rtcore.h") {
-        "embree4"
-    } else if has("embree3/rtcore.h") {
-        "embree3"
-    } else {
-        fail("Embree's header rtcore.h was not found; on Debian: apt-get install libembree-dev")
-    }
-}
-
-/// Whether libclang, which bindgen loads, is installed.
-fn has_libclang() -> bool {
-    let named = std::env::var_os("LIBCLANG_PATH").is_some();
-    let on_disk = |folder: &Path| {
-        std::fs::read_dir(folder).is_ok_and(|d| d.flatten().any(|e| e.file_name().to_string_lossy().starts_with("libclang")))
-    };
-    let llvm = std::fs::read_dir("/usr/lib").into_iter().flatten().flatten().map(|e| e.path());
-    named
-        || llvm.filter(|p| p.to_string_lossy().contains("llvm")).any(|p| on_disk(&p.join("lib")))
-        || ["/usr/lib", "/usr/lib64", "/usr/lib/x86_64-linux-gnu", "/usr/local/lib"].iter().any(|p| on_disk(Path::new(p)))
-}
+/// Headers and sources of the C side.
+const SOURCES: [&str; 3] = ["ffi/wrapper.h", "ffi/embree_shim.h", "ffi/embree_shim.c"];
 
 fn main() {
-    println!("cargo::rerun-if-changed=ffi");
-    println!("cargo::rerun-if-env-changed=LIBCLANG_PATH");
-    let mut build = cc::Build::new();
-    let compiler = build.try_get_compiler().unwrap_or_else(|_| fail("a C compiler is needed; on Debian: apt-get install build-essential"));
-    if Command::new(compiler.path()).arg("--version").output().is_err() {
-        fail("a C compiler is needed; on Debian: apt-get install build-essential");
+    for source in SOURCES {
+        println!("cargo::rerun-if-changed={source}");
     }
-    let library = find_embree(&compiler);
-    if !has_libclang() {
-        fail("libclang is needed to read Embree's header; on Debian: apt-get install libclang-dev");
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-env-changed=EMBREE_DIR");
+    if let Err(message) = build() {
+        println!("cargo::error={message}");
     }
+}
 
-    build.file("ffi/embree_shim.c").opt_level(2).warnings(true).compile("embree_shim");
-    println!("cargo::rustc-link-lib=dylib={library}");
+fn build() -> Result<(), String> {
+    // EMBREE_DIR names the prefix of an Embree outside the system's directories.
+    let own = env::var_os("EMBREE_DIR").map(PathBuf::from);
+    let prefixes: Vec<PathBuf> = own.iter().cloned().chain(["/usr".into(), "/usr/local".into()]).collect();
+    let (prefix, version) = find_embree(&prefixes).ok_or("Embree's headers are missing; on Debian: apt install libembree-dev")?;
+    let include = format!("-I{}", prefix.join("include").display());
+    let define = format!("-DSTERADIAN_EMBREE={version}");
 
-    let bindings = bindgen::Builder::default()
+    bind(&[&include, &define])?;
+    cc::Build::new()
+        .file("ffi/embree_shim.c")
+        .flag(&include)
+        .flag(&define)
+        .std("c11")
+        .opt_level(2)
+        .try_compile("steradian_embree_shim")
+        .map_err(|error| format!("the C shim does not compile; on Debian: apt install build-essential ({})", one_line(&error)))?;
+
+    if own.is_some_and(|own| own == prefix) {
+        println!("cargo::rustc-link-search=native={}", prefix.join("lib").display());
+    }
+    println!("cargo::rustc-link-lib=dylib=embree{version}");
+    Ok(())
+}
+
+/// The first prefix with Embree's headers, and the major version found there.
+fn find_embree(prefixes: &[PathBuf]) -> Option<(&Path, u32)> {
+    let has = |prefix: &Path, version: u32| prefix.join(format!("include/embree{version}/rtcore.h")).is_file();
+    prefixes.iter().find_map(|prefix| EMBREE_VERSIONS.into_iter().find(|&v| has(prefix, v)).map(|v| (prefix.as_path(), v)))
+}
+
+/// Writes `embree.rs` into the output directory.
+fn bind(arguments: &[&str]) -> Result<(), String> {
+    let builder = bindgen::builder()
         .header("ffi/wrapper.h")
-        .allowlist_function("rtc.*|st_.*")
-        .allowlist_type("RTC.*|St.*")
-        .allowlist_var("RTC_.*")
-        .default_enum_style(bindgen::EnumVariation::ModuleConsts)
-        .layout_tests(false)
+        .clang_args(arguments)
+        .allowlist_function("st_.*|rtc(New|Release)(Device|Scene|Geometry)|rtc(Get|Set)Device.*")
+        .allowlist_function("rtcSet(SharedGeometryBuffer|Geometry(InstancedScene|Transform|TimeStepCount|BuildQuality|UserPrimitiveCount))")
+        .allowlist_function("rtcSetScene(Flags|BuildQuality)|rtcCommit(Geometry|Scene)|rtcAttachGeometryByID|rtcGetSceneBounds")
+        .allowlist_var("RTC_VERSION_MAJOR")
+        .prepend_enum_name(false)
         .generate_comments(false)
-        .generate()
-        .unwrap_or_else(|e| {
-            fail(&format!("bindgen cannot read Embree's header: {e}; on Debian: apt-get install libembree-dev libclang-dev"))
-        });
-    let out = PathBuf::from(std::env::var("OUT_DIR").unwrap_or_default()).join("embree.rs");
-    if let Err(e) = bindings.write_to_file(&out) {
-        fail(&format!("cannot write {}: {e}", out.display()));
-    }
+        .derive_default(true)
+        .merge_extern_blocks(true);
+    // bindgen panics if libclang cannot be loaded.
+    std::panic::set_hook(Box::new(|_| {}));
+    let bound = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| builder.generate()));
+    let _ = std::panic::take_hook();
+    let bindings = match bound {
+        Err(_) => return Err("libclang is missing; on Debian: apt install libclang-dev".into()),
+        Ok(Err(error)) => return Err(format!("Embree's headers cannot be read ({})", one_line(&error))),
+        Ok(Ok(bindings)) => bindings,
+    };
+    let out = PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?).join("embree.rs");
+    bindings.write_to_file(&out).map_err(|error| format!("cannot write {}: {error}", out.display()))
+}
+
+fn one_line(error: &impl ToString) -> String {
+    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }

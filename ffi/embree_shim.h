@@ -1,13 +1,21 @@
-/* What is inline, packed or versioned in Embree, behind functions with one signature for Embree 3 and 4. */
-#pragma once
+/*
+ * What of Embree's interface is inline, packed or differs between versions 3 and 4, as plain functions.
+ *
+ * Every ray must be valid: Debian builds Embree with assertions, and an invalid ray aborts the process. The caller sees to that.
+ */
+#ifndef STERADIAN_EMBREE_SHIM_H
+#define STERADIAN_EMBREE_SHIM_H
 
-#if __has_include(<embree4/rtcore.h>)
+#include <stdbool.h>
+#include <stdint.h>
+
+#if STERADIAN_EMBREE == 4
 #include <embree4/rtcore.h>
 #else
 #include <embree3/rtcore.h>
 #endif
 
-/* A ray as plain numbers; the same layout as Rust's `Ray`. */
+/* A ray as it stands in Rust. */
 struct StRay {
     float origin[3];
     float t_min;
@@ -16,25 +24,31 @@ struct StRay {
     float time;
 };
 
-/* The distance of the first hit of `ray` with `shape`, or a NaN on a miss. */
-typedef float (*StIntersect)(const void* shape, const struct StRay* ray);
+/* The distance at which `ray` hits `shape`, within the ray's interval; negative on a miss. */
+typedef float (*StIntersect)(const void *shape, const struct StRay *ray);
 
-/* The user pointer of user geometry. */
-struct StShape {
+/* The user data of a user geometry: one primitive. It must outlive the geometry. */
+struct StUserShape {
+    const void *shape;
     StIntersect intersect;
-    const void* shape;
+    float lower[3];
+    float upper[3];
 };
 
-/* Closest hits of one ray and of 16; `valid` has -1 for lanes that count. */
-void st_intersect1(RTCScene scene, struct RTCRayHit* rayhit);
-void st_intersect16(const int* valid, RTCScene scene, struct RTCRayHit16* rayhit, int coherent);
+/* A new, committed geometry of one user primitive; null on an error. */
+RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape);
 
-/* Any hits: a ray that hits something gets t_far = -inf. */
-void st_occluded1(RTCScene scene, struct RTCRay* ray);
-void st_occluded16(const int* valid, RTCScene scene, struct RTCRay16* ray, int coherent);
+/* Closest hit. `rayhit->hit.geomID` must be invalid on entry, and stays so on a miss. */
+void st_intersect1(RTCScene scene, struct RTCRayHit *rayhit);
 
-/* Makes `geometry` user geometry of one primitive: `bounds` has the lower and upper corner; `shape` must outlive the geometry. */
-void st_set_user_geometry(RTCGeometry geometry, const struct StShape* shape, RTCBoundsFunction bounds);
+/* Whether there is any hit. */
+bool st_occluded1(RTCScene scene, struct RTCRay *ray);
 
-/* Version as major * 10000 + minor * 100 + patch, of the headers. */
-int st_header_version(void);
+/* Closest hits of the lanes whose `valid` is -1; lanes of 0 are left alone. `valid` is aligned to 64 bytes. `coherent` promises that the
+   lanes start near each other and point nearly the same way. */
+void st_intersect16(RTCScene scene, const int32_t *valid, struct RTCRayHit16 *rayhits, bool coherent);
+
+/* Any hits; `tfar` of an occluded lane becomes -inf. */
+void st_occluded16(RTCScene scene, const int32_t *valid, struct RTCRay16 *rays, bool coherent);
+
+#endif

@@ -1,2 +1,2 @@
-/* The one header that bindgen reads. */
+/* What bindgen reads. */
 #include "embree_shim.h"

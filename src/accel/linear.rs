@@ -1,84 +1,68 @@
-//! Every primitive for every ray: slow, simple, and the oracle that the others are held against.
+//! Every primitive of every shape for every ray: slow, and right by inspection. The other accelerators are tested against it.
 
 use super::Accelerator;
 use crate::geometry::{Geometry, Hit};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::{Aabb, Ray};
 
-/// Tests every primitive of the geometry.
+/// The accelerator without a structure.
 pub struct LinearAccel<'g> {
     geometry: &'g Geometry,
 }
 
 impl<'g> LinearAccel<'g> {
-    /// Nothing is built.
+    /// Keeps a reference; there is nothing to build.
     pub fn new(geometry: &'g Geometry) -> Self {
         Self { geometry }
     }
 
-    /// Calls `visit` with every hit of `ray` until it returns false. The ray that `visit` may shorten is the one that is tested.
-    fn visit_hits(&self, ray: &Ray, mut visit: impl FnMut(Hit, &mut f32) -> bool) {
-        if !ray.is_valid() {
-            return;
+    /// Calls `visit` for every group of shapes with the ray in the space of the group, until it returns true.
+    fn any_group(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &[ShapeId], InstanceId) -> bool) -> bool {
+        if visit(ray, &self.geometry.world, Hit::NO_INSTANCE) {
+            return true;
         }
-        let mut t_max = ray.t_max;
-        if !self.visit_shapes(&self.geometry.world, ray, Hit::NO_INSTANCE, &mut t_max, &mut visit) {
-            return;
-        }
-        for (i, instance) in self.geometry.instances.iter().enumerate() {
+        self.geometry.instances.iter().enumerate().any(|(i, instance)| {
             let local = instance.object_ray(ray);
-            if local.is_valid() {
-                let shapes = &self.geometry.object(instance.object).shapes;
-                if !self.visit_shapes(shapes, &local, InstanceId::new(i), &mut t_max, &mut visit) {
-                    return;
-                }
-            }
-        }
+            // A ray may leave the range of f32 on its way into a small object.
+            local.is_valid() && visit(&local, &self.geometry.object(instance.object).shapes, InstanceId::new(i))
+        })
     }
 
-    fn visit_shapes(
-        &self,
-        shapes: &[ShapeId],
-        ray: &Ray,
-        instance: InstanceId,
-        t_max: &mut f32,
-        visit: &mut impl FnMut(Hit, &mut f32) -> bool,
-    ) -> bool {
-        for &id in shapes {
-            let shape = self.geometry.shape(id);
-            for prim in 0..shape.prim_count() {
-                let ray = Ray { t_max: *t_max, ..*ray };
-                if let Some(hit) = shape.intersect_prim(&ray, id, PrimId::new(prim))
-                    && !visit(Hit { instance, ..hit }, t_max)
-                {
-                    return false;
-                }
-            }
-        }
-        true
+    fn prims(&self, id: ShapeId) -> impl Iterator<Item = PrimId> {
+        (0..self.geometry.shape(id).prim_count()).map(PrimId::new)
     }
 }
 
 impl Accelerator for LinearAccel<'_> {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        if !ray.is_valid() {
+            return None;
+        }
         let mut closest: Option<Hit> = None;
-        self.visit_hits(ray, |hit, t_max| {
-            if closest.is_none_or(|c| hit.is_before(&c)) {
-                *t_max = t_max.min(hit.t);
-                closest = Some(hit);
+        self.any_group(ray, |local, ids, instance| {
+            let mut local = *local;
+            for &id in ids {
+                for prim in self.prims(id) {
+                    // One float beyond the best hit, so that a hit which rounds to the same distance takes part in the tie.
+                    local.t_max = closest.map_or(ray.t_max, |best| best.t.next_up().min(ray.t_max));
+                    let Some(hit) = self.geometry.shape(id).intersect_prim(&local, id, prim) else { continue };
+                    let hit = Hit { instance, ..hit };
+                    if closest.is_none_or(|best| hit.is_before(&best)) {
+                        closest = Some(hit);
+                    }
+                }
             }
-            true
+            false
         });
         closest
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        let mut found = false;
-        self.visit_hits(ray, |_, _| {
-            found = true;
-            false
-        });
-        found
+        let hits = |local: &Ray, id: ShapeId| {
+            let shape = self.geometry.shape(id);
+            self.prims(id).any(|prim| shape.intersect_prim(local, id, prim).is_some())
+        };
+        ray.is_valid() && self.any_group(ray, |local, ids, _| ids.iter().any(|&id| hits(local, id)))
     }
 
     fn bounds(&self) -> Aabb {
@@ -90,6 +74,6 @@ impl Accelerator for LinearAccel<'_> {
     }
 
     fn description(&self) -> String {
-        "linear (scalar, every primitive)".into()
+        "linear".into()
     }
 }

@@ -13,8 +13,8 @@ use crate::math::{Aabb, Ray};
 /// Which rays of a batch belong together, so that an accelerator may trace them side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
-    /// Every run of 16 rays starts at nearly one point and points nearly one way (camera rays of a pixel block, or their first shadow
-    /// rays).
+    /// Every run of 16 rays starts at nearly one point and points nearly one way: camera rays of a pixel block, or shadow rays from there
+    /// to a small light. A promise not kept costs more than it brings.
     Coherent,
     /// Nothing is known.
     Incoherent,
@@ -22,8 +22,9 @@ pub enum Coherence {
 
 /// Answers ray queries on a fixed geometry.
 ///
-/// All entry points accept any ray: one that is not [valid](Ray::is_valid) hits nothing. The answer to a ray of a coherent batch may depend,
-/// within rounding, on the other rays of its run of 16; that of a single or incoherent ray depends on nothing else.
+/// All entry points accept any ray: one that is not [valid](Ray::is_valid) hits nothing. The answer to a ray of a batch may depend, within
+/// rounding, on the other rays of its run of 16 (such as which of two triangles a ray through their common edge hits); that of a single ray
+/// depends on nothing else.
 pub trait Accelerator: Send + Sync {
     /// The closest hit within the ray's interval.
     fn intersect(&self, ray: &Ray) -> Option<Hit>;

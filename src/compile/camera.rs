@@ -25,9 +25,12 @@ fn placement(files: &Files, desc: &CameraDesc) -> Result<DAffine3> {
             let map = files.affine("camera.transform", transform)?;
             rigid(&map).ok_or_else(|| files.error("camera.transform", "must be a rotation and translation (a uniform scale is ignored)"))
         }
-        (None, None, None) => Ok(DAffine3::IDENTITY),
+        (None, None, None) => Err(files.error("camera", "give `position` and `look_at`, or `transform`")),
         (Some(_), ..) => Err(files.error("camera", "give either `transform`, or `position`, `look_at` and `up`")),
-        (None, ..) => Err(files.error("camera", "`position` and `look_at` go together")),
+        (None, position, _) => {
+            let missing = if position.is_none() { "position" } else { "look_at" };
+            Err(files.error("camera", format!("`position` and `look_at` go together: there is no `{missing}`")))
+        }
     }
 }
 
@@ -54,7 +57,7 @@ fn compile_lens(files: &Files, desc: &LensDesc, camera: &Transform) -> Result<Le
         (None, Some(point)) => {
             let point: DVec3 = files.vector("camera.lens.focus_point", point)?;
             let depth = -camera.inverse_point(point).z;
-            if !(depth > 0.0) {
+            if depth.is_nan() || depth <= 0.0 {
                 return Err(files.error("camera.lens.focus_point", "the point lies behind the camera"));
             }
             depth

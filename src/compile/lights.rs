@@ -4,7 +4,7 @@ use super::Files;
 use crate::color::Rgb;
 use crate::desc::{EnvironmentLightDesc, LightDesc};
 use crate::error::Result;
-use crate::import::read_rgb_image;
+use crate::import::{AssetError, read_rgb_image};
 use crate::light::{DirectionalLight, Environment, EnvironmentMap, Light, PointLight, SpotLight};
 use crate::math::{DAffine3, DMat3};
 
@@ -64,7 +64,7 @@ fn environment(files: &Files, path: &str, desc: &EnvironmentLightDesc) -> Result
             let image = read_rgb_image(&asset).map_err(|e| files.asset_error(&place, &asset, e))?;
             let pixels = image.pixels.into_iter().map(Rgb::from).collect();
             let map = EnvironmentMap::new(image.width, image.height, pixels, rotation, scale);
-            let map = map.map_err(|e| files.error(&place, format!("{}: {e}", asset.display())))?;
+            let map = map.map_err(|e| files.asset_error(&place, &asset, AssetError::Malformed(e.to_string())))?;
             Ok(Environment::Map(Box::new(map)))
         }
         _ => Err(files.error(path, "give either `radiance` or `file`")),

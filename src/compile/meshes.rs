@@ -51,15 +51,18 @@ pub struct Placement<'a> {
     pub reverse_normal: bool,
 }
 
+/// The error about a mesh, in its file if it has one.
+pub fn refusal(files: &Files, path: &str, file: Option<&str>, message: String) -> Error {
+    match file {
+        Some(file) => files.asset_error(&format!("{path}.file"), &files.asset(file), AssetError::Malformed(message)),
+        None => files.error(path, message),
+    }
+}
+
 /// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the front. Triangles
 /// without area are dropped with a warning. `file` is where the mesh came from.
 pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, placement: Placement) -> Result<Mesh> {
-    let refuse = |error: MeshError| match file {
-        Some(file) => {
-            Error::Asset { scene: files.scene.clone(), path: format!("{path}.file"), asset: files.asset(file), message: error.to_string() }
-        }
-        None => files.error(path, error.to_string()),
-    };
+    let refuse = |error: MeshError| refusal(files, path, file, error.to_string());
     let count = data.positions.len();
     if let Some((triangle, index)) = out_of_range(&data) {
         return Err(refuse(MeshError::Index { triangle, index, count }));
@@ -81,7 +84,7 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, plac
     let dropped = before - triangles.len();
     if dropped > 0 {
         if triangles.is_empty() {
-            return Err(files.error(path, format!("all {before} triangles of the mesh have no area")));
+            return Err(refusal(files, path, file, format!("all {before} triangles of the mesh have no area")));
         }
         tracing::warn!("{}: {path}: {dropped} of {before} triangles have no area and were dropped", files.scene.display());
     }

@@ -6,7 +6,9 @@ mod check;
 mod lights;
 mod materials;
 mod meshes;
+mod nesting;
 mod objects;
+mod prepared;
 mod settings;
 mod shapes;
 mod summary;
@@ -45,6 +47,9 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
     }
     builder.finish(desc, camera)
 }
+
+/// Why a transform cannot place anything.
+const SINGULAR: &str = "the transform is singular: it flattens the shape, or is not finite";
 
 /// Where the scene lies; makes errors and finds assets.
 #[derive(Clone, Debug)]
@@ -93,7 +98,7 @@ impl Builder {
         if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky {
             return Err(files.error("shapes", "there is nothing to see: no shapes, no instances and no environment"));
         }
-        if lights.is_empty() && needs_light(&desc.integrator) {
+        if lights.choose(0.0).is_none() && needs_light(&desc.integrator) {
             let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
             return Err(files.error("lights", message));
         }

@@ -1,177 +1,97 @@
-//! Shapes of the world, objects and instances. Instances of objects inside objects are flattened to one level; what emits inside an object
-//! is placed in the world once per instance, so that every light is a shape of its own.
+//! Objects and instances. Instances of objects inside objects are flattened to one level; what emits inside an object is placed in the world
+//! once per instance, so that every light is a shape of its own.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
-use super::{Builder, meshes, shapes};
-use crate::color::Rgb;
-use crate::desc::{InstanceDesc, MeshDesc, MeshShadingDesc, SceneDesc, ShapeCommon, ShapeDesc};
-use crate::error::{Error, Result};
-use crate::geometry::{Instance, Object, Placed, Shape};
-use crate::id::{LightId, MaterialId, ObjectId, PrimId, ShapeId};
-use crate::light::{AreaLight, Emission, Light};
-use crate::math::{DAffine3, Transform};
-use crate::scene::Surface;
+use super::Builder;
+use super::nesting::Nesting;
+use super::prepared::PreparedShape;
+use crate::desc::{InstanceDesc, SceneDesc};
+use crate::error::Result;
+use crate::geometry::{Instance, Object};
+use crate::id::ObjectId;
+use crate::math::DAffine3;
 
-/// More instances than any memory holds are refused before they are made.
-const MAX_INSTANCES: usize = 100_000_000;
-
-/// Objects that already have an id, by name; `None` for those without shapes to share.
-type ObjectIds<'a> = HashMap<&'a str, Option<ObjectId>>;
+/// An object in parts: what its instances share, and what each of them has of its own.
+struct PreparedObject {
+    shared: Option<ObjectId>,
+    emitters: Vec<PreparedShape>,
+}
 
 impl Builder {
     /// Adds the shapes of the world and all instances.
     pub(super) fn add_world(&mut self, desc: &SceneDesc) -> Result<()> {
         for (i, shape) in desc.shapes.iter().enumerate() {
-            let added = self.add_shape(&format!("shapes[{i}]"), shape, &DAffine3::IDENTITY)?;
-            self.geometry.world.extend(added);
+            for prepared in self.prepare(&format!("shapes[{i}]"), shape)? {
+                let id = self.place(prepared, &DAffine3::IDENTITY)?;
+                self.geometry.world.push(id);
+            }
         }
-        let mut ids = ObjectIds::new();
-        self.add_instances(desc, "instances", &desc.instances, &DAffine3::IDENTITY, &mut Vec::new(), &mut ids)?;
-        for name in desc.objects.keys().filter(|name| !ids.contains_key(name.as_str())) {
-            tracing::warn!("{}: objects.{name}: no instance places this object", self.files.scene.display());
+
+        let nesting = Nesting::new(&self.files, desc)?;
+        let mut objects = BTreeMap::new();
+        for (name, object) in &desc.objects {
+            let mut shapes = Vec::new();
+            for (k, shape) in object.shapes.iter().enumerate() {
+                shapes.extend(self.prepare(&format!("objects.{name}.shapes[{k}]"), shape)?);
+            }
+            if nesting.is_used(name) {
+                objects.insert(name.as_str(), self.share(shapes)?);
+            } else {
+                tracing::warn!("{}: objects.{name}: no instance places this object", self.files.scene.display());
+            }
         }
-        Ok(())
+        let world = Level { desc, nesting: &nesting, objects: &objects, path: "instances", outer: DAffine3::IDENTITY };
+        self.add_instances(&world, &desc.instances)
     }
 
-    fn add_instances<'a>(
-        &mut self,
-        desc: &'a SceneDesc,
-        path: &str,
-        instances: &'a [InstanceDesc],
-        outer: &DAffine3,
-        inside: &mut Vec<&'a str>,
-        ids: &mut ObjectIds<'a>,
-    ) -> Result<()> {
-        for (i, instance) in instances.iter().enumerate() {
-            let path = format!("{path}[{i}]");
-            let Some((name, object)) = desc.objects.get_key_value(&instance.object) else {
-                let names = desc.objects.keys().map(String::as_str);
-                return Err(self.files.unknown(&format!("{path}.object"), "object", &instance.object, names));
-            };
-            let name = name.as_str();
-            if inside.contains(&name) {
-                let cycle = [inside.as_slice(), &[name]].concat().join(" > ");
-                return Err(self.files.error(&path, format!("objects contain each other in a cycle: {cycle}")));
-            }
-            let transform = self.files.transform(&format!("{path}.transform"), &instance.transform, outer)?;
+    /// The shapes of an object: what does not emit goes into a group for all instances.
+    fn share(&mut self, shapes: Vec<PreparedShape>) -> Result<PreparedObject> {
+        let (emitters, others): (Vec<_>, Vec<_>) = shapes.into_iter().partition(|shape| shape.emission.is_some());
+        let mut object = Object::default();
+        for shape in others {
+            object.shapes.push(self.place(shape, &DAffine3::IDENTITY)?);
+        }
+        let shared = (!object.shapes.is_empty()).then(|| {
+            self.geometry.objects.push(object);
+            ObjectId::new(self.geometry.objects.len() - 1)
+        });
+        Ok(PreparedObject { shared, emitters })
+    }
 
-            let id = match ids.get(name) {
-                Some(id) => *id,
-                None => {
-                    let id = self.add_object(name, &object.shapes)?;
-                    ids.insert(name, id);
-                    id
-                }
+    /// Adds instances and those inside of them; [`Nesting`] has checked that this ends.
+    fn add_instances(&mut self, level: &Level, instances: &[InstanceDesc]) -> Result<()> {
+        for (i, instance) in instances.iter().enumerate() {
+            let name = instance.object.as_str();
+            let (Some(inner), Some(object)) = (level.desc.objects.get(name), level.objects.get(name)) else {
+                continue;
             };
-            if let Some(object) = id {
-                if self.geometry.instances.len() >= MAX_INSTANCES {
-                    return Err(Error::OutOfMemory(format!("{path}: more than {MAX_INSTANCES} instances")));
-                }
+            if level.nesting.is_empty(name) {
+                continue;
+            }
+            let path = format!("{}[{i}].transform", level.path);
+            let transform = self.files.transform(&path, &instance.transform, &level.outer)?;
+            if let Some(object) = object.shared {
                 self.geometry.instances.push(Instance { object, transform });
             }
-            for (k, shape) in object.shapes.iter().enumerate().filter(|(_, shape)| emits(shape)) {
-                let added = self.add_shape(&format!("objects.{name}.shapes[{k}]"), shape, &transform.world_from_object)?;
-                self.geometry.world.extend(added);
+            let outer = transform.world_from_object;
+            for emitter in &object.emitters {
+                let id = self.place(emitter.clone(), &outer)?;
+                self.geometry.world.push(id);
             }
-
-            inside.push(name);
-            let nested = format!("objects.{name}.instances");
-            self.add_instances(desc, &nested, &object.instances, &transform.world_from_object, inside, ids)?;
-            inside.pop();
+            let path = format!("objects.{name}.instances");
+            self.add_instances(&Level { path: &path, outer, ..*level }, &inner.instances)?;
         }
         Ok(())
-    }
-
-    /// The object of the shapes that instances can share.
-    fn add_object(&mut self, name: &str, shapes: &[ShapeDesc]) -> Result<Option<ObjectId>> {
-        let mut object = Object::default();
-        for (k, shape) in shapes.iter().enumerate().filter(|(_, shape)| !emits(shape)) {
-            object.shapes.extend(self.add_shape(&format!("objects.{name}.shapes[{k}]"), shape, &DAffine3::IDENTITY)?);
-        }
-        if object.shapes.is_empty() {
-            return Ok(None);
-        }
-        self.geometry.objects.push(object);
-        Ok(Some(ObjectId::new(self.geometry.objects.len() - 1)))
-    }
-
-    /// Adds one shape of the scene file, placed by its own transform and `outer` after it; an OBJ file may bring several.
-    fn add_shape(&mut self, path: &str, desc: &ShapeDesc, outer: &DAffine3) -> Result<Vec<ShapeId>> {
-        let common = desc.common();
-        let material = self.materials.find(&self.files, path, common.material)?;
-        let transform = self.files.transform(&format!("{path}.transform"), common.transform, outer)?;
-        let emission = self.emission(path, &common)?;
-        if let Some(surface) = shapes::compile(&self.files, path, desc)? {
-            let mut placed = Placed::new(surface, transform);
-            placed.reverse_normal = common.reverse_normal;
-            return Ok(vec![self.push_shape(path, Shape::Analytic(placed), material, emission)?]);
-        }
-        match desc {
-            ShapeDesc::Mesh(mesh) => self.add_meshes(path, mesh, &transform, material, emission),
-            _ => {
-                let placement =
-                    meshes::Placement { transform: &transform, shading: MeshShadingDesc::Flat, reverse_normal: common.reverse_normal };
-                let mesh = meshes::place(&self.files, path, None, meshes::cube(), placement)?;
-                Ok(vec![self.push_shape(path, Shape::Mesh(mesh), material, emission)?])
-            }
-        }
-    }
-
-    fn add_meshes(
-        &mut self,
-        path: &str,
-        desc: &MeshDesc,
-        transform: &Transform,
-        material: MaterialId,
-        emission: Option<Emission>,
-    ) -> Result<Vec<ShapeId>> {
-        let mut added = Vec::new();
-        for loaded in meshes::load(&self.files, path, desc)? {
-            let placement = meshes::Placement { transform, shading: desc.shading, reverse_normal: desc.reverse_normal };
-            let mesh = meshes::place(&self.files, path, desc.file.as_deref(), loaded.data, placement)?;
-            let (mut material, mut emission) = (material, emission);
-            if let Some(mtl) = &loaded.material {
-                material = self.materials.push(super::materials::from_mtl(mtl));
-                let glow = mtl.emissive.filter(|e| e.iter().all(|x| x.is_finite() && *x >= 0.0) && e.iter().any(|&x| x > 0.0));
-                emission = emission.or(glow.map(|radiance| Emission { radiance: radiance.into(), two_sided: false }));
-            }
-            added.push(self.push_shape(path, Shape::Mesh(mesh), material, emission)?);
-        }
-        Ok(added)
-    }
-
-    fn emission(&self, path: &str, common: &ShapeCommon) -> Result<Option<Emission>> {
-        let Some(emission) = common.emission else {
-            return Ok(None);
-        };
-        let radiance = Rgb::from(self.files.emitted(&format!("{path}.emission.radiance"), emission.radiance)?);
-        Ok((!radiance.is_black()).then_some(Emission { radiance, two_sided: emission.two_sided }))
-    }
-
-    fn push_shape(&mut self, path: &str, shape: Shape, material: MaterialId, emission: Option<Emission>) -> Result<ShapeId> {
-        if !shape.bounds().min.is_finite() || !shape.bounds().max.is_finite() {
-            return Err(self.files.error(path, "the shape reaches to infinity: its size or place is too large for 32-bit numbers"));
-        }
-        let id = ShapeId::new(self.geometry.shapes.len());
-        self.geometry.shapes.push(shape);
-        let mut surface = Surface { material, first_light: None, single_light: false };
-        if let Some(emission) = emission {
-            let lights = AreaLight::for_shape(id, emission, &self.geometry);
-            if !lights.iter().any(|light| light.area() > 0.0) {
-                return Err(self.files.error(&format!("{path}.emission"), "the light has no area"));
-            }
-            surface.first_light = Some(LightId::new(self.lights.len()));
-            surface.single_light = lights.len() == 1;
-            self.lights.extend(lights.into_iter().map(Light::Area));
-            debug_assert!(surface.light(PrimId(0)).is_some());
-        }
-        self.surfaces.push(surface);
-        Ok(id)
     }
 }
 
-/// Whether a shape gives off light, as far as the scene file says.
-fn emits(desc: &ShapeDesc) -> bool {
-    desc.common().emission.is_some_and(|e| e.radiance.iter().any(|&r| r != 0.0))
+/// A list of instances and what stands around it.
+#[derive(Clone, Copy)]
+struct Level<'a> {
+    desc: &'a SceneDesc,
+    nesting: &'a Nesting<'a>,
+    objects: &'a BTreeMap<&'a str, PreparedObject>,
+    path: &'a str,
+    outer: DAffine3,
 }

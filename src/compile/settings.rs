@@ -1,8 +1,8 @@
-//! Checks of film, sampler and integrator, which compilation does not use.
+//! Checks of what says how to render: film, sampler, camera, integrator and outputs.
 
 use std::path::Path;
 
-use super::Files;
+use super::{Files, camera};
 use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, OutputDesc, SceneDesc};
 use crate::error::Result;
 
@@ -19,6 +19,7 @@ pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
     if desc.sampler.spp == 0 {
         return Err(files.error("sampler.spp", "must be at least 1"));
     }
+    camera::compile(&files, &desc.camera)?;
     check_integrator(&files, &desc.integrator)?;
     for (i, output) in desc.outputs.iter().enumerate() {
         check_output(&files, &format!("outputs[{i}]"), output)?;

@@ -18,7 +18,7 @@ impl Files {
     /// [`Self::affine`] after `outer`, refused if it cannot be inverted.
     pub(super) fn transform(&self, path: &str, desc: &TransformDesc, outer: &DAffine3) -> Result<Transform> {
         let map = *outer * self.affine(path, desc)?;
-        Transform::new(map).ok_or_else(|| self.error(path, "the transform is singular: it flattens the shape, or is not finite"))
+        Transform::new(map).ok_or_else(|| self.error(path, super::SINGULAR))
     }
 
     fn step(&self, path: &str, step: &TransformStepDesc) -> Result<DAffine3> {
@@ -55,7 +55,7 @@ impl Files {
         let origin = self.vector(path, from)?;
         let z = origin - self.vector(path, to)?;
         let z = z.try_normalize().ok_or_else(|| self.error(path, "looks at the very point it stands on"))?;
-        let up = self.direction(&format!("{path}: up"), up)?;
+        let up = self.direction(&format!("{path}.up"), up)?;
         let x = up.cross(z);
         // Sines below this leave no digit of the direction that `up` should give.
         if x.length() < 1e-12 {

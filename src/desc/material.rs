@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// A colour: `[r, g, b]`, one number for grey, or `{ "texture": "name" }`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, deny_unknown_fields, expecting = "expected a colour: [red, green, blue], one number for grey, or { \"texture\": name }")]
 pub enum ColorDesc {
     /// The same value in every channel.
     Grey(f32),
@@ -20,7 +20,7 @@ pub enum ColorDesc {
 
 /// GGX roughness: a number, or `[along u, along v]` for an anisotropic surface. The distribution's alpha is its square.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, or [along u, along v]")]
 pub enum RoughnessDesc {
     /// The same in all directions.
     Isotropic(f32),
@@ -40,7 +40,7 @@ pub enum MaterialDesc {
     },
     /// Ideal specular reflection.
     Mirror {
-        /// Fraction of light reflected, each channel within `[0, 1]`. Default: 1.
+        /// Fraction of light reflected, each channel within `[0, 1]`, not a checkerboard. Default: 1.
         #[serde(default = "white")]
         reflectance: ColorDesc,
     },
@@ -61,7 +61,7 @@ pub enum MaterialDesc {
         /// GGX alpha itself, in place of `roughness`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         alpha: Option<RoughnessDesc>,
-        /// Factor on the reflectance, within `[0, 1]`. Default: 1.
+        /// Factor on the reflectance, within `[0, 1]`, not a checkerboard. Default: 1.
         #[serde(default = "white")]
         tint: ColorDesc,
     },

@@ -24,9 +24,12 @@ pub use shape::{
 pub use transform::{ScaleDesc, TransformDesc, TransformStepDesc};
 
 use std::collections::BTreeMap;
+use std::fmt;
+use std::marker::PhantomData;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::{Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A scene: what to render, how, and where to write it.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -50,16 +53,16 @@ pub struct SceneDesc {
     #[serde(default)]
     pub sampler: SamplerDesc,
     /// Textures by name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, deserialize_with = "unique_names", skip_serializing_if = "BTreeMap::is_empty")]
     pub textures: BTreeMap<String, TextureDesc>,
     /// Materials by name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, deserialize_with = "unique_names", skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, MaterialDesc>,
     /// Shapes in the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeDesc>,
     /// Objects by name: groups of shapes that are drawn only where an instance places them.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, deserialize_with = "unique_names", skip_serializing_if = "BTreeMap::is_empty")]
     pub objects: BTreeMap<String, ObjectDesc>,
     /// Placements of objects in the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -70,4 +73,31 @@ pub struct SceneDesc {
     /// Files to write; the command line's `-o` replaces them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<OutputDesc>,
+}
+
+/// A map whose names differ; JSON itself would let the last of two win.
+fn unique_names<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<BTreeMap<String, T>, D::Error> {
+    struct Names<T>(PhantomData<T>);
+
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for Names<T> {
+        type Value = BTreeMap<String, T>;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("an object of names")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Self::Value, A::Error> {
+            let mut map = BTreeMap::new();
+            while let Some(name) = entries.next_key::<String>()? {
+                let value = entries.next_value()?;
+                if map.contains_key(&name) {
+                    return Err(A::Error::custom(format_args!("the name \"{name}\" is given twice")));
+                }
+                map.insert(name, value);
+            }
+            Ok(map)
+        }
+    }
+
+    deserializer.deserialize_map(Names(PhantomData))
 }

@@ -1,7 +1,7 @@
 //! Film, sampler and integrator as written.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// The picture's size and its pixel filter.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -155,14 +155,19 @@ pub enum IntegratorDesc {
         ambient: [f32; 3],
     },
     /// The geometric normal as a colour, `(n + 1) / 2`.
+    #[serde(deserialize_with = "no_keys")]
     Normal,
     /// The shading normal as a colour, `(n + 1) / 2`.
+    #[serde(deserialize_with = "no_keys")]
     ShadingNormal,
     /// Surface parameters as red and green.
+    #[serde(deserialize_with = "no_keys")]
     Uv,
     /// Depth along the view axis, in world units.
+    #[serde(deserialize_with = "no_keys")]
     Depth,
     /// A colour for each primitive.
+    #[serde(deserialize_with = "no_keys")]
     PrimitiveId,
     /// The fraction of a cosine-weighted hemisphere that is free.
     AmbientOcclusion {
@@ -176,6 +181,15 @@ impl Default for IntegratorDesc {
     fn default() -> Self {
         Self::Path { max_depth: default_max_depth(), rr_depth: default_rr_depth(), strategy: StrategyDesc::default() }
     }
+}
+
+/// For variants without parameters, whose unknown keys serde would ignore.
+fn no_keys<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct NoKeys {}
+
+    NoKeys::deserialize(deserializer).map(|NoKeys {}| ())
 }
 
 fn default_max_depth() -> u32 {

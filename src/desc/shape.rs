@@ -74,7 +74,10 @@ pub struct ShapeCommon<'a> {
 shapes! {
     /// A triangle mesh from a file, or inline by `positions` and `triangles`.
     Mesh(MeshDesc) {
-        /// An OBJ (with its MTL) or PLY file (binary or ASCII), relative to the scene file.
+        /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ brings those of its MTL: `illum`
+        /// 5 is a mirror of colour Ks; 4, 6, 7 and 9, or `d` below 1/2, is glass of index Ni; a specular colour Ks with an exponent Ns has
+        /// alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic with base Kd otherwise; all else is diffuse with
+        /// Kd. Ke is radiance given off. Texture maps are not read.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
         /// Inline: positions of the vertices.

@@ -39,7 +39,7 @@ pub enum TransformStepDesc {
 
 /// One factor, or one for each axis.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected one factor, or [x, y, z]")]
 pub enum ScaleDesc {
     /// The same along every axis.
     Uniform(f64),

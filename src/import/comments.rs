@@ -1,17 +1,32 @@
 //! Comments in scene files: `//` to the end of the line and `/* */`, outside of strings.
 
-/// The text with every comment replaced by spaces; line breaks stay, so that positions in messages are right.
-pub fn blank_comments(text: &str) -> String {
+/// A text without comments.
+pub struct Blanked {
+    /// The text with every comment (and a byte order mark) replaced by spaces, byte by byte; line breaks stay, so that positions in messages
+    /// are right.
+    pub text: String,
+    /// Where a comment begins that never ends.
+    pub open_comment: Option<usize>,
+}
+
+/// Replaces comments by spaces.
+pub fn blank_comments(text: &str) -> Blanked {
     let mut out = Vec::with_capacity(text.len());
     let bytes = text.as_bytes();
     let mut state = State::Code;
+    let mut comment_start = 0;
     let mut i = 0;
+    if text.starts_with('\u{feff}') {
+        i = '\u{feff}'.len_utf8();
+        out.resize(i, b' ');
+    }
     while i < bytes.len() {
         let (byte, next) = (bytes[i], bytes.get(i + 1));
         match state {
             State::Code if byte == b'/' && next == Some(&b'/') => state = State::Line,
             State::Code if byte == b'/' && next == Some(&b'*') => {
                 out.extend(b"  ");
+                comment_start = i;
                 i += 2;
                 state = State::Block;
                 continue;
@@ -40,7 +55,7 @@ pub fn blank_comments(text: &str) -> String {
         i += 1;
     }
     // Only whole comments were replaced, by ASCII, so this is still UTF-8.
-    String::from_utf8(out).unwrap_or_default()
+    Blanked { text: String::from_utf8(out).unwrap_or_default(), open_comment: (state == State::Block).then_some(comment_start) }
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -58,7 +73,7 @@ mod tests {
     #[test]
     fn comments_become_blanks_and_positions_stay() {
         let text = "{ // one é\n \"a\": \"// no\", /* two\n three */ \"b\\\"/*\": 1 }";
-        let blank = blank_comments(text);
+        let blank = blank_comments(text).text;
         assert_eq!(blank.lines().count(), text.lines().count());
         let value: serde_json::Value = serde_json::from_str(&blank).unwrap();
         assert_eq!(value["a"], "// no");
@@ -68,7 +83,9 @@ mod tests {
     #[test]
     fn an_open_comment_or_string_ends_with_the_text() {
         for text in ["/* open", "\"open \\", "//", "/", "\"\\"] {
-            assert!(blank_comments(text).len() <= text.len());
+            let blanked = blank_comments(text);
+            assert_eq!(blanked.text.len(), text.len(), "{text}");
+            assert_eq!(blanked.open_comment, text.starts_with("/*").then_some(0), "{text}");
         }
     }
 }

@@ -29,13 +29,25 @@ pub fn read_rgb_image(path: &Path) -> Result<RgbImage, AssetError> {
     }
 }
 
+/// More pixels than any environment has; a header that claims more is damaged.
+const MAX_PIXELS: u64 = 1 << 30;
+
 fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
+    let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR file: {e}"));
+    // The size is believed only after a look: memory is asked for before any pixel is read.
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| malformed(&e))?;
+    for header in &meta.headers {
+        let size = header.layer_size;
+        if size.width() as u64 * size.height() as u64 > MAX_PIXELS {
+            return Err(malformed(&format!("{} x {} pixels are too many", size.width(), size.height())));
+        }
+    }
     let image = exr::prelude::read_first_rgba_layer_from_file(
         path,
         |size, _| RgbImage { width: size.width(), height: size.height(), pixels: vec![[0.0; 3]; size.area()] },
         |image: &mut RgbImage, at, (r, g, b, _a): (f32, f32, f32, f32)| image.pixels[at.y() * image.width + at.x()] = [r, g, b],
     );
-    image.map(|image| image.layer_data.channel_data.pixels).map_err(|e| AssetError::Malformed(format!("not a readable EXR file: {e}")))
+    image.map(|image| image.layer_data.channel_data.pixels).map_err(|e| malformed(&e))
 }
 
 fn read_hdr(path: &Path) -> Result<RgbImage, AssetError> {
@@ -45,4 +57,46 @@ fn read_hdr(path: &Path) -> Result<RgbImage, AssetError> {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let pixels = image.into_raw().as_chunks::<3>().0.to_vec();
     Ok(RgbImage { width, height, pixels })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_formats_keep_rows_and_colours() {
+        let folder = tempfile::tempdir().unwrap();
+        let pixel = |x: usize, y: usize| [x as f32, y as f32, 0.25];
+        let exr = folder.path().join("sky.exr");
+        exr::prelude::write_rgb_file(&exr, 3, 2, |x, y| pixel(x, y).into()).unwrap();
+        let hdr = folder.path().join("sky.HDR");
+        let raw: Vec<image::Rgb<f32>> = (0..6).map(|i| image::Rgb(pixel(i % 3, i / 3))).collect();
+        image::codecs::hdr::HdrEncoder::new(std::fs::File::create(&hdr).unwrap()).encode(&raw, 3, 2).unwrap();
+        for path in [exr, hdr] {
+            let image = read_rgb_image(&path).unwrap();
+            assert_eq!((image.width, image.height), (3, 2));
+            for (i, p) in image.pixels.iter().enumerate() {
+                let expected = pixel(i % 3, i / 3);
+                assert!(p.iter().zip(expected).all(|(a, b)| (a - b).abs() <= b / 128.0), "{}: {p:?}", path.display());
+            }
+        }
+    }
+
+    #[test]
+    fn damaged_files_are_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("whole.exr");
+        exr::prelude::write_rgb_file(&path, 8, 8, |x, y| (x as f32, y as f32, 0.5f32)).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for length in [0, 3, 40, whole.len() / 2, whole.len() - 1] {
+            let cut = folder.path().join("cut.exr");
+            std::fs::write(&cut, &whole[..length]).unwrap();
+            assert!(matches!(read_rgb_image(&cut), Err(AssetError::Malformed(_))), "{length} bytes");
+        }
+        let other = folder.path().join("sky.hdr");
+        std::fs::write(&other, "#?RADIANCE\n\n-Y 100000 +X 100000\n").unwrap();
+        assert!(matches!(read_rgb_image(&other), Err(AssetError::Malformed(_))));
+        assert!(matches!(read_rgb_image(folder.path()), Err(AssetError::Malformed(_))));
+        assert!(matches!(read_rgb_image(&folder.path().join("none.exr")), Err(AssetError::Missing { .. })));
+    }
 }

@@ -1,5 +1,7 @@
 //! A mesh as a file gives it: buffers that nobody has checked.
 
+use super::AssetError;
+
 /// Buffers of a triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
@@ -14,6 +16,21 @@ pub struct MeshData {
 }
 
 impl MeshData {
+    /// Adds another mesh with the same attributes.
+    pub(super) fn append(&mut self, mut other: Self) -> Result<(), AssetError> {
+        let first = u32::try_from(self.positions.len()).ok().filter(|&first| (u32::MAX - first) as usize >= other.positions.len());
+        let first = first.ok_or_else(|| AssetError::Malformed("the file has more than 4,294,967,295 vertices".into()))?;
+        self.positions.append(&mut other.positions);
+        self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|i| i + first)));
+        if let (Some(normals), Some(others)) = (&mut self.normals, &mut other.normals) {
+            normals.append(others);
+        }
+        if let (Some(uvs), Some(others)) = (&mut self.uvs, &mut other.uvs) {
+            uvs.append(others);
+        }
+        Ok(())
+    }
+
     /// Adds a convex polygon as a fan around its first corner; fewer than three corners add nothing.
     pub fn push_polygon(&mut self, corners: &[u32]) {
         for pair in corners.windows(2).skip(1) {

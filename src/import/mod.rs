@@ -2,8 +2,10 @@
 
 mod comments;
 mod environment_image;
+mod fault;
 mod mesh_data;
 mod obj;
+mod obj_check;
 mod ply;
 mod scene_file;
 

@@ -1,8 +1,11 @@
 //! OBJ files with their MTL: one mesh for each material.
 
 use std::cell::RefCell;
-use std::path::{Path, PathBuf};
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::path::Path;
 
+use super::obj_check::{check_obj, expand_colors};
 use super::{AssetError, MeshData};
 
 /// What an MTL says of a material that is used here.
@@ -20,60 +23,73 @@ pub struct ObjMaterial {
     pub shininess: Option<f32>,
     /// `Ni`, index of refraction.
     pub ior: Option<f32>,
-    /// `d`, opacity.
+    /// `d`, opacity, or what `Tr` leaves of 1.
     pub opacity: Option<f32>,
     /// `illum`.
     pub illumination: Option<u8>,
 }
 
-/// A mesh of an OBJ file with the material of its faces.
+/// The faces of an OBJ file that share a material.
 #[derive(Clone, Debug)]
 pub struct ObjMesh {
-    /// The `o` or `g` it belongs to.
-    pub name: String,
     /// The mesh.
     pub mesh: MeshData,
     /// Its material, if the file names one.
     pub material: Option<ObjMaterial>,
 }
 
-/// Reads an OBJ file; with `materials`, also the MTL files it names.
+/// Reads an OBJ file; with `materials`, also the MTL files it names. Polygons become fans; points and lines are left out.
 ///
 /// # Errors
 /// If a file is missing or malformed, a face refers to what does not exist, or there are no faces.
 pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError> {
-    let file = std::fs::File::open(path).map_err(|e| AssetError::missing(path, &e))?;
+    // Comments and names in old files may be in any encoding.
+    let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    let text = String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned());
+    let used = check_obj(&text)?;
+    // The parser takes lines of three and more points for faces.
+    let text = if used.has_lines { without_lines(&text) } else { text };
+
     let folder = path.parent().unwrap_or(Path::new(""));
-    let missing: RefCell<Option<(PathBuf, std::io::Error)>> = RefCell::new(None);
+    let trouble: RefCell<Option<AssetError>> = RefCell::new(None);
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
-    let mut reader = std::io::BufReader::with_capacity(1 << 20, file);
-    let loaded = tobj::load_obj_buf(&mut reader, &options, |mtl| {
+    let loaded = tobj::load_obj_buf(&mut text.as_bytes(), &options, |mtl| {
         if !materials {
             return Ok(Default::default());
         }
         let mtl = folder.join(mtl);
-        match std::fs::File::open(&mtl) {
-            Ok(file) => tobj::load_mtl_buf(&mut std::io::BufReader::new(file)),
-            Err(e) => {
-                missing.borrow_mut().get_or_insert((mtl, e));
-                Err(tobj::LoadError::OpenFileFailed)
-            }
-        }
+        let parsed = read_mtl(&mtl).and_then(|text| tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|e| mtl_fault(&mtl, &e)));
+        parsed.map_err(|e| {
+            trouble.borrow_mut().get_or_insert(e);
+            tobj::LoadError::ReadError
+        })
     });
-    if let Some((file, error)) = missing.into_inner() {
-        return Err(AssetError::missing(&file, &error));
+    if let Some(error) = trouble.into_inner() {
+        return Err(error);
     }
-    let malformed = |what: &str, e: &tobj::LoadError| AssetError::Malformed(format!("not a valid {what} file: {e}"));
-    let (models, library) = loaded.map_err(|e| malformed("OBJ", &e))?;
-    let library = if materials { library.map_err(|e| malformed("MTL", &e))? } else { Vec::new() };
-
-    let mut meshes = Vec::new();
-    for model in models {
-        if model.mesh.indices.is_empty() {
-            continue;
+    let (models, library) = loaded.map_err(|e| AssetError::Malformed(format!("not a valid OBJ file: {e}")))?;
+    let library = if materials { library.unwrap_or_default() } else { Vec::new() };
+    if materials && used.names_a_library {
+        let unknown = |(_, name): &&(usize, String)| !library.iter().any(|m| m.name == *name);
+        if let Some((line, name)) = used.materials.iter().find(unknown) {
+            return Err(AssetError::Malformed(format!("line {line}: no material named \"{name}\" in the MTL")));
         }
-        let material = model.mesh.material_id.and_then(|id| library.get(id)).map(from_mtl);
-        meshes.push(ObjMesh { name: model.name, mesh: from_tobj(&model.mesh), material });
+    }
+    join_models(&models, &library)
+}
+
+/// One mesh for each material and set of attributes, in the order of their first faces.
+fn join_models(models: &[tobj::Model], library: &[tobj::Material]) -> Result<Vec<ObjMesh>, AssetError> {
+    let mut meshes: Vec<ObjMesh> = Vec::new();
+    let mut places = HashMap::new();
+    for model in models.iter().filter(|model| !model.mesh.indices.is_empty()) {
+        let mesh = from_tobj(&model.mesh);
+        let material = model.mesh.material_id.filter(|&id| id < library.len());
+        let place = *places.entry((material, mesh.normals.is_some(), mesh.uvs.is_some())).or_insert(meshes.len());
+        match meshes.get_mut(place) {
+            Some(joined) => joined.mesh.append(mesh)?,
+            None => meshes.push(ObjMesh { mesh, material: material.map(|id| from_mtl(&library[id])) }),
+        }
     }
     if meshes.is_empty() {
         return Err(AssetError::Malformed("the file has no faces".into()));
@@ -81,7 +97,22 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     Ok(meshes)
 }
 
+fn without_lines(text: &str) -> String {
+    text.lines().filter(|line| line.split_whitespace().next() != Some("l")).flat_map(|line| [line, "\n"]).collect()
+}
+
+/// The text of an MTL, fit for the parser.
+fn read_mtl(path: &Path) -> Result<String, AssetError> {
+    let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    expand_colors(&String::from_utf8_lossy(&bytes)).map_err(|e| mtl_fault(path, &e))
+}
+
+fn mtl_fault(path: &Path, fault: &dyn Display) -> AssetError {
+    AssetError::Malformed(format!("{}: not a valid MTL file: {fault}", path.display()))
+}
+
 fn from_mtl(material: &tobj::Material) -> ObjMaterial {
+    let transparency = material.unknown_param.get("Tr").and_then(|text| text.parse::<f32>().ok());
     ObjMaterial {
         name: material.name.clone(),
         diffuse: material.diffuse,
@@ -89,7 +120,7 @@ fn from_mtl(material: &tobj::Material) -> ObjMaterial {
         emissive: material.emissive,
         shininess: material.shininess,
         ior: material.optical_density,
-        opacity: material.dissolve,
+        opacity: material.dissolve.or(transparency.map(|t| 1.0 - t)),
         illumination: material.illumination_model,
     }
 }
@@ -110,9 +141,11 @@ fn from_tobj(mesh: &tobj::Mesh) -> MeshData {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
 
-    fn write(folder: &tempfile::TempDir, name: &str, text: &str) -> PathBuf {
+    fn write(folder: &tempfile::TempDir, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
         path
@@ -121,32 +154,78 @@ mod tests {
     const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
 
     #[test]
-    fn materials_split_the_mesh() {
+    fn materials_split_the_mesh_and_groups_do_not() {
         let folder = tempfile::tempdir().unwrap();
-        write(&folder, "m.mtl", "newmtl a\nKd 0.1 0.2 0.3\nnewmtl b\nKe 1 2 3\n");
-        let text = format!("mtllib m.mtl\n{QUAD}usemtl a\nf 1/1 2/2 3/3 4/4\nusemtl b\nf -4 -3 -2\n");
+        write(&folder, "m.mtl", "newmtl a\nKd 0.1 0.2 0.3\nnewmtl b\nKe 1 2 3\nKd 0.5\nTr 0.25\n");
+        let text =
+            format!("mtllib m.mtl\n{QUAD}g one\nusemtl a\nf 1/1 2/2 3/3 4/4\nusemtl b\nf -4 -3 -2\ng two\nusemtl a\nf 1/1 2/2 3/3\n");
         let meshes = read_obj(&write(&folder, "q.obj", &text), true).unwrap();
         assert_eq!(meshes.len(), 2);
-        assert_eq!(meshes[0].mesh.triangles.len(), 2);
-        assert!(meshes[0].mesh.uvs.is_some());
+        assert_eq!(meshes[0].mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 5, 6]]);
+        assert_eq!(meshes[0].mesh.uvs.as_ref().unwrap()[6], [1.0, 1.0]);
         assert_eq!(meshes[0].material.as_ref().unwrap().diffuse, Some([0.1, 0.2, 0.3]));
-        assert_eq!(meshes[1].material.as_ref().unwrap().emissive, Some([1.0, 2.0, 3.0]));
+        let b = meshes[1].material.as_ref().unwrap();
+        assert_eq!((b.emissive, b.diffuse, b.opacity), (Some([1.0, 2.0, 3.0]), Some([0.5; 3]), Some(0.75)));
+        assert_eq!(read_obj(&folder.path().join("q.obj"), false).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn lines_and_points_are_no_faces() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!("# caf\u{e9}\n{QUAD}l 1 2 3 4\np 1\nl 1 2\nf 1 2 3\nf 1 2\n");
+        let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        let meshes = read_obj(&write(&folder, "q.obj", latin), true).unwrap();
+        assert_eq!(meshes[0].mesh.triangles, [[0, 1, 2]]);
     }
 
     #[test]
     fn a_missing_mtl_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        let path = write(&folder, "q.obj", &format!("mtllib gone.mtl\n{QUAD}usemtl a\nf 1 2 3\n"));
+        let path = write(&folder, "q.obj", format!("mtllib gone.mtl\n{QUAD}usemtl a\nf 1 2 3\n"));
         assert!(matches!(read_obj(&path, true), Err(AssetError::Missing { file, .. }) if file.ends_with("gone.mtl")));
         assert!(read_obj(&path, false).is_ok());
     }
 
     #[test]
-    fn malformed_files_are_errors() {
+    fn malformed_materials_are_errors() {
         let folder = tempfile::tempdir().unwrap();
-        for text in ["", "v 0 0 0\nf 1 2 3\n", "v 0 0 x\n", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2\n", "v 0 0 0\nf 0 0 0\n", "f 1 2 3\n"] {
-            let path = write(&folder, "bad.obj", text);
-            assert!(matches!(read_obj(&path, true), Err(AssetError::Malformed(_))), "{text:?}");
+        let path = write(&folder, "q.obj", format!("mtllib m.mtl\n{QUAD}usemtl a\nf 1 2 3\n"));
+        for (mtl, part) in [
+            ("newmtl a\nKd 0.1 0.2\n", "line 2"),
+            ("newmtl a\nKd spectral x.rfl\n", "line 2"),
+            ("newmtl a\nKd\n", "line 2"),
+            ("newmtl a\nNs x\n", "MTL"),
+            ("newmtl b\nKd 0 0 0\n", "no material named \"a\""),
+            ("newmtl\n", "MTL"),
+            ("", "no material named \"a\""),
+        ] {
+            write(&folder, "m.mtl", mtl);
+            let error = read_obj(&path, true).unwrap_err().to_string();
+            assert!(error.contains(part), "{mtl:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn malformed_files_are_errors_with_their_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let three = "v 0 0 0\nv 1 0 0\nv 1 1 0\n";
+        for (text, part) in [
+            (String::new(), "no faces"),
+            ("v 0 0 0\nf 1 2 3\n".into(), "line 2: a face refers to vertex 3, but there are only 1"),
+            ("v 0 0 x\n".into(), "line 1"),
+            ("v 0 0\n".into(), "line 1"),
+            (format!("{three}f 1 2\n"), "no faces"),
+            (format!("{three}f 0 1 2\n"), "line 4"),
+            (format!("{three}f 1 2 -4\n"), "line 4"),
+            (format!("{three}f 1 2 x\n"), "line 4"),
+            (format!("{three}f 1/1/1/1 2 3\n"), "line 4"),
+            (format!("{three}vt 0 0\nf 1/2 2/1 3/1\n"), "line 5: a face refers to uv 2, but there are only 1"),
+            (format!("{three}f 1//1 2//1 3//1\n"), "line 4: a face refers to normal 1, but there are only 0"),
+            (format!("{three}f 1 2 99999999999999999999\n"), "line 4"),
+            (format!("{three}f 1 2 -9223372036854775808\n"), "line 4"),
+        ] {
+            let error = read_obj(&write(&folder, "bad.obj", &text), true).unwrap_err();
+            assert!(matches!(&error, AssetError::Malformed(message) if message.contains(part)), "{text:?}: {error}");
         }
         assert!(matches!(read_obj(&folder.path().join("none.obj"), true), Err(AssetError::Missing { .. })));
     }

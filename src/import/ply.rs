@@ -20,20 +20,28 @@ pub fn read_ply(path: &Path) -> Result<MeshData, AssetError> {
 }
 
 fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
-    let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a valid PLY file: {e}"));
+    // The parser's messages run over several lines: what, the text in question, and the same again in other words.
+    let malformed = |e: &dyn std::fmt::Display| {
+        let text = e.to_string();
+        let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.chars().all(|c| c == '\'')).take(2).collect();
+        AssetError::Malformed(format!("not a valid PLY file: {}", lines.join(" ")))
+    };
     let mut reader = Reader::new(source);
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(|e| malformed(&e))?;
     let mut mesh = MeshData::default();
     for (name, element) in &header.elements {
         match name.as_str() {
             "vertex" => {
+                if let Some(axis) = ["x", "y", "z"].iter().find(|axis| !element.properties.contains_key(**axis)) {
+                    return Err(AssetError::Malformed(format!("the vertices have no property {axis}")));
+                }
                 let vertices = read_elements::<Vertex>(&mut reader, element, &header).map_err(|e| malformed(&e))?;
                 take_vertices(&mut mesh, &vertices, element);
             }
             "face" => {
-                for face in read_elements::<Face>(&mut reader, element, &header).map_err(|e| malformed(&e))? {
+                for (i, face) in read_elements::<Face>(&mut reader, element, &header).map_err(|e| malformed(&e))?.iter().enumerate() {
                     if let Some(bad) = face.negative {
-                        return Err(AssetError::Malformed(format!("a face refers to vertex {bad}")));
+                        return Err(AssetError::Malformed(format!("face {i} refers to vertex {bad}")));
                     }
                     mesh.push_polygon(&face.corners);
                 }
@@ -45,6 +53,9 @@ fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
     }
     if mesh.positions.is_empty() {
         return Err(AssetError::Malformed("the file has no vertices".into()));
+    }
+    if mesh.triangles.is_empty() {
+        return Err(AssetError::Malformed("the file has no faces with a list `vertex_indices`".into()));
     }
     Ok(mesh)
 }
@@ -201,6 +212,40 @@ mod tests {
         }
         let text = ascii();
         assert!(parse_ply(&text.as_bytes()[..text.len() - 12]).is_err());
-        assert!(parse_ply(text.replace("0 1 2 3", "0 1 2 -3").as_bytes()).is_err());
+        for (from, to) in [
+            ("0 1 2 3", "0 1 2 -3"),
+            ("4 0 1 2 3", "2 0 1"),
+            ("vertex_indices", "others"),
+            ("float z", "float w"),
+            ("ply", "pyl"),
+            ("ascii", "utf8"),
+            ("1 1 0 1 1", "1 x 0 1 1"),
+            ("vertex 4", "vertex 400000000000"),
+            ("vertex 4", "vertex -4"),
+        ] {
+            let error = parse_ply(text.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
+            assert!(!error.contains('\n'), "{error}");
+        }
+    }
+
+    #[test]
+    fn faults_of_text_files_have_a_line() {
+        let error = parse_ply(ascii().replacen("1 1 0 1 1", "1 x 0 1 1", 1).as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("Line 14"), "{error}");
+    }
+
+    #[test]
+    fn normals_other_types_and_other_elements_are_read() {
+        let text = "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nelement camera 1\r\nproperty list uchar float view\r\nelement face 1\r\n\
+                    property list uint8 uint16 vertex_index\r\nproperty uchar red\r\nelement vertex 3\r\nproperty double x\r\nproperty short y\r\n\
+                    property float z\r\nproperty float nx\r\nproperty float ny\r\nproperty float nz\r\nproperty uchar red\r\nend_header\r\n\
+                    2 0.5 0.5\r\n3 2 1 0 255\r\n0 0 0 0 0 1 9\r\n1.5 0 0 0 0 1 9\r\n0 -2 0 0 0 1 9\r\n";
+        for text in [text.to_owned(), text.replace("\r\n", "\n")] {
+            let mesh = parse_ply(text.as_bytes()).unwrap();
+            assert_eq!(mesh.positions, [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, -2.0, 0.0]]);
+            assert_eq!(mesh.triangles, [[2, 1, 0]]);
+            assert_eq!(mesh.normals, Some(vec![[0.0, 0.0, 1.0]; 3]));
+            assert_eq!(mesh.uvs, None);
+        }
     }
 }

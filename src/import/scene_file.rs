@@ -2,7 +2,11 @@
 
 use std::path::Path;
 
+use serde_json::Value;
+use serde_json::error::Category;
+
 use super::comments::blank_comments;
+use super::fault::{self, Step};
 use crate::desc::SceneDesc;
 use crate::error::{Error, Result};
 
@@ -11,13 +15,14 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Missing`] if it cannot be read, [`Error::Parse`] with line, column and path for what it says.
 pub fn load_scene(path: &Path) -> Result<SceneDesc> {
-    let missing = |message: String| Error::Missing { file: path.into(), message };
-    let bytes = std::fs::read(path).map_err(|e| missing(e.to_string()))?;
-    let text = String::from_utf8(bytes).map_err(|e| {
-        let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count();
-        Error::Parse { file: path.into(), line, column: 1, message: "the file is not UTF-8 text".into() }
-    })?;
-    parse_scene(&text, path)
+    let bytes = std::fs::read(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+    match std::str::from_utf8(&bytes) {
+        Ok(text) => parse_scene(text, path),
+        Err(e) => {
+            let valid = String::from_utf8_lossy(&bytes[..e.valid_up_to()]);
+            Err(fault_at(path, &valid, valid.len(), "the file is not UTF-8 text".into()))
+        }
+    }
 }
 
 /// Parses the text of a scene; `path` is only for messages.
@@ -25,26 +30,71 @@ pub fn load_scene(path: &Path) -> Result<SceneDesc> {
 /// # Errors
 /// As [`load_scene`].
 pub fn parse_scene(text: &str, path: &Path) -> Result<SceneDesc> {
-    let json = blank_comments(text);
-    let fault = |error: &serde_json::Error, place: &str| Error::Parse {
-        file: path.into(),
-        line: error.line(),
-        column: error.column(),
-        message: describe(error, place),
+    let blanked = blank_comments(text);
+    let json = blanked.text.as_str();
+    if let Some(start) = blanked.open_comment {
+        return Err(fault_at(path, text, start, "the comment is never closed".into()));
+    }
+    if json.trim().is_empty() {
+        return Err(fault_at(path, text, 0, "the file is empty: a scene is a JSON object with at least a `camera`".into()));
+    }
+    let mut deserializer = serde_json::Deserializer::from_str(json);
+    let parsed = serde_path_to_error::deserialize::<_, SceneDesc>(&mut deserializer);
+    match parsed {
+        Ok(scene) => match deserializer.end() {
+            Ok(()) => Ok(scene),
+            Err(e) => Err(fault_at(path, text, offset(text, &e), describe(&e.to_string(), ""))),
+        },
+        Err(e) => Err(parse_fault(path, text, json, &e)),
+    }
+}
+
+/// The error for what serde complains about.
+fn parse_fault(path: &Path, text: &str, json: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> Error {
+    let inner = error.inner();
+    let serde_path = error.path().to_string();
+    let plain = |place: &str| fault_at(path, text, offset(text, inner), describe(&inner.to_string(), place));
+    let serde_place = if serde_path == "." { "" } else { &serde_path };
+    if inner.classify() != Category::Data {
+        return plain(serde_place);
+    }
+    // The text may break off further on, or name a key twice: then serde's own words must do.
+    let Ok(scene) = serde_json::from_str::<Value>(json) else {
+        return plain(serde_place);
     };
-    let mut deserializer = serde_json::Deserializer::from_str(&json);
-    let scene = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| {
-        let place = e.path().to_string();
-        fault(e.inner(), if place == "." { "" } else { &place })
-    })?;
-    deserializer.end().map_err(|e| fault(&e, ""))?;
-    Ok(scene)
+    let mut steps = fault::steps_of(error.path(), &scene);
+    let Some(message) = fault::refine(&scene, &mut steps) else {
+        return plain(serde_place);
+    };
+    // Where the message itself names the last key, the place is the key's.
+    let names_key = match steps.last() {
+        Some(Step::Key(key)) => ["field", "variant"].iter().any(|what| message.starts_with(&format!("unknown {what} `{key}`"))),
+        _ => false,
+    };
+    let start = fault::locate(json, &steps, names_key).unwrap_or_else(|| offset(text, inner));
+    if names_key {
+        steps.pop();
+    }
+    fault_at(path, text, start, describe(&message, &fault::path_text(&steps)))
+}
+
+/// The error at a byte of the text; columns count characters.
+fn fault_at(path: &Path, text: &str, offset: usize, message: String) -> Error {
+    let before = text.get(..offset).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+    let line = 1 + before.bytes().filter(|&b| b == b'\n').count();
+    Error::Parse { file: path.into(), line, column: 1 + before[line_start..].chars().count(), message }
+}
+
+/// The byte that serde's line and column (which counts bytes) mean.
+fn offset(text: &str, error: &serde_json::Error) -> usize {
+    let line_start = text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum::<usize>();
+    text.floor_char_boundary(line_start + error.column().saturating_sub(1))
 }
 
 /// The message without its position (which stands elsewhere), with the path in front and a suggestion behind.
-fn describe(error: &serde_json::Error, place: &str) -> String {
-    let text = error.to_string();
-    let text = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);
+fn describe(text: &str, place: &str) -> String {
+    let text = text.rsplit_once(" at line ").map_or(text, |(message, _)| message);
     let place = if place.is_empty() { String::new() } else { format!("{place}: ") };
     let suggestion = suggestion(text).map_or(String::new(), |name| format!(" (did you mean `{name}`?)"));
     format!("{place}{text}{suggestion}")
@@ -67,7 +117,7 @@ pub fn closest_name<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str
         .into_iter()
         .map(|candidate| (strsim::damerau_levenshtein(&lower, &candidate.to_lowercase()), candidate))
         .filter(|(distance, _)| *distance <= 1 + name.chars().count() / 4)
-        .min_by_key(|(distance, _)| *distance)
+        .min()
         .map(|(_, candidate)| candidate)
 }
 
@@ -79,29 +129,86 @@ mod tests {
         parse_scene(text, Path::new("s.json")).unwrap_err().to_string()
     }
 
+    #[track_caller]
+    fn assert_message(text: &str, start: &str, parts: &[&str]) {
+        let message = message(text);
+        assert!(message.starts_with(start), "{message}");
+        for part in parts {
+            assert!(message.contains(part), "{part} is not in: {message}");
+        }
+    }
+
     #[test]
     fn a_typo_has_its_place_and_a_suggestion() {
         let text = "{\n \"camera\": {},\n \"shapes\": [{ \"type\": \"sphere\", \"radus\": 2 }]\n}";
-        let message = message(text);
-        assert!(
-            message.starts_with("s.json:3:") && message.contains("shapes[0]") && message.contains("did you mean `radius`"),
-            "{message}"
-        );
+        assert_message(text, "s.json:3:33: shapes[0]: ", &["`radus`", "did you mean `radius`"]);
+        assert_message("{ \"camera\": {}, \"shaeps\": [] }", "s.json:1:17: unknown field `shaeps`", &["did you mean `shapes`"]);
+    }
+
+    #[test]
+    fn faults_inside_typed_values_have_their_own_path() {
+        let shape = |body: &str| format!("{{ \"camera\": {{}}, // é\n \"shapes\": [{{ \"type\": \"cube\" }},\n {{ {body} }}] }}");
+        let text = shape("\"type\": \"sphere\", \"z_max\": \"high\"");
+        assert_message(&text, "s.json:3:31: shapes[1].z_max: invalid type: string \"high\"", &[]);
+        let text = shape("\"emission\": { \"radiance\": [1, true, 1] }, \"type\": \"disk\"");
+        assert_message(&text, "s.json:3:34: shapes[1].emission.radiance[1]: invalid type: boolean", &[]);
+        let text = shape("\"type\": \"disk\", \"emission\": {}");
+        assert_message(&text, "s.json:3:32: shapes[1].emission: missing field `radiance`", &[]);
+        let text = shape("\"type\": \"cube\", \"transform\": [{ \"scale\": 2 }, { \"trnslate\": [1, 2, 3] }]");
+        assert_message(&text, "s.json:3:", &["shapes[1].transform[1]", "did you mean `translate`"]);
+        let text = "{ \"camera\": {}, \"objects\": { \"o\": { \"shapes\": [{ \"type\": \"quad\", \"origin\": [1, 2] }] } } }";
+        assert_message(text, "s.json:1:", &["objects.o.shapes[0].origin: invalid length 2"]);
     }
 
     #[test]
     fn unknown_types_are_named() {
-        let message = message("{ \"camera\": {}, \"shapes\": [{ \"type\": \"shpere\" }] }");
-        assert!(message.contains("`shpere`") && message.contains("did you mean `sphere`"), "{message}");
+        let text = "{ \"camera\": {}, \"shapes\": [{ \"type\": \"shpere\" }] }";
+        assert_message(text, "s.json:1:38: shapes[0].type: unknown variant `shpere`", &["did you mean `sphere`"]);
+        assert_message("{ \"camera\": {}, \"shapes\": [{ \"radius\": 1 }] }", "s.json:1:28: shapes[0]: missing field `type`", &[]);
+    }
+
+    #[test]
+    fn integrators_without_parameters_take_none() {
+        assert_message("{ \"camera\": {}, \"integrator\": { \"type\": \"normal\", \"max_depth\": 3 } }", "s.json:1:", &["max_depth"]);
+        assert!(parse_scene("{ \"camera\": {}, \"integrator\": { \"type\": \"shading_normal\" } }", Path::new("s.json")).is_ok());
+    }
+
+    #[test]
+    fn names_and_keys_are_given_once() {
+        let text = "{ \"camera\": {}, \"materials\": { \"a\": { \"type\": \"mirror\" }, \"a\": { \"type\": \"diffuse\" } } }";
+        assert_message(text, "s.json:1:", &["\"a\" is given twice"]);
+        assert_message("{ \"camera\": {}, \"camera\": {} }", "s.json:1:", &["duplicate field `camera`"]);
+        assert_message(
+            "{ \"camera\": { \"position\": [0, 0, 0], \"position\": [1, 1, 1] } }",
+            "s.json:1:",
+            &["duplicate field `position`"],
+        );
+    }
+
+    #[test]
+    fn colours_say_what_they_may_be() {
+        let text = "{ \"camera\": {}, \"materials\": { \"m\": { \"type\": \"diffuse\", \"albedo\": \"red\" } } }";
+        assert_message(text, "s.json:1:", &["materials.m.albedo", "expected a colour"]);
     }
 
     #[test]
     fn truncated_empty_and_trailing_texts_are_errors() {
-        for text in ["", "{", "{ \"camera\": {}", "[1, 2", "{ \"camera\": {} } x", "nul"] {
+        for text in ["", " \n", "// nothing", "{", "{ \"camera\": {}", "[1, 2", "{ \"camera\": {} } x", "nul", "/* open"] {
             assert!(message(text).starts_with("s.json:1:"), "{text}");
         }
-        let deep = "[".repeat(100_000);
-        assert!(message(&deep).contains("s.json:1:"));
+        let whole = "{ \"camera\": { \"position\": [0, 1, 2] }, \"shapes\": [{ \"type\": \"sphere\", \"name\": \"a\\u00e9\" }] }";
+        assert!(parse_scene(whole, Path::new("s.json")).is_ok());
+        for end in 0..whole.len() {
+            assert!(parse_scene(&whole[..end], Path::new("s.json")).is_err(), "{end}");
+        }
+        assert!(parse_scene(&format!("\u{feff}{whole}"), Path::new("s.json")).is_ok());
+    }
+
+    #[test]
+    fn deep_nesting_is_an_error() {
+        for deep in ["[".repeat(100_000), "{\"camera\":".repeat(100_000), format!("{{ \"camera\": {} }}", "[".repeat(100_000))] {
+            assert_message(&deep, "s.json:1:", &[]);
+        }
     }
 
     #[test]

@@ -122,6 +122,8 @@ impl PathIntegrator {
             counts.shadow += shadows as u64;
             scratch.occluded.clear();
             scratch.occluded.resize(shadows, false);
+            let toward_one_place = bounce == 0 && !world.scene.features.environment;
+            let coherence = if toward_one_place { Coherence::Coherent } else { Coherence::Incoherent };
             world.accel.occluded_batch(&scratch.shadow_rays, &mut scratch.occluded, coherence);
             for (pending, occluded) in scratch.pending.iter().zip(&scratch.occluded) {
                 if !occluded {

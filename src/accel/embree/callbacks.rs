@@ -1,48 +1,49 @@
-//! What Embree calls for analytic shapes: bounds, and the hit of one ray.
+//! What Embree calls: with errors, with changes of memory, and to intersect a shape. None of these may panic; a panic would abort.
 
-use std::ffi::c_void;
+use std::ffi::{CStr, c_char, c_void};
+use std::sync::atomic::Ordering;
 
+use super::device::Monitor;
 use super::sys;
 use crate::geometry::Placed;
-use crate::math::{Ray, vec3};
+use crate::math::Ray;
 
-/// The user data of a shape for the shim.
-///
-/// The shape must stay where it is, unchanged, as long as Embree may call back.
-pub fn user_shape(shape: &Placed) -> sys::StShape {
-    sys::StShape { intersect: Some(intersect), shape: (&raw const *shape).cast() }
+// `StRay` is `Ray` under its C name.
+const _: () = {
+    assert!(size_of::<sys::StRay>() == size_of::<Ray>() && align_of::<sys::StRay>() == align_of::<Ray>());
+    assert!(std::mem::offset_of!(sys::StRay, t_min) == std::mem::offset_of!(Ray, t_min));
+    assert!(std::mem::offset_of!(sys::StRay, direction) == std::mem::offset_of!(Ray, direction));
+    assert!(std::mem::offset_of!(sys::StRay, t_max) == std::mem::offset_of!(Ray, t_max));
+    assert!(std::mem::offset_of!(sys::StRay, time) == std::mem::offset_of!(Ray, time));
+};
+
+/// Keeps the first error.
+pub(super) unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError, message: *const c_char) {
+    // SAFETY: `user` is the monitor that the device was given, alive as long as the device.
+    let monitor = unsafe { &*user.cast::<Monitor>() };
+    let message = if message.is_null() {
+        String::new()
+    } else {
+        // SAFETY: Embree passes a C string that lives through this call.
+        unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned()
+    };
+    // A second error is a consequence of the first.
+    let _ = monitor.first_error.set((code, message));
 }
 
-/// Distance of the first hit within the ray's interval, or a NaN.
-unsafe extern "C" fn intersect(shape: *const c_void, ray: *const sys::StRay) -> f32 {
-    // SAFETY: `shape` comes from `user_shape`, whose caller keeps it alive and unchanged.
-    let shape = unsafe { &*shape.cast::<Placed>() };
-    // SAFETY: the shim passes a pointer to a ray on its stack.
-    let ray = unsafe { &*ray };
-    let [ox, oy, oz] = ray.origin;
-    let [dx, dy, dz] = ray.direction;
-    let ray = Ray { origin: vec3(ox, oy, oz), t_min: ray.t_min, direction: vec3(dx, dy, dz), t_max: ray.t_max, time: ray.time };
-    // Rounding to nearest must not leave the interval.
-    shape.intersect(&ray).map_or(f32::NAN, |hit| (hit.t as f32).clamp(ray.t_min, ray.t_max))
+/// Counts bytes; called from all building threads at once. An allocation is never refused.
+pub(super) unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post: bool) -> bool {
+    // SAFETY: as in `on_error`.
+    let monitor = unsafe { &*user.cast::<Monitor>() };
+    monitor.bytes.fetch_add(bytes, Ordering::Relaxed);
+    true
 }
 
-/// Padded bounds of a shape. Embree's user pointer is the `StShape`.
-pub unsafe extern "C" fn bounds(args: *const sys::RTCBoundsFunctionArguments) {
-    // SAFETY: Embree passes valid arguments whose user pointer is the `StShape` given to `st_set_user_geometry`; its `shape` comes from
-    // `user_shape`. The output is a valid place for one box.
-    unsafe {
-        let args = &*args;
-        let user = &*args.geometryUserPtr.cast::<sys::StShape>();
-        let bounds = (*user.shape.cast::<Placed>()).bounds().padded();
-        *args.bounds_o = sys::RTCBounds {
-            lower_x: bounds.min.x,
-            lower_y: bounds.min.y,
-            lower_z: bounds.min.z,
-            align0: 0.0,
-            upper_x: bounds.max.x,
-            upper_y: bounds.max.y,
-            upper_z: bounds.max.z,
-            align1: 0.0,
-        };
-    }
+/// The distance at which `ray` hits the [`Placed`] behind `shape`; negative on a miss.
+pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *const sys::StRay) -> f32 {
+    // SAFETY: `shape` was made from a `&Placed` inside the geometry that the accelerator borrows, and `Placed` is not changed by anyone;
+    // `ray` points to a ray on the shim's stack, and `StRay` has the layout of `Ray`.
+    let (placed, ray) = unsafe { (&*shape.cast::<Placed>(), &*ray.cast::<Ray>()) };
+    // Rounding to f32 keeps the order, so the result stays within the ray's interval.
+    placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32)
 }

@@ -1,11 +1,12 @@
-//! Embree's device: version and abilities, the first error, and the memory in use.
+//! The Embree device: what it can do, the first error it reports, the memory it holds.
 
-use std::ffi::{CStr, CString, c_char, c_void};
-use std::ptr;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::ffi::CString;
+use std::ptr::NonNull;
+use std::sync::atomic::{AtomicIsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
-use super::sys;
+use super::callbacks;
+use super::sys::{self, RTCDeviceProperty, RTCError};
 use crate::error::{Error, Result};
 
 /// What Embree reports of itself.
@@ -13,166 +14,163 @@ use crate::error::{Error, Result};
 pub struct EmbreeInfo {
     /// Version, such as `3.13.5`.
     pub version: String,
-    /// Instruction set, such as `AVX-512`: the widest that this processor has and Embree has code for. (Embree chooses by the same rule and
-    /// does not tell.)
-    pub isa: &'static str,
+    /// Instruction set, such as `AVX-512`: the best of those that Embree has code for and the processor runs, which is what Embree
+    /// chooses. Embree has no query for it.
+    pub isa: String,
 }
 
 impl EmbreeInfo {
-    /// Of the library that this program is linked with.
+    /// Asks the installed Embree, without a scene.
     ///
     /// # Errors
-    /// If no device can be made.
+    /// If no device can be made, or the build of Embree lacks something this crate needs.
     pub fn query() -> Result<Self> {
-        Device::new(1).map(|device| device.info())
+        Ok(Device::new(1)?.info())
     }
 }
 
-/// What the callbacks of a device write to; they may run on any thread.
-struct State {
-    first_error: Mutex<Option<(sys::RTCError::Type, String)>>,
-    bytes: AtomicI64,
+/// What the callbacks of a device write to.
+#[derive(Default)]
+pub(super) struct Monitor {
+    pub(super) first_error: OnceLock<(RTCError, String)>,
+    pub(super) bytes: AtomicIsize,
 }
 
-/// A device; released on drop, after every object made from it (Embree counts references).
-pub struct Device {
-    handle: sys::RTCDevice,
-    state: Box<State>,
+/// An Embree device.
+pub(super) struct Device {
+    handle: NonNull<sys::RTCDeviceTy>,
+    /// Behind an `Arc`, since Embree keeps its address.
+    monitor: Arc<Monitor>,
 }
 
-// SAFETY: Embree's devices may be used and released from any thread; the state is synchronised.
+// SAFETY: a device is a reference-counted object whose functions may be called from any thread; those that must not run at the same time as
+// others are called while the device is still owned by a builder.
 unsafe impl Send for Device {}
-// SAFETY: shared use is limited to queries that Embree documents as thread-safe, and to building, which takes `&mut` elsewhere.
+// SAFETY: as above; through a shared reference only properties, error and byte count are read.
 unsafe impl Sync for Device {}
 
 impl Device {
-    /// A device that builds with the given number of threads (0: all).
-    pub fn new(threads: usize) -> Result<Self> {
-        let config = CString::new(format!("threads={threads}")).map_err(|e| Error::Internal(e.to_string()))?;
-        // SAFETY: the configuration is a C string that outlives the call.
+    /// A device with `threads` threads for building (0: all).
+    ///
+    /// # Errors
+    /// If Embree cannot make one, or lacks triangles, user geometry or filter functions.
+    pub(super) fn new(threads: usize) -> Result<Self> {
+        let config = if threads == 0 { String::new() } else { format!("threads={threads}") };
+        let config = CString::new(config).map_err(|_| Error::Internal("a device configuration with a zero byte".into()))?;
+        // SAFETY: the configuration is a C string, which Embree copies.
         let handle = unsafe { sys::rtcNewDevice(config.as_ptr()) };
-        if handle.is_null() {
-            // SAFETY: a null device asks for the error of the failed creation.
-            let code = unsafe { sys::rtcGetDeviceError(ptr::null_mut()) };
-            return Err(Error::Embree(format!("no device: error {code}")));
-        }
-        let state = Box::new(State { first_error: Mutex::new(None), bytes: AtomicI64::new(0) });
-        let device = Self { handle, state };
-        let user = (&raw const *device.state).cast_mut().cast::<c_void>();
-        // SAFETY: the state is boxed and lives as long as the device handle.
+        let Some(handle) = NonNull::new(handle) else {
+            // SAFETY: a null device asks for the error of the failed creation on this thread.
+            let code = unsafe { sys::rtcGetDeviceError(std::ptr::null_mut()) };
+            return Err(device_error(code, "no device could be created"));
+        };
+        let monitor = Arc::<Monitor>::default();
+        let user = Arc::as_ptr(&monitor).cast_mut().cast();
+        // SAFETY: the monitor does not move and outlives the device (see `drop`); the callbacks only use its atomics.
         unsafe {
-            sys::rtcSetDeviceErrorFunction(handle, Some(on_error), user);
-            sys::rtcSetDeviceMemoryMonitorFunction(handle, Some(on_memory), user);
+            sys::rtcSetDeviceErrorFunction(handle.as_ptr(), Some(callbacks::on_error), user);
+            sys::rtcSetDeviceMemoryMonitorFunction(handle.as_ptr(), Some(callbacks::on_memory), user);
         }
-        device.require_abilities()?;
+        let device = Self { handle, monitor };
+        device.check_abilities()?;
         Ok(device)
     }
 
-    /// Refuses builds of Embree that lack what the renderer rests on.
-    fn require_abilities(&self) -> Result<()> {
+    pub(super) fn handle(&self) -> sys::RTCDevice {
+        self.handle.as_ptr()
+    }
+
+    /// The first error reported, if any.
+    pub(super) fn check(&self) -> Result<()> {
+        match self.monitor.first_error.get() {
+            None => Ok(()),
+            Some((code, message)) => Err(device_error(*code, message)),
+        }
+    }
+
+    /// Bytes Embree holds.
+    pub(super) fn memory_bytes(&self) -> usize {
+        usize::try_from(self.monitor.bytes.load(Ordering::Relaxed)).unwrap_or(0)
+    }
+
+    pub(super) fn info(&self) -> EmbreeInfo {
+        let part = |property| self.property(property);
+        let version = format!(
+            "{}.{}.{}",
+            part(sys::RTC_DEVICE_PROPERTY_VERSION_MAJOR),
+            part(sys::RTC_DEVICE_PROPERTY_VERSION_MINOR),
+            part(sys::RTC_DEVICE_PROPERTY_VERSION_PATCH)
+        );
+        EmbreeInfo { version, isa: instruction_set().into() }
+    }
+
+    fn property(&self, property: RTCDeviceProperty) -> isize {
+        // SAFETY: the device is alive and the property is one of the header's.
+        unsafe { sys::rtcGetDeviceProperty(self.handle(), property) }
+    }
+
+    fn check_abilities(&self) -> Result<()> {
+        let major = self.property(sys::RTC_DEVICE_PROPERTY_VERSION_MAJOR);
+        if major != sys::RTC_VERSION_MAJOR as isize {
+            return Err(Error::Embree(format!("version {major} is installed, but this program was built for {}", sys::RTC_VERSION_MAJOR)));
+        }
         let needed = [
-            (sys::RTCDeviceProperty::RTC_DEVICE_PROPERTY_TRIANGLE_GEOMETRY_SUPPORTED, "triangles"),
-            (sys::RTCDeviceProperty::RTC_DEVICE_PROPERTY_USER_GEOMETRY_SUPPORTED, "user geometry"),
+            (sys::RTC_DEVICE_PROPERTY_TRIANGLE_GEOMETRY_SUPPORTED, "triangles"),
+            (sys::RTC_DEVICE_PROPERTY_USER_GEOMETRY_SUPPORTED, "user geometry"),
+            (sys::RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED, "filter functions"),
         ];
         for (property, name) in needed {
             if self.property(property) == 0 {
-                return Err(Error::Embree(format!("this build of Embree {} has no {name}", self.info().version)));
+                return Err(Error::Embree(format!("the installed library was built without {name}")));
             }
         }
-        // SAFETY: a constant of the headers.
-        let header = unsafe { sys::st_header_version() } / 10_000;
-        let library = self.property(sys::RTCDeviceProperty::RTC_DEVICE_PROPERTY_VERSION_MAJOR);
-        if library != header as isize {
-            return Err(Error::Embree(format!("built for Embree {header}, but the library is Embree {library}")));
+        if self.property(sys::RTC_DEVICE_PROPERTY_BACKFACE_CULLING_ENABLED) != 0 {
+            return Err(Error::Embree("the installed library was built with back-face culling".into()));
         }
-        Ok(())
-    }
-
-    fn property(&self, property: sys::RTCDeviceProperty::Type) -> isize {
-        // SAFETY: the handle is a live device.
-        unsafe { sys::rtcGetDeviceProperty(self.handle, property) }
-    }
-
-    /// Version and instruction set.
-    pub fn info(&self) -> EmbreeInfo {
-        let version = self.property(sys::RTCDeviceProperty::RTC_DEVICE_PROPERTY_VERSION);
-        EmbreeInfo { version: format!("{}.{}.{}", version / 10_000, version / 100 % 100, version % 100), isa: widest_isa() }
-    }
-
-    /// The handle, for calls that build.
-    pub fn handle(&self) -> sys::RTCDevice {
-        self.handle
-    }
-
-    /// Bytes that Embree holds.
-    pub fn memory_bytes(&self) -> usize {
-        usize::try_from(self.state.bytes.load(Ordering::Relaxed)).unwrap_or(0)
-    }
-
-    /// The first error since the last call, if any.
-    pub fn check(&self) -> Result<()> {
-        let Ok(mut first) = self.state.first_error.lock() else {
-            return Err(Error::Embree("the error callback failed".into()));
-        };
-        match first.take() {
-            None => Ok(()),
-            Some((sys::RTCError::RTC_ERROR_OUT_OF_MEMORY, message)) => Err(Error::OutOfMemory(message)),
-            Some((_, message)) => Err(Error::Embree(message)),
-        }
+        self.check()
     }
 }
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: the handle is live; without the callbacks, nothing refers to the state afterwards even if another object keeps the
-        // device alive a little longer.
-        unsafe {
-            sys::rtcSetDeviceErrorFunction(self.handle, None, ptr::null_mut());
-            sys::rtcSetDeviceMemoryMonitorFunction(self.handle, None, ptr::null_mut());
-            sys::rtcReleaseDevice(self.handle);
-        }
+        // SAFETY: this is the last use of the handle; the monitor is dropped after this body, when no callback can come any more.
+        unsafe { sys::rtcReleaseDevice(self.handle()) }
     }
 }
 
-/// The widest instruction set that Embree has code for and this processor has.
-fn widest_isa() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl") {
-            return "AVX-512";
-        }
-        if is_x86_feature_detected!("avx2") {
-            return "AVX2";
-        }
-        if is_x86_feature_detected!("avx") {
-            return "AVX";
-        }
-        if is_x86_feature_detected!("sse4.2") {
-            return "SSE4.2";
-        }
+fn device_error(code: RTCError, message: &str) -> Error {
+    if code == sys::RTC_ERROR_OUT_OF_MEMORY {
+        return Error::OutOfMemory(format!("Embree: {message}"));
+    }
+    let kind = match code {
+        sys::RTC_ERROR_INVALID_ARGUMENT => "invalid argument",
+        sys::RTC_ERROR_INVALID_OPERATION => "invalid operation",
+        sys::RTC_ERROR_UNSUPPORTED_CPU => "unsupported processor",
+        sys::RTC_ERROR_CANCELLED => "cancelled",
+        _ => "unknown error",
+    };
+    Error::Embree(format!("{kind}: {message}"))
+}
+
+/// The best instruction set that both Embree and this processor have.
+#[cfg(target_arch = "x86_64")]
+fn instruction_set() -> &'static str {
+    use std::arch::is_x86_feature_detected as has;
+    if has!("avx512f") && has!("avx512dq") && has!("avx512cd") && has!("avx512bw") && has!("avx512vl") {
+        "AVX-512"
+    } else if has!("avx2") && has!("fma") && has!("f16c") && has!("bmi1") && has!("bmi2") && has!("lzcnt") {
+        "AVX2"
+    } else if has!("avx") {
+        "AVX"
+    } else if has!("sse4.2") {
+        "SSE4.2"
+    } else {
         "SSE2"
     }
-    #[cfg(not(target_arch = "x86_64"))]
+}
+
+/// The best instruction set that both Embree and this processor have.
+#[cfg(not(target_arch = "x86_64"))]
+fn instruction_set() -> &'static str {
     "NEON"
-}
-
-unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError::Type, message: *const c_char) {
-    // SAFETY: `user` is the state given at creation, which outlives the callback; only shared access happens here.
-    let state = unsafe { &*user.cast::<State>() };
-    let message = if message.is_null() {
-        format!("error {code}")
-    } else {
-        // SAFETY: Embree passes a C string that lives during the call.
-        unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned()
-    };
-    if let Ok(mut first) = state.first_error.lock() {
-        first.get_or_insert((code, message));
-    }
-}
-
-unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post: bool) -> bool {
-    // SAFETY: as in `on_error`.
-    let state = unsafe { &*user.cast::<State>() };
-    state.bytes.fetch_add(bytes as i64, Ordering::Relaxed);
-    true
 }

@@ -1,71 +1,143 @@
-//! Embree: triangle meshes natively on the geometry's own buffers, analytic shapes as user geometry, objects as instanced scenes.
+//! Embree as an accelerator: triangles on the meshes' own buffers, analytic shapes as user geometry, objects as scenes of their own that
+//! instances place.
 //!
-//! The only home of `unsafe`. Every scene has the ROBUST flag: without it about a tenth of grazing rays pass between triangles.
+//! This directory is the only home of `unsafe`. What of Embree's interface is inline or differs between versions is in
+//! `ffi/embree_shim.c`.
 
 mod callbacks;
 mod device;
-mod query;
+mod gate;
+mod packet;
 mod scene;
 mod sys;
 
 pub use device::EmbreeInfo;
 
-use device::Device;
-use query::LANES;
-use scene::CommittedScene;
-
 use super::{Accelerator, Coherence};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit};
+use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::{Aabb, Ray};
+use device::Device;
+use gate::Gate;
+use packet::{HitPacket, INVALID, RawHit, ShadowPacket, WIDTH};
+use scene::{GeometryHandle, Scene, SceneBuilder, UserShapes};
 
-/// Embree over a geometry. It borrows the geometry, so shared buffers and user data can neither move nor vanish while it lives.
+/// An Embree scene over borrowed geometry.
+///
+/// Every scene has the robust flag: no ray slips between the triangles of a closed mesh, and `t_min` and `t_max` are inclusive.
 pub struct EmbreeAccel<'g> {
-    // Released before the device.
-    scene: CommittedScene,
+    // Dropped in this order: the scene refers to the user data and to the device.
+    scene: Scene,
+    _user_shapes: UserShapes,
     device: Device,
+    gate: Gate,
     geometry: &'g Geometry,
-    /// Instances have the ids from here on.
-    first_instance: u32,
+    bounds: Aabb,
 }
 
 impl<'g> EmbreeAccel<'g> {
-    /// Builds with the given number of threads (0: all).
+    /// Builds the accelerator with `threads` threads (0: all).
     ///
     /// # Errors
-    /// The first error that Embree reports, such as a lack of memory.
+    /// If Embree reports an error, memory runs out, or an instance's transform has no inverse in `f32`.
     pub fn new(geometry: &'g Geometry, threads: usize) -> Result<Self> {
+        let gate = Gate::for_instances(&geometry.instances)?;
         let device = Device::new(threads)?;
-        let scene = scene::build(&device, geometry)?;
-        Ok(Self { scene, device, geometry, first_instance: geometry.shapes.len() as u32 })
+        let user_shapes = UserShapes::new(geometry);
+        let scene = build(geometry, &device, &user_shapes)?;
+        Ok(Self { scene, _user_shapes: user_shapes, device, gate, geometry, bounds: geometry.bounds() })
+    }
+
+    /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an object it is the
+    /// shape's place there.
+    #[inline(always)]
+    fn hit(&self, raw: RawHit) -> Hit {
+        let (shape, instance) = if raw.instance == INVALID {
+            (ShapeId(raw.geometry), Hit::NO_INSTANCE)
+        } else {
+            let instance = InstanceId(raw.instance - self.geometry.shapes.len() as u32);
+            let object = self.geometry.object(self.geometry.instance(instance).object);
+            (object.shapes[raw.geometry as usize], instance)
+        };
+        Hit { t: raw.t, u: raw.u, v: raw.v, shape, prim: PrimId(raw.prim), instance }
     }
 }
 
-impl Accelerator for EmbreeAccel<'_> {
-    fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        query::intersect(&self.scene, self.first_instance, ray)
+/// The committed scene of `geometry`. The result must be dropped before `user_shapes`, and while `geometry` is borrowed.
+fn build(geometry: &Geometry, device: &Device, user_shapes: &UserShapes) -> Result<Scene> {
+    // One Embree geometry for each shape in use, however many objects share it.
+    let mut handles: Vec<Option<GeometryHandle>> = geometry.shapes.iter().map(|_| None).collect();
+    let used = geometry.world.iter().chain(geometry.objects.iter().flat_map(|object| &object.shapes));
+    for id in used {
+        if handles[id.index()].is_none() {
+            // SAFETY: the accelerator borrows the geometry and owns the user data, and drops its scene first.
+            let handle = unsafe { GeometryHandle::of_shape(device, geometry.shape(*id), user_shapes.get(*id)) }?;
+            handles[id.index()] = Some(handle);
+        }
     }
 
+    let object_scene = |ids: &[ShapeId]| -> Result<Scene> {
+        let mut builder = SceneBuilder::new(device)?;
+        scene::attach_shapes(&mut builder, &handles, ids, |position, _| position)?;
+        builder.commit()
+    };
+    let objects = geometry.objects.iter().map(|object| object_scene(&object.shapes)).collect::<Result<Vec<_>>>()?;
+
+    let mut world = SceneBuilder::new(device)?;
+    scene::attach_shapes(&mut world, &handles, &geometry.world, |_, id| id.index())?;
+    for (i, instance) in geometry.instances.iter().enumerate() {
+        let handle = GeometryHandle::of_instance(device, &objects[instance.object.index()], instance)?;
+        world.attach(&handle, geometry.shapes.len() + i)?;
+    }
+    world.commit()
+}
+
+impl Accelerator for EmbreeAccel<'_> {
+    #[inline]
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        packet::intersect1(&self.scene, &self.gate, ray).map(|raw| self.hit(raw))
+    }
+
+    #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
-        query::occluded(&self.scene, ray)
+        packet::occluded1(&self.scene, &self.gate, ray)
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
-        let coherent = coherence == Coherence::Coherent;
-        for (rays, hits) in rays.chunks(LANES).zip(hits.chunks_mut(LANES)) {
-            query::intersect_packet(&self.scene, self.first_instance, rays, hits, coherent);
+        let mut packet = HitPacket::new();
+        let (full, rest) = rays.as_chunks::<WIDTH>();
+        let mut hits = hits.chunks_mut(WIDTH);
+        for (run, hits) in full.iter().zip(&mut hits) {
+            packet.intersect(&self.scene, &self.gate, run, coherence);
+            for (lane, hit) in hits.iter_mut().enumerate() {
+                *hit = packet.hit(lane).map(|raw| self.hit(raw));
+            }
+        }
+        if let (false, Some(hits)) = (rest.is_empty(), hits.next()) {
+            packet.intersect(&self.scene, &self.gate, &padded_run(rest), coherence);
+            for (lane, hit) in hits.iter_mut().enumerate() {
+                *hit = packet.hit(lane).map(|raw| self.hit(raw));
+            }
         }
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
-        let coherent = coherence == Coherence::Coherent;
-        for (rays, occluded) in rays.chunks(LANES).zip(occluded.chunks_mut(LANES)) {
-            query::occluded_packet(&self.scene, rays, occluded, coherent);
+        let mut packet = ShadowPacket::new();
+        let (full, rest) = rays.as_chunks::<WIDTH>();
+        let mut occluded = occluded.chunks_mut(WIDTH);
+        for (run, occluded) in full.iter().zip(&mut occluded) {
+            let found = packet.occluded(&self.scene, &self.gate, run, coherence);
+            occluded.copy_from_slice(&found[..occluded.len()]);
+        }
+        if let (false, Some(occluded)) = (rest.is_empty(), occluded.next()) {
+            let found = packet.occluded(&self.scene, &self.gate, &padded_run(rest), coherence);
+            occluded.copy_from_slice(&found[..occluded.len()]);
         }
     }
 
     fn bounds(&self) -> Aabb {
-        self.geometry.bounds()
+        self.bounds
     }
 
     fn memory_bytes(&self) -> usize {
@@ -73,7 +145,14 @@ impl Accelerator for EmbreeAccel<'_> {
     }
 
     fn description(&self) -> String {
-        let info = self.device.info();
-        format!("Embree {} ({}, single rays and packets of {LANES})", info.version, info.isa)
+        let EmbreeInfo { version, isa } = self.device.info();
+        format!("Embree {version} ({isa})")
     }
+}
+
+/// A short run with inactive rays behind it.
+fn padded_run(rays: &[Ray]) -> [Ray; WIDTH] {
+    let mut run = [Ray::INACTIVE; WIDTH];
+    run[..rays.len()].copy_from_slice(rays);
+    run
 }

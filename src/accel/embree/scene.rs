@@ -1,177 +1,204 @@
-//! Embree's scene: built by `&mut self`, then committed; a committed scene only answers queries.
+//! From borrowed geometry to a committed Embree scene. A [`SceneBuilder`] takes geometries; [`SceneBuilder::commit`] consumes it and only
+//! the committed [`Scene`] can be traced.
 
-use std::ptr;
+use std::ffi::c_void;
+use std::ptr::NonNull;
 
-use super::callbacks;
+use super::callbacks::intersect_placed;
 use super::device::Device;
 use super::sys;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Instance, Mesh, Placed, Shape};
 use crate::id::ShapeId;
+use crate::math::Aabb;
 
-/// A committed scene. It keeps the child scenes of its instances and the user data of its shapes alive, and refers to the buffers of the
-/// geometry it was built from.
-pub struct CommittedScene {
-    handle: sys::RTCScene,
-    /// Boxed, because Embree keeps their addresses.
-    #[allow(clippy::vec_box)]
-    _user_shapes: Vec<Box<sys::StShape>>,
-    _children: Vec<CommittedScene>,
-}
+/// The user data of every analytic shape, by [`ShapeId`]; `None` for meshes. Embree keeps addresses into it.
+pub(super) struct UserShapes(Vec<Option<sys::StUserShape>>);
 
-// SAFETY: after the commit a scene only answers queries, which Embree documents as thread-safe; the pointers it holds refer to data that
-// nobody changes.
-unsafe impl Send for CommittedScene {}
+// SAFETY: the pointers inside lead to `Placed`, which is `Send` and `Sync`, and are only read through.
+unsafe impl Send for UserShapes {}
 // SAFETY: as above.
-unsafe impl Sync for CommittedScene {}
+unsafe impl Sync for UserShapes {}
 
-impl CommittedScene {
-    /// The handle, for queries.
-    #[inline]
-    pub fn handle(&self) -> sys::RTCScene {
-        self.handle
-    }
-}
-
-impl Drop for CommittedScene {
-    fn drop(&mut self) {
-        // SAFETY: the handle is live and this is its last use; Embree keeps child scenes alive by counting references.
-        unsafe { sys::rtcReleaseScene(self.handle) };
-    }
-}
-
-/// The whole geometry as a committed scene, with one child scene for each object.
-///
-/// Shapes keep their ids; instance `i` has the id `shapes + i`. The geometry must outlive the scene and must not change.
-pub fn build(device: &Device, geometry: &Geometry) -> Result<CommittedScene> {
-    let mut children = Vec::with_capacity(geometry.objects.len());
-    for object in &geometry.objects {
-        let mut builder = Builder::new(device);
-        for &id in &object.shapes {
-            builder.attach_shape(id, geometry.shape(id));
-        }
-        children.push(builder.commit(Vec::new())?);
-    }
-    let mut top = Builder::new(device);
-    for &id in &geometry.world {
-        top.attach_shape(id, geometry.shape(id));
-    }
-    for (i, instance) in geometry.instances.iter().enumerate() {
-        top.attach_instance(ShapeId::new(geometry.shapes.len() + i), instance, &children[instance.object.index()]);
-    }
-    top.commit(children)
-}
-
-struct Builder<'d> {
-    device: &'d Device,
-    handle: sys::RTCScene,
-    #[allow(clippy::vec_box)]
-    user_shapes: Vec<Box<sys::StShape>>,
-}
-
-impl<'d> Builder<'d> {
-    fn new(device: &'d Device) -> Self {
-        // SAFETY: the device is live. A failure gives a null scene, which the calls below report through the device's error callback.
-        let handle = unsafe {
-            let handle = sys::rtcNewScene(device.handle());
-            sys::rtcSetSceneFlags(handle, sys::RTCSceneFlags::RTC_SCENE_FLAG_ROBUST);
-            handle
+impl UserShapes {
+    /// The table for `geometry`.
+    pub(super) fn new(geometry: &Geometry) -> Self {
+        let user_shape = |placed: &Placed| {
+            let Aabb { min, max } = placed.bounds().padded();
+            sys::StUserShape {
+                shape: std::ptr::from_ref(placed).cast::<c_void>(),
+                intersect: Some(intersect_placed),
+                lower: min.to_array(),
+                upper: max.to_array(),
+            }
         };
-        Self { device, handle, user_shapes: Vec::new() }
+        let of = |shape: &Shape| match shape {
+            Shape::Mesh(_) => None,
+            Shape::Analytic(placed) => Some(user_shape(placed)),
+        };
+        Self(geometry.shapes.iter().map(of).collect())
     }
 
-    fn attach_shape(&mut self, id: ShapeId, shape: &Shape) {
-        match shape {
-            Shape::Mesh(mesh) => self.attach_mesh(id, mesh),
-            Shape::Analytic(placed) => self.attach_analytic(id, placed),
-        }
+    /// The entry of one shape.
+    pub(super) fn get(&self, id: ShapeId) -> Option<&sys::StUserShape> {
+        self.0[id.index()].as_ref()
+    }
+}
+
+/// An Embree geometry, released on drop; scenes it is attached to keep it alive.
+pub(super) struct GeometryHandle(NonNull<sys::RTCGeometryTy>);
+
+impl GeometryHandle {
+    fn new(device: &Device, handle: sys::RTCGeometry) -> Result<Self> {
+        NonNull::new(handle).map(Self).ok_or_else(|| no_object(device, "geometry"))
     }
 
-    fn attach_mesh(&mut self, id: ShapeId, mesh: &Mesh) {
-        let positions = mesh.padded_positions();
-        let triangles = mesh.triangles();
-        // SAFETY: the buffers belong to the borrowed geometry, which outlives the scene; their lengths and strides are as stated, and the
-        // position buffer has one vertex of padding behind the last that is declared.
-        unsafe {
-            let geometry = sys::rtcNewGeometry(self.device.handle(), sys::RTCGeometryType::RTC_GEOMETRY_TYPE_TRIANGLE);
-            sys::rtcSetSharedGeometryBuffer(
-                geometry,
-                sys::RTCBufferType::RTC_BUFFER_TYPE_VERTEX,
-                0,
-                sys::RTCFormat::RTC_FORMAT_FLOAT3,
-                positions.as_ptr().cast(),
-                0,
-                size_of::<[f32; 3]>(),
-                positions.len() - 1,
-            );
-            sys::rtcSetSharedGeometryBuffer(
-                geometry,
-                sys::RTCBufferType::RTC_BUFFER_TYPE_INDEX,
-                0,
-                sys::RTCFormat::RTC_FORMAT_UINT3,
-                triangles.as_ptr().cast(),
-                0,
-                size_of::<[u32; 3]>(),
-                triangles.len(),
-            );
-            self.attach(geometry, id.0);
-        }
-    }
-
-    fn attach_analytic(&mut self, id: ShapeId, placed: &Placed) {
-        let user = Box::new(callbacks::user_shape(placed));
-        // SAFETY: the boxed user data is kept by the scene; the shape it names belongs to the borrowed geometry, which outlives the scene.
-        unsafe {
-            let geometry = sys::rtcNewGeometry(self.device.handle(), sys::RTCGeometryType::RTC_GEOMETRY_TYPE_USER);
-            sys::st_set_user_geometry(geometry, &raw const *user, Some(callbacks::bounds));
-            self.attach(geometry, id.0);
-        }
-        self.user_shapes.push(user);
-    }
-
-    fn attach_instance(&mut self, id: ShapeId, instance: &Instance, child: &CommittedScene) {
-        let columns = instance.transform.world_from_object.to_cols_array().map(|x| x as f32);
-        // SAFETY: the child scene is committed and live; Embree copies the twelve numbers.
-        unsafe {
-            let geometry = sys::rtcNewGeometry(self.device.handle(), sys::RTCGeometryType::RTC_GEOMETRY_TYPE_INSTANCE);
-            sys::rtcSetGeometryInstancedScene(geometry, child.handle);
-            sys::rtcSetGeometryTimeStepCount(geometry, 1);
-            sys::rtcSetGeometryTransform(geometry, 0, sys::RTCFormat::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.as_ptr().cast());
-            self.attach(geometry, id.0);
-        }
-    }
-
-    /// Commits the geometry and hands it over to the scene under the given id.
+    /// The committed geometry of a shape.
     ///
     /// # Safety
-    /// `geometry` is a new geometry of this builder's device with all its data set.
-    unsafe fn attach(&mut self, geometry: sys::RTCGeometry, id: u32) {
-        // SAFETY: by the contract above; the scene holds its own reference, so ours is released.
-        unsafe {
-            sys::rtcCommitGeometry(geometry);
-            sys::rtcAttachGeometryByID(self.handle, geometry, id);
-            sys::rtcReleaseGeometry(geometry);
+    /// The shape and `user` must outlive every scene the geometry is attached to, and must not move.
+    pub(super) unsafe fn of_shape(device: &Device, shape: &Shape, user: Option<&sys::StUserShape>) -> Result<Self> {
+        match (shape, user) {
+            // SAFETY: the caller keeps the mesh alive.
+            (Shape::Mesh(mesh), _) => unsafe { Self::of_mesh(device, mesh) },
+            (Shape::Analytic(_), Some(user)) => {
+                // SAFETY: the device is alive; the caller keeps the user data alive.
+                let handle = unsafe { sys::st_new_user_geometry(device.handle(), user) };
+                Self::new(device, handle)
+            }
+            (Shape::Analytic(_), None) => Err(Error::Internal("an analytic shape without its user data".into())),
         }
     }
 
-    fn commit(mut self, children: Vec<CommittedScene>) -> Result<CommittedScene> {
-        // SAFETY: the scene is complete, and nobody else uses it yet.
-        unsafe { sys::rtcCommitScene(self.handle) };
-        let committed = CommittedScene {
-            handle: std::mem::replace(&mut self.handle, ptr::null_mut()),
-            _user_shapes: std::mem::take(&mut self.user_shapes),
-            _children: children,
-        };
-        self.device.check()?;
-        Ok(committed)
+    /// Triangles on the mesh's own buffers.
+    ///
+    /// # Safety
+    /// As for [`of_shape`](Self::of_shape).
+    unsafe fn of_mesh(device: &Device, mesh: &Mesh) -> Result<Self> {
+        // SAFETY: the device is alive.
+        let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
+        let this = Self::new(device, handle)?;
+        // SAFETY: both buffers hold as many items of that format as are announced; 16 bytes may be read of the last position, since the
+        // mesh keeps one more behind it; Embree only reads them, and the caller keeps them alive.
+        unsafe {
+            let positions = mesh.padded_positions();
+            this.share(sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, positions.as_ptr().cast(), positions.len() - 1);
+            let triangles = mesh.triangles();
+            this.share(sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, triangles.as_ptr().cast(), triangles.len());
+            sys::rtcCommitGeometry(handle);
+        }
+        Ok(this)
+    }
+
+    /// Shares `count` items of 12 bytes.
+    ///
+    /// # Safety
+    /// There must be as many, and they must outlive the geometry.
+    unsafe fn share(&self, kind: sys::RTCBufferType, format: sys::RTCFormat, items: *const c_void, count: usize) {
+        // SAFETY: the handle is alive; the rest is the caller's promise.
+        unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, 0, format, items, 0, 12, count) }
+    }
+
+    /// The committed geometry of an instance of `object`.
+    pub(super) fn of_instance(device: &Device, object: &Scene, instance: &Instance) -> Result<Self> {
+        // SAFETY: the device is alive.
+        let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_INSTANCE) };
+        let this = Self::new(device, handle)?;
+        let map = &instance.transform.world_from_object;
+        let columns = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis, map.translation].map(|c| c.as_vec3().to_array());
+        // SAFETY: both handles are alive, the geometry keeps the object's scene alive, and Embree copies the twelve floats.
+        unsafe {
+            sys::rtcSetGeometryInstancedScene(handle, object.handle());
+            sys::rtcSetGeometryTransform(handle, 0, sys::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.as_ptr().cast());
+            sys::rtcCommitGeometry(handle);
+        }
+        Ok(this)
     }
 }
 
-impl Drop for Builder<'_> {
+impl Drop for GeometryHandle {
     fn drop(&mut self) {
-        if !self.handle.is_null() {
-            // SAFETY: the scene was not handed over, so this is its last use.
-            unsafe { sys::rtcReleaseScene(self.handle) };
+        // SAFETY: gives back the one reference this handle owns.
+        unsafe { sys::rtcReleaseGeometry(self.0.as_ptr()) }
+    }
+}
+
+/// A scene that takes geometries and cannot be traced yet.
+pub(super) struct SceneBuilder<'d> {
+    device: &'d Device,
+    scene: Scene,
+}
+
+impl<'d> SceneBuilder<'d> {
+    /// An empty scene.
+    pub(super) fn new(device: &'d Device) -> Result<Self> {
+        // SAFETY: the device is alive.
+        let handle = unsafe { sys::rtcNewScene(device.handle()) };
+        let scene = NonNull::new(handle).map(Scene).ok_or_else(|| no_object(device, "scene"))?;
+        // SAFETY: the scene is alive. Without the robust flag one ray in ten slips through the edges of a distant mesh.
+        unsafe { sys::rtcSetSceneFlags(handle, sys::RTC_SCENE_FLAG_ROBUST) };
+        Ok(Self { device, scene })
+    }
+
+    /// Adds a geometry under a number that no other has; hits name it. Embree's tables grow with the largest number.
+    pub(super) fn attach(&mut self, geometry: &GeometryHandle, number: usize) -> Result<()> {
+        let number = u32::try_from(number).map_err(|_| Error::Embree("too many shapes and instances".into()))?;
+        // SAFETY: both handles are alive; the scene takes a reference of its own.
+        unsafe { sys::rtcAttachGeometryByID(self.scene.handle(), geometry.0.as_ptr(), number) };
+        Ok(())
+    }
+
+    /// Builds the acceleration structure.
+    ///
+    /// # Errors
+    /// The first error that the device has reported.
+    pub(super) fn commit(self) -> Result<Scene> {
+        self.device.check()?;
+        // SAFETY: the scene is alive and this builder is its only user.
+        unsafe { sys::rtcCommitScene(self.scene.handle()) };
+        self.device.check()?;
+        Ok(self.scene)
+    }
+}
+
+/// A committed scene, released on drop.
+pub(super) struct Scene(NonNull<sys::RTCSceneTy>);
+
+// SAFETY: a committed scene is only traced, which Embree allows from any number of threads at once, and at last released, by its owner.
+unsafe impl Send for Scene {}
+// SAFETY: as above.
+unsafe impl Sync for Scene {}
+
+impl Scene {
+    #[inline]
+    pub(super) fn handle(&self) -> sys::RTCScene {
+        self.0.as_ptr()
+    }
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        // SAFETY: gives back the one reference this scene owns; nobody traces it any more.
+        unsafe { sys::rtcReleaseScene(self.handle()) }
+    }
+}
+
+/// What a failed creation says: the device's error, or at least what is missing.
+fn no_object(device: &Device, what: &str) -> Error {
+    device.check().err().unwrap_or_else(|| Error::Embree(format!("no {what} could be created")))
+}
+
+/// Fills a scene with shapes: each under the number that `number` gives it.
+pub(super) fn attach_shapes(
+    builder: &mut SceneBuilder,
+    shapes: &[Option<GeometryHandle>],
+    ids: &[ShapeId],
+    number: impl Fn(usize, ShapeId) -> usize,
+) -> Result<()> {
+    for (position, &id) in ids.iter().enumerate() {
+        if let Some(geometry) = &shapes[id.index()] {
+            builder.attach(geometry, number(position, id))?;
         }
     }
+    Ok(())
 }

@@ -12,6 +12,8 @@ use steradian::render::Progress;
 const BAR_PERIOD: Duration = Duration::from_millis(100);
 /// Least time between two lines.
 const LINE_PERIOD: Duration = Duration::from_secs(1);
+/// A line comes after this time even if the percentage stands.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(60);
 
 /// Where progress goes.
 enum Sink {
@@ -34,7 +36,7 @@ struct State {
     start: Instant,
     total: u64,
     last: Option<Instant>,
-    last_percent: u64,
+    last_percent: Option<u64>,
     stop_told: bool,
 }
 
@@ -46,7 +48,7 @@ impl Reporter {
             (false, true) => Sink::Bar(bar()),
             (false, false) => Sink::Lines,
         };
-        let state = State { start: Instant::now(), total: 0, last: None, last_percent: 0, stop_told: false };
+        let state = State { start: Instant::now(), total: 0, last: None, last_percent: None, stop_told: false };
         Self { sink, stop, time_limit, done: AtomicU64::new(0), state: Mutex::new(state) }
     }
 
@@ -83,11 +85,11 @@ impl Reporter {
                 bar.set_position((view.fraction * 1000.0) as u64);
                 bar.set_message(format!("{:3} %  {}", view.percent, view.text));
             }
-            Sink::Lines if view.percent == state.last_percent => return,
+            Sink::Lines if state.last_percent == Some(view.percent) && state.last.is_some_and(|last| now - last < SIGN_OF_LIFE) => return,
             Sink::Lines => print(&format!("Progress: {}% ({})", view.percent, view.text)),
         }
         state.last = Some(now);
-        state.last_percent = view.percent;
+        state.last_percent = Some(view.percent);
     }
 }
 

@@ -153,9 +153,10 @@ fn world_to_camera(camera: &Camera, size: [u32; 2]) -> [[f32; 4]; 4] {
     let mut rows = [[0.0; 4]; 4];
     for (column, axis) in axes.iter().enumerate() {
         for (row, component) in axis.to_array().into_iter().enumerate() {
-            rows[row][column] = component as f32;
+            // Adding zero makes a negative zero positive.
+            rows[row][column] = component as f32 + 0.0;
         }
-        rows[3][column] = -axis.dot(position) as f32;
+        rows[3][column] = -axis.dot(position) as f32 + 0.0;
     }
     rows[3][3] = 1.0;
     rows

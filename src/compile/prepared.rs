@@ -1,0 +1,130 @@
+//! Shapes of the scene file: loaded and checked once, placed once or (emitters of objects) once per instance.
+
+use super::{Builder, materials, meshes, shapes};
+use crate::color::Rgb;
+use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
+use crate::error::Result;
+use crate::geometry::{Analytic, Placed, Shape};
+use crate::id::{LightId, MaterialId, ShapeId};
+use crate::import::MeshData;
+use crate::light::{AreaLight, Emission, Light};
+use crate::math::{DAffine3, Transform};
+use crate::scene::Surface;
+
+/// A shape that knows everything but its final place.
+#[derive(Clone, Debug)]
+pub struct PreparedShape {
+    form: Form,
+    /// The shape's own transform.
+    map: DAffine3,
+    reverse_normal: bool,
+    material: MaterialId,
+    /// Light that it gives off, not black.
+    pub emission: Option<Emission>,
+    /// Where the scene has it.
+    path: String,
+}
+
+#[derive(Clone, Debug)]
+enum Form {
+    Analytic(Analytic),
+    Mesh {
+        data: MeshData,
+        shading: MeshShadingDesc,
+        /// Where it was read, relative to the scene.
+        file: Option<String>,
+    },
+}
+
+impl Builder {
+    /// Loads and checks one shape of the scene file; an OBJ file may bring several.
+    pub(super) fn prepare(&mut self, path: &str, desc: &ShapeDesc) -> Result<Vec<PreparedShape>> {
+        let common = desc.common();
+        let material = self.materials.find(&self.files, path, common.material)?;
+        let place = format!("{path}.transform");
+        let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
+        let emission = self.emission(path, &common)?;
+        let form = match desc {
+            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, material, emission),
+            ShapeDesc::Cube(_) => Form::Mesh { data: meshes::cube(), shading: MeshShadingDesc::Flat, file: None },
+            _ => match shapes::compile(&self.files, path, desc)? {
+                Some(surface) => Form::Analytic(surface),
+                None => return Ok(Vec::new()),
+            },
+        };
+        let reverse_normal = common.reverse_normal;
+        Ok(vec![PreparedShape { form, map, reverse_normal, material, emission, path: path.into() }])
+    }
+
+    fn prepare_mesh(
+        &mut self,
+        path: &str,
+        desc: &MeshDesc,
+        map: &DAffine3,
+        material: MaterialId,
+        emission: Option<Emission>,
+    ) -> Result<Vec<PreparedShape>> {
+        let mut prepared = Vec::new();
+        for loaded in meshes::load(&self.files, path, desc)? {
+            let (mut material, mut emission) = (material, emission);
+            if let Some(mtl) = &loaded.material {
+                let from_mtl =
+                    materials::from_mtl(mtl).map_err(|message| meshes::refusal(&self.files, path, desc.file.as_deref(), message))?;
+                material = self.materials.push(from_mtl.material);
+                emission = emission.or(from_mtl.radiance.map(|radiance| Emission { radiance, two_sided: false }));
+            }
+            prepared.push(PreparedShape {
+                form: Form::Mesh { data: loaded.data, shading: desc.shading, file: desc.file.clone() },
+                map: *map,
+                reverse_normal: desc.reverse_normal,
+                material,
+                emission,
+                path: path.into(),
+            });
+        }
+        Ok(prepared)
+    }
+
+    fn emission(&self, path: &str, common: &ShapeCommon) -> Result<Option<Emission>> {
+        let Some(emission) = common.emission else {
+            return Ok(None);
+        };
+        let radiance = Rgb::from(self.files.emitted(&format!("{path}.emission.radiance"), emission.radiance)?);
+        Ok((!radiance.is_black()).then_some(Emission { radiance, two_sided: emission.two_sided }))
+    }
+
+    /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
+    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3) -> Result<ShapeId> {
+        let PreparedShape { form, map, reverse_normal, material, emission, path } = prepared;
+        let transform = Transform::new(*outer * map).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
+        let shape = match form {
+            Form::Analytic(surface) => {
+                let mut placed = Placed::new(surface, transform);
+                placed.reverse_normal = reverse_normal;
+                Shape::Analytic(placed)
+            }
+            Form::Mesh { data, shading, file } => {
+                let placement = meshes::Placement { transform: &transform, shading, reverse_normal };
+                Shape::Mesh(meshes::place(&self.files, &path, file.as_deref(), data, placement)?)
+            }
+        };
+        let bounds = shape.bounds();
+        if !bounds.min.is_finite() || !bounds.max.is_finite() {
+            return Err(self.files.error(&path, "the shape reaches to infinity: its size or place is too large for 32-bit numbers"));
+        }
+        self.geometry.shapes.push(shape);
+        let id = ShapeId::new(self.geometry.shapes.len() - 1);
+        let mut surface = Surface { material, first_light: None, single_light: false };
+        if let Some(emission) = emission {
+            let lights = AreaLight::for_shape(id, emission, &self.geometry);
+            if !lights.iter().any(|light| light.area() > 0.0) {
+                return Err(self.files.error(&format!("{path}.emission"), "the light has no area"));
+            }
+            surface.first_light = Some(LightId::new(self.lights.len()));
+            surface.single_light = lights.len() == 1;
+            self.lights.extend(lights.into_iter().map(Light::Area));
+        }
+        self.surfaces.push(surface);
+        Ok(id)
+    }
+}

@@ -1,0 +1,138 @@
+//! The program as its users and scripts see it.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+use steradian::output;
+
+const SCENE: &str = r#"{
+    "film": { "width": 24, "height": 16 },
+    "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
+    "sampler": { "spp": 2 },
+    "shapes": [{ "type": "sphere", "radius": 1 }],
+    "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
+}"#;
+
+/// A command in a folder that holds `scene.json`.
+fn steradian(folder: &Path, arguments: &str) -> Command {
+    std::fs::write(folder.join("scene.json"), SCENE).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
+    command.current_dir(folder).args(arguments.split_whitespace());
+    command
+}
+
+fn run(folder: &Path, arguments: &str) -> Output {
+    steradian(folder, arguments).output().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn faults_have_their_exit_codes_and_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("broken.json"), "{").unwrap();
+    let cases = [
+        ("render scene.json --spp 0", 2),
+        ("render scene.json --nonsense", 2),
+        ("render scene.json -o a.jpg", 2),
+        ("render broken.json", 3),
+        ("render missing.json", 4),
+        ("render scene.json -o missing/a.exr", 5),
+        ("render scene.json --json missing/a.json", 5),
+        ("render scene.json --size 65536x65536", 33),
+        ("compare a.exr b.exr", 4),
+        ("--help", 0),
+        ("render --help", 0),
+    ];
+    for (arguments, code) in cases {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", stderr(&output));
+        assert_eq!(stderr(&output).matches("error:").count(), usize::from(code != 0), "{arguments}");
+        assert_eq!(output.stdout.is_empty(), code != 0, "{arguments}");
+    }
+    // Nothing was left behind.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn without_outputs_the_files_are_named_after_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), "render scene.json --layers Z --json stats.json");
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let told = stderr(&output);
+    assert!(told.contains("wrote scene.exr\n") && told.contains("wrote scene.png\n") && told.ends_with("Progress: 100%\n"), "{told}");
+    assert!(folder.path().join("scene.png").exists());
+    let image = output::read_exr(&folder.path().join("scene.exr")).unwrap();
+    assert_eq!(image.size, [24, 16]);
+
+    let stats: Value = serde_json::from_str(&std::fs::read_to_string(folder.path().join("stats.json")).unwrap()).unwrap();
+    assert_eq!(
+        (&stats["samples"], &stats["spp"], &stats["interrupted"]),
+        (&Value::from(24 * 16 * 2), &Value::from(2), &Value::from(false))
+    );
+    for key in [
+        "load_seconds",
+        "build_seconds",
+        "render_seconds",
+        "mrays_per_second",
+        "msamples_per_second",
+        "peak_memory_bytes",
+        "nan_samples",
+        "threads",
+    ] {
+        assert!(stats[key].is_number(), "{key}: {stats}");
+    }
+    assert!(stats["rays"]["camera"].as_u64().is_some_and(|rays| rays >= 24 * 16 * 2), "{stats}");
+    assert!(stats["embree"]["version"].is_string() && stats["embree"]["isa"].is_string(), "{stats}");
+}
+
+#[test]
+fn quiet_runs_say_nothing_and_statistics_go_to_stdout() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), "render scene.json -q -o a.exr --json -");
+    assert_eq!((output.status.code(), stderr(&output).as_str()), (Some(0), ""));
+    let stats: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(stats["outputs"], serde_json::json!(["a.exr"]));
+
+    // The same scene again is the same picture; another seed is not.
+    for (name, seed) in [("b.exr", 0), ("c.exr", 1)] {
+        assert!(run(folder.path(), &format!("render scene.json -q -o {name} --seed {seed}")).status.success());
+    }
+    let compare =
+        |name: &str| -> Value { serde_json::from_slice(&run(folder.path(), &format!("compare a.exr {name} --json")).stdout).unwrap() };
+    assert_eq!((&compare("b.exr")["mse"], &compare("b.exr")["psnr"]), (&Value::from(0.0), &Value::Null));
+    assert!(compare("c.exr")["mse"].as_f64().is_some_and(|mse| mse > 0.0));
+}
+
+#[test]
+fn a_replay_prints_the_sample_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), "render scene.json --pixel 12,8 --sample 1");
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.starts_with("radiance  ") && text.contains("\nalpha     1\n") && text.contains("\ndepth     3"), "{text}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(run(folder.path(), "render scene.json --pixel 24,8 --sample 1").status.code(), Some(2));
+}
+
+/// The first signal finishes the samples under way, writes the picture and gives the signal's code.
+#[test]
+fn interrupted_renders_write_their_picture() {
+    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = steradian(folder.path(), "render scene.json --spp 2000000000 --time-limit 60 -o a.exr --threads 1");
+        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+        // With the first line of progress the program listens.
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let first = lines.next().unwrap().unwrap();
+        assert!(first.starts_with("Progress: "), "{first}");
+        assert!(Command::new("kill").arg(signal).arg(child.id().to_string()).status().unwrap().success());
+        let rest: Vec<String> = lines.map_while(Result::ok).collect();
+        assert_eq!(child.wait().unwrap().code(), Some(code), "{rest:?}");
+        assert!(rest.iter().any(|line| line == "wrote a.exr"), "{rest:?}");
+        assert!(output::read_exr(&folder.path().join("a.exr")).is_ok());
+    }
+}

@@ -1,0 +1,281 @@
+//! What scene files say reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
+
+use serde_json::{Value, json};
+use steradian::compile::Summary;
+use steradian::geometry::{Mesh, Shape};
+use steradian::id::{PrimId, ShapeId};
+use steradian::import;
+use steradian::light::Light;
+use steradian::math::{DVec3, Vec3};
+use steradian::scene::Scene;
+
+use crate::util::folder::{Folder, good_scene, set};
+
+fn lit(shape: Value) -> Value {
+    json!({
+        "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] },
+        "shapes": [shape],
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
+    })
+}
+
+fn mesh(scene: &Scene, shape: usize) -> &Mesh {
+    match &scene.geometry.shapes[shape] {
+        Shape::Mesh(mesh) => mesh,
+        Shape::Analytic(_) => panic!("no mesh"),
+    }
+}
+
+fn geometric_normal(mesh: &Mesh, triangle: usize) -> Vec3 {
+    mesh.triangle_points(PrimId::new(triangle)).cross().normalize().as_vec3()
+}
+
+#[test]
+fn the_schema_accepts_scenes_and_refuses_slips() {
+    let schema: Value = serde_json::from_str(&import::schema()).unwrap();
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    let good = good_scene();
+    let faults: Vec<String> = validator.iter_errors(&good).map(|e| e.to_string()).collect();
+    assert!(faults.is_empty(), "{faults:?}");
+    for (path, value) in [
+        ("shaeps", json!([])),
+        ("camera.postion", json!([0, 0, 0])),
+        ("shapes[0].raduis", json!(1)),
+        ("shapes[0].type", json!("shpere")),
+        ("shapes[0].radius", json!("one")),
+        ("materials.Gold.roughnes", json!(0.1)),
+        ("materials.tiled.albedo", json!("red")),
+        ("shapes[0].transform", json!([{ "trnslate": [0, 0, 0] }])),
+        ("lights[0].intensity", json!([1, 1])),
+        ("film.filter.sgima", json!(1)),
+        ("integrator", json!({ "type": "normal", "max_depth": 3 })),
+        ("camera", Value::Null),
+    ] {
+        let mut scene = good_scene();
+        set(&mut scene, path, value);
+        assert!(!validator.is_valid(&scene), "{path}");
+    }
+}
+
+#[test]
+fn a_scene_survives_writing() {
+    let folder = Folder::new();
+    let path = folder.write("scene.json", good_scene().to_string());
+    let scene = import::load_scene(&path).unwrap();
+    let text = serde_json::to_string(&scene).unwrap();
+    let again = import::parse_scene(&text, &path).unwrap();
+    assert_eq!(text, serde_json::to_string(&again).unwrap());
+}
+
+#[test]
+fn comments_are_allowed_everywhere_but_in_strings() {
+    let text = good_scene().to_string().replace("{\"", "/* \" */{ // }\n\"").replace("\"out.exr\"", "\"a//b/*c*/.exr\"");
+    let path = Folder::new().write("scene.json", &text);
+    let scene = import::parse_scene(&text, &path).unwrap();
+    assert_eq!(scene.outputs[0].file, "a//b/*c*/.exr");
+}
+
+#[test]
+fn the_first_step_of_a_transform_acts_first() {
+    let folder = Folder::new();
+    let turn = json!({ "rotate": { "axis": [0, 0, 1], "degrees": 90 } });
+    let shift = json!({ "translate": [5, 0, 0] });
+    let first = |steps: [&Value; 2]| {
+        let triangle = json!({
+            "type": "mesh", "positions": [[1, 0, 0], [2, 0, 0], [1, 1, 0]], "triangles": [[0, 1, 2]], "transform": steps
+        });
+        mesh(&folder.compile(&lit(triangle)).unwrap(), 0).positions()[0]
+    };
+    assert_eq!(first([&turn, &shift]), [5.0, 1.0, 0.0]);
+    assert_eq!(first([&shift, &turn]), [0.0, 6.0, 0.0]);
+}
+
+#[test]
+fn fronts_stay_fronts_in_a_mirror_and_turn_on_demand() {
+    let folder = Folder::new();
+    for (scale, reverse, front) in [(1.0, false, 1.0), (-1.0, false, 1.0), (1.0, true, -1.0), (-1.0, true, -1.0)] {
+        let triangle = json!({
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "normals": vec![[0.6, 0.0, 0.8]; 3],
+            "transform": [{ "scale": [scale, 1.0, 2.0] }], "reverse_normal": reverse
+        });
+        let scene = folder.compile(&lit(triangle)).unwrap();
+        let normal = geometric_normal(mesh(&scene, 0), 0);
+        assert!((normal - front * Vec3::Z).length() < 1e-6, "{scale} {reverse}: {normal}");
+    }
+}
+
+#[test]
+fn triangles_without_area_are_dropped() {
+    let triangle = json!({
+        "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]],
+        "triangles": [[0, 1, 3], [0, 1, 2], [1, 1, 2], [1, 3, 2]]
+    });
+    let scene = Folder::new().compile(&lit(triangle)).unwrap();
+    assert_eq!(mesh(&scene, 0).triangles(), [[0, 1, 2], [1, 3, 2]]);
+}
+
+#[test]
+fn shading_chooses_the_normals() {
+    let folder = Folder::new();
+    let has_normals = |normals: bool, shading: Value| {
+        let mut triangle =
+            json!({ "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "shading": shading });
+        if normals {
+            triangle["normals"] = json!(vec![[0.0, 0.0, 1.0]; 3]);
+        }
+        mesh(&folder.compile(&lit(triangle)).unwrap(), 0).has_normals()
+    };
+    for (given, shading, expected) in [
+        (false, "auto", false),
+        (true, "auto", true),
+        (false, "flat", false),
+        (true, "flat", false),
+        (false, "smooth", true),
+        (true, "smooth", true),
+    ] {
+        assert_eq!(has_normals(given, json!(shading)), expected, "{given} {shading}");
+    }
+}
+
+/// A pyramid of a quad and four triangles, with uv.
+const PYRAMID: [[f32; 5]; 5] = [
+    [-1.0, 0.0, -1.0, 0.0, 0.0],
+    [1.0, 0.0, -1.0, 1.0, 0.0],
+    [1.0, 0.0, 1.0, 1.0, 1.0],
+    [-1.0, 0.0, 1.0, 0.0, 1.0],
+    [0.0, 1.5, 0.0, 0.5, 0.5],
+];
+const FACES: [&[u32]; 5] = [&[0, 1, 2, 3], &[1, 0, 4], &[2, 1, 4], &[3, 2, 4], &[0, 3, 4]];
+
+fn pyramid_ply(format: &str, number: impl Fn(f32) -> Vec<u8>, index: impl Fn(u32) -> Vec<u8>) -> Vec<u8> {
+    let mut out = format!("ply\nformat {format} 1.0\nelement vertex 5\n").into_bytes();
+    for name in ["x", "y", "z", "u", "v"] {
+        out.extend(format!("property float {name}\n").bytes());
+    }
+    out.extend(b"element face 5\nproperty list uchar int vertex_indices\nend_header\n");
+    let is_text = format == "ascii";
+    for vertex in PYRAMID {
+        vertex.iter().for_each(|&x| out.extend(number(x)));
+        out.extend(is_text.then_some(b'\n'));
+    }
+    for face in FACES {
+        if is_text {
+            out.extend(format!("{} ", face.len()).bytes());
+        } else {
+            out.push(face.len() as u8);
+        }
+        face.iter().for_each(|&i| out.extend(index(i)));
+        out.extend(is_text.then_some(b'\n'));
+    }
+    out
+}
+
+fn pyramid_obj() -> String {
+    let vertices = PYRAMID.iter().map(|[x, y, z, u, v]| format!("v {x} {y} {z}\nvt {u} {v}\n")).collect::<String>();
+    let corner = |i: &u32| format!(" {0}/{0}", i + 1);
+    vertices + &FACES.iter().map(|face| format!("f{}\n", face.iter().map(corner).collect::<String>())).collect::<String>()
+}
+
+#[test]
+fn the_same_mesh_in_every_format_is_the_same() {
+    let folder = Folder::new();
+    folder.write("a.ply", pyramid_ply("ascii", |x| format!("{x} ").into_bytes(), |i| format!("{i} ").into_bytes()));
+    folder.write("l.ply", pyramid_ply("binary_little_endian", |x| x.to_le_bytes().into(), |i| i.to_le_bytes().into()));
+    folder.write("b.ply", pyramid_ply("binary_big_endian", |x| x.to_be_bytes().into(), |i| i.to_be_bytes().into()));
+    folder.write("o.obj", pyramid_obj());
+    let corners = |name: &str| {
+        let scene = folder.compile(&lit(json!({ "type": "mesh", "file": name }))).unwrap();
+        let mesh = mesh(&scene, 0);
+        assert!(mesh.has_uvs(), "{name}");
+        mesh.triangles().iter().map(|t| t.map(|i| mesh.positions()[i as usize])).collect::<Vec<_>>()
+    };
+    let expected = corners("a.ply");
+    assert_eq!(expected.len(), 6);
+    for name in ["l.ply", "b.ply", "o.obj"] {
+        assert_eq!(corners(name), expected, "{name}");
+    }
+}
+
+#[test]
+fn an_obj_brings_its_materials_and_lights_unless_one_is_given() {
+    let folder = Folder::new();
+    folder.write("m.mtl", "newmtl wall\nKd 0.2 0.4 0.6\nnewmtl lamp\nKd 0 0 0\nKe 3 2 1\n");
+    folder.write("m.obj", format!("mtllib m.mtl\n{}usemtl lamp\nf 1 2 3\nusemtl wall\nf 1 3 4\ng more\nf 2 3 5\n", pyramid_obj()));
+    let own = folder.compile(&lit(json!({ "type": "mesh", "file": "m.obj" }))).unwrap();
+    // Without a material, with the lamp's, with the wall's.
+    assert_eq!(own.geometry.shapes.len(), 3);
+    assert_eq!(own.surfaces.iter().filter(|s| s.first_light.is_some()).count(), 1);
+    assert_eq!(own.lights.lights().iter().filter(|light| matches!(light, Light::Area(_))).count(), 1);
+
+    let mut scene = lit(json!({ "type": "mesh", "file": "m.obj", "material": "red" }));
+    scene["materials"] = json!({ "red": { "type": "diffuse", "albedo": [0.5, 0, 0] } });
+    let given = folder.compile(&scene).unwrap();
+    assert_eq!(given.geometry.shapes.len(), 1);
+    assert!(given.surfaces[0].first_light.is_none());
+}
+
+#[test]
+fn what_emits_in_an_object_stands_in_the_world_for_each_instance() {
+    let folder = Folder::new();
+    folder.write("m.mtl", "newmtl lamp\nKe 3 2 1\n");
+    folder.write("m.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl lamp\nf 1 2 3\n");
+    let scene = json!({
+        "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] },
+        "objects": {
+            "inner": {
+                "shapes": [
+                    { "type": "cube" },
+                    { "type": "mesh", "file": "m.obj" },
+                    { "type": "sphere", "radius": 0.5, "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": [1, 0, 0] }] }
+                ]
+            },
+            "outer": { "instances": [{ "object": "inner" }, { "object": "inner", "transform": [{ "translate": [0, 10, 0] }] }] },
+            "idle": { "shapes": [{ "type": "disk" }] }
+        },
+        "instances": [{ "object": "outer", "transform": [{ "scale": 2 }] }, { "object": "inner" }]
+    });
+    let scene = folder.compile(&scene).unwrap();
+    let summary = Summary::new(&scene);
+    assert_eq!((summary.objects, summary.instances, summary.triangles_instanced), (1, 3, 3 * 12 + 3));
+    assert_eq!(summary.lights["area"], 6);
+    assert_eq!(scene.geometry.world.len(), 6);
+    // Transforms multiply: the second sphere of the first instance is moved by 10, then doubled.
+    let mut spheres: Vec<DVec3> = Vec::new();
+    for &id in &scene.geometry.world {
+        assert!(scene.surface(id).light(PrimId(0)).is_some());
+        if let Shape::Analytic(placed) = scene.geometry.shape(id) {
+            spheres.push(placed.transform.point(DVec3::ZERO));
+        }
+    }
+    assert_eq!(spheres, [DVec3::new(2.0, 0.0, 0.0), DVec3::new(2.0, 20.0, 0.0), DVec3::new(1.0, 0.0, 0.0)]);
+    assert!(scene.geometry.objects[0].shapes.iter().all(|&id| scene.surface(id).first_light.is_none()));
+}
+
+#[test]
+fn each_emissive_triangle_finds_its_light() {
+    let scene = lit(json!({ "type": "cube", "emission": { "radiance": [1, 2, 3] } }));
+    let scene = Folder::new().compile(&scene).unwrap();
+    for prim in 0..12 {
+        let id = scene.surface(ShapeId(0)).light(PrimId(prim)).unwrap();
+        match &scene.lights.lights()[id.index()] {
+            Light::Area(light) => assert_eq!((light.shape, light.prim), (ShapeId(0), PrimId(prim))),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn the_summary_counts_what_is_there() {
+    let scene = Folder::new().compile(&good_scene()).unwrap();
+    let summary = serde_json::to_value(Summary::new(&scene)).unwrap();
+    assert_eq!(summary["triangles"], 13);
+    assert_eq!(summary["instances"], 2);
+    assert_eq!(summary["lights"], json!({ "area": 3, "point": 1, "spot": 1, "directional": 1, "environment": 1 }));
+    assert_eq!(summary["shapes"]["sphere"], 3);
+    assert_eq!(summary["textures"], 1);
+    let features = summary["features"].as_array().unwrap();
+    for feature in ["lights", "environment", "analytic shapes", "instances", "textures", "mirror or glass", "anisotropic materials", "lens"]
+    {
+        assert!(features.contains(&json!(feature)), "{feature}");
+    }
+}
