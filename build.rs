@@ -6,13 +6,8 @@ use std::path::{Path, PathBuf};
 /// Major versions this crate is written for, the one it is measured with first. Debian 12 has 3, Debian 13 has 4.
 const EMBREE_VERSIONS: [u32; 2] = [3, 4];
 
-/// Headers and sources of the C side.
-const SOURCES: [&str; 3] = ["ffi/wrapper.h", "ffi/embree_shim.h", "ffi/embree_shim.c"];
-
 fn main() {
-    for source in SOURCES {
-        println!("cargo::rerun-if-changed={source}");
-    }
+    println!("cargo::rerun-if-changed=ffi");
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=EMBREE_DIR");
     if let Err(message) = build() {

@@ -2,10 +2,12 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 _Static_assert(RTC_VERSION_MAJOR == 3 || RTC_VERSION_MAJOR == 4, "written for Embree 3 and 4");
 _Static_assert(RTC_VERSION_MAJOR != 3 || RTC_VERSION >= 31200, "user callbacks get geomID since Embree 3.12");
 _Static_assert(sizeof(struct StRay) == 36, "Ray is nine floats");
+_Static_assert(offsetof(struct RTCRay, tnear) == 12 && offsetof(struct RTCRay, time) == 28, "origin and tnear, direction and time");
 _Static_assert(sizeof(struct RTCRay) == 48 && sizeof(struct RTCRay16) == 16 * 48, "twelve words for each ray");
 _Static_assert(offsetof(struct RTCRayHit, hit) == 48 && offsetof(struct RTCRayHit16, hit) == 16 * 48, "hits follow rays");
 
@@ -85,19 +87,82 @@ RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *sha
     return geometry;
 }
 
+typedef float Float4 __attribute__((vector_size(16), may_alias));
+
+/* Written in pieces of 16 bytes, which Embree reads at once; smaller ones could not be forwarded from the store buffer. */
+static inline void set_ray(struct RTCRay *out, const struct StRay *ray) {
+    Float4 direction_time;
+    memcpy(&direction_time, ray->direction, sizeof direction_time);
+    direction_time[3] = ray->time;
+    memcpy(&out->org_x, ray->origin, sizeof(Float4));
+    memcpy(&out->dir_x, &direction_time, sizeof direction_time);
+    out->tfar = ray->t_max;
+    out->mask = 0xffffffffu;
+    out->id = 0;
+    out->flags = 0;
+}
+
+/* Four floats from each of four rays, written to four rows of a packet. */
+static inline void transpose(const float *const in[4], float *row0, float *row1, float *row2, float *row3) {
+    Float4 a, b, c, d;
+    memcpy(&a, in[0], sizeof a);
+    memcpy(&b, in[1], sizeof b);
+    memcpy(&c, in[2], sizeof c);
+    memcpy(&d, in[3], sizeof d);
+    const Float4 ab01 = __builtin_shufflevector(a, b, 0, 4, 1, 5), ab23 = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Float4 cd01 = __builtin_shufflevector(c, d, 0, 4, 1, 5), cd23 = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    *(Float4 *)row0 = __builtin_shufflevector(ab01, cd01, 0, 1, 4, 5);
+    *(Float4 *)row1 = __builtin_shufflevector(ab01, cd01, 2, 3, 6, 7);
+    *(Float4 *)row2 = __builtin_shufflevector(ab23, cd23, 0, 1, 4, 5);
+    *(Float4 *)row3 = __builtin_shufflevector(ab23, cd23, 2, 3, 6, 7);
+}
+
+void st_fill16(struct RTCRay16 *packet, const struct StRay *rays) {
+    for (int first = 0; first < 16; first += 4) {
+        const struct StRay *r = rays + first;
+        const float *const origins[4] = {r[0].origin, r[1].origin, r[2].origin, r[3].origin};
+        const float *const directions[4] = {r[0].direction, r[1].direction, r[2].direction, r[3].direction};
+        transpose(origins, packet->org_x + first, packet->org_y + first, packet->org_z + first, packet->tnear + first);
+        transpose(directions, packet->dir_x + first, packet->dir_y + first, packet->dir_z + first, packet->tfar + first);
+        const Float4 times = {r[0].time, r[1].time, r[2].time, r[3].time};
+        *(Float4 *)(packet->time + first) = times;
+    }
+}
+
+static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit);
+static void trace_any(RTCScene scene, struct RTCRay *ray);
+
+bool st_intersect1(RTCScene scene, const struct StRay *ray, struct StHit *hit) {
+    struct RTCRayHit rayhit;
+    set_ray(&rayhit.ray, ray);
+    rayhit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rayhit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    trace_closest(scene, &rayhit);
+    if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    const struct StHit found = {rayhit.ray.tfar, rayhit.hit.u, rayhit.hit.v, rayhit.hit.primID, rayhit.hit.geomID, rayhit.hit.instID[0]};
+    *hit = found;
+    return true;
+}
+
+bool st_occluded1(RTCScene scene, const struct StRay *ray) {
+    struct RTCRay traced;
+    set_ray(&traced, ray);
+    trace_any(scene, &traced);
+    return traced.tfar < 0.0f;
+}
+
 #if RTC_VERSION_MAJOR == 3
 
-void st_intersect1(RTCScene scene, struct RTCRayHit *rayhit) {
+static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcIntersect1(scene, &context, rayhit);
 }
 
-bool st_occluded1(RTCScene scene, struct RTCRay *ray) {
+static void trace_any(RTCScene scene, struct RTCRay *ray) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcOccluded1(scene, &context, ray);
-    return ray->tfar < 0.0f;
 }
 
 void st_intersect16(RTCScene scene, const int32_t *valid, struct RTCRayHit16 *rayhits, bool coherent) {
@@ -116,13 +181,12 @@ void st_occluded16(RTCScene scene, const int32_t *valid, struct RTCRay16 *rays, 
 
 #else
 
-void st_intersect1(RTCScene scene, struct RTCRayHit *rayhit) {
+static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit) {
     rtcIntersect1(scene, rayhit, NULL);
 }
 
-bool st_occluded1(RTCScene scene, struct RTCRay *ray) {
+static void trace_any(RTCScene scene, struct RTCRay *ray) {
     rtcOccluded1(scene, ray, NULL);
-    return ray->tfar < 0.0f;
 }
 
 void st_intersect16(RTCScene scene, const int32_t *valid, struct RTCRayHit16 *rayhits, bool coherent) {

@@ -38,17 +38,29 @@ struct StUserShape {
 /* A new, committed geometry of one user primitive; null on an error. */
 RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape);
 
-/* Closest hit. `rayhit->hit.geomID` must be invalid on entry, and stays so on a miss. */
-void st_intersect1(RTCScene scene, struct RTCRayHit *rayhit);
+/* A hit under Embree's numbers. */
+struct StHit {
+    float t, u, v;
+    uint32_t prim, geometry, instance;
+};
+
+/* The closest hit, written to `hit`; false on a miss, when `hit` is left alone. */
+bool st_intersect1(RTCScene scene, const struct StRay *ray, struct StHit *hit);
 
 /* Whether there is any hit. */
-bool st_occluded1(RTCScene scene, struct RTCRay *ray);
+bool st_occluded1(RTCScene scene, const struct StRay *ray);
 
-/* Closest hits of the lanes whose `valid` is -1; lanes of 0 are left alone. `valid` is aligned to 64 bytes. `coherent` promises that the
-   lanes start near each other and point nearly the same way. */
+/* Writes sixteen rays into the lanes of a packet; mask, id and flags stay as they are. */
+void st_fill16(struct RTCRay16 *packet, const struct StRay *rays);
+
+/*
+ * Closest hits of the lanes whose `valid` is -1; lanes of 0 are left alone. `valid` is aligned to 64 bytes. With `coherent` the packet is
+ * traced as a frustum; no direction of a valid lane may then have a component between zero and 1e-18 in magnitude, in the space of an
+ * instance neither.
+ */
 void st_intersect16(RTCScene scene, const int32_t *valid, struct RTCRayHit16 *rayhits, bool coherent);
 
-/* Any hits; `tfar` of an occluded lane becomes -inf. */
+/* Any hits, as above; `tfar` of an occluded lane becomes -inf. */
 void st_occluded16(RTCScene scene, const int32_t *valid, struct RTCRay16 *rays, bool coherent);
 
 #endif

@@ -1,16 +1,24 @@
 //! The one integration-test binary.
 
+/// Embree answers as the linear oracle does, alone, in packets and from many threads.
+mod accel_agreement;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
 /// The program as a user runs it: exit codes, what it writes, what it says.
 mod cli;
+/// What is not a ray, and what is hardly a triangle.
+mod degenerate_input;
 /// The same picture for any number of threads, any crop, any accelerator; samples can be replayed.
 mod determinism;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
 /// Meshes, comments, names and transforms of scene files, read as users write them.
 mod scene_files;
+/// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
+mod self_intersection;
 /// Layers, file lengths, unsafe code, printing.
 mod tidy;
 /// Shared helpers.
 mod util;
+/// Hit accuracy, and meshes without holes.
+mod watertight;

@@ -5,7 +5,7 @@
 
 use crate::geometry::Hit;
 use crate::id::{InstanceId, PrimId, ShapeId};
-use crate::math::float::{UNIT_ROUNDOFF, round_toward};
+use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Ray, Vec2, Vec3};
 
 /// A point on a surface.
@@ -67,10 +67,10 @@ impl SurfaceInteraction {
     pub fn spawn_to(&self, target: &SpawnTarget) -> Ray {
         let toward = (target.p - self.p).as_vec3();
         let origin = offset_origin(self.p, self.n_g, self.error, toward.dot(self.n_g));
-        // The end moves off the light towards us, also by the rounding of the direction.
+        // The end moves off the light towards us, also by the rounding of the direction and of the accelerator's arithmetic on it.
         let side = -toward.dot(target.n);
         let n = target.n.as_dvec3().abs();
-        let end_error = f64::from(target.error) + UNIT_ROUNDOFF * n.dot(toward.as_dvec3().abs());
+        let end_error = f64::from(target.error) + 4.0 * UNIT_ROUNDOFF * n.dot(toward.as_dvec3().abs());
         let end = offset_point(target.p, target.n, end_error, side);
         let direction = (end - origin.as_dvec3()).as_vec3();
         Ray { t_max: 1f32.next_down(), ..Ray::new(origin, direction) }
@@ -85,12 +85,11 @@ fn offset_point(p: DVec3, n: Vec3, error: f64, side: f32) -> DVec3 {
     p + n * delta.copysign(f64::from(side))
 }
 
-/// [`offset_point`] rounded to `f32`, away from the surface.
+/// [`offset_point`] rounded to `f32`. The half-ulp box is added twice: what rounding to nearest takes back at most, and what is to remain.
 #[inline]
 fn offset_origin(p: DVec3, n: Vec3, error: f32, side: f32) -> Vec3 {
-    let q = offset_point(p, n, f64::from(error), side);
-    let away = n * 1f32.copysign(side);
-    Vec3::new(round_toward(q.x, f64::from(away.x)), round_toward(q.y, f64::from(away.y)), round_toward(q.z, f64::from(away.z)))
+    let half_ulp_box = UNIT_ROUNDOFF * n.as_dvec3().abs().dot(p.abs());
+    offset_point(p, n, f64::from(error) + half_ulp_box, side).as_vec3()
 }
 
 #[cfg(test)]

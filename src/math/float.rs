@@ -29,18 +29,6 @@ pub fn round_down(x: f64) -> f32 {
     if f64::from(rounded) > x { rounded.next_down() } else { rounded }
 }
 
-/// `x` as `f32`, rounded in the direction of the sign of `toward`.
-#[inline]
-pub fn round_toward(x: f64, toward: f64) -> f32 {
-    if toward > 0.0 {
-        round_up(x)
-    } else if toward < 0.0 {
-        round_down(x)
-    } else {
-        x as f32
-    }
-}
-
 /// The `t_min` that steps past a hit at `t`: the next float, but never a denormal.
 #[inline]
 pub fn step_past(t: f32) -> f32 {

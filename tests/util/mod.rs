@@ -1,4 +1,5 @@
 //! What several test modules share.
 
 pub mod folder;
+pub mod geometry;
 pub mod render;

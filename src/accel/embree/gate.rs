@@ -36,13 +36,26 @@ impl Gate {
         Ok(gate)
     }
 
-    /// Whether `ray` may be handed to Embree. Every other ray hits nothing.
+    /// Whether `ray` may be handed to Embree. Every other ray hits nothing; so does one with `t_max = 0`, which Embree's closest-hit query
+    /// passes over and its any-hit query does not.
     #[inline(always)]
     pub(super) fn admits(&self, ray: &Ray) -> bool {
         let within = |v: Vec3, limit: f32| (v.x.abs() <= limit) & (v.y.abs() <= limit) & (v.z.abs() <= limit);
-        ray.is_valid() & within(ray.origin, self.origin) & within(ray.direction, self.direction)
+        ray.is_valid() & (ray.t_max > 0.0) & within(ray.origin, self.origin) & within(ray.direction, self.direction)
+    }
+
+    /// Whether `ray` may be traced side by side with others. Embree sorts the rays of a packet by the signs of their directions but takes
+    /// the reciprocal of any component below [`SMALLEST_RECIPROCAL`] as positive; a small negative one spoils the common frustum: nodes
+    /// are missed, and empty ones entered, which ends in an assertion. An interval of one point goes alone too: any-hit packets pass over it.
+    #[inline(always)]
+    pub(super) fn admits_to_packet(&self, ray: &Ray) -> bool {
+        let tame = |x: f32| (x == 0.0) | (x.abs() >= SMALLEST_RECIPROCAL);
+        self.admits(ray) & (ray.t_min < ray.t_max) & tame(ray.direction.x) & tame(ray.direction.y) & tame(ray.direction.z)
     }
 }
+
+/// Embree's `min_rcp_input`, rounded up.
+const SMALLEST_RECIPROCAL: f32 = 1.0001e-18;
 
 /// How far a map to object space can move a ray.
 struct Inverse {

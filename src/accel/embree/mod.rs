@@ -20,18 +20,18 @@ use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::{Aabb, Ray};
 use device::Device;
 use gate::Gate;
-use packet::{HitPacket, INVALID, RawHit, ShadowPacket, WIDTH};
+use packet::{HitPacket, INVALID, ShadowPacket, Tracer, WIDTH};
 use scene::{GeometryHandle, Scene, SceneBuilder, UserShapes};
+use sys::StHit;
 
 /// An Embree scene over borrowed geometry.
 ///
 /// Every scene has the robust flag: no ray slips between the triangles of a closed mesh, and `t_min` and `t_max` are inclusive.
 pub struct EmbreeAccel<'g> {
-    // Dropped in this order: the scene refers to the user data and to the device.
-    scene: Scene,
+    // Dropped in this order: the scene inside refers to the user data and to the device.
+    tracer: Tracer,
     _user_shapes: UserShapes,
     device: Device,
-    gate: Gate,
     geometry: &'g Geometry,
     bounds: Aabb,
 }
@@ -46,13 +46,14 @@ impl<'g> EmbreeAccel<'g> {
         let device = Device::new(threads)?;
         let user_shapes = UserShapes::new(geometry);
         let scene = build(geometry, &device, &user_shapes)?;
-        Ok(Self { scene, _user_shapes: user_shapes, device, gate, geometry, bounds: geometry.bounds() })
+        let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty() };
+        Ok(Self { tracer, _user_shapes: user_shapes, device, geometry, bounds: geometry.bounds() })
     }
 
     /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an object it is the
     /// shape's place there.
     #[inline(always)]
-    fn hit(&self, raw: RawHit) -> Hit {
+    fn hit(&self, raw: StHit) -> Hit {
         let (shape, instance) = if raw.instance == INVALID {
             (ShapeId(raw.geometry), Hit::NO_INSTANCE)
         } else {
@@ -96,12 +97,12 @@ fn build(geometry: &Geometry, device: &Device, user_shapes: &UserShapes) -> Resu
 impl Accelerator for EmbreeAccel<'_> {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        packet::intersect1(&self.scene, &self.gate, ray).map(|raw| self.hit(raw))
+        self.tracer.intersect(ray).map(|raw| self.hit(raw))
     }
 
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
-        packet::occluded1(&self.scene, &self.gate, ray)
+        self.tracer.occluded(ray)
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
@@ -109,13 +110,13 @@ impl Accelerator for EmbreeAccel<'_> {
         let (full, rest) = rays.as_chunks::<WIDTH>();
         let mut hits = hits.chunks_mut(WIDTH);
         for (run, hits) in full.iter().zip(&mut hits) {
-            packet.intersect(&self.scene, &self.gate, run, coherence);
+            packet.intersect(&self.tracer, run, coherence);
             for (lane, hit) in hits.iter_mut().enumerate() {
                 *hit = packet.hit(lane).map(|raw| self.hit(raw));
             }
         }
         if let (false, Some(hits)) = (rest.is_empty(), hits.next()) {
-            packet.intersect(&self.scene, &self.gate, &padded_run(rest), coherence);
+            packet.intersect(&self.tracer, &padded_run(rest), coherence);
             for (lane, hit) in hits.iter_mut().enumerate() {
                 *hit = packet.hit(lane).map(|raw| self.hit(raw));
             }
@@ -127,11 +128,11 @@ impl Accelerator for EmbreeAccel<'_> {
         let (full, rest) = rays.as_chunks::<WIDTH>();
         let mut occluded = occluded.chunks_mut(WIDTH);
         for (run, occluded) in full.iter().zip(&mut occluded) {
-            let found = packet.occluded(&self.scene, &self.gate, run, coherence);
+            let found = packet.occluded(&self.tracer, run, coherence);
             occluded.copy_from_slice(&found[..occluded.len()]);
         }
         if let (false, Some(occluded)) = (rest.is_empty(), occluded.next()) {
-            let found = packet.occluded(&self.scene, &self.gate, &padded_run(rest), coherence);
+            let found = packet.occluded(&self.tracer, &padded_run(rest), coherence);
             occluded.copy_from_slice(&found[..occluded.len()]);
         }
     }

@@ -4,7 +4,7 @@
 
 use super::gate::Gate;
 use super::scene::Scene;
-use super::sys::{self, RTCHit, RTCHit16, RTCRay, RTCRay16, RTCRayHit, RTCRayHit16};
+use super::sys::{self, RTCHit16, RTCRay16, RTCRayHit16, StHit};
 use crate::accel::Coherence;
 use crate::math::{Ray, Vec3};
 
@@ -17,70 +17,58 @@ pub(super) const INVALID: u32 = u32::MAX;
 /// Embree ignores geometries whose mask has no bit in common with the ray's.
 const ALL_GEOMETRIES: u32 = u32::MAX;
 
-/// The numbers under which Embree reports a hit.
-#[derive(Clone, Copy)]
-pub(super) struct RawHit {
-    pub(super) t: f32,
-    pub(super) u: f32,
-    pub(super) v: f32,
-    pub(super) prim: u32,
-    pub(super) geometry: u32,
-    pub(super) instance: u32,
+/// What traces, and what it may be given.
+pub(super) struct Tracer {
+    pub(super) scene: Scene,
+    pub(super) gate: Gate,
+    /// Whether packets may be traced as frusta: not through instances, since a transform can make a component of the direction tiny.
+    pub(super) frusta: bool,
 }
 
-#[inline]
-fn single(ray: &Ray) -> RTCRay {
-    RTCRay {
-        org_x: ray.origin.x,
-        org_y: ray.origin.y,
-        org_z: ray.origin.z,
-        tnear: ray.t_min,
-        dir_x: ray.direction.x,
-        dir_y: ray.direction.y,
-        dir_z: ray.direction.z,
-        time: ray.time,
-        tfar: ray.t_max,
-        mask: ALL_GEOMETRIES,
-        id: 0,
-        flags: 0,
+impl Tracer {
+    /// Whether a packet is traced as a frustum.
+    fn as_frustum(&self, coherence: Coherence) -> bool {
+        self.frusta && coherence == Coherence::Coherent
+    }
+
+    /// The closest hit of one ray.
+    #[inline]
+    pub(super) fn intersect(&self, ray: &Ray) -> Option<StHit> {
+        if !self.gate.admits(ray) {
+            return None;
+        }
+        let mut hit = StHit::default();
+        // SAFETY: the scene is committed, `StRay` is `Ray` under its C name, and the ray has passed the gate.
+        let found = unsafe { sys::st_intersect1(self.scene.handle(), c_ray(ray), &mut hit) };
+        found.then_some(hit)
+    }
+
+    /// Whether one ray hits anything.
+    #[inline]
+    pub(super) fn occluded(&self, ray: &Ray) -> bool {
+        if !self.gate.admits(ray) {
+            return false;
+        }
+        // SAFETY: as in `intersect`.
+        unsafe { sys::st_occluded1(self.scene.handle(), c_ray(ray)) }
     }
 }
 
-/// The closest hit of one ray.
-#[inline]
-pub(super) fn intersect1(scene: &Scene, gate: &Gate, ray: &Ray) -> Option<RawHit> {
-    if !gate.admits(ray) {
-        return None;
-    }
-    let hit = RTCHit { geomID: INVALID, instID: [INVALID], ..RTCHit::default() };
-    let mut rayhit = RTCRayHit { ray: single(ray), hit };
-    // SAFETY: the scene is committed, the struct is aligned by its type, and the ray has passed the gate.
-    unsafe { sys::st_intersect1(scene.handle(), &mut rayhit) };
-    let hit = &rayhit.hit;
-    (hit.geomID != INVALID).then(|| RawHit {
-        t: rayhit.ray.tfar,
-        u: hit.u,
-        v: hit.v,
-        prim: hit.primID,
-        geometry: hit.geomID,
-        instance: hit.instID[0],
-    })
-}
-
-/// Whether one ray hits anything.
-#[inline]
-pub(super) fn occluded1(scene: &Scene, gate: &Gate, ray: &Ray) -> bool {
-    if !gate.admits(ray) {
-        return false;
-    }
-    let mut ray = single(ray);
-    // SAFETY: as in `intersect1`.
-    unsafe { sys::st_occluded1(scene.handle(), &mut ray) }
+#[inline(always)]
+fn c_ray(ray: &Ray) -> *const sys::StRay {
+    std::ptr::from_ref(ray).cast()
 }
 
 /// Which lanes Embree may look at: -1, others 0.
 #[repr(C, align(64))]
 struct Lanes([i32; WIDTH]);
+
+impl Lanes {
+    #[inline]
+    fn is_full(&self) -> bool {
+        !self.0.contains(&0)
+    }
+}
 
 /// Sixteen rays for closest hits, reused from packet to packet.
 pub(super) struct HitPacket {
@@ -96,19 +84,33 @@ impl HitPacket {
 
     /// Traces `rays` side by side; [`hit`](Self::hit) tells the results.
     #[inline]
-    pub(super) fn intersect(&mut self, scene: &Scene, gate: &Gate, rays: &[Ray; WIDTH], coherence: Coherence) {
-        fill(&mut self.rayhits.ray, &mut self.valid, gate, rays);
+    pub(super) fn intersect(&mut self, tracer: &Tracer, rays: &[Ray; WIDTH], coherence: Coherence) {
+        fill(&mut self.rayhits.ray, &mut self.valid, &tracer.gate, rays);
         self.rayhits.hit.geomID = [INVALID; WIDTH];
         self.rayhits.hit.instID = [[INVALID; WIDTH]];
         // SAFETY: the scene is committed, both structs are aligned by their types, and every valid lane has passed the gate.
-        unsafe { sys::st_intersect16(scene.handle(), self.valid.0.as_ptr(), &mut self.rayhits, coherence == Coherence::Coherent) };
+        unsafe { sys::st_intersect16(tracer.scene.handle(), self.valid.0.as_ptr(), &mut self.rayhits, tracer.as_frustum(coherence)) };
+        if !self.valid.is_full() {
+            self.intersect_left_out(tracer, rays);
+        }
+    }
+
+    /// Traces the rays that were not fit for the packet, one by one.
+    #[cold]
+    fn intersect_left_out(&mut self, tracer: &Tracer, rays: &[Ray; WIDTH]) {
+        for lane in (0..WIDTH).filter(|&lane| self.valid.0[lane] == 0) {
+            let Some(found) = tracer.intersect(&rays[lane]) else { continue };
+            let hit = &mut self.rayhits.hit;
+            (hit.u[lane], hit.v[lane], self.rayhits.ray.tfar[lane]) = (found.u, found.v, found.t);
+            (hit.primID[lane], hit.geomID[lane], hit.instID[0][lane]) = (found.prim, found.geometry, found.instance);
+        }
     }
 
     /// The hit of one lane.
     #[inline(always)]
-    pub(super) fn hit(&self, lane: usize) -> Option<RawHit> {
+    pub(super) fn hit(&self, lane: usize) -> Option<StHit> {
         let hit = &self.rayhits.hit;
-        (hit.geomID[lane] != INVALID).then(|| RawHit {
+        (hit.geomID[lane] != INVALID).then(|| StHit {
             t: self.rayhits.ray.tfar[lane],
             u: hit.u[lane],
             v: hit.v[lane],
@@ -132,25 +134,30 @@ impl ShadowPacket {
 
     /// Traces `rays` side by side and tells which of them hit anything.
     #[inline]
-    pub(super) fn occluded(&mut self, scene: &Scene, gate: &Gate, rays: &[Ray; WIDTH], coherence: Coherence) -> [bool; WIDTH] {
-        fill(&mut self.rays, &mut self.valid, gate, rays);
+    pub(super) fn occluded(&mut self, tracer: &Tracer, rays: &[Ray; WIDTH], coherence: Coherence) -> [bool; WIDTH] {
+        fill(&mut self.rays, &mut self.valid, &tracer.gate, rays);
         // SAFETY: as in `HitPacket::intersect`.
-        unsafe { sys::st_occluded16(scene.handle(), self.valid.0.as_ptr(), &mut self.rays, coherence == Coherence::Coherent) };
+        unsafe { sys::st_occluded16(tracer.scene.handle(), self.valid.0.as_ptr(), &mut self.rays, tracer.as_frustum(coherence)) };
         // A lane that was not traced keeps the finite end of an inactive ray.
-        self.rays.tfar.map(|t_far| t_far == f32::NEG_INFINITY)
+        let mut found = self.rays.tfar.map(|t_far| t_far == f32::NEG_INFINITY);
+        if !self.valid.is_full() {
+            for lane in (0..WIDTH).filter(|&lane| self.valid.0[lane] == 0) {
+                found[lane] = tracer.occluded(&rays[lane]);
+            }
+        }
+        found
     }
 }
 
-/// Writes `rays` into the lanes, and for those that do not pass the gate harmless numbers and `valid = 0`.
+/// Writes `rays` into the lanes, and for those that are not fit for a packet harmless numbers and `valid = 0`.
 #[inline(always)]
 fn fill(packet: &mut RTCRay16, valid: &mut Lanes, gate: &Gate, rays: &[Ray; WIDTH]) {
-    for (lane, ray) in rays.iter().enumerate() {
-        put(packet, lane, ray);
-    }
+    // SAFETY: both hold sixteen rays, and `StRay` is `Ray` under its C name.
+    unsafe { sys::st_fill16(packet, c_ray(&rays[0])) };
     for lane in 0..WIDTH {
-        valid.0[lane] = -i32::from(gate.admits(&get(packet, lane)));
+        valid.0[lane] = -i32::from(gate.admits_to_packet(&get(packet, lane)));
     }
-    if valid.0.contains(&0) {
+    if !valid.is_full() {
         disarm(packet, valid);
     }
 }

@@ -194,7 +194,7 @@ fn spherical_rectangles_are_sampled_uniformly() {
 
         let (mut counts, mut random) = (vec![0u32; n * n], Random(3));
         if !quad.is_sampled_by_solid_angle(p) {
-            assert!(p.length() > 30.0);
+            assert!(p.length() > 8.0);
             let sum: f64 = (0..100_000).map(|_| 1.0 / f64::from(quad.sample(p, random.pair()).unwrap().pdf)).sum();
             assert!((sum / 1e5 / whole - 1.0).abs() < 1e-3);
             continue;
