@@ -101,7 +101,7 @@ fn render_scene(name: &str, spp: u32, seed: u64) -> Result<Image> {
     let desc = import::load_scene(&path)?;
     let settings = Settings::new(&desc, &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() })?;
     let scene = compile::compile(&desc, &path)?;
-    let accel = accel::build(AccelKind::Embree, &scene.geometry, settings.threads)?;
+    let accel = accel::build(AccelKind::EMBREE, &scene.geometry, settings.threads)?;
     Ok(render::render(&scene, &*accel, &settings, &Silent, &AtomicBool::new(false))?.image)
 }
 

@@ -28,7 +28,7 @@ fn scene() -> Value {
 fn any_number_of_threads_gives_the_same_bits() {
     let images: Vec<_> = [1, 2, 3, 8]
         .map(|threads| {
-            render_with(&prepare(&scene(), &Overrides { threads: Some(threads), ..Overrides::default() }), AccelKind::Embree).image
+            render_with(&prepare(&scene(), &Overrides { threads: Some(threads), ..Overrides::default() }), AccelKind::EMBREE).image
         })
         .into();
     assert!(images.windows(2).all(|w| w[0] == w[1]));
@@ -36,9 +36,9 @@ fn any_number_of_threads_gives_the_same_bits() {
 
 #[test]
 fn a_crop_is_a_part_of_the_whole() {
-    let whole = render_with(&prepare(&scene(), &Overrides::default()), AccelKind::Embree).image;
+    let whole = render_with(&prepare(&scene(), &Overrides::default()), AccelKind::EMBREE).image;
     let crop = Overrides { crop: Some([13, 9, 22, 11]), ..Overrides::default() };
-    let part = render_with(&prepare(&scene(), &crop), AccelKind::Embree).image;
+    let part = render_with(&prepare(&scene(), &crop), AccelKind::EMBREE).image;
     for y in 0..11 {
         for x in 0..22 {
             assert_eq!(part.rgb(x + 13, y + 9).unwrap(), whole.rgb(x + 13, y + 9).unwrap(), "{x} {y}");
@@ -50,15 +50,15 @@ fn a_crop_is_a_part_of_the_whole() {
 fn a_replayed_sample_is_the_one_in_the_picture() {
     let one = |spp| prepare(&scene(), &Overrides { spp: Some(spp), ..Overrides::default() });
     let prepared = one(1);
-    let image = render_with(&prepared, AccelKind::Embree).image;
-    let accel = accel::build(AccelKind::Embree, &prepared.scene.geometry, 1).unwrap();
+    let image = render_with(&prepared, AccelKind::EMBREE).image;
+    let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
     for pixel in [[0, 0], [20, 17], [49, 34], [25, 20]] {
         let sample = render::replay(&prepared.scene, &*accel, &prepared.settings, pixel, 0).unwrap();
         assert_eq!(sample.radiance.to_array(), image.rgb(pixel[0], pixel[1]).unwrap(), "{pixel:?}");
     }
     // Later samples: the sum of the replayed ones is the picture.
     let prepared = one(7);
-    let image = render_with(&prepared, AccelKind::Embree).image;
+    let image = render_with(&prepared, AccelKind::EMBREE).image;
     let mean = (0..7)
         .map(|s| f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [20, 17], s).unwrap().radiance.g))
         .sum::<f64>()
@@ -69,7 +69,7 @@ fn a_replayed_sample_is_the_one_in_the_picture() {
 #[test]
 fn embree_and_the_oracle_give_the_same_picture() {
     let prepared = prepare(&scene(), &Overrides::default());
-    let (a, b) = (render_with(&prepared, AccelKind::Embree).image, render_with(&prepared, AccelKind::Linear).image);
+    let (a, b) = (render_with(&prepared, AccelKind::EMBREE).image, render_with(&prepared, AccelKind::Linear).image);
     let (mut different, mut total) = (0, 0);
     for y in 0..35 {
         for x in 0..50 {
@@ -83,6 +83,6 @@ fn embree_and_the_oracle_give_the_same_picture() {
 
 #[test]
 fn seeds_give_different_noise() {
-    let image = |seed| render_with(&prepare(&scene(), &Overrides { seed: Some(seed), ..Overrides::default() }), AccelKind::Embree).image;
+    let image = |seed| render_with(&prepare(&scene(), &Overrides { seed: Some(seed), ..Overrides::default() }), AccelKind::EMBREE).image;
     assert_ne!(image(1), image(2));
 }

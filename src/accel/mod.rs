@@ -1,14 +1,23 @@
 //! Accelerators: which primitive does a ray meet first, and does it meet any? They know bounds, counts and ids, nothing of materials.
 
+mod bvh;
 mod embree;
+pub mod inspect;
+mod kdtree;
+mod kind;
 mod linear;
+mod octree;
+mod tree;
 
-pub use embree::{EmbreeAccel, EmbreeInfo};
+pub use bvh::BvhOptions;
+pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality};
+pub use kdtree::KdTreeOptions;
+pub use kind::{AccelKind, UnknownAccel, build};
 pub use linear::LinearAccel;
 
-use crate::error::Result;
-use crate::geometry::{Geometry, Hit};
+use crate::geometry::Hit;
 use crate::math::{Aabb, Ray};
+use inspect::Inspect;
 
 /// Which rays of a batch belong together, so that an accelerator may trace them side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,40 +65,9 @@ pub trait Accelerator: Send + Sync {
 
     /// Name and version of what traces, with its instruction set, for statistics.
     fn description(&self) -> String;
-}
 
-/// The accelerators that can be chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum AccelKind {
-    /// Embree.
-    #[default]
-    Embree,
-    /// Every primitive for every ray: the oracle.
-    Linear,
-}
-
-impl AccelKind {
-    /// Every kind with the name users choose it by.
-    pub const ALL: [(Self, &'static str); 2] = [(Self::Embree, "embree"), (Self::Linear, "linear")];
-
-    /// The name users choose it by.
-    pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(kind, _)| *kind == self).map_or("", |(_, name)| name)
+    /// The structure and the work of single rays, where they are open.
+    fn inspect(&self) -> Option<&dyn Inspect> {
+        None
     }
-
-    /// The kind with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().find(|(_, n)| *n == name).map(|(kind, _)| *kind)
-    }
-}
-
-/// Builds an accelerator of the given kind over `geometry` with `threads` threads (0: all).
-///
-/// # Errors
-/// If Embree reports an error, such as a lack of memory.
-pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box<dyn Accelerator + '_>> {
-    Ok(match kind {
-        AccelKind::Embree => Box::new(EmbreeAccel::new(geometry, threads)?),
-        AccelKind::Linear => Box::new(LinearAccel::new(geometry)),
-    })
 }

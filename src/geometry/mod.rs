@@ -30,7 +30,7 @@ pub use revolution::Revolution;
 pub use sector::Sector;
 pub use shape_error::ShapeError;
 pub use sphere::Sphere;
-pub use triangle::{TriangleHit, TriangleSample};
+pub use triangle::{TriangleHit, TriangleRay, TriangleSample};
 
 use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
 use crate::math::{Aabb, Ray};

@@ -61,42 +61,9 @@ impl TrianglePoints {
     }
 
     /// The hit within the ray's interval, with either side up.
+    #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<TriangleHit> {
-        let ray = RayF64::from(ray);
-
-        // Axes so that z is where the direction is largest.
-        let d = ray.direction;
-        let size = d.abs();
-        let kz = if size.x > size.y {
-            if size.x > size.z { 0 } else { 2 }
-        } else if size.y > size.z {
-            1
-        } else {
-            2
-        };
-        let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
-        let (sx, sy) = (d[kx] / d[kz], d[ky] / d[kz]);
-
-        // Corners relative to the origin (exact differences of f32 up to one rounding), sheared.
-        let corner = |p: Vec3| p.as_dvec3() - ray.origin;
-        let (a, b, c) = (corner(self.a), corner(self.b), corner(self.c));
-        let (ax, ay) = (a[kx] - sx * a[kz], a[ky] - sy * a[kz]);
-        let (bx, by) = (b[kx] - sx * b[kz], b[ky] - sy * b[kz]);
-        let (cx, cy) = (c[kx] - sx * c[kz], c[ky] - sy * c[kz]);
-
-        // Edge functions; a point on an edge belongs to both neighbours.
-        let u = cx * by - cy * bx;
-        let v = ax * cy - ay * cx;
-        let w = bx * ay - by * ax;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let determinant = u + v + w;
-        if determinant == 0.0 {
-            return None;
-        }
-        let t = (u * a[kz] + v * b[kz] + w * c[kz]) / (determinant * d[kz]);
-        ray.contains(t).then(|| TriangleHit { t: t as f32, u: (v / determinant) as f32, v: (w / determinant) as f32 })
+        TriangleRay::from(ray).intersect(self)
     }
 
     /// A point distributed uniformly by area; `u` in the unit square. `None` if the triangle has no area.
@@ -118,6 +85,76 @@ impl TrianglePoints {
         let p = self.a.as_dvec3() * b2 + self.b.as_dvec3() * b0 + self.c.as_dvec3() * b1;
         let n = (cross / double_area).as_vec3();
         Some(TriangleSample { p, n, pdf_area: 2.0 / double_area, u: b0 as f32, v: b1 as f32 })
+    }
+}
+
+/// A ray prepared for many triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct TriangleRay {
+    /// The axis along which the direction is largest, and the two after it in cyclic order.
+    pub kz: usize,
+    /// The first axis after `kz`.
+    pub kx: usize,
+    /// The second axis after `kz`.
+    pub ky: usize,
+    /// The direction's component along `kx` over that along `kz`.
+    pub sx: f64,
+    /// The direction's component along `ky` over that along `kz`.
+    pub sy: f64,
+    /// The direction's component along `kz`.
+    pub dz: f64,
+    /// Where `t = 0`.
+    pub origin: DVec3,
+    /// Smallest accepted `t`, inclusive.
+    pub t_min: f64,
+    /// Largest accepted `t`, inclusive.
+    pub t_max: f64,
+}
+
+impl From<&Ray> for TriangleRay {
+    #[inline]
+    fn from(ray: &Ray) -> Self {
+        let RayF64 { origin, direction: d, t_min, t_max } = RayF64::from(ray);
+        let size = d.abs();
+        let kz = if size.x > size.y {
+            if size.x > size.z { 0 } else { 2 }
+        } else if size.y > size.z {
+            1
+        } else {
+            2
+        };
+        let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
+        Self { kz, kx, ky, sx: d[kx] / d[kz], sy: d[ky] / d[kz], dz: d[kz], origin, t_min, t_max }
+    }
+}
+
+impl TriangleRay {
+    /// The hit within the ray's interval, with either side up.
+    #[inline]
+    pub fn intersect(&self, triangle: &TrianglePoints) -> Option<TriangleHit> {
+        let Self { kx, ky, kz, sx, sy, dz, .. } = *self;
+
+        // Corners relative to the origin (exact differences of f32 up to one rounding), sheared.
+        let corner = |p: Vec3| p.as_dvec3() - self.origin;
+        let (a, b, c) = (corner(triangle.a), corner(triangle.b), corner(triangle.c));
+        let (ax, ay) = (a[kx] - sx * a[kz], a[ky] - sy * a[kz]);
+        let (bx, by) = (b[kx] - sx * b[kz], b[ky] - sy * b[kz]);
+        let (cx, cy) = (c[kx] - sx * c[kz], c[ky] - sy * c[kz]);
+
+        // Edge functions; a point on an edge belongs to both neighbours.
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let determinant = u + v + w;
+        if determinant == 0.0 {
+            return None;
+        }
+        let t = (u * a[kz] + v * b[kz] + w * c[kz]) / (determinant * dz);
+        let contained = self.t_min <= t && t <= self.t_max;
+        contained.then(|| TriangleHit { t: t as f32, u: (v / determinant) as f32, v: (w / determinant) as f32 })
     }
 }
 

@@ -257,7 +257,7 @@ mod tests {
         assert_eq!((s.sampler, s.spp, s.seed), (SamplerKind::Independent, 16, 3));
         assert!(matches!(s.integrator, IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis }));
         assert_eq!(s.layers, [LayerKind::N].into_iter().collect());
-        assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::Embree, None, 2));
+        assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::EMBREE, None, 2));
         assert!(s.threads >= 1);
     }
 

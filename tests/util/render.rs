@@ -33,7 +33,7 @@ pub fn render_with(prepared: &Prepared, kind: AccelKind) -> RenderResult {
 
 /// Renders a scene given as JSON through Embree.
 pub fn render(scene: &Value) -> Image {
-    render_with(&prepare(scene, &Overrides { threads: Some(2), ..Overrides::default() }), AccelKind::Embree).image
+    render_with(&prepare(scene, &Overrides { threads: Some(2), ..Overrides::default() }), AccelKind::EMBREE).image
 }
 
 /// A scene with a camera at `position` looking at `look_at` through a very narrow angle, so that all pixels see nearly one point.

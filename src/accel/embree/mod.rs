@@ -24,9 +24,38 @@ use packet::{HitPacket, INVALID, ShadowPacket, Tracer, WIDTH};
 use scene::{GeometryHandle, Scene, SceneBuilder, UserShapes};
 use sys::StHit;
 
+/// How much effort Embree's build makes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EmbreeQuality {
+    /// Morton codes: fastest to build.
+    Low,
+    /// Binned surface area heuristic.
+    #[default]
+    Medium,
+    /// With spatial splits.
+    High,
+}
+
+/// How Embree builds and traces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EmbreeOptions {
+    /// Effort of the build.
+    pub quality: EmbreeQuality,
+    /// Whether rays may not slip through edges. Without it distances are less certain, too; for comparisons only.
+    pub robust: bool,
+    /// Less memory for some speed.
+    pub compact: bool,
+}
+
+impl Default for EmbreeOptions {
+    fn default() -> Self {
+        Self { quality: EmbreeQuality::Medium, robust: true, compact: false }
+    }
+}
+
 /// An Embree scene over borrowed geometry.
 ///
-/// Every scene has the robust flag: no ray slips between the triangles of a closed mesh, and `t_min` and `t_max` are inclusive.
+/// With the robust flag no ray slips between the triangles of a closed mesh, and `t_min` and `t_max` are inclusive.
 pub struct EmbreeAccel<'g> {
     // Dropped in this order: the scene inside refers to the user data and to the device.
     tracer: Tracer,
@@ -42,10 +71,18 @@ impl<'g> EmbreeAccel<'g> {
     /// # Errors
     /// If Embree reports an error, memory runs out, or an instance's transform has no inverse in `f32`.
     pub fn new(geometry: &'g Geometry, threads: usize) -> Result<Self> {
+        Self::with_options(geometry, threads, EmbreeOptions::default())
+    }
+
+    /// [`new`](Self::new) with options.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn with_options(geometry: &'g Geometry, threads: usize, options: EmbreeOptions) -> Result<Self> {
         let gate = Gate::for_instances(&geometry.instances)?;
         let device = Device::new(threads)?;
         let user_shapes = UserShapes::new(geometry);
-        let scene = build(geometry, &device, &user_shapes)?;
+        let scene = build(geometry, &device, &user_shapes, options)?;
         let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty() };
         Ok(Self { tracer, _user_shapes: user_shapes, device, geometry, bounds: geometry.bounds() })
     }
@@ -66,7 +103,7 @@ impl<'g> EmbreeAccel<'g> {
 }
 
 /// The committed scene of `geometry`. The result must be dropped before `user_shapes`, and while `geometry` is borrowed.
-fn build(geometry: &Geometry, device: &Device, user_shapes: &UserShapes) -> Result<Scene> {
+fn build(geometry: &Geometry, device: &Device, user_shapes: &UserShapes, options: EmbreeOptions) -> Result<Scene> {
     // One Embree geometry for each shape in use, however many objects share it.
     let mut handles: Vec<Option<GeometryHandle>> = geometry.shapes.iter().map(|_| None).collect();
     let used = geometry.world.iter().chain(geometry.objects.iter().flat_map(|object| &object.shapes));
@@ -79,13 +116,13 @@ fn build(geometry: &Geometry, device: &Device, user_shapes: &UserShapes) -> Resu
     }
 
     let object_scene = |ids: &[ShapeId]| -> Result<Scene> {
-        let mut builder = SceneBuilder::new(device)?;
+        let mut builder = SceneBuilder::new(device, options)?;
         scene::attach_shapes(&mut builder, &handles, ids, |position, _| position)?;
         builder.commit()
     };
     let objects = geometry.objects.iter().map(|object| object_scene(&object.shapes)).collect::<Result<Vec<_>>>()?;
 
-    let mut world = SceneBuilder::new(device)?;
+    let mut world = SceneBuilder::new(device, options)?;
     scene::attach_shapes(&mut world, &handles, &geometry.world, |_, id| id.index())?;
     for (i, instance) in geometry.instances.iter().enumerate() {
         let handle = GeometryHandle::of_instance(device, &objects[instance.object.index()], instance)?;

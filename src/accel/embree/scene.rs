@@ -6,7 +6,7 @@ use std::ptr::NonNull;
 
 use super::callbacks::intersect_placed;
 use super::device::Device;
-use super::sys;
+use super::{EmbreeOptions, EmbreeQuality, sys};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Instance, Mesh, Placed, Shape};
 use crate::id::ShapeId;
@@ -131,12 +131,23 @@ pub(super) struct SceneBuilder<'d> {
 
 impl<'d> SceneBuilder<'d> {
     /// An empty scene.
-    pub(super) fn new(device: &'d Device) -> Result<Self> {
+    pub(super) fn new(device: &'d Device, options: EmbreeOptions) -> Result<Self> {
         // SAFETY: the device is alive.
         let handle = unsafe { sys::rtcNewScene(device.handle()) };
         let scene = NonNull::new(handle).map(Scene).ok_or_else(|| no_object(device, "scene"))?;
-        // SAFETY: the scene is alive. Without the robust flag one ray in ten slips through the edges of a distant mesh.
-        unsafe { sys::rtcSetSceneFlags(handle, sys::RTC_SCENE_FLAG_ROBUST) };
+        // Without the robust flag one ray in ten slips through the edges of a distant mesh.
+        let robust = if options.robust { sys::RTC_SCENE_FLAG_ROBUST } else { sys::RTC_SCENE_FLAG_NONE };
+        let compact = if options.compact { sys::RTC_SCENE_FLAG_COMPACT } else { sys::RTC_SCENE_FLAG_NONE };
+        let quality = match options.quality {
+            EmbreeQuality::Low => sys::RTC_BUILD_QUALITY_LOW,
+            EmbreeQuality::Medium => sys::RTC_BUILD_QUALITY_MEDIUM,
+            EmbreeQuality::High => sys::RTC_BUILD_QUALITY_HIGH,
+        };
+        // SAFETY: the scene is alive.
+        unsafe {
+            sys::rtcSetSceneFlags(handle, robust | compact);
+            sys::rtcSetSceneBuildQuality(handle, quality);
+        }
         Ok(Self { device, scene })
     }
 

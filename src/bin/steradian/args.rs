@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args, Parser, Subcommand};
 use clap_complete::Shell;
 use steradian::accel::AccelKind;
@@ -124,8 +123,8 @@ pub struct RenderArgs {
     /// A different seed gives different noise
     #[arg(long, value_name = "N", help_heading = "Algorithm")]
     pub seed: Option<u64>,
-    /// What finds hits
-    #[arg(long, value_name = "NAME", value_parser = accel_parser(), help_heading = "Algorithm")]
+    /// What finds hits: embree, bvh, kdtree, octree or linear, with options such as embree:high
+    #[arg(long, value_name = "NAME", help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
 
     /// Number of threads; 0 stands for all. The picture does not depend on it
@@ -202,11 +201,6 @@ impl RenderArgs {
             exposure: self.exposure,
         }
     }
-}
-
-fn accel_parser() -> impl TypedValueParser<Value = AccelKind> {
-    let names = AccelKind::ALL.map(|(_, name)| name);
-    PossibleValuesParser::new(names).try_map(|name| AccelKind::from_name(&name).ok_or("unknown accelerator"))
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {

@@ -1,0 +1,164 @@
+//! Which accelerators can be chosen, under which names, with which options.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::bvh::{Bvh, BvhOptions};
+use super::kdtree::{KdTree, KdTreeOptions};
+use super::octree::Octree;
+use super::tree::TwoLevel;
+use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel};
+use crate::error::Result;
+use crate::geometry::Geometry;
+
+/// An accelerator with its options. Its name is `KIND` or `KIND:OPTION+OPTION`; [`AccelKind::CHOICES`] lists both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AccelKind {
+    /// Embree.
+    Embree(EmbreeOptions),
+    /// A bounding volume hierarchy of ours.
+    Bvh(BvhOptions),
+    /// A kd-tree.
+    KdTree(KdTreeOptions),
+    /// An octree.
+    Octree,
+    /// Every primitive for every ray: the oracle.
+    Linear,
+}
+
+impl Default for AccelKind {
+    fn default() -> Self {
+        Self::EMBREE
+    }
+}
+
+impl AccelKind {
+    /// Embree with default options.
+    pub const EMBREE: Self = Self::Embree(EmbreeOptions { quality: EmbreeQuality::Medium, robust: true, compact: false });
+
+    /// Every kind with default options, with the name users choose it by.
+    pub const ALL: [(Self, &'static str); 5] = [
+        (Self::EMBREE, "embree"),
+        (Self::Bvh(BvhOptions { spatial_splits: false, binary: false }), "bvh"),
+        (Self::KdTree(KdTreeOptions { median: false }), "kdtree"),
+        (Self::Octree, "octree"),
+        (Self::Linear, "linear"),
+    ];
+
+    /// Every kind and every option, with what it is.
+    pub const CHOICES: &'static [(&'static str, &'static str)] = &[
+        ("embree", "Embree: fastest; build quality medium, robust"),
+        ("embree:low", "built faster, traced slower"),
+        ("embree:high", "spatial splits: built slower, traced faster"),
+        ("embree:fast", "not robust: rays may slip through edges; for comparisons"),
+        ("embree:compact", "less memory, traced slower"),
+        ("bvh", "bounding volume hierarchy: binned surface area heuristic, eight boxes a node, SIMD"),
+        ("bvh:spatial", "with spatial splits: built slower, traced faster where triangles are long"),
+        ("bvh:binary", "two boxes a node, no SIMD"),
+        ("kdtree", "kd-tree: surface area heuristic with a bonus for empty space"),
+        ("kdtree:median", "split in the middle of the longest axis, as in textbooks"),
+        ("octree", "octree"),
+        ("linear", "every primitive for every ray: the oracle, slow"),
+    ];
+}
+
+impl fmt::Display for AccelKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kind, options): (_, Vec<&str>) = match self {
+            Self::Embree(o) => {
+                let quality = match o.quality {
+                    EmbreeQuality::Low => Some("low"),
+                    EmbreeQuality::Medium => None,
+                    EmbreeQuality::High => Some("high"),
+                };
+                let flags = [(!o.robust).then_some("fast"), o.compact.then_some("compact")];
+                ("embree", quality.into_iter().chain(flags.into_iter().flatten()).collect())
+            }
+            Self::Bvh(o) => {
+                let flags = [o.spatial_splits.then_some("spatial"), o.binary.then_some("binary")];
+                ("bvh", flags.into_iter().flatten().collect())
+            }
+            Self::KdTree(o) => ("kdtree", o.median.then_some("median").into_iter().collect()),
+            Self::Octree => ("octree", Vec::new()),
+            Self::Linear => ("linear", Vec::new()),
+        };
+        f.write_str(kind)?;
+        if !options.is_empty() {
+            write!(f, ":{}", options.join("+"))?;
+        }
+        Ok(())
+    }
+}
+
+/// Why a name is none of an accelerator.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no accelerator \"{name}\"; there are {}, and options such as embree:high or embree:low+compact", kinds())]
+pub struct UnknownAccel {
+    name: String,
+}
+
+fn kinds() -> String {
+    AccelKind::ALL.map(|(_, name)| name).join(", ")
+}
+
+impl FromStr for AccelKind {
+    type Err = UnknownAccel;
+
+    fn from_str(name: &str) -> std::result::Result<Self, UnknownAccel> {
+        let unknown = || UnknownAccel { name: name.to_owned() };
+        let (kind, options) = name.split_once(':').unwrap_or((name, ""));
+        let mut accel = Self::ALL.into_iter().find(|(_, n)| *n == kind).ok_or_else(unknown)?.0;
+        for option in options.split('+').filter(|_| name.contains(':')) {
+            match (&mut accel, option) {
+                (Self::Embree(o), "low") => o.quality = EmbreeQuality::Low,
+                (Self::Embree(o), "high") => o.quality = EmbreeQuality::High,
+                (Self::Embree(o), "fast") => o.robust = false,
+                (Self::Embree(o), "compact") => o.compact = true,
+                (Self::Bvh(o), "spatial") => o.spatial_splits = true,
+                (Self::Bvh(o), "binary") => o.binary = true,
+                (Self::KdTree(o), "median") => o.median = true,
+                _ => return Err(unknown()),
+            }
+        }
+        Ok(accel)
+    }
+}
+
+/// Builds an accelerator of the given kind over `geometry` with `threads` threads (0: all).
+///
+/// # Errors
+/// If Embree reports an error, such as a lack of memory.
+pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box<dyn Accelerator + '_>> {
+    Ok(match kind {
+        AccelKind::Embree(options) => Box::new(EmbreeAccel::with_options(geometry, threads, options)?),
+        AccelKind::Bvh(options) => Box::new(TwoLevel::<Bvh>::new(geometry, &options, threads)),
+        AccelKind::KdTree(options) => Box::new(TwoLevel::<KdTree>::new(geometry, &options, threads)),
+        AccelKind::Octree => Box::new(TwoLevel::<Octree>::new(geometry, &(), threads)),
+        AccelKind::Linear => Box::new(LinearAccel::new(geometry)),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_kinds_are_one_to_one() {
+        for (name, _) in AccelKind::CHOICES {
+            assert_eq!(name.parse::<AccelKind>().unwrap().to_string(), *name);
+        }
+        for (kind, name) in AccelKind::ALL {
+            assert_eq!((kind.to_string().as_str(), name.parse().as_ref()), (name, Ok(&kind)));
+        }
+        assert_eq!("embree:compact+low".parse::<AccelKind>().unwrap().to_string(), "embree:low+compact");
+        assert_eq!(AccelKind::default(), AccelKind::EMBREE);
+    }
+
+    #[test]
+    fn other_names_are_refused_with_those_there_are() {
+        for name in ["", "embre", "embree:", "embree:hi", "bvh:median", "linear:fast", "octree:"] {
+            let error = name.parse::<AccelKind>().unwrap_err().to_string();
+            assert!(error.contains("embree, bvh, kdtree, octree, linear"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! A ray prepared for boxes, so that no box is missed that the exact ray meets.
+
+use crate::math::{Aabb, Ray, Vec3};
+
+/// Relative slack of a distance to a plane: three roundings on each side and the scaling itself, twice over (Ize, "Robust BVH Ray
+/// Traversal").
+const RELATIVE: f32 = 4.0 * f32::EPSILON;
+
+/// Largest reciprocal of a direction's component on the near side; smaller ones only open more boxes.
+const LARGEST_RECIPROCAL: f32 = 1e30;
+
+/// A ray prepared for conservative slab tests.
+///
+/// A box is entered at `max((near plane - near_origin) * near_reciprocal)` and left at `min((far plane - far_origin) * far_reciprocal)` over
+/// the axes. Origins stand one float (or the slack asked for) outside, reciprocals are scaled by a few roundings, so entries are never late
+/// and exits never early. A far product is NaN where a plane holds the origin and the direction has no component; it then does not count.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::accel) struct SlabRay {
+    /// Origin to subtract from near planes.
+    pub near_origin: Vec3,
+    /// Origin to subtract from far planes.
+    pub far_origin: Vec3,
+    /// Finite.
+    pub near_reciprocal: Vec3,
+    /// May be infinite.
+    pub far_reciprocal: Vec3,
+    /// Axes along which the maximum is the near plane.
+    pub negative: [bool; 3],
+}
+
+impl SlabRay {
+    /// Prepares a ray for boxes within `bounds`, with positions uncertain by `slack` times the magnitudes of the origin and the bounds.
+    #[inline(always)]
+    pub fn new(ray: &Ray, bounds: &Aabb, slack: f32) -> Self {
+        let extent = bounds.min.abs().max(bounds.max.abs());
+        let size = ray.origin.abs().max_element() + extent.max_element();
+        // A float of the origin, and for f64 tests of primitives a trace of the whole size.
+        let shift = ray.origin.abs() * f32::EPSILON + Vec3::splat(size * slack.max(1e-12));
+        let reciprocal = ray.direction.recip();
+        let negative = [0, 1, 2].map(|axis| ray.direction[axis].is_sign_negative());
+        let outward = Vec3::select(glam::BVec3::from_array(negative), -shift, shift);
+        Self {
+            near_origin: ray.origin + outward,
+            far_origin: ray.origin - outward,
+            near_reciprocal: reciprocal.clamp(Vec3::splat(-LARGEST_RECIPROCAL), Vec3::splat(LARGEST_RECIPROCAL)) * (1.0 - RELATIVE),
+            far_reciprocal: reciprocal * (1.0 + RELATIVE),
+            negative,
+        }
+    }
+
+    /// Where the ray may be inside the box within `[t_min, t_max]`.
+    #[inline(always)]
+    pub fn interval(&self, bounds: &Aabb, t_min: f32, t_max: f32) -> Option<(f32, f32)> {
+        let (mut enter, mut leave) = (t_min, t_max);
+        for axis in 0..3 {
+            let (near, far) = if self.negative[axis] { (bounds.max[axis], bounds.min[axis]) } else { (bounds.min[axis], bounds.max[axis]) };
+            let near = (near - self.near_origin[axis]) * self.near_reciprocal[axis];
+            let far = (far - self.far_origin[axis]) * self.far_reciprocal[axis];
+            enter = if near > enter { near } else { enter };
+            leave = if far < leave { far } else { leave };
+        }
+        (enter <= leave).then_some((enter, leave))
+    }
+}
