@@ -61,11 +61,10 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
         self.ray.t_max
     }
 
-    /// The slack that boxes of this tree need, as a multiple of the magnitudes of the ray's origin and of the tree's bounds: rays are
-    /// rounded to `f32` on their way into instances.
+    /// The slack that boxes of this tree need, in units of the tree's space: rays are rounded to `f32` on their way into instances.
     #[inline(always)]
     pub fn slack(&self) -> f32 {
-        if self.instance == Hit::NO_INSTANCE { self.accel.instance_slack() } else { 0.0 }
+        if self.instance == Hit::NO_INSTANCE { self.accel.instance_slack(&self.ray) } else { 0.0 }
     }
 
     /// Tests one item. True ends the traversal.

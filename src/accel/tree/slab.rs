@@ -6,6 +6,9 @@ use crate::math::{Aabb, Ray, Vec3};
 /// Traversal").
 const RELATIVE: f32 = 4.0 * f32::EPSILON;
 
+/// What tests of primitives in `f64` can err by, relative to the magnitudes of origin and bounds; a few thousand of their roundings.
+const TRACE: f32 = 1e-12;
+
 /// Largest reciprocal of a direction's component on the near side; smaller ones only open more boxes.
 const LARGEST_RECIPROCAL: f32 = 1e30;
 
@@ -29,13 +32,13 @@ pub(in crate::accel) struct SlabRay {
 }
 
 impl SlabRay {
-    /// Prepares a ray for boxes within `bounds`, with positions uncertain by `slack` times the magnitudes of the origin and the bounds.
+    /// Prepares a ray for boxes within `bounds`, with positions uncertain by `slack`.
     #[inline(always)]
     pub fn new(ray: &Ray, bounds: &Aabb, slack: f32) -> Self {
         let extent = bounds.min.abs().max(bounds.max.abs());
         let size = ray.origin.abs().max_element() + extent.max_element();
         // A float of the origin, and for f64 tests of primitives a trace of the whole size.
-        let shift = ray.origin.abs() * f32::EPSILON + Vec3::splat(size * slack.max(1e-12));
+        let shift = ray.origin.abs() * f32::EPSILON + Vec3::splat(size * TRACE + slack);
         let reciprocal = ray.direction.recip();
         let negative = [0, 1, 2].map(|axis| ray.direction[axis].is_sign_negative());
         let outward = Vec3::select(glam::BVec3::from_array(negative), -shift, shift);

@@ -6,7 +6,7 @@ use crate::accel::inspect::{Inspect, NodeInfo, TraversalCounts};
 use crate::geometry::{Geometry, Hit};
 use crate::id::ObjectId;
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Aabb, Ray};
+use crate::math::{Aabb, DAffine3, Ray, Transform};
 
 /// Trees over borrowed geometry.
 pub(in crate::accel) struct TwoLevel<'g, T> {
@@ -14,7 +14,7 @@ pub(in crate::accel) struct TwoLevel<'g, T> {
     world: T,
     objects: Vec<T>,
     bounds: Aabb,
-    instance_slack: f32,
+    instances: Option<InstanceRounding>,
 }
 
 impl<'g, T: Tree> TwoLevel<'g, T> {
@@ -32,7 +32,7 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
             Ok(pool) => pool.install(build),
             Err(_) => build(),
         };
-        Self { geometry, world, objects, bounds: geometry.bounds(), instance_slack: instance_slack(geometry) }
+        Self { geometry, world, objects, bounds: geometry.bounds(), instances: InstanceRounding::of(geometry) }
     }
 
     /// What all trees are over.
@@ -47,10 +47,10 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
         &self.objects[id.index()]
     }
 
-    /// Relative slack of boxes in the world's tree.
+    /// How far `ray` can move when it is rounded in the space of an instance, in world units.
     #[inline(always)]
-    pub fn instance_slack(&self) -> f32 {
-        self.instance_slack
+    pub fn instance_slack(&self, ray: &Ray) -> f32 {
+        self.instances.map_or(0.0, |rounding| rounding.slack(ray))
     }
 
     #[inline(always)]
@@ -64,17 +64,37 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
     }
 }
 
-/// How far, relative to the magnitudes of origin and bounds, a ray rounded in an instance's space can lie from the exact one: one rounding of
-/// the origin and one of the direction there, seen in the world.
-fn instance_slack(geometry: &Geometry) -> f32 {
-    let condition = geometry.instances.iter().map(|instance| {
-        let norm = |m: &crate::math::DAffine3| {
-            let m = &m.matrix3;
-            (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element()
-        };
-        norm(&instance.transform.world_from_object) * norm(&instance.transform.object_from_world)
-    });
-    condition.fold(0.0, |worst: f64, c| worst.max(8.0 * UNIT_ROUNDOFF * c)) as f32
+/// A bound of the rounding of rays in the spaces of all instances, seen in the world.
+#[derive(Clone, Copy)]
+struct InstanceRounding {
+    /// Relative error: the roundoff times the worst condition number.
+    relative: f32,
+    /// Largest coordinate of bounds and translations.
+    reach: f32,
+}
+
+impl InstanceRounding {
+    /// `None` if there are no instances.
+    fn of(geometry: &Geometry) -> Option<Self> {
+        let norm = |m: &DAffine3| (m.matrix3.x_axis.abs() + m.matrix3.y_axis.abs() + m.matrix3.z_axis.abs()).max_element();
+        let bounds = geometry.bounds();
+        let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
+        let mut rounding: Option<Self> = None;
+        for instance in &geometry.instances {
+            let Transform { world_from_object, object_from_world, .. } = &instance.transform;
+            // One rounding of the origin and one of the direction, each with room for the arithmetic in f64.
+            let relative = (4.0 * UNIT_ROUNDOFF * norm(world_from_object) * norm(object_from_world)) as f32;
+            let translation = world_from_object.translation.abs().max_element() as f32;
+            let old = rounding.unwrap_or(Self { relative, reach });
+            rounding = Some(Self { relative: old.relative.max(relative), reach: old.reach.max(translation) });
+        }
+        rounding
+    }
+
+    #[inline(always)]
+    fn slack(&self, ray: &Ray) -> f32 {
+        self.relative * (ray.origin.abs().max_element() + self.reach)
+    }
 }
 
 impl<T: Tree> Accelerator for TwoLevel<'_, T> {

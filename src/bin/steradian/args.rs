@@ -124,7 +124,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", help_heading = "Algorithm")]
     pub seed: Option<u64>,
     /// What finds hits: embree, bvh, kdtree, octree or linear, with options such as embree:high
-    #[arg(long, value_name = "NAME", help_heading = "Algorithm")]
+    #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
 
     /// Number of threads; 0 stands for all. The picture does not depend on it
@@ -201,6 +201,12 @@ impl RenderArgs {
             exposure: self.exposure,
         }
     }
+}
+
+fn accel_help() -> String {
+    let line = |(name, what): &(&str, &str)| format!("  {name:<16}{what}");
+    let lines: Vec<_> = AccelKind::CHOICES.iter().map(line).collect();
+    format!("What finds hits; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}", lines.join("\n"))
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {
