@@ -30,6 +30,10 @@ static struct StRay ray_of_lane(const float *rays, unsigned n, unsigned lane) {
     return ray;
 }
 
+static uint32_t key_of_lane(const float *rays, unsigned n, unsigned lane) {
+    return ((const uint32_t *)rays)[ID * n + lane];
+}
+
 static void user_bounds(const struct RTCBoundsFunctionArguments *args) {
     const struct StUserShape *shape = args->geometryUserPtr;
     struct RTCBounds *bounds = args->bounds_o;
@@ -50,7 +54,7 @@ static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
     for (unsigned lane = 0; lane < n; lane++) {
         if (args->valid[lane] != -1) continue;
         const struct StRay ray = ray_of_lane(rays, n, lane);
-        const float t = shape->intersect(shape->shape, &ray);
+        const float t = shape->intersect(shape->shape, &ray, key_of_lane(rays, n, lane), args->context->instID[0]);
         if (!(t >= 0.0f)) continue;
         rays[TFAR * n + lane] = t;
         reals[NG_X * n + lane] = 0.0f;
@@ -71,7 +75,8 @@ static void user_occluded(const struct RTCOccludedFunctionNArguments *args) {
     for (unsigned lane = 0; lane < n; lane++) {
         if (args->valid[lane] != -1) continue;
         const struct StRay ray = ray_of_lane(rays, n, lane);
-        if (shape->intersect(shape->shape, &ray) >= 0.0f) rays[TFAR * n + lane] = -INFINITY;
+        const float t = shape->intersect(shape->shape, &ray, key_of_lane(rays, n, lane), args->context->instID[0]);
+        if (t >= 0.0f) rays[TFAR * n + lane] = -INFINITY;
     }
 }
 
@@ -87,10 +92,33 @@ RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *sha
     return geometry;
 }
 
+static void filter(const struct RTCFilterFunctionNArguments *args) {
+    const struct StCutout *cutout = args->geometryUserPtr;
+    const unsigned n = args->N;
+    const float *rays = (const float *)args->ray;
+    const float *reals = (const float *)args->hit;
+    const unsigned *ids = (const unsigned *)reals;
+    for (unsigned lane = 0; lane < n; lane++) {
+        if (args->valid[lane] != -1) continue;
+        const struct StRay ray = ray_of_lane(rays, n, lane);
+        const struct StHit hit = {
+            ray.t_max, reals[U * n + lane], reals[V * n + lane],
+            ids[PRIM_ID * n + lane], ids[GEOM_ID * n + lane], ids[INST_ID * n + lane],
+        };
+        if (!cutout->counts(cutout->user, &ray, key_of_lane(rays, n, lane), &hit)) args->valid[lane] = 0;
+    }
+}
+
+void st_set_cutout(RTCGeometry triangles, const struct StCutout *cutout) {
+    rtcSetGeometryUserData(triangles, (void *)cutout);
+    rtcSetGeometryIntersectFilterFunction(triangles, filter);
+    rtcSetGeometryOccludedFilterFunction(triangles, filter);
+}
+
 typedef float Float4 __attribute__((vector_size(16), may_alias));
 
 /* Written in pieces of 16 bytes, which Embree reads at once; smaller ones could not be forwarded from the store buffer. */
-static inline void set_ray(struct RTCRay *out, const struct StRay *ray) {
+static inline void set_ray(struct RTCRay *out, const struct StRay *ray, uint32_t key) {
     Float4 direction_time;
     memcpy(&direction_time, ray->direction, sizeof direction_time);
     direction_time[3] = ray->time;
@@ -98,7 +126,7 @@ static inline void set_ray(struct RTCRay *out, const struct StRay *ray) {
     memcpy(&out->dir_x, &direction_time, sizeof direction_time);
     out->tfar = ray->t_max;
     out->mask = 0xffffffffu;
-    out->id = 0;
+    out->id = key;
     out->flags = 0;
 }
 
@@ -132,9 +160,9 @@ void st_fill16(struct RTCRay16 *packet, const struct StRay *rays) {
 static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit);
 static void trace_any(RTCScene scene, struct RTCRay *ray);
 
-bool st_intersect1(RTCScene scene, const struct StRay *ray, struct StHit *hit) {
+bool st_intersect1(RTCScene scene, const struct StRay *ray, uint32_t key, struct StHit *hit) {
     struct RTCRayHit rayhit;
-    set_ray(&rayhit.ray, ray);
+    set_ray(&rayhit.ray, ray, key);
     rayhit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rayhit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     trace_closest(scene, &rayhit);
@@ -144,9 +172,9 @@ bool st_intersect1(RTCScene scene, const struct StRay *ray, struct StHit *hit) {
     return true;
 }
 
-bool st_occluded1(RTCScene scene, const struct StRay *ray) {
+bool st_occluded1(RTCScene scene, const struct StRay *ray, uint32_t key) {
     struct RTCRay traced;
-    set_ray(&traced, ray);
+    set_ray(&traced, ray, key);
     trace_any(scene, &traced);
     return traced.tfar < 0.0f;
 }

@@ -6,6 +6,8 @@ mod accel_agreement;
 mod bad_input;
 /// The program as a user runs it: exit codes, what it writes, what it says.
 mod cli;
+/// Surfaces with holes, the same ones for every accelerator and every kind of query.
+mod cutouts;
 /// What is not a ray, and what is hardly a triangle.
 mod degenerate_input;
 /// The same picture for any number of threads, any crop, any accelerator; samples can be replayed.

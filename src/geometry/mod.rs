@@ -1,5 +1,6 @@
 //! Shapes and everything an accelerator sees of a scene: bounds, counts, ids and intersection; nothing of materials or lights.
 
+mod cutout;
 mod disk;
 mod frustum;
 mod hit;
@@ -17,6 +18,7 @@ mod sphere;
 mod testing;
 mod triangle;
 
+pub use cutout::{Coverage, Cutouts};
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use hit::Hit;
@@ -33,6 +35,7 @@ pub use sphere::Sphere;
 pub use triangle::{TriangleHit, TriangleRay, TriangleSample};
 
 use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
+use crate::math::float::step_past;
 use crate::math::{Aabb, Ray};
 
 /// A triangle mesh or one analytic surface.
@@ -100,6 +103,8 @@ pub struct Geometry {
     pub objects: Vec<Object>,
     /// Placements of objects in the world.
     pub instances: Vec<Instance>,
+    /// Which shapes have holes.
+    pub cutouts: Cutouts,
 }
 
 impl Geometry {
@@ -119,6 +124,25 @@ impl Geometry {
     #[inline]
     pub fn object(&self, id: ObjectId) -> &Object {
         &self.objects[id.index()]
+    }
+
+    /// The first hit that counts of `ray` with one primitive. `ray` is in the space the shape is placed in, through `instance`; `key` is that
+    /// of the world-space ray. Any-hit queries use this very function.
+    #[inline]
+    pub fn intersect_prim(&self, ray: &Ray, key: u32, id: ShapeId, prim: PrimId, instance: InstanceId) -> Option<Hit> {
+        let shape = self.shape(id);
+        let mut ray = *ray;
+        loop {
+            let hit = Hit { instance, ..shape.intersect_prim(&ray, id, prim)? };
+            if self.cutouts.counts(&self.shapes, key, &ray, &hit) {
+                return Some(hit);
+            }
+            // A triangle is met once; behind a hole of an analytic surface there may be more of it.
+            ray.t_min = match shape {
+                Shape::Analytic(_) if hit.t < ray.t_max => step_past(hit.t),
+                _ => return None,
+            };
+        }
     }
 
     /// Bounds of everything; empty if there is nothing.

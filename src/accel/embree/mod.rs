@@ -83,7 +83,7 @@ impl<'g> EmbreeAccel<'g> {
         let device = Device::new(threads)?;
         let user_shapes = UserShapes::new(geometry);
         let scene = build(geometry, &device, &user_shapes, options)?;
-        let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty() };
+        let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty(), cutouts: geometry.cutouts.clone() };
         Ok(Self { tracer, _user_shapes: user_shapes, device, geometry, bounds: geometry.bounds() })
     }
 
