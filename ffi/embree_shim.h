@@ -44,6 +44,23 @@ struct StUserShape {
     float upper[3];
 };
 
+/*
+ * Writes `ray` in the space of an instance that moves, at the ray's time; false if it cannot be traced there.
+ */
+typedef bool (*StEnter)(const void *instance, const struct StRay *ray, struct StRay *inside);
+
+/* The user data of an instance that moves. It must outlive the geometry. */
+struct StMovingInstance {
+    const void *instance;
+    StEnter enter;
+    RTCScene object;
+    float lower[3];
+    float upper[3];
+};
+
+/* A new, committed geometry of one moving instance; null on an error. Its hits name the geometry's number as their instance. */
+RTCGeometry st_new_moving_instance(RTCDevice device, const struct StMovingInstance *instance);
+
 /* A new, committed geometry of one user primitive; null on an error. */
 RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape);
 

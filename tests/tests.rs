@@ -14,6 +14,8 @@ mod degenerate_input;
 mod determinism;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
+/// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
+mod motion;
 /// Meshes, comments, names and transforms of scene files, read as users write them.
 mod scene_files;
 /// Rays that leave a surface do not find it again, and do not leak out of closed boxes.

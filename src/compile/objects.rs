@@ -72,7 +72,7 @@ impl Builder {
             let path = format!("{}[{i}].transform", level.path);
             let transform = self.files.transform(&path, &instance.transform, &level.outer)?;
             if let Some(object) = object.shared {
-                self.geometry.instances.push(Instance { object, transform });
+                self.geometry.instances.push(Instance::new(object, transform));
             }
             let outer = transform.world_from_object;
             for emitter in &object.emitters {

@@ -24,7 +24,7 @@ pub use frustum::Frustum;
 pub use hit::Hit;
 pub use instance::{Instance, Object};
 pub use interaction::{SpawnTarget, SurfaceInteraction};
-pub use mesh::{Mesh, MeshError, TrianglePoints};
+pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
 pub use placed::{Analytic, LocalHit, LocalSurface, Placed, PlacedPoint, ShapeSample};
 pub use profile::Profile;
 pub use quad::Quad;
@@ -59,10 +59,10 @@ impl Shape {
         }
     }
 
-    /// Bounds of one primitive, fit for an accelerator (outward, padded on analytic shapes).
+    /// Bounds of one primitive over the whole shutter interval, fit for an accelerator (outward, padded on analytic shapes).
     pub fn prim_bounds(&self, prim: PrimId) -> Aabb {
         match self {
-            Self::Mesh(mesh) => mesh.triangle_points(prim).bounds(),
+            Self::Mesh(mesh) => mesh.triangle_bounds(prim),
             Self::Analytic(placed) => placed.bounds().padded(),
         }
     }
@@ -81,7 +81,7 @@ impl Shape {
         let instance = Hit::NO_INSTANCE;
         match self {
             Self::Mesh(mesh) => {
-                let hit = mesh.triangle_points(prim).intersect(ray)?;
+                let hit = mesh.triangle_points_at(prim, ray.time).intersect(ray)?;
                 Some(Hit { t: hit.t, u: hit.u, v: hit.v, shape, prim, instance })
             }
             Self::Analytic(placed) => {

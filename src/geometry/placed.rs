@@ -216,6 +216,7 @@ impl Placed {
             shape: hit.shape,
             prim: hit.prim,
             instance: hit.instance,
+            time: ray.time,
         })
     }
 

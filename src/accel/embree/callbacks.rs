@@ -4,9 +4,10 @@ use std::ffi::{CStr, c_char, c_void};
 use std::sync::atomic::Ordering;
 
 use super::device::Monitor;
+use super::gate::Gate;
 use super::packet::INVALID;
 use super::sys;
-use crate::geometry::{Geometry, Hit, Placed};
+use crate::geometry::{Geometry, Hit, Instance, Placed};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::Ray;
 
@@ -48,6 +49,17 @@ pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *con
     let (placed, ray) = unsafe { (&*shape.cast::<Placed>(), &*ray.cast::<Ray>()) };
     // Rounding to f32 keeps the order, so the result stays within the ray's interval.
     placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32)
+}
+
+/// Writes `ray` in the space of the moving [`Instance`] behind `instance`; false if it cannot be traced there.
+pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *const sys::StRay, inside: *mut sys::StRay) -> bool {
+    // SAFETY: `instance` was made from a `&Instance` inside the geometry that the accelerator borrows; both rays are on the shim's stack,
+    // and `StRay` has the layout of `Ray`.
+    let (instance, ray) = unsafe { (&*instance.cast::<Instance>(), &*ray.cast::<Ray>()) };
+    let local = instance.object_ray(ray);
+    // SAFETY: as above; every bit pattern is a `Ray`.
+    unsafe { inside.cast::<Ray>().write(local) };
+    Gate::OPEN.admits(&local)
 }
 
 /// A shape with holes, as the user data of its geometry.

@@ -4,7 +4,7 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use super::callbacks::{Cutout, counts, intersect_cutout, intersect_placed};
+use super::callbacks::{Cutout, counts, enter_instance, intersect_cutout, intersect_placed};
 use super::device::Device;
 use super::{EmbreeOptions, EmbreeQuality, sys};
 use crate::error::{Error, Result};
@@ -68,6 +68,39 @@ impl UserShapes {
     }
 }
 
+/// The user data of the instances that move; the others have none. Embree keeps addresses into it.
+pub(super) struct MovingInstances(Vec<Option<sys::StMovingInstance>>);
+
+// SAFETY: the pointers inside lead to the geometry and to Embree's scenes, and are only read through, which both allow from any thread.
+unsafe impl Send for MovingInstances {}
+// SAFETY: as above.
+unsafe impl Sync for MovingInstances {}
+
+impl MovingInstances {
+    /// The table for `geometry`, over the committed scenes of its objects, which must live as long.
+    pub(super) fn new(geometry: &Geometry, objects: &[Scene]) -> Self {
+        let of = |instance: &Instance| {
+            instance.motion.as_ref()?;
+            let object = geometry.object(instance.object);
+            let inside = object.shapes.iter().fold(Aabb::EMPTY, |b, &id| b.union(&geometry.shape(id).bounds()));
+            let Aabb { min, max } = instance.bounds(&inside);
+            Some(sys::StMovingInstance {
+                instance: std::ptr::from_ref(instance).cast::<c_void>(),
+                enter: Some(enter_instance),
+                object: objects[instance.object.index()].handle(),
+                lower: min.to_array(),
+                upper: max.to_array(),
+            })
+        };
+        Self(geometry.instances.iter().map(of).collect())
+    }
+
+    /// The entry of one instance.
+    pub(super) fn get(&self, index: usize) -> Option<&sys::StMovingInstance> {
+        self.0[index].as_ref()
+    }
+}
+
 /// An Embree geometry, released on drop; scenes it is attached to keep it alive.
 pub(super) struct GeometryHandle(NonNull<sys::RTCGeometryTy>);
 
@@ -103,13 +136,16 @@ impl GeometryHandle {
         // SAFETY: the device is alive.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
         let this = Self::new(device, handle)?;
-        // SAFETY: both buffers hold as many items of that format as are announced; 16 bytes may be read of the last position, since the
+        // SAFETY: all buffers hold as many items of that format as are announced; 16 bytes may be read of the last position, since the
         // mesh keeps one more behind it; Embree only reads them, and the caller keeps them alive.
         unsafe {
-            let positions = mesh.padded_positions();
-            this.share(sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, positions.as_ptr().cast(), positions.len() - 1);
+            sys::rtcSetGeometryTimeStepCount(handle, mesh.padded_steps().count() as u32);
+            for (step, positions) in (0..).zip(mesh.padded_steps()) {
+                let data = positions.as_ptr().cast();
+                this.share(sys::RTC_BUFFER_TYPE_VERTEX, step, sys::RTC_FORMAT_FLOAT3, data, positions.len() - 1);
+            }
             let triangles = mesh.triangles();
-            this.share(sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, triangles.as_ptr().cast(), triangles.len());
+            this.share(sys::RTC_BUFFER_TYPE_INDEX, 0, sys::RTC_FORMAT_UINT3, triangles.as_ptr().cast(), triangles.len());
             if let Some(cutout) = cutout {
                 sys::st_set_cutout(handle, cutout);
             }
@@ -122,12 +158,22 @@ impl GeometryHandle {
     ///
     /// # Safety
     /// There must be as many, and they must outlive the geometry.
-    unsafe fn share(&self, kind: sys::RTCBufferType, format: sys::RTCFormat, items: *const c_void, count: usize) {
+    unsafe fn share(&self, kind: sys::RTCBufferType, slot: u32, format: sys::RTCFormat, items: *const c_void, count: usize) {
         // SAFETY: the handle is alive; the rest is the caller's promise.
-        unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, 0, format, items, 0, 12, count) }
+        unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, items, 0, 12, count) }
     }
 
-    /// The committed geometry of an instance of `object`.
+    /// The committed geometry of an instance that moves.
+    ///
+    /// # Safety
+    /// The user data, the instance and the scene it names must outlive every scene the geometry is attached to, and must not move.
+    pub(super) unsafe fn of_moving_instance(device: &Device, user: &sys::StMovingInstance) -> Result<Self> {
+        // SAFETY: the device is alive; the caller keeps the rest alive.
+        let handle = unsafe { sys::st_new_moving_instance(device.handle(), user) };
+        Self::new(device, handle)
+    }
+
+    /// The committed geometry of an instance of `object` at rest.
     pub(super) fn of_instance(device: &Device, object: &Scene, instance: &Instance) -> Result<Self> {
         // SAFETY: the device is alive.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_INSTANCE) };

@@ -78,7 +78,7 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
                 self.counter.prims(1);
                 match self.accel.geometry().shape(shape) {
                     Shape::Mesh(mesh) => {
-                        let hit = self.triangle_ray.intersect(&mesh.triangle_points(prim));
+                        let hit = self.triangle_ray.intersect(&mesh.triangle_points_at(prim, self.ray.time));
                         hit.is_some_and(|h| self.offer(Hit { t: h.t, u: h.u, v: h.v, shape, prim, instance: self.instance }))
                     }
                     Shape::Analytic(_) => {

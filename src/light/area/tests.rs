@@ -302,6 +302,7 @@ fn a_shadow_ray_reaches_the_light_it_was_made_for() {
                 shape: ShapeId(9),
                 prim: PrimId(0),
                 instance: Hit::NO_INSTANCE,
+                time: 0.0,
             };
             let ray = from.spawn_to(&target);
             let blocked = (0..2).any(|i| geometry.shape(ShapeId(0)).intersect_prim(&ray, ShapeId(0), PrimId(i)).is_some());
