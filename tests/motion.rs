@@ -3,7 +3,11 @@ use steradian::geometry::{Geometry, Instance, Mesh, MeshStep, Object, Shape};
 use steradian::id::{ObjectId, ShapeId};
 use steradian::math::{DAffine3, DMat3, DVec3, Motion, Ray};
 
+use serde_json::{Value, json};
+
+use crate::util::folder::Folder;
 use crate::util::geometry::{Rng, cube, ids, meshes, placed_analytic_shapes, ray_through, soup};
+use crate::util::render::{Estimate, probe, render};
 
 fn place(rng: &mut Rng, reach: f64) -> DAffine3 {
     DAffine3 { matrix3: rng.rotation() * rng.range(0.5, 1.2), translation: reach * rng.cube() }
@@ -151,5 +155,78 @@ fn rays_that_leave_a_moving_surface_do_not_find_it_again() {
             assert!(again.is_none(), "{name}: {at:?} {again:?}");
         }
         assert!(left > 200, "{name}: {left}");
+    }
+}
+
+/// A black card that passes before a white sky, in the middle of the picture for half of the time.
+fn passing_card(shapes: Value, rest: Value) -> Value {
+    let mut scene = json!({
+        "materials": { "black": { "type": "diffuse", "albedo": 0 } },
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+        "shapes": shapes,
+    });
+    crate::util::render::merge(&mut scene, rest);
+    let mut scene = probe([0.0, 0.0, 5.0], [0.0, 0.0, 0.0], scene);
+    scene["camera"]["up"] = json!([0, 1, 0]);
+    scene
+}
+
+#[test]
+fn a_card_is_seen_as_long_as_it_is_there() {
+    let card = json!({ "type": "quad", "material": "black", "origin": [-0.5, -1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0] });
+    let path = json!([{ "time": 0, "transform": [{ "translate": [-1, 0, 0] }] }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }]);
+    let mut moving = card.clone();
+    moving["motion"] = path.clone();
+    let ball = json!({ "type": "sphere", "material": "black", "radius": 0.5, "motion": path });
+    let deforming = json!({
+        "type": "mesh", "material": "black", "triangles": [[0, 1, 2], [0, 2, 3]],
+        "positions": [[-1.5, -1, 0], [-0.5, -1, 0], [-0.5, 1, 0], [-1.5, 1, 0]],
+        "deform_positions": [[[0.5, -1, 0], [1.5, -1, 0], [1.5, 1, 0], [0.5, 1, 0]]],
+    });
+    let scenes = [
+        ("shape", passing_card(json!([moving]), json!({}))),
+        ("sphere", passing_card(json!([ball]), json!({}))),
+        ("deforming mesh", passing_card(json!([deforming]), json!({}))),
+        (
+            "instance",
+            passing_card(json!([]), json!({ "objects": { "o": { "shapes": [card] } }, "instances": [{ "object": "o", "motion": path }] })),
+        ),
+        (
+            "shape in an instance",
+            passing_card(json!([]), json!({ "objects": { "o": { "shapes": [moving] } }, "instances": [{ "object": "o" }] })),
+        ),
+    ];
+    for (what, scene) in scenes {
+        Estimate::of(&render(&scene), 1).assert_is(0.5, what);
+    }
+}
+
+#[test]
+fn what_cannot_move_is_refused_with_its_place() {
+    let still = json!({ "time": 0.5 });
+    let flat = json!({ "time": 1, "transform": [{ "scale": [1, 0, 1] }] });
+    let mirrored = json!({ "time": 1, "transform": [{ "scale": [1, -1, 1] }] });
+    let shifted = json!({ "time": 1, "transform": [{ "translate": [1, 0, 0] }] });
+    let lamp = json!({ "radiance": [1, 1, 1] });
+    let triangle = json!([[0, 0, 0], [1, 0, 0], [0, 1, 0]]);
+    let cases = [
+        (json!({ "type": "sphere", "motion": [still, flat] }), "shapes[0].motion[1].transform", "singular"),
+        (json!({ "type": "sphere", "motion": [still, mirrored] }), "shapes[0].motion", "singular"),
+        (json!({ "type": "sphere", "motion": [still, still] }), "shapes[0].motion[1].time", "grow"),
+        (json!({ "type": "sphere", "motion": [still, shifted], "emission": lamp }), "shapes[0].motion", "light"),
+        (
+            json!({ "type": "mesh", "positions": triangle, "triangles": [[0, 1, 2]], "deform_positions": [[[0, 0, 0]]] }),
+            "shapes[0]",
+            "1 for 3 vertices",
+        ),
+        (
+            json!({ "type": "mesh", "positions": triangle, "triangles": [[0, 1, 2]], "deform_files": ["a.obj"] }),
+            "shapes[0]",
+            "a mesh needs either",
+        ),
+    ];
+    for (shape, place, message) in cases {
+        let error = Folder::new().compile(&passing_card(json!([shape]), json!({}))).unwrap_err().to_string();
+        assert!(error.contains(place) && error.contains(message), "{error}");
     }
 }

@@ -113,6 +113,7 @@ impl Builder {
             delta_materials: materials.iter().any(Material::is_delta),
             anisotropic: has_bsdf(Bsdf::is_anisotropic),
             lens: camera.lens().is_some(),
+            motion: self.geometry.is_moving(),
         };
         Ok(Scene {
             geometry: self.geometry,

@@ -1,9 +1,9 @@
 //! Transforms: steps in the order written become one map.
 
 use super::Files;
-use crate::desc::{ScaleDesc, TransformDesc, TransformStepDesc};
+use crate::desc::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};
 use crate::error::Result;
-use crate::math::{DAffine3, DMat3, DVec3, Transform};
+use crate::math::{DAffine3, DMat3, DVec3, Motion, Transform};
 
 impl Files {
     /// The product of the steps: the first acts first.
@@ -19,6 +19,26 @@ impl Files {
     pub(super) fn transform(&self, path: &str, desc: &TransformDesc, outer: &DAffine3) -> Result<Transform> {
         let map = *outer * self.affine(path, desc)?;
         Transform::new(map).ok_or_else(|| self.error(path, super::SINGULAR))
+    }
+
+    /// The motion of keyframes after `map`; just `map` if there are none.
+    pub(super) fn motion(&self, path: &str, keyframes: &[KeyframeDesc], map: &DAffine3) -> Result<Motion> {
+        let constant = Motion::constant(*map);
+        if keyframes.is_empty() {
+            return Ok(constant);
+        }
+        let mut list = Vec::with_capacity(keyframes.len());
+        for (i, keyframe) in keyframes.iter().enumerate() {
+            let path = format!("{path}[{i}]");
+            let map = self.transform(&format!("{path}.transform"), &keyframe.transform, &DAffine3::IDENTITY)?.world_from_object;
+            if !keyframe.time.is_finite() || list.last().is_some_and(|(time, _)| keyframe.time <= *time) {
+                return Err(self.error(&format!("{path}.time"), "times must be finite and grow from keyframe to keyframe"));
+            }
+            list.push((keyframe.time, map));
+        }
+        let motion = Motion::keyframed(&list)
+            .ok_or_else(|| self.error(path, "the motion passes through a singular transform (does one keyframe mirror the shape?)"))?;
+        Ok(motion.after(&constant))
     }
 
     fn step(&self, path: &str, step: &TransformStepDesc) -> Result<DAffine3> {

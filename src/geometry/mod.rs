@@ -126,6 +126,12 @@ impl Geometry {
         &self.objects[id.index()]
     }
 
+    /// Whether anything moves while the shutter is open.
+    pub fn is_moving(&self) -> bool {
+        let deforming = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.is_deforming());
+        self.shapes.iter().any(deforming) || self.instances.iter().any(|instance| instance.motion.is_some())
+    }
+
     /// The first hit that counts of `ray` with one primitive. `ray` is in the space the shape is placed in, through `instance`; `key` is that
     /// of the world-space ray. Any-hit queries use this very function.
     #[inline]

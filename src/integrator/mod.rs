@@ -25,6 +25,9 @@ pub mod dimensions {
     /// Film position (two) and lens position (two).
     pub const CAMERA: u32 = 0;
 
+    /// Time within the shutter interval (one), of scenes in which something moves.
+    pub const TIME: u32 = u32::MAX;
+
     /// Choice of a light (one) and a direction towards it (two), at the vertex with this many bounces before it.
     pub const fn light(bounce: u32) -> u32 {
         1 + 2 * bounce
