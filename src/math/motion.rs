@@ -290,8 +290,9 @@ mod tests {
                 }
             }
             assert!(bounds.min.cmple(reach.min).all() && bounds.max.cmpge(reach.max).all(), "{bounds:?} {reach:?}");
+            // The box of a turned box is larger than what was in it, by up to the square root of 3.
             let slack = (bounds.max - bounds.min) / (reach.max - reach.min);
-            assert!(slack.max_element() < 1.6, "bounds are too loose: {slack}");
+            assert!(slack.max_element() < 3f64.sqrt(), "bounds are too loose: {slack}");
         }
     }
 }
