@@ -35,6 +35,13 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
         Self { geometry, world, objects, bounds: geometry.bounds(), instances: InstanceRounding::of(geometry) }
     }
 
+    /// A tree made by `build` over the world of a geometry without instances.
+    #[cfg(test)]
+    pub fn over_world(geometry: &'g Geometry, build: impl Fn(&Items<'_>) -> T) -> Self {
+        let world = build(&Items::of_world(geometry, &[]));
+        Self { geometry, world, objects: Vec::new(), bounds: geometry.bounds(), instances: None }
+    }
+
     /// What all trees are over.
     #[inline(always)]
     pub fn geometry(&self) -> &'g Geometry {
