@@ -184,8 +184,9 @@ fn split(items: &Items<'_>, cell: &Cell) -> Option<Vec<(u32, Cell)>> {
         let upper = glam::BVec3::new(octant & 1 != 0, octant & 2 != 0, octant & 4 != 0);
         let bounds = Aabb { min: Vec3::select(upper, middle, cell.bounds.min), max: Vec3::select(upper, cell.bounds.max, middle) };
         let part = |(index, part): &(u32, Aabb)| {
-            // Most parts lie on one side.
-            if !(part.min.cmple(bounds.max).all() && bounds.min.cmple(part.max).all()) {
+            // Most parts lie on one side; of the others, many only in the corner of their box.
+            let near = part.min.cmple(bounds.max).all() && bounds.min.cmple(part.max).all();
+            if !near || !items.overlaps(*index as usize, &bounds) {
                 return None;
             }
             let part = items.clipped_bounds(*index as usize, &bounds);
