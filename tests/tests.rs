@@ -2,6 +2,8 @@
 
 /// Embree answers as the linear oracle does, alone, in packets and from many threads.
 mod accel_agreement;
+/// Accelerators compared from the command line.
+mod bench_accel;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
 /// The program as a user runs it: exit codes, what it writes, what it says.

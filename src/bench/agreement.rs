@@ -39,24 +39,43 @@ pub struct Disagreement {
     pub found: String,
 }
 
-/// Compares the answers of `accel` with those of `oracle`: closest hits, or any hits.
-pub fn compare(geometry: &Geometry, oracle: &dyn Accelerator, accel: &dyn Accelerator, rays: &[Ray], any_hit: bool) -> Agreement {
-    let check = |ray: &Ray| {
-        if any_hit {
-            let (a, b) = (oracle.occluded(ray), accel.occluded(ray));
-            let class = if a == b { Class::Identical } else { Class::Different };
-            return (class, (a != b).then(|| (occlusion(a), occlusion(b))));
-        }
-        let (a, b) = (oracle.intersect(ray), accel.intersect(ray));
+/// An answer to a ray: the closest hit, or whether there is any.
+#[derive(Clone, Copy, Debug)]
+pub enum Answer {
+    /// The closest hit.
+    Closest(Option<Hit>),
+    /// Whether there is any hit.
+    Any(bool),
+}
+
+/// The answers to many rays, with all threads of the current pool.
+pub fn answers(accel: &dyn Accelerator, rays: &[Ray], any_hit: bool) -> Vec<Answer> {
+    let answer = |ray: &Ray| if any_hit { Answer::Any(accel.occluded(ray)) } else { Answer::Closest(accel.intersect(ray)) };
+    rays.par_iter().with_min_len(256).map(answer).collect()
+}
+
+/// Compares the answers of `accel` with those expected, ray by ray.
+pub fn compare(geometry: &Geometry, expected: &[Answer], accel: &dyn Accelerator, rays: &[Ray]) -> Agreement {
+    let check = |ray: &Ray, expected: &Answer| {
+        let a = match expected {
+            Answer::Closest(hit) => *hit,
+            Answer::Any(a) => {
+                let (a, b) = (*a, accel.occluded(ray));
+                let class = if a == b { Class::Identical } else { Class::Different };
+                return (class, (a != b).then(|| (occlusion(a), occlusion(b))));
+            }
+        };
+        let b = accel.intersect(ray);
         let class = classify(geometry, ray, a.as_ref(), b.as_ref());
         (class, (class == Class::Different).then(|| (describe(a.as_ref()), describe(b.as_ref()))))
     };
     let chunks: Vec<Agreement> = rays
         .par_chunks(4096)
-        .map(|rays| {
+        .zip(expected.par_chunks(4096))
+        .map(|(rays, expected)| {
             let mut sum = Agreement { rays: rays.len(), ..Agreement::default() };
-            for ray in rays {
-                let (class, answers) = check(ray);
+            for (ray, expected) in rays.iter().zip(expected) {
+                let (class, answers) = check(ray, expected);
                 match class {
                     Class::Identical => sum.identical += 1,
                     Class::WithinBound => sum.within_bound += 1,

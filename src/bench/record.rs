@@ -142,6 +142,7 @@ impl Accelerator for Recorder<'_> {
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
+        self.keep(|_| 1, std::slice::from_ref(ray));
         self.inner.occluded(ray)
     }
 
