@@ -2,10 +2,10 @@
 
 /// Embree answers as the linear oracle does, alone, in packets and from many threads.
 mod accel_agreement;
-/// Accelerators compared from the command line.
-mod bench_accel;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
+/// Accelerators compared from the command line.
+mod bench_accel;
 /// The program as a user runs it: exit codes, what it writes, what it says.
 mod cli;
 /// Surfaces with holes, the same ones for every accelerator and every kind of query.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::accel::inspect::{Inspect, Item, ItemKind, SAH_NODE_COST, SAH_PRIM_COST};
 use crate::geometry::{Geometry, Shape};
-use crate::math::{Aabb, DVec3};
+use crate::math::{Aabb, DVec3, Vec3};
 
 /// More triangles would take longer than the rest of a benchmark.
 const MOST_TRIANGLES: usize = 2_000_000;
@@ -32,7 +32,7 @@ pub fn end_point_overlap(geometry: &Geometry, accel: &dyn Inspect) -> Option<f64
         let ItemKind::Prim(shape, prim) = item.kind() else { return None };
         let Shape::Mesh(mesh) = geometry.shape(shape) else { return None };
         let points = mesh.triangle_points(prim);
-        let corners = [points.a, points.b, points.c].map(|p| p.as_dvec3());
+        let corners = [points.a, points.b, points.c].map(Vec3::as_dvec3);
         let bounds = points.bounds();
         total += points.area();
         let mut i = 0;
@@ -116,7 +116,7 @@ mod tests {
     use crate::accel::inspect::{NodeInfo, TraversalCounts};
     use crate::geometry::{Hit, Mesh};
     use crate::id::{PrimId, ShapeId};
-    use crate::math::{Ray, Vec3};
+    use crate::math::Ray;
 
     /// A root with two leaves of one triangle each.
     struct TwoLeaves {

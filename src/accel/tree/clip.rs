@@ -43,7 +43,7 @@ fn intersection(a: &Aabb, b: &Aabb) -> Aabb {
 }
 
 fn corners(triangle: &TrianglePoints) -> [DVec3; 3] {
-    [triangle.a, triangle.b, triangle.c].map(|p| p.as_dvec3())
+    [triangle.a, triangle.b, triangle.c].map(Vec3::as_dvec3)
 }
 
 /// A bound of the error of a corner after all cuts, relative to which the largest coordinate at hand is given.
