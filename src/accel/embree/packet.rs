@@ -2,12 +2,14 @@
 //!
 //! A packet is filled lane by lane; the gate then runs over whole rows, which the compiler turns into vector code.
 
-use super::gate::Gate;
+use std::mem::MaybeUninit;
+
+use super::gate::{Gate, RayWords};
 use super::scene::Scene;
-use super::sys::{self, RTCHit16, RTCRay16, RTCRayHit16, StHit};
+use super::sys::{self, RTCHit16, RTCRay, RTCRay16, RTCRayHit, RTCRayHit16, StHit};
 use crate::accel::Coherence;
 use crate::geometry::Cutouts;
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec3, Vec4};
 
 /// Rays of one packet.
 pub(super) const WIDTH: usize = 16;
@@ -35,26 +37,63 @@ impl Tracer {
     }
 
     /// The closest hit of one ray.
-    #[inline]
+    #[inline(always)]
     pub(super) fn intersect(&self, ray: &Ray) -> Option<StHit> {
-        if !self.gate.admits(ray) {
+        let words = RayWords::new(ray);
+        if !self.gate.admits(&words) {
             return None;
         }
-        let mut hit = StHit::default();
-        // SAFETY: the scene is committed, `StRay` is `Ray` under its C name, and the ray has passed the gate.
-        let found = unsafe { sys::st_intersect1(self.scene.handle(), c_ray(ray), self.cutouts.key(ray), &mut hit) };
-        found.then_some(hit)
+        let mut rayhit = MaybeUninit::<RTCRayHit>::uninit();
+        // SAFETY: the pointer is to memory of that type; all that Embree reads is written before it is called, with a ray that has passed the
+        // gate and a scene that is committed; all that is read after a hit Embree has written.
+        unsafe {
+            let RTCRayHit { ray: out, hit } = &mut *rayhit.as_mut_ptr();
+            set_ray(out, &words, self.cutouts.key(ray));
+            hit.geomID = INVALID;
+            hit.instID[0] = INVALID;
+            let mut query = MaybeUninit::<sys::StQuery>::uninit();
+            sys::st_intersect1(self.scene.handle(), query.as_mut_ptr(), rayhit.as_mut_ptr());
+            (hit.geomID != INVALID).then(|| StHit {
+                t: out.tfar,
+                u: hit.u,
+                v: hit.v,
+                prim: hit.primID,
+                geometry: hit.geomID,
+                instance: hit.instID[0],
+            })
+        }
     }
 
     /// Whether one ray hits anything.
-    #[inline]
+    #[inline(always)]
     pub(super) fn occluded(&self, ray: &Ray) -> bool {
-        if !self.gate.admits(ray) {
+        let words = RayWords::new(ray);
+        if !self.gate.admits(&words) {
             return false;
         }
+        let mut out = MaybeUninit::<RTCRay>::uninit();
         // SAFETY: as in `intersect`.
-        unsafe { sys::st_occluded1(self.scene.handle(), c_ray(ray), self.cutouts.key(ray)) }
+        unsafe {
+            set_ray(&mut *out.as_mut_ptr(), &words, self.cutouts.key(ray));
+            let mut query = MaybeUninit::<sys::StQuery>::uninit();
+            sys::st_occluded1(self.scene.handle(), query.as_mut_ptr(), out.as_mut_ptr());
+            (*out.as_ptr()).tfar < 0.0
+        }
     }
+}
+
+/// Writes a ray in pieces of 16 bytes, which Embree reads at once; smaller ones could not be forwarded from the store buffer.
+#[inline(always)]
+fn set_ray(out: &mut RTCRay, words: &RayWords, key: u32) {
+    // SAFETY: an `RTCRay` is aligned to 16 bytes and starts with origin and `tnear`, then direction and time.
+    unsafe {
+        (&raw mut *out).cast::<Vec4>().write(words.origin_t_min);
+        (&raw mut *out).cast::<Vec4>().add(1).write(words.direction_time);
+    }
+    out.tfar = words.t_max;
+    out.mask = ALL_GEOMETRIES;
+    out.id = key;
+    out.flags = 0;
 }
 
 #[inline(always)]
