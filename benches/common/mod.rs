@@ -2,4 +2,5 @@
 #![allow(dead_code)]
 
 pub mod models;
+pub mod others;
 pub mod rays;
