@@ -11,11 +11,11 @@ use common::models::{Model, hare, scans};
 use common::others::{BvhCrate, ObvhsCrate, Other};
 use common::rays::{RaySet, ray_sets};
 use criterion::measurement::WallTime;
-use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use steradian::accel::{self, AccelKind, Accelerator};
 
 /// Pixels along each side of the picture that the rays are of.
-const RESOLUTION: usize = 256;
+const RESOLUTION: usize = 128;
 
 const ACCELERATORS: [&str; 6] = ["embree", "bvh", "bvh:binary", "kdtree", "kdtree:median", "octree"];
 
@@ -70,7 +70,8 @@ fn queries(criterion: &mut Criterion) {
         for set in ray_sets(&model, &*accels[0].1, RESOLUTION) {
             agree(&model, &set, &accels, &others);
             let mut group = criterion.benchmark_group(format!("{}/{}", model.name, set.name));
-            group.sample_size(10).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_millis(1500));
+            group.sampling_mode(SamplingMode::Flat).sample_size(10);
+            group.warm_up_time(Duration::from_millis(100)).measurement_time(Duration::from_millis(600));
             for (kind, accel) in &accels {
                 let any = set.any;
                 time(&mut group, &kind.to_string(), &set, |ray| if any { accel.occluded(ray) } else { accel.intersect(ray).is_some() });

@@ -53,14 +53,16 @@ impl Tracer {
             (&raw mut (*rayhit).hit.instID[0]).write(INVALID);
             let mut query = MaybeUninit::<sys::StQuery>::uninit();
             sys::st_intersect1(self.scene.handle(), query.as_mut_ptr(), rayhit);
-            let geometry = (*rayhit).hit.geomID;
+            // Embree has just written these one by one; read together they would wait for its stores to reach the cache.
+            let hit = &raw const (*rayhit).hit;
+            let geometry = (&raw const (*hit).geomID).read_volatile();
             (geometry != INVALID).then(|| StHit {
-                t: (*rayhit).ray.tfar,
-                u: (*rayhit).hit.u,
-                v: (*rayhit).hit.v,
-                prim: (*rayhit).hit.primID,
+                t: (&raw const (*rayhit).ray.tfar).read_volatile(),
+                u: (&raw const (*hit).u).read_volatile(),
+                v: (&raw const (*hit).v).read_volatile(),
+                prim: (&raw const (*hit).primID).read_volatile(),
                 geometry,
-                instance: (*rayhit).hit.instID[0],
+                instance: (&raw const (*hit).instID[0]).read_volatile(),
             })
         }
     }
