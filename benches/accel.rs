@@ -42,13 +42,20 @@ fn agree(model: &Model, set: &RaySet, accels: &[(AccelKind, Box<dyn Accelerator 
         assert!(different * 1000 <= set.rays.len(), "{kind}: {different} of {} answers differ", set.rays.len());
     }
     for (name, other) in others {
-        let differs = |ray, expected: &Option<steradian::geometry::Hit>| {
-            other.closest(ray).map(|(prim, _)| prim) != expected.map(|h| h.prim.0) || other.any(ray) != expected.is_some()
-        };
-        let different = set.rays.iter().zip(&answers).filter(|(ray, expected)| differs(ray, expected)).count();
-        // They test triangles in f32, and not watertight.
-        assert!(different * 100 <= set.rays.len(), "{name}: {different} of {} answers differ", set.rays.len());
-        println!("{}, {}: {name} differs on {different} of {} rays", model.name, set.name, set.rays.len());
+        let (mut again, mut different) = (0, 0);
+        for (ray, expected) in set.rays.iter().zip(&answers) {
+            match other.closest(ray) {
+                // They test triangles in f32, and not watertight: some rays find the surface again that they leave.
+                Some((prim, t)) if Some(prim) != expected.map(|h| h.prim.0) && t < 1e-3 => again += 1,
+                found => different += usize::from(found.map(|(prim, _)| prim) != expected.map(|h| h.prim.0)),
+            }
+        }
+        let count = set.rays.len();
+        assert!(different * 100 <= count, "{name}: {different} of {count} answers differ");
+        println!(
+            "{}, {}: {name} differs on {different} of {count} rays and finds the surface again that they leave on {again}",
+            model.name, set.name
+        );
     }
 }
 

@@ -64,7 +64,7 @@ impl BvhCrate {
         let [a, b, c] = &triangle.corners;
         // Its test culls one side, so both orders are asked; its rays are normalised.
         let t = of.intersects_triangle(a, b, c).distance.min(of.intersects_triangle(a, c, b).distance) * scale;
-        (t >= ray.t_min && t <= ray.t_max).then_some(t)
+        (t.is_finite() && t >= ray.t_min && t <= ray.t_max).then_some(t)
     }
 }
 
