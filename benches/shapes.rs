@@ -67,13 +67,13 @@ fn shape_tests(criterion: &mut Criterion) {
         group.bench_function("test alone", |b| b.iter(|| black_box(&rays).iter().filter(|ray| direct(ray).is_some()).count()));
         group.bench_function("embree", |b| b.iter(|| black_box(&rays).iter().filter(|ray| embree.intersect(ray).is_some()).count()));
         if name == "sphere" {
-            for cells in [1, 4, 16, 64] {
+            for cells in [4, 16, 64] {
                 let mesh = tessellated_sphere(cells);
                 let accel = accel::build(AccelKind::EMBREE, &mesh, 1).expect("builds");
                 // The mesh is inscribed: a ray that hits it hits the sphere.
                 let count = |accel: &dyn Accelerator| rays.iter().filter(|ray| accel.intersect(ray).is_some()).count();
                 let found = count(&*accel);
-                assert!(found <= hits && found * 100 > hits * (100 - 60 / cells as usize), "{found} of {hits}");
+                assert!(found <= hits && found * 100 > hits * (99 - 80 / cells as usize), "{found} of {hits}");
                 let triangles = mesh.shapes[0].prim_count();
                 group.bench_function(format!("embree, {triangles} triangles"), |b| b.iter(|| count(black_box(&*accel))));
             }
