@@ -98,7 +98,7 @@ impl Builder {
         if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky {
             return Err(files.error("shapes", "there is nothing to see: no shapes, no instances and no environment"));
         }
-        if lights.choose(0.0).is_none() && needs_light(&desc.integrator) {
+        if !lights.shines() && needs_light(&desc.integrator) {
             let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
             return Err(files.error("lights", message));
         }

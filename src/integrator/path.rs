@@ -11,7 +11,7 @@ use crate::bsdf::{Bsdf, BsdfSample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::{Light, ShadowTarget};
+use crate::light::{Light, Receiver, ShadowTarget};
 use crate::math::{DVec3, Frame, Ray, Vec3};
 use crate::sampling::{PixelSeed, Sampler, power_heuristic};
 
@@ -56,7 +56,7 @@ struct Path {
     seed: PixelSeed,
     sample: u32,
     /// Where the last direction was chosen, for the density of light sampling.
-    from: DVec3,
+    from: Receiver,
 }
 
 /// Light that reaches a path if its shadow ray is free.
@@ -101,7 +101,7 @@ impl PathIntegrator {
                 slot: slot as u32,
                 seed: sample.seed,
                 sample: sample.sample,
-                from: DVec3::ZERO,
+                from: Receiver { p: DVec3::ZERO, n: Vec3::ZERO },
             });
         }
 
@@ -192,7 +192,7 @@ impl PathIntegrator {
         for &id in world.scene.lights.at_infinity() {
             let found = world.scene.lights.get(id).eval_at_infinity(direction);
             if !found.radiance.is_black() {
-                radiance += found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id));
+                radiance += found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from));
             }
         }
         radiance
@@ -211,7 +211,7 @@ impl PathIntegrator {
         if radiance.is_black() || path.pdf == f32::INFINITY || self.strategy != Strategy::Mis {
             return radiance * self.found_by_chance(path, 0.0);
         }
-        let light_pdf = light.pdf(&world.scene.geometry, path.from, ray, at) * world.scene.lights.pmf(id);
+        let light_pdf = light.pdf(&world.scene.geometry, path.from.p, ray, at) * world.scene.lights.pmf(id, &path.from);
         radiance * self.found_by_chance(path, light_pdf)
     }
 
@@ -222,7 +222,7 @@ impl PathIntegrator {
             return None;
         }
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::light(bounce));
-        let choice = world.scene.lights.choose(u[0])?;
+        let choice = world.scene.lights.choose(&vertex.receiver(), [u[0], u[3]])?;
         let light = world.scene.lights.get(choice.id);
         let sample = light.sample(&world.scene.geometry, vertex.at.p, [u[1], u[2]])?;
         if self.strategy == Strategy::Bsdf && !sample.is_delta {
@@ -269,7 +269,7 @@ impl PathIntegrator {
 
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         path.pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        path.from = vertex.at.p;
+        path.from = vertex.receiver();
         Some(vertex.at.spawn(direction))
     }
 }
@@ -300,6 +300,13 @@ impl<'a> Vertex<'a> {
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
         let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
         Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric }
+    }
+
+    /// The point and the side of it that light must reach.
+    #[inline]
+    fn receiver(&self) -> Receiver {
+        let n = if self.bsdf.transmits() { Vec3::ZERO } else { self.frame.z * 1f32.copysign(self.wo.z) };
+        Receiver { p: self.at.p, n }
     }
 
     /// Whether the shading frame and the geometry agree on which side a direction lies; where they do not, light would leak through.

@@ -1,6 +1,7 @@
 //! Lights, how one is chosen, and how a direction towards it is chosen.
 
 mod area;
+mod bounds;
 mod directional;
 mod environment;
 mod point;
@@ -8,6 +9,7 @@ mod set;
 mod spot;
 #[cfg(test)]
 mod test_support;
+mod tree;
 
 pub use area::{AreaLight, Emission};
 pub use directional::DirectionalLight;
@@ -15,10 +17,12 @@ pub use environment::{Environment, EnvironmentMap, EnvironmentMapError};
 pub use point::PointLight;
 pub use set::{LightChoice, LightSet};
 pub use spot::SpotLight;
+pub use tree::Receiver;
 
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnTarget};
 use crate::math::{DVec2, DVec3, Vec3};
+use bounds::LightBounds;
 
 /// A light of the scene.
 #[derive(Clone, Debug)]
@@ -112,6 +116,16 @@ impl Light {
             Self::Spot(light) => light.sample(p),
             Self::Directional(light) => light.sample(u),
             Self::Environment(light) => light.sample(u),
+        }
+    }
+
+    /// Where the light is and how it shines; `None` for lights at infinity and those that do not shine.
+    fn bounds(&self, geometry: &Geometry) -> Option<LightBounds> {
+        match self {
+            Self::Area(light) => light.bounds(geometry),
+            Self::Point(light) => light.bounds(),
+            Self::Spot(light) => light.bounds(),
+            Self::Directional(_) | Self::Environment(_) => None,
         }
     }
 

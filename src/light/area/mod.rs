@@ -10,6 +10,7 @@ use parallelogram::ParallelogramEmitter;
 use sphere::SphereEmitter;
 use triangle::{TriangleEmitter, triangle_error};
 
+use super::bounds::{EmissionCone, LightBounds, to_positive};
 use super::{LightSample, ShadowTarget};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Mesh, Placed, Shape, SpawnTarget, SurfaceInteraction};
@@ -169,6 +170,23 @@ impl AreaLight {
         }
     }
 
+    /// For the choice of a light.
+    pub(super) fn bounds(&self, geometry: &Geometry) -> Option<LightBounds> {
+        let shape = geometry.shape(self.shape);
+        let (bounds, normal) = match &self.form {
+            Form::Sphere(_) => (shape.bounds(), None),
+            Form::Parallelogram(quad) => (shape.bounds(), Some(quad.normal())),
+            Form::Triangle(triangle) => (shape.prim_bounds(self.prim), Some(triangle.normal())),
+            Form::Placed { .. } => (shape.bounds(), flat_normal(shape)),
+        };
+        let cone = normal.map_or(EmissionCone::SPHERE, EmissionCone::flat);
+        // Of a closed convex surface, a quarter of the area is seen from far away.
+        let seen = self.area() * if normal.is_some() { 1.0 } else { 0.25 };
+        let intensity = seen * f64::from(self.emission.radiance.luminance());
+        let two_sided = self.emission.two_sided && normal.is_some();
+        (intensity > 0.0).then(|| LightBounds { bounds, cone, two_sided, intensity: to_positive(intensity) })
+    }
+
     /// Emitted power, as luminance.
     pub fn power(&self) -> f64 {
         let sides = if self.emission.two_sided { 2.0 } else { 1.0 };
@@ -218,6 +236,14 @@ impl Form {
         }
         let error = triangle_error(&first).max(triangle_error(&second)) + gap as f32;
         ParallelogramEmitter::new(origin, edge_u, edge_v, first.cross(), error).map(Self::Parallelogram)
+    }
+}
+
+/// Unit normal of a flat shape, towards its front.
+fn flat_normal(shape: &Shape) -> Option<Vec3> {
+    match shape {
+        Shape::Analytic(placed) if matches!(placed.shape, Analytic::Disk(_) | Analytic::Quad(_)) => Some(placed.sample_area([0.5; 2]).n),
+        _ => None,
     }
 }
 

@@ -2,7 +2,7 @@
 //! Spherical Rectangles"), all others by area.
 
 use super::SurfaceSample;
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 
 /// A parallelogram in the world.
 #[derive(Clone, Debug)]
@@ -68,6 +68,11 @@ impl ParallelogramEmitter {
 
     pub fn area(&self) -> f64 {
         self.area
+    }
+
+    /// Unit normal, towards the front.
+    pub fn normal(&self) -> Vec3 {
+        self.normal.as_vec3()
     }
 
     /// Whether `p` sees the front.

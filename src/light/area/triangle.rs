@@ -2,7 +2,7 @@
 
 use super::SurfaceSample;
 use crate::geometry::TrianglePoints;
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 use crate::math::float::UNIT_ROUNDOFF;
 
 /// A triangle of a mesh.
@@ -40,6 +40,11 @@ impl TriangleEmitter {
 
     pub fn area(&self) -> f64 {
         self.area
+    }
+
+    /// Unit normal, towards the front.
+    pub fn normal(&self) -> Vec3 {
+        self.normal.as_vec3()
     }
 
     /// Whether `p` sees the front.
