@@ -24,10 +24,11 @@ use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::import::AssetError;
-use crate::light::{Light, LightSet};
+use crate::light::LightSet;
 use crate::material::Material;
 use crate::scene::{Features, Scene, Surface};
 
+use lights::LightTable;
 use materials::MaterialTable;
 
 /// Compiles a scene; the files it names are looked up beside `scene_file`.
@@ -39,11 +40,13 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
     let files = Files { scene: scene_file.into() };
     let camera = camera::compile(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
-    let mut builder = Builder { files, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: Vec::new() };
+    let mut builder = Builder { files, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: LightTable::default() };
     builder.add_world(desc)?;
     for (i, light) in desc.lights.iter().enumerate() {
-        let light = lights::compile(&builder.files, &format!("lights[{i}]"), light)?;
-        builder.lights.push(light);
+        let path = format!("lights[{i}]");
+        let group = builder.lights.group(&builder.files, &path, light.group())?;
+        let light = lights::compile(&builder.files, &path, light)?;
+        builder.lights.add([light], group);
     }
     builder.finish(desc, camera)
 }
@@ -87,13 +90,14 @@ struct Builder {
     geometry: Geometry,
     /// By shape.
     surfaces: Vec<Surface>,
-    lights: Vec<Light>,
+    lights: LightTable,
 }
 
 impl Builder {
-    fn finish(self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
+    fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
         let files = &self.files;
-        let lights = LightSet::new(self.lights, &self.geometry);
+        let light_groups = self.lights.groups();
+        let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();
         if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky {
             return Err(files.error("shapes", "there is nothing to see: no shapes, no instances and no environment"));
@@ -120,6 +124,7 @@ impl Builder {
             materials,
             textures: self.materials.textures,
             lights,
+            light_groups,
             camera,
             features,
         })

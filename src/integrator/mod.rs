@@ -25,7 +25,7 @@ pub mod dimensions {
     /// Film position (two) and lens position (two).
     pub const CAMERA: u32 = 0;
 
-    /// Choice of a light (one) and a direction towards it (two), at the vertex with this many bounces before it.
+    /// Choice of a light (one, and one for its last digits) and a direction towards it (two), at the vertex with this many bounces before it.
     pub const fn light(bounce: u32) -> u32 {
         1 + 2 * bounce
     }
@@ -91,8 +91,8 @@ pub trait Integrator: Send + Sync {
 pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Box<dyn Integrator> {
     let view = |view| Box::new(DebugView { view, needs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy } => {
-            Box::new(PathIntegrator { max_depth, rr_depth, strategy: strategy.into(), sampler, needs })
+        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp } => {
+            Box::new(PathIntegrator { max_depth, rr_depth, strategy: strategy.into(), clamp: clamp.unwrap_or(f32::INFINITY), sampler, needs })
         }
         IntegratorDesc::Whitted { max_depth, ambient } => Box::new(Whitted { max_depth, ambient: ambient.into(), needs }),
         IntegratorDesc::Normal => view(View::Normal),

@@ -36,6 +36,8 @@ pub struct PathIntegrator {
     pub rr_depth: u32,
     /// How directions towards lights are found.
     pub strategy: Strategy,
+    /// Largest channel that a single contribution of indirect light keeps: less noise for too little light. Infinite for no bias.
+    pub clamp: f32,
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
@@ -144,7 +146,7 @@ impl PathIntegrator {
             let ray = rays[i];
             let sample = &mut out[path.slot as usize];
             let Some(at) = world.resolve(&ray, hits[i]) else {
-                sample.radiance += path.throughput * self.escaped(world, &path, ray.direction);
+                sample.radiance += self.clamped(path.throughput * self.escaped(world, &path, ray.direction), bounce);
                 continue;
             };
             if bounce == 0 {
@@ -153,7 +155,7 @@ impl PathIntegrator {
                     sample.surface = surface_sample(world, self.needs, &at, ray.direction);
                 }
             }
-            sample.radiance += path.throughput * self.emitted(world, &path, &ray, &at);
+            sample.radiance += self.clamped(path.throughput * self.emitted(world, &path, &ray, &at), bounce);
             if bounce + 1 >= self.max_depth {
                 continue;
             }
@@ -161,7 +163,7 @@ impl PathIntegrator {
             let vertex = Vertex::new(world, &at, &ray);
             if let Some(shadow) = self.sample_light(world, &path, &vertex, bounce) {
                 shadow_rays.push(shadow.ray);
-                pending.push(Pending { contribution: shadow.contribution, slot: path.slot });
+                pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
             }
             if let Some(next) = self.scatter(world, &mut path, &vertex, bounce) {
                 paths[alive] = path;
@@ -171,6 +173,13 @@ impl PathIntegrator {
         }
         paths.truncate(alive);
         rays.truncate(alive);
+    }
+
+    /// What a contribution brings that was scattered so many times between the light and the camera.
+    #[inline]
+    fn clamped(&self, contribution: Rgb, scatterings: u32) -> Rgb {
+        let largest = contribution.max_channel();
+        if scatterings > 1 && largest > self.clamp { contribution * (self.clamp / largest) } else { contribution }
     }
 
     /// Weight of light that was found by following `direction`, against finding it by sampling the light with density `light_pdf`.
@@ -207,7 +216,7 @@ impl PathIntegrator {
         let Light::Area(light) = world.scene.lights.get(id) else {
             return Rgb::BLACK;
         };
-        let radiance = light.radiance(at, -ray.direction);
+        let radiance = light.radiance(&world.scene.textures, at, -ray.direction);
         if radiance.is_black() || path.pdf == f32::INFINITY || self.strategy != Strategy::Mis {
             return radiance * self.found_by_chance(path, 0.0);
         }
@@ -224,7 +233,7 @@ impl PathIntegrator {
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::light(bounce));
         let choice = world.scene.lights.choose(&vertex.receiver(), [u[0], u[3]])?;
         let light = world.scene.lights.get(choice.id);
-        let sample = light.sample(&world.scene.geometry, vertex.at.p, [u[1], u[2]])?;
+        let sample = light.sample(&world.scene.geometry, &world.scene.textures, vertex.at.p, [u[1], u[2]])?;
         if self.strategy == Strategy::Bsdf && !sample.is_delta {
             return None;
         }

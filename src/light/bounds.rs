@@ -101,3 +101,49 @@ impl LightBounds {
 pub fn to_positive(intensity: f64) -> f32 {
     (intensity as f32).clamp(f32::MIN_POSITIVE, f32::MAX)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::test_support::Random;
+
+    /// A random unit direction within an angle of an axis.
+    fn within(random: &mut Random, axis: Vec3, angle: f32) -> Vec3 {
+        let across = random.direction().as_vec3().cross(axis).normalize();
+        let (sin, cos) = (angle * random.next()).sin_cos();
+        (axis * cos + across * sin).normalize()
+    }
+
+    #[test]
+    fn the_union_of_cones_holds_both() {
+        let mut random = Random(1);
+        for _ in 0..2000 {
+            let mut cone = || EmissionCone {
+                axis: random.direction().as_vec3().normalize(),
+                spread: 2.0 * random.next() * random.next(),
+                reach: FRAC_PI_2 * random.next(),
+            };
+            let (a, b) = (cone(), cone());
+            let union = a.union(&b);
+            assert!(union.reach >= a.reach.max(b.reach) && union.spread <= PI);
+            for part in [a, b] {
+                for _ in 0..20 {
+                    let n = within(&mut random, part.axis, part.spread);
+                    assert!(angle_between(n, union.axis) <= union.spread + 1e-5, "{a:?} {b:?} {union:?}");
+                }
+            }
+        }
+        // Opposite axes, equal cones, and one inside the other.
+        let up = EmissionCone::flat(Vec3::Y);
+        assert_eq!(up.union(&EmissionCone::flat(-Vec3::Y)).spread, PI);
+        assert_eq!(up.union(&up), up);
+        assert_eq!(EmissionCone::SPHERE.union(&up).spread, PI);
+    }
+
+    #[test]
+    fn the_measure_is_that_of_the_paper() {
+        // A flat surface: 0 + pi / 2 (0 - cos(-pi) - 0 + 1) = pi. Everywhere: 4 pi.
+        assert!((EmissionCone::flat(Vec3::Y).measure() - PI).abs() < 1e-5);
+        assert!((EmissionCone::SPHERE.measure() - 4.0 * PI).abs() < 1e-4);
+    }
+}

@@ -48,8 +48,9 @@ struct NearLights {
     share: f32,
 }
 
-/// From so many lights on that are not at infinity, a tree chooses.
-const TREE_FROM: usize = 3;
+/// From so many lights on that are not at infinity, a tree chooses. Where time is equal, it halves the error of 16 lights, and gains nothing
+/// on 3 or 4.
+const TREE_FROM: usize = 6;
 
 /// Least share of the choices for lights at infinity, and for all others, if both exist.
 const LEAST_SHARE: f64 = 0.25;
@@ -206,7 +207,7 @@ mod tests {
 
     #[test]
     fn probabilities_add_up_and_are_those_of_the_choice() {
-        let sun = Light::Directional(DirectionalLight::new(-DVec3::Y, Rgb::splat(3.0), 0.01));
+        let sun = Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::splat(3.0), 0.01)));
         let sky = Light::Environment(Environment::Constant(Rgb::splat(1e-9)));
         let lights = set(vec![point(1.0), sun, point(0.0), point(1e-30), sky, point(50.0)]);
         let n = 1 << 20;
@@ -236,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_sharp_sun_is_not_visible_and_no_light_is_no_choice() {
-        let lights = set(vec![Light::Directional(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0))]);
+        let lights = set(vec![Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0)))]);
         assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0)) == 1.0);
         assert!(LightSet::default().choose(0.5).is_none() && LightSet::default().is_empty());
         assert!(set(vec![point(0.0)]).choose(0.5).is_none());

@@ -1,6 +1,7 @@
 //! Building a light tree from the top: the group of greatest cost is split until a node is full.
 
-use super::{LEAF, LightTree, NONE, Node, Place, WIDTH};
+use super::node::{Node, WIDTH};
+use super::{LEAF, LightTree, NONE, Place};
 use crate::light::bounds::LightBounds;
 use crate::math::Aabb;
 
