@@ -30,15 +30,22 @@ static struct StRay ray_of_lane(const float *rays, unsigned n, unsigned lane) {
     return ray;
 }
 
+static uint32_t key_of_lane(const float *rays, unsigned n, unsigned lane) {
+    return ((const uint32_t *)rays)[ID * n + lane];
+}
+
+static void set_bounds(struct RTCBounds *bounds, const float *lower, const float *upper) {
+    bounds->lower_x = lower[0];
+    bounds->lower_y = lower[1];
+    bounds->lower_z = lower[2];
+    bounds->upper_x = upper[0];
+    bounds->upper_y = upper[1];
+    bounds->upper_z = upper[2];
+}
+
 static void user_bounds(const struct RTCBoundsFunctionArguments *args) {
     const struct StUserShape *shape = args->geometryUserPtr;
-    struct RTCBounds *bounds = args->bounds_o;
-    bounds->lower_x = shape->lower[0];
-    bounds->lower_y = shape->lower[1];
-    bounds->lower_z = shape->lower[2];
-    bounds->upper_x = shape->upper[0];
-    bounds->upper_y = shape->upper[1];
-    bounds->upper_z = shape->upper[2];
+    set_bounds(args->bounds_o, shape->lower, shape->upper);
 }
 
 static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
@@ -50,7 +57,7 @@ static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
     for (unsigned lane = 0; lane < n; lane++) {
         if (args->valid[lane] != -1) continue;
         const struct StRay ray = ray_of_lane(rays, n, lane);
-        const float t = shape->intersect(shape->shape, &ray);
+        const float t = shape->intersect(shape->shape, &ray, key_of_lane(rays, n, lane), args->context->instID[0]);
         if (!(t >= 0.0f)) continue;
         rays[TFAR * n + lane] = t;
         reals[NG_X * n + lane] = 0.0f;
@@ -71,26 +78,56 @@ static void user_occluded(const struct RTCOccludedFunctionNArguments *args) {
     for (unsigned lane = 0; lane < n; lane++) {
         if (args->valid[lane] != -1) continue;
         const struct StRay ray = ray_of_lane(rays, n, lane);
-        if (shape->intersect(shape->shape, &ray) >= 0.0f) rays[TFAR * n + lane] = -INFINITY;
+        const float t = shape->intersect(shape->shape, &ray, key_of_lane(rays, n, lane), args->context->instID[0]);
+        if (t >= 0.0f) rays[TFAR * n + lane] = -INFINITY;
     }
 }
 
-RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape) {
+static RTCGeometry new_user_geometry(
+    RTCDevice device, const void *user, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect, RTCOccludedFunctionN occluded
+) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
     if (!geometry) return NULL;
     rtcSetGeometryUserPrimitiveCount(geometry, 1);
-    rtcSetGeometryUserData(geometry, (void *)shape);
-    rtcSetGeometryBoundsFunction(geometry, user_bounds, NULL);
-    rtcSetGeometryIntersectFunction(geometry, user_intersect);
-    rtcSetGeometryOccludedFunction(geometry, user_occluded);
+    rtcSetGeometryUserData(geometry, (void *)user);
+    rtcSetGeometryBoundsFunction(geometry, bounds, NULL);
+    rtcSetGeometryIntersectFunction(geometry, intersect);
+    rtcSetGeometryOccludedFunction(geometry, occluded);
     rtcCommitGeometry(geometry);
     return geometry;
+}
+
+RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape) {
+    return new_user_geometry(device, shape, user_bounds, user_intersect, user_occluded);
+}
+
+static void filter(const struct RTCFilterFunctionNArguments *args) {
+    const struct StCutout *cutout = args->geometryUserPtr;
+    const unsigned n = args->N;
+    const float *rays = (const float *)args->ray;
+    const float *reals = (const float *)args->hit;
+    const unsigned *ids = (const unsigned *)reals;
+    for (unsigned lane = 0; lane < n; lane++) {
+        if (args->valid[lane] != -1) continue;
+        const struct StRay ray = ray_of_lane(rays, n, lane);
+        const struct StHit hit = {
+            ray.t_max, reals[U * n + lane], reals[V * n + lane],
+            ids[PRIM_ID * n + lane], ids[GEOM_ID * n + lane], ids[INST_ID * n + lane],
+        };
+        if (!cutout->counts(cutout->user, &ray, key_of_lane(rays, n, lane), &hit)) args->valid[lane] = 0;
+    }
+}
+
+void st_set_cutout(RTCGeometry triangles, const struct StCutout *cutout) {
+    rtcSetGeometryUserData(triangles, (void *)cutout);
+    rtcSetGeometryIntersectFilterFunction(triangles, filter);
+    rtcSetGeometryOccludedFilterFunction(triangles, filter);
 }
 
 typedef float Float4 __attribute__((vector_size(16), may_alias));
 
 /* Written in pieces of 16 bytes, which Embree reads at once; smaller ones could not be forwarded from the store buffer. */
-static inline void set_ray(struct RTCRay *out, const struct StRay *ray) {
+static inline void set_ray(struct RTCRay *out, const struct StRay *ray, uint32_t key) {
     Float4 direction_time;
     memcpy(&direction_time, ray->direction, sizeof direction_time);
     direction_time[3] = ray->time;
@@ -98,7 +135,7 @@ static inline void set_ray(struct RTCRay *out, const struct StRay *ray) {
     memcpy(&out->dir_x, &direction_time, sizeof direction_time);
     out->tfar = ray->t_max;
     out->mask = 0xffffffffu;
-    out->id = 0;
+    out->id = key;
     out->flags = 0;
 }
 
@@ -129,39 +166,95 @@ void st_fill16(struct RTCRay16 *packet, const struct StRay *rays) {
     }
 }
 
-static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit);
-static void trace_any(RTCScene scene, struct RTCRay *ray);
+/* Through `instance`, whose number hits then have; RTC_INVALID_GEOMETRY_ID in the world. */
+static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit, unsigned instance);
+static void trace_any(RTCScene scene, struct RTCRay *ray, unsigned instance);
 
-bool st_intersect1(RTCScene scene, const struct StRay *ray, struct StHit *hit) {
+static void moving_bounds(const struct RTCBoundsFunctionArguments *args) {
+    const struct StMovingInstance *instance = args->geometryUserPtr;
+    set_bounds(args->bounds_o, instance->lower, instance->upper);
+}
+
+static void moving_intersect(const struct RTCIntersectFunctionNArguments *args) {
+    const struct StMovingInstance *instance = args->geometryUserPtr;
+    const unsigned n = args->N;
+    float *rays = (float *)args->rayhit;
+    float *reals = rays + HIT * n;
+    unsigned *ids = (unsigned *)reals;
+    for (unsigned lane = 0; lane < n; lane++) {
+        if (args->valid[lane] != -1) continue;
+        const struct StRay ray = ray_of_lane(rays, n, lane);
+        struct StRay inside;
+        if (!instance->enter(instance->instance, &ray, &inside)) continue;
+        struct RTCRayHit rayhit;
+        set_ray(&rayhit.ray, &inside, key_of_lane(rays, n, lane));
+        rayhit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        trace_closest(instance->object, &rayhit, args->geomID);
+        if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+        rays[TFAR * n + lane] = rayhit.ray.tfar;
+        reals[NG_X * n + lane] = rayhit.hit.Ng_x;
+        reals[NG_Y * n + lane] = rayhit.hit.Ng_y;
+        reals[NG_Z * n + lane] = rayhit.hit.Ng_z;
+        reals[U * n + lane] = rayhit.hit.u;
+        reals[V * n + lane] = rayhit.hit.v;
+        ids[PRIM_ID * n + lane] = rayhit.hit.primID;
+        ids[GEOM_ID * n + lane] = rayhit.hit.geomID;
+        ids[INST_ID * n + lane] = args->geomID;
+    }
+}
+
+static void moving_occluded(const struct RTCOccludedFunctionNArguments *args) {
+    const struct StMovingInstance *instance = args->geometryUserPtr;
+    const unsigned n = args->N;
+    float *rays = (float *)args->ray;
+    for (unsigned lane = 0; lane < n; lane++) {
+        if (args->valid[lane] != -1) continue;
+        const struct StRay ray = ray_of_lane(rays, n, lane);
+        struct StRay inside;
+        if (!instance->enter(instance->instance, &ray, &inside)) continue;
+        struct RTCRay traced;
+        set_ray(&traced, &inside, key_of_lane(rays, n, lane));
+        trace_any(instance->object, &traced, args->geomID);
+        if (traced.tfar < 0.0f) rays[TFAR * n + lane] = -INFINITY;
+    }
+}
+
+RTCGeometry st_new_moving_instance(RTCDevice device, const struct StMovingInstance *instance) {
+    return new_user_geometry(device, instance, moving_bounds, moving_intersect, moving_occluded);
+}
+
+bool st_intersect1(RTCScene scene, const struct StRay *ray, uint32_t key, struct StHit *hit) {
     struct RTCRayHit rayhit;
-    set_ray(&rayhit.ray, ray);
+    set_ray(&rayhit.ray, ray, key);
     rayhit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rayhit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    trace_closest(scene, &rayhit);
+    trace_closest(scene, &rayhit, RTC_INVALID_GEOMETRY_ID);
     if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
     const struct StHit found = {rayhit.ray.tfar, rayhit.hit.u, rayhit.hit.v, rayhit.hit.primID, rayhit.hit.geomID, rayhit.hit.instID[0]};
     *hit = found;
     return true;
 }
 
-bool st_occluded1(RTCScene scene, const struct StRay *ray) {
+bool st_occluded1(RTCScene scene, const struct StRay *ray, uint32_t key) {
     struct RTCRay traced;
-    set_ray(&traced, ray);
-    trace_any(scene, &traced);
+    set_ray(&traced, ray, key);
+    trace_any(scene, &traced, RTC_INVALID_GEOMETRY_ID);
     return traced.tfar < 0.0f;
 }
 
 #if RTC_VERSION_MAJOR == 3
 
-static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit) {
+static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit, unsigned instance) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    context.instID[0] = instance;
     rtcIntersect1(scene, &context, rayhit);
 }
 
-static void trace_any(RTCScene scene, struct RTCRay *ray) {
+static void trace_any(RTCScene scene, struct RTCRay *ray, unsigned instance) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    context.instID[0] = instance;
     rtcOccluded1(scene, &context, ray);
 }
 
@@ -181,12 +274,24 @@ void st_occluded16(RTCScene scene, const int32_t *valid, struct RTCRay16 *rays, 
 
 #else
 
-static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit) {
-    rtcIntersect1(scene, rayhit, NULL);
+static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit, unsigned instance) {
+    struct RTCRayQueryContext context;
+    struct RTCIntersectArguments args;
+    rtcInitRayQueryContext(&context);
+    rtcInitIntersectArguments(&args);
+    context.instID[0] = instance;
+    args.context = &context;
+    rtcIntersect1(scene, rayhit, &args);
 }
 
-static void trace_any(RTCScene scene, struct RTCRay *ray) {
-    rtcOccluded1(scene, ray, NULL);
+static void trace_any(RTCScene scene, struct RTCRay *ray, unsigned instance) {
+    struct RTCRayQueryContext context;
+    struct RTCOccludedArguments args;
+    rtcInitRayQueryContext(&context);
+    rtcInitOccludedArguments(&args);
+    context.instID[0] = instance;
+    args.context = &context;
+    rtcOccluded1(scene, ray, &args);
 }
 
 void st_intersect16(RTCScene scene, const int32_t *valid, struct RTCRayHit16 *rayhits, bool coherent) {

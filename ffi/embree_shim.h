@@ -24,8 +24,17 @@ struct StRay {
     float time;
 };
 
-/* The distance at which `ray` hits `shape`, within the ray's interval; negative on a miss. */
-typedef float (*StIntersect)(const void *shape, const struct StRay *ray);
+/* A hit under Embree's numbers. */
+struct StHit {
+    float t, u, v;
+    uint32_t prim, geometry, instance;
+};
+
+/* The distance at which `ray` hits `shape`, within the ray's interval; negative on a miss. `key` is the ray's id, `instance` Embree's. */
+typedef float (*StIntersect)(const void *shape, const struct StRay *ray, uint32_t key, uint32_t instance);
+
+/* Whether a hit of `ray` (in the space of `instance`) with the shape behind `user` counts. */
+typedef bool (*StCounts)(const void *user, const struct StRay *ray, uint32_t key, const struct StHit *hit);
 
 /* The user data of a user geometry: one primitive. It must outlive the geometry. */
 struct StUserShape {
@@ -35,20 +44,40 @@ struct StUserShape {
     float upper[3];
 };
 
+/*
+ * Writes `ray` in the space of an instance that moves, at the ray's time; false if it cannot be traced there.
+ */
+typedef bool (*StEnter)(const void *instance, const struct StRay *ray, struct StRay *inside);
+
+/* The user data of an instance that moves. It must outlive the geometry. */
+struct StMovingInstance {
+    const void *instance;
+    StEnter enter;
+    RTCScene object;
+    float lower[3];
+    float upper[3];
+};
+
+/* A new, committed geometry of one moving instance; null on an error. Its hits name the geometry's number as their instance. */
+RTCGeometry st_new_moving_instance(RTCDevice device, const struct StMovingInstance *instance);
+
 /* A new, committed geometry of one user primitive; null on an error. */
 RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape);
 
-/* A hit under Embree's numbers. */
-struct StHit {
-    float t, u, v;
-    uint32_t prim, geometry, instance;
+/* The user data of triangles with holes. It must outlive the geometry. */
+struct StCutout {
+    const void *user;
+    StCounts counts;
 };
 
-/* The closest hit, written to `hit`; false on a miss, when `hit` is left alone. */
-bool st_intersect1(RTCScene scene, const struct StRay *ray, struct StHit *hit);
+/* Lets hits of triangles count only where `cutout` says so. To be called before the geometry is committed. */
+void st_set_cutout(RTCGeometry triangles, const struct StCutout *cutout);
+
+/* The closest hit, written to `hit`; false on a miss, when `hit` is left alone. Callbacks get `key` as the ray's id. */
+bool st_intersect1(RTCScene scene, const struct StRay *ray, uint32_t key, struct StHit *hit);
 
 /* Whether there is any hit. */
-bool st_occluded1(RTCScene scene, const struct StRay *ray);
+bool st_occluded1(RTCScene scene, const struct StRay *ray, uint32_t key);
 
 /* Writes sixteen rays into the lanes of a packet; mask, id and flags stay as they are. */
 void st_fill16(struct RTCRay16 *packet, const struct StRay *rays);

@@ -46,6 +46,8 @@ pub struct Features {
     pub anisotropic: bool,
     /// The camera has a lens.
     pub lens: bool,
+    /// Something moves while the shutter is open.
+    pub motion: bool,
 }
 
 /// A scene ready to render.

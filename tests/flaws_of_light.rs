@@ -87,11 +87,14 @@ fn no_light_is_found_by_a_tolerance_that_depends_on_the_scale() {
 #[test]
 fn lights_shine_in_mirrors_and_through_glass() {
     let lamp = json!({ "type": "quad", "material": "black", "emission": { "radiance": [3, 2, 1] }, "origin": [-5, -5, 9], "edge_u": [10, 0, 0], "edge_v": [0, 10, 0], "reverse_normal": true });
-    for (material, factor) in [(json!({ "type": "mirror", "reflectance": 0.5 }), 0.5), (json!({ "type": "conductor", "metal": "silver", "tint": [0, 0, 0] }), 0.0)] {
+    for (material, factor) in [
+        (json!({ "type": "mirror", "reflectance": 0.5 }), 0.5),
+        (json!({ "type": "conductor", "metal": "silver", "tint": [0, 0, 0] }), 0.0),
+    ] {
         let scene = probe(
             [0.0, 0.0, 3.0],
             [0.0; 3],
-            json!({ "sampler": { "spp": 16 }, "integrator": { "max_depth": 3 }, "materials": { "m": material, "black": { "type": "diffuse", "albedo": 0 } },
+            json!({ "sampler": { "spp": 16 }, "integrator": { "type": "path", "max_depth": 3 }, "materials": { "m": material, "black": { "type": "diffuse", "albedo": 0 } },
                     "shapes": [{ "type": "quad", "material": "m" }, lamp] }),
         );
         assert!(pixels(&render(&scene)).all(|p| (p[0] - 3.0 * factor).abs() < 1e-5 && (p[2] - factor).abs() < 1e-5), "{factor}");
@@ -119,7 +122,8 @@ fn a_light_across_the_horizon_is_cut_there_and_never_negative() {
     let wall = json!({ "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [2, -1, -1.5], "edge_u": [0, 0, 3], "edge_v": [0, 2, 0] });
     let mut scene = floor_probe([0.0; 3], json!([wall]));
     // Without the floor in front of the wall nothing else would cut it.
-    scene["shapes"][0] = json!({ "type": "disk", "radius": 0.05, "material": "white", "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }] });
+    scene["shapes"][0] =
+        json!({ "type": "disk", "radius": 0.05, "material": "white", "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }] });
     let strip = |height: f64| (1.5 / (4.0f64 + height * height).sqrt()).atan() / (4.0 + height * height).sqrt() * 2.0;
     // Irradiance of a vertical strip seen along its normal: E = (atan(w/d) - d / sqrt(d² + h²) atan(w / sqrt(d² + h²))) for half-width w.
     let expected = (1.5f64 / 2.0).atan() - strip(1.0);
@@ -145,7 +149,7 @@ fn each_area_light_has_an_area_of_its_own() {
 fn environments_of_several_sizes_are_right_at_the_pole_and_across_the_seam() {
     // Rows at the pole where the sine is 0, a width shared between lights, and a seam that clamps: each is wrong by a lot here.
     let folder = Folder::new();
-    let write = |name: &str, size: [usize; 2], texel: &dyn Fn(usize, usize) -> f32| {
+    let write = |name: &str, size: [usize; 2], texel: &(dyn Fn(usize, usize) -> f32 + Sync)| {
         let path = folder.write(name, "");
         exr::prelude::write_rgb_file(&path, size[0], size[1], |x, y| [texel(x, y); 3].into()).unwrap();
         path.to_str().unwrap().to_owned()
@@ -181,7 +185,11 @@ fn environments_of_several_sizes_are_right_at_the_pole_and_across_the_seam() {
         scene["integrator"]["strategy"] = json!(strategy);
         let estimate = Estimate::of(&render(&scene), 0);
         // The brute-force sum is good to 1e-5.
-        assert!((estimate.mean - expected / PI).abs() < 5.5 * estimate.error + 2e-5 * expected, "{strategy}: {estimate:?} {}", expected / PI);
+        assert!(
+            (estimate.mean - expected / PI).abs() < 5.5 * estimate.error + 2e-5 * expected,
+            "{strategy}: {estimate:?} {}",
+            expected / PI
+        );
     }
 }
 
@@ -206,7 +214,7 @@ fn light_met_after_a_bounce_carries_the_paths_throughput() {
     let scene = probe(
         [0.0, 0.0, 3.0],
         [0.0; 3],
-        json!({ "sampler": { "spp": 16 }, "integrator": { "max_depth": 8, "rr_depth": 1 },
+        json!({ "sampler": { "spp": 16 }, "integrator": { "type": "path", "max_depth": 8, "rr_depth": 1 },
             "materials": { "blue": { "type": "mirror", "reflectance": [0.2, 0.4, 0.8] }, "red": { "type": "mirror", "reflectance": [0.5, 0.25, 0.125] }, "black": { "type": "diffuse", "albedo": 0 } },
             "shapes": [
                 { "type": "quad", "material": "blue", "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 45 } }] },
@@ -227,7 +235,11 @@ fn light_met_after_a_bounce_carries_the_paths_throughput() {
 #[test]
 fn roulette_gives_the_survivors_the_weight_of_the_dead_on_every_material_and_from_its_own_depth_on() {
     // A factor that is forgotten on glossy surfaces, or applied before roulette has begun, changes the mean with the depth.
-    for material in [json!({ "type": "diffuse", "albedo": 0.5 }), json!({ "type": "conductor", "metal": "copper", "alpha": 0.4 }), json!({ "type": "plastic", "albedo": 0.4, "alpha": 0.2 })] {
+    for material in [
+        json!({ "type": "diffuse", "albedo": 0.5 }),
+        json!({ "type": "conductor", "metal": "copper", "alpha": 0.4 }),
+        json!({ "type": "plastic", "albedo": 0.4, "alpha": 0.2 }),
+    ] {
         let mean = |rr_depth: u32| {
             let scene = json!({
                 "film": { "width": 16, "height": 16, "filter": { "type": "box" } },

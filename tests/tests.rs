@@ -4,10 +4,14 @@
 mod accel_agreement;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
+/// Accelerators compared from the command line.
+mod bench_accel;
 /// What the cameras of the scene file see.
 mod cameras;
 /// The program as a user runs it: exit codes, what it writes, what it says.
 mod cli;
+/// Surfaces with holes, the same ones for every accelerator and every kind of query.
+mod cutouts;
 /// What is not a ray, and what is hardly a triangle.
 mod degenerate_input;
 /// The same picture for any number of threads, any crop, any accelerator; samples can be replayed.
@@ -18,14 +22,16 @@ mod flaws_of_camera;
 mod flaws_of_light;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
-/// Meshes, comments, names and transforms of scene files, read as users write them.
-mod scene_files;
-/// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
-mod self_intersection;
 /// Measured and textured lights, lamps in objects, groups, clamping.
 mod lights;
 /// Choosing among many lights.
 mod many_lights;
+/// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
+mod motion;
+/// Meshes, comments, names and transforms of scene files, read as users write them.
+mod scene_files;
+/// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
+mod self_intersection;
 /// Layers, file lengths, unsafe code, printing.
 mod tidy;
 /// Shared helpers.

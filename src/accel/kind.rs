@@ -39,7 +39,7 @@ impl AccelKind {
     /// Every kind with default options, with the name users choose it by.
     pub const ALL: [(Self, &'static str); 5] = [
         (Self::EMBREE, "embree"),
-        (Self::Bvh(BvhOptions { spatial_splits: false, binary: false }), "bvh"),
+        (Self::Bvh(BvhOptions { binary: false }), "bvh"),
         (Self::KdTree(KdTreeOptions { median: false }), "kdtree"),
         (Self::Octree, "octree"),
         (Self::Linear, "linear"),
@@ -53,7 +53,6 @@ impl AccelKind {
         ("embree:fast", "not robust: rays may slip through edges; for comparisons"),
         ("embree:compact", "less memory, traced slower"),
         ("bvh", "bounding volume hierarchy: binned surface area heuristic, eight boxes a node, SIMD"),
-        ("bvh:spatial", "with spatial splits: built slower, traced faster where triangles are long"),
         ("bvh:binary", "two boxes a node, no SIMD"),
         ("kdtree", "kd-tree: surface area heuristic with a bonus for empty space"),
         ("kdtree:median", "split in the middle of the longest axis, as in textbooks"),
@@ -75,7 +74,7 @@ impl fmt::Display for AccelKind {
                 ("embree", quality.into_iter().chain(flags.into_iter().flatten()).collect())
             }
             Self::Bvh(o) => {
-                let flags = [o.spatial_splits.then_some("spatial"), o.binary.then_some("binary")];
+                let flags = [o.binary.then_some("binary")];
                 ("bvh", flags.into_iter().flatten().collect())
             }
             Self::KdTree(o) => ("kdtree", o.median.then_some("median").into_iter().collect()),
@@ -114,7 +113,6 @@ impl FromStr for AccelKind {
                 (Self::Embree(o), "high") => o.quality = EmbreeQuality::High,
                 (Self::Embree(o), "fast") => o.robust = false,
                 (Self::Embree(o), "compact") => o.compact = true,
-                (Self::Bvh(o), "spatial") => o.spatial_splits = true,
                 (Self::Bvh(o), "binary") => o.binary = true,
                 (Self::KdTree(o), "median") => o.median = true,
                 _ => return Err(unknown()),

@@ -38,6 +38,7 @@ impl Accelerator for LinearAccel<'_> {
         if !ray.is_valid() {
             return None;
         }
+        let key = self.geometry.cutouts.key(ray);
         let mut closest: Option<Hit> = None;
         self.any_group(ray, |local, ids, instance| {
             let mut local = *local;
@@ -45,8 +46,7 @@ impl Accelerator for LinearAccel<'_> {
                 for prim in self.prims(id) {
                     // One float beyond the best hit, so that a hit which rounds to the same distance takes part in the tie.
                     local.t_max = closest.map_or(ray.t_max, |best| best.t.next_up().min(ray.t_max));
-                    let Some(hit) = self.geometry.shape(id).intersect_prim(&local, id, prim) else { continue };
-                    let hit = Hit { instance, ..hit };
+                    let Some(hit) = self.geometry.intersect_prim(&local, key, id, prim, instance) else { continue };
                     if closest.is_none_or(|best| hit.is_before(&best)) {
                         closest = Some(hit);
                     }
@@ -58,11 +58,11 @@ impl Accelerator for LinearAccel<'_> {
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        let hits = |local: &Ray, id: ShapeId| {
-            let shape = self.geometry.shape(id);
-            self.prims(id).any(|prim| shape.intersect_prim(local, id, prim).is_some())
+        let key = self.geometry.cutouts.key(ray);
+        let hits = |local: &Ray, id: ShapeId, instance| {
+            self.prims(id).any(|prim| self.geometry.intersect_prim(local, key, id, prim, instance).is_some())
         };
-        ray.is_valid() && self.any_group(ray, |local, ids, _| ids.iter().any(|&id| hits(local, id)))
+        ray.is_valid() && self.any_group(ray, |local, ids, instance| ids.iter().any(|&id| hits(local, id, instance)))
     }
 
     fn bounds(&self) -> Aabb {

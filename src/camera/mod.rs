@@ -8,7 +8,7 @@ pub use lens::{Blades, Lens, lens_equation};
 
 use std::f64::consts::{PI, TAU};
 
-use crate::math::{DVec3, Ray, Transform, Vec2, Vec3};
+use crate::math::{DAffine3, DVec3, Motion, Ray, Transform, Vec2, Vec3};
 
 /// How points of the picture become directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +48,9 @@ impl Default for Framing {
 /// A camera that looks along its local -Z with +Y up.
 #[derive(Clone, Debug)]
 pub struct Camera {
+    /// At the opening of the shutter, if the camera moves.
     world_from_camera: Transform,
+    motion: Option<Box<Motion>>,
     projection: Projection,
     /// Of perspective and orthographic cameras.
     framing: Framing,
@@ -59,7 +61,7 @@ pub struct Camera {
 impl Camera {
     /// A camera placed by a rotation and translation.
     pub fn new(world_from_camera: Transform, projection: Projection) -> Self {
-        Self { world_from_camera, projection, framing: Framing::default(), near: 0.0, shutter: [0.0, 1.0] }
+        Self { world_from_camera, motion: None, projection, framing: Framing::default(), near: 0.0, shutter: [0.0, 1.0] }
     }
 
     /// This camera with another framing; environment cameras have none.
@@ -78,6 +80,19 @@ impl Camera {
     #[must_use]
     pub fn with_shutter(self, shutter: [f64; 2]) -> Self {
         Self { shutter, ..self }
+    }
+
+    /// This camera on the way of `motion`, which rotates and translates (and takes the place of where it stood). Its times are shares of the
+    /// shutter interval; a constant one makes the camera rest. `None` if the motion is singular.
+    pub fn with_motion(self, motion: Motion) -> Option<Self> {
+        let world_from_camera = Transform::new(motion.map_at(0.0))?;
+        let motion = motion.as_constant().is_none().then(|| Box::new(motion));
+        Some(Self { world_from_camera, motion, ..self })
+    }
+
+    /// Whether the camera moves while the shutter is open.
+    pub fn is_moving(&self) -> bool {
+        self.motion.is_some()
     }
 
     /// The projection.
@@ -109,15 +124,24 @@ impl Camera {
         if self.shutter[1] > self.shutter[0] { u } else { 0.0 }
     }
 
-    /// Where the camera stands.
+    /// Where the camera stands when the shutter opens.
     pub fn position(&self) -> DVec3 {
         self.world_from_camera.point(DVec3::ZERO)
     }
 
-    /// The ray through `film`, in pixels from the upper left corner of a picture of `size` pixels, from the point of the lens that `lens_u`
-    /// (in the unit square) chooses. The direction is unit.
+    /// Camera to world at the [time of a ray](Ray::time).
     #[inline]
-    pub fn ray(&self, film: Vec2, size: [u32; 2], lens_u: [f32; 2]) -> Ray {
+    fn map_at(&self, time: f32) -> DAffine3 {
+        match &self.motion {
+            None => self.world_from_camera.world_from_object,
+            Some(motion) => motion.map_at(f64::from(time)),
+        }
+    }
+
+    /// The ray through `film`, in pixels from the upper left corner of a picture of `size` pixels, from the point of the lens that `lens_u`
+    /// (in the unit square) chooses, at a [time](Self::time). The direction is unit.
+    #[inline]
+    pub fn ray(&self, film: Vec2, size: [u32; 2], lens_u: [f32; 2], time: f32) -> Ray {
         let (mut origin, direction) = match &self.projection {
             Projection::Perspective { half_height, lens } => {
                 let toward = self.on_picture(film, size, *half_height);
@@ -136,8 +160,9 @@ impl Camera {
             let unit = if matches!(self.projection, Projection::Environment) { 1.0 } else { -direction.z };
             origin += direction * (self.near / unit);
         }
-        let m = &self.world_from_camera;
-        Ray::new(m.point(origin).as_vec3(), m.vector(direction).normalize().as_vec3())
+        let map = self.map_at(time);
+        let (origin, direction) = (map.transform_point3(origin), map.transform_vector3(direction).normalize());
+        Ray { time, ..Ray::new(origin.as_vec3(), direction.as_vec3()) }
     }
 
     /// The point of a picture at z = -1.
@@ -151,22 +176,25 @@ impl Camera {
         DVec3::new(x, y, -1.0)
     }
 
-    /// Depth of a world point: along the view axis, or the distance from an environment camera.
+    /// Depth of a world point at the [time of a ray](Ray::time): along the view axis, or the distance from an environment camera.
     #[inline]
-    pub fn depth(&self, p: DVec3) -> f32 {
-        let local = self.world_from_camera.inverse_point(p);
+    pub fn depth(&self, p: DVec3, time: f32) -> f32 {
+        let local = match &self.motion {
+            None => self.world_from_camera.inverse_point(p),
+            Some(motion) => motion.map_at(f64::from(time)).inverse().transform_point3(p),
+        };
         match self.projection {
             Projection::Perspective { .. } | Projection::Orthographic { .. } => -local.z as f32,
             Projection::Environment => local.length() as f32,
         }
     }
 
-    /// Unit view direction in the world.
+    /// Unit view direction in the world when the shutter opens.
     pub fn axis(&self) -> Vec3 {
         self.world_from_camera.vector(-DVec3::Z).normalize().as_vec3()
     }
 
-    /// Unit upward direction in the world, perpendicular to the view direction.
+    /// Unit upward direction in the world, perpendicular to the view direction, when the shutter opens.
     pub fn up(&self) -> Vec3 {
         self.world_from_camera.vector(DVec3::Y).normalize().as_vec3()
     }

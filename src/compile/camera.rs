@@ -1,10 +1,11 @@
 //! The camera.
 
 use super::Files;
+use super::transforms::Shutter;
 use crate::camera::{Blades, Camera, Framing, Lens, Projection, lens_equation};
-use crate::desc::{CameraDesc, CameraKindDesc, LensDesc};
+use crate::desc::{CameraDesc, CameraKindDesc, KeyframeDesc, LensDesc};
 use crate::error::Result;
-use crate::math::{DAffine3, DMat3, DVec3, Transform};
+use crate::math::{DAffine3, DMat3, DVec3, Motion, Transform};
 
 const DEFAULT_FOV_DEGREES: f64 = 40.0;
 
@@ -35,11 +36,30 @@ pub fn compile(files: &Files, desc: &CameraDesc) -> Result<Camera> {
     if !(desc.near >= 0.0 && desc.near.is_finite()) {
         return Err(files.error("camera.near", format!("must be finite and not negative, not {}", desc.near)));
     }
+    let motion = motion(files, &desc.motion, &map, shutter(files, desc)?)?;
+    let camera = Camera::new(transform, projection).with_framing(framing(files, desc)?).with_near(desc.near).with_shutter(desc.shutter);
+    camera.with_motion(motion).ok_or_else(|| files.error("camera.motion", "the motion is singular"))
+}
+
+/// When the shutter is open.
+pub fn shutter(files: &Files, desc: &CameraDesc) -> Result<Shutter> {
     let [open, close] = desc.shutter;
-    if !(open.is_finite() && close.is_finite() && open <= close) {
-        return Err(files.error("camera.shutter", format!("must be finite and not close before it opens, not [{open}, {close}]")));
+    if !(open.is_finite() && close.is_finite() && open <= close && (close - open).is_finite()) {
+        return Err(files.error("camera.shutter", format!("must be finite and not close before it opens, not {:?}", desc.shutter)));
     }
-    Ok(Camera::new(transform, projection).with_framing(framing(files, desc)?).with_near(desc.near).with_shutter(desc.shutter))
+    Ok(Shutter { open, close })
+}
+
+/// How the camera moves from where `map` puts it.
+fn motion(files: &Files, keyframes: &[KeyframeDesc], map: &DAffine3, shutter: Shutter) -> Result<Motion> {
+    for (i, keyframe) in keyframes.iter().enumerate() {
+        let path = format!("camera.motion[{i}].transform");
+        let step = files.transform(&path, &keyframe.transform, &DAffine3::IDENTITY)?;
+        if step.swaps_handedness() || !step.uniform_scale().is_some_and(|scale| (scale - 1.0).abs() < 1e-6) {
+            return Err(files.error(&path, "must be a rotation and translation: a camera cannot be scaled"));
+        }
+    }
+    files.motion("camera.motion", keyframes, map, shutter)
 }
 
 /// Keys that mean nothing to this type of camera.
@@ -119,7 +139,9 @@ fn compile_lens(files: &Files, desc: &LensDesc, camera: &Transform, half_height:
         }
         (Some(f), Some(a), None) => {
             let b = lens_equation(f, a).filter(|b| b.is_finite());
-            let b = b.ok_or_else(|| files.error("camera.lens", format!("nothing is in focus: the sensor's distance {a} must be above the focal length {f}")))?;
+            let b = b.ok_or_else(|| {
+                files.error("camera.lens", format!("nothing is in focus: the sensor's distance {a} must be above the focal length {f}"))
+            })?;
             (Some(f), b)
         }
         (None, Some(a), Some(b)) => (Some(1.0 / (1.0 / a + 1.0 / b)), b),

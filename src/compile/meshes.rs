@@ -5,42 +5,62 @@ use std::collections::HashMap;
 use super::Files;
 use crate::desc::{MeshDesc, MeshShadingDesc};
 use crate::error::{Error, Result};
-use crate::geometry::{Mesh, MeshError};
+use crate::geometry::{Mesh, MeshError, MeshStep};
 use crate::import::{self, AssetError, MeshData, ObjMaterial};
 use crate::math::{DVec3, Transform, Vec3};
 
 /// A mesh as given, with the material that its file names.
 pub struct LoadedMesh {
     pub data: MeshData,
+    /// Its vertices at later times.
+    pub later: Vec<MeshData>,
     pub material: Option<ObjMaterial>,
 }
 
 /// The meshes of a shape: several where an OBJ has several materials.
 pub fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
-    let place = format!("{path}.file");
     match (&desc.file, &desc.positions, &desc.triangles) {
-        (Some(file), None, None) if desc.normals.is_none() && desc.uvs.is_none() => {
-            let asset = files.asset(file);
-            let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
-            let loaded = match extension.as_deref() {
-                Some("ply") => import::read_ply(&asset).map(|data| vec![LoadedMesh { data, material: None }]),
-                Some("obj") => import::read_obj(&asset, desc.material.is_none())
-                    .map(|meshes| meshes.into_iter().map(|mesh| LoadedMesh { data: mesh.mesh, material: mesh.material }).collect()),
-                _ => Err(AssetError::Malformed("meshes are .obj or .ply files".into())),
-            };
-            loaded.map_err(|e| files.asset_error(&place, &asset, e))
+        (Some(file), None, None) if desc.normals.is_none() && desc.uvs.is_none() && desc.deform_positions.is_empty() => {
+            let mut meshes = load_file(files, &format!("{path}.file"), file, desc.material.is_none())?;
+            for (i, file) in desc.deform_files.iter().enumerate() {
+                let place = format!("{path}.deform_files[{i}]");
+                let later = load_file(files, &place, file, desc.material.is_none())?;
+                if later.len() != meshes.len() || meshes.iter().zip(&later).any(|(a, b)| a.data.triangles != b.data.triangles) {
+                    return Err(files.error(&place, "the triangles are not those of `file`: only positions may differ"));
+                }
+                for (mesh, later) in meshes.iter_mut().zip(later) {
+                    mesh.later.push(later.data);
+                }
+            }
+            Ok(meshes)
         }
-        (None, Some(positions), Some(triangles)) => {
+        (None, Some(positions), Some(triangles)) if desc.deform_files.is_empty() => {
             let data = MeshData {
                 positions: positions.clone(),
                 triangles: triangles.clone(),
                 normals: desc.normals.clone(),
                 uvs: desc.uvs.clone(),
             };
-            Ok(vec![LoadedMesh { data, material: None }])
+            let at = |positions: &Vec<[f32; 3]>| MeshData { positions: positions.clone(), ..data.clone() };
+            let later = desc.deform_positions.iter().map(at).collect();
+            Ok(vec![LoadedMesh { data, later, material: None }])
         }
         _ => Err(files.error(path, "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals` and `uvs`)")),
     }
+}
+
+fn load_file(files: &Files, place: &str, file: &str, with_materials: bool) -> Result<Vec<LoadedMesh>> {
+    let asset = files.asset(file);
+    let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let plain = |data, material| LoadedMesh { data, later: Vec::new(), material };
+    let loaded = match extension.as_deref() {
+        Some("ply") => import::read_ply(&asset).map(|data| vec![plain(data, None)]),
+        Some("obj") => {
+            import::read_obj(&asset, with_materials).map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect())
+        }
+        _ => Err(AssetError::Malformed("meshes are .obj or .ply files".into())),
+    };
+    loaded.map_err(|e| files.asset_error(place, &asset, e))
 }
 
 /// How a mesh is placed.
@@ -61,7 +81,7 @@ pub fn refusal(files: &Files, path: &str, file: Option<&str>, message: String) -
 
 /// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the front. Triangles
 /// without area are dropped with a warning. `file` is where the mesh came from.
-pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, placement: Placement) -> Result<Mesh> {
+pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, later: Vec<MeshData>, placement: Placement) -> Result<Mesh> {
     let refuse = |error: MeshError| refusal(files, path, file, error.to_string());
     let count = data.positions.len();
     if let Some((triangle, index)) = out_of_range(&data) {
@@ -69,18 +89,22 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, plac
     }
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
-    let mut positions = data.positions;
-    if !is_identity {
-        for p in &mut positions {
-            *p = transform.point(DVec3::from(p.map(f64::from))).as_vec3().to_array();
+    let place_positions = |mut positions: Vec<[f32; 3]>| {
+        if !is_identity {
+            for p in &mut positions {
+                *p = transform.point(DVec3::from(p.map(f64::from))).as_vec3().to_array();
+            }
         }
-    }
+        positions
+    };
+    let positions = place_positions(data.positions);
     let mut triangles = data.triangles;
     if transform.swaps_handedness() != placement.reverse_normal {
         triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
     let before = triangles.len();
-    triangles.retain(|t| has_area(t.map(|i| Vec3::from(positions[i as usize]))));
+    // What deforms may get an area later.
+    triangles.retain(|t| !later.is_empty() || has_area(t.map(|i| Vec3::from(positions[i as usize]))));
     let dropped = before - triangles.len();
     if dropped > 0 {
         if triangles.is_empty() {
@@ -89,15 +113,22 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, plac
         tracing::warn!("{}: {path}: {dropped} of {before} triangles have no area and were dropped", files.scene.display());
     }
 
-    let normals = match placement.shading {
-        MeshShadingDesc::Flat => None,
-        MeshShadingDesc::Auto | MeshShadingDesc::Smooth => match data.normals {
-            Some(normals) => Some(place_normals(normals, transform, placement.reverse_normal)),
-            None if placement.shading == MeshShadingDesc::Smooth => Some(smooth_normals(&positions, &triangles)),
-            None => None,
-        },
+    let find_normals = |given: Option<Vec<[f32; 3]>>, positions: &[[f32; 3]]| match (placement.shading, given) {
+        (MeshShadingDesc::Flat, _) | (MeshShadingDesc::Auto, None) => None,
+        (_, Some(normals)) => Some(place_normals(normals, transform, placement.reverse_normal)),
+        (MeshShadingDesc::Smooth, None) => Some(smooth_normals(positions, &triangles)),
     };
-    Mesh::new(positions, triangles, normals, data.uvs).map_err(refuse)
+    let normals = find_normals(data.normals, &positions);
+    let mut steps = Vec::with_capacity(later.len());
+    for step in later {
+        if step.positions.len() != count {
+            return Err(refuse(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices: count }));
+        }
+        let positions = place_positions(step.positions);
+        steps.push(MeshStep { normals: find_normals(step.normals, &positions), positions });
+    }
+    let mesh = Mesh::new(positions, triangles, normals, data.uvs).map_err(refuse)?;
+    if steps.is_empty() { Ok(mesh) } else { mesh.deforming(steps).map_err(refuse) }
 }
 
 fn out_of_range(data: &MeshData) -> Option<(usize, u32)> {

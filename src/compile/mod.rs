@@ -30,6 +30,7 @@ use crate::scene::{Features, Scene, Surface};
 
 use lights::LightTable;
 use materials::MaterialTable;
+use transforms::Shutter;
 
 /// Compiles a scene; the files it names are looked up beside `scene_file`.
 ///
@@ -39,8 +40,10 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
     check_settings(desc, scene_file)?;
     let files = Files { scene: scene_file.into() };
     let camera = camera::compile(&files, &desc.camera)?;
+    let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
-    let mut builder = Builder { files, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: LightTable::default() };
+    let mut builder =
+        Builder { files, shutter, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: LightTable::default() };
     builder.add_world(desc)?;
     for (i, light) in desc.lights.iter().enumerate() {
         let path = format!("lights[{i}]");
@@ -86,6 +89,7 @@ impl Files {
 /// A scene under construction.
 struct Builder {
     files: Files,
+    shutter: Shutter,
     materials: MaterialTable,
     geometry: Geometry,
     /// By shape.
@@ -117,6 +121,7 @@ impl Builder {
             delta_materials: materials.iter().any(Material::is_delta),
             anisotropic: has_bsdf(Bsdf::is_anisotropic),
             lens: camera.lens().is_some(),
+            motion: self.geometry.is_moving() || camera.is_moving(),
         };
         Ok(Scene {
             geometry: self.geometry,

@@ -10,11 +10,13 @@ use crate::desc::{InstanceDesc, SceneDesc};
 use crate::error::Result;
 use crate::geometry::{Instance, Object};
 use crate::id::ObjectId;
-use crate::math::DAffine3;
+use crate::math::{DAffine3, Motion};
 
 /// An object in parts: what its instances share, and what each of them has of its own.
 struct PreparedObject {
     shared: Option<ObjectId>,
+    /// Shapes that move in it.
+    movers: Vec<(ObjectId, Motion)>,
     emitters: Vec<PreparedShape>,
 }
 
@@ -23,8 +25,13 @@ impl Builder {
     pub(super) fn add_world(&mut self, desc: &SceneDesc) -> Result<()> {
         for (i, shape) in desc.shapes.iter().enumerate() {
             for prepared in self.prepare(&format!("shapes[{i}]"), shape)? {
-                let id = self.place(prepared, &DAffine3::IDENTITY)?;
-                self.geometry.world.push(id);
+                if let Some(motion) = prepared.motion.clone() {
+                    let object = self.group(vec![prepared])?;
+                    self.push_instance(&format!("shapes[{i}].motion"), object, &motion)?;
+                } else {
+                    let id = self.place(prepared, &DAffine3::IDENTITY)?;
+                    self.geometry.world.push(id);
+                }
             }
         }
 
@@ -41,22 +48,38 @@ impl Builder {
                 tracing::warn!("{}: objects.{name}: no instance places this object", self.files.scene.display());
             }
         }
-        let world = Level { desc, nesting: &nesting, objects: &objects, path: "instances", outer: DAffine3::IDENTITY };
+        let world = Level { desc, nesting: &nesting, objects: &objects, path: "instances", outer: &Motion::constant(DAffine3::IDENTITY) };
         self.add_instances(&world, &desc.instances)
     }
 
-    /// The shapes of an object: what does not emit goes into a group for all instances.
+    /// The shapes of an object: what neither emits nor moves goes into a group for all instances.
     fn share(&mut self, shapes: Vec<PreparedShape>) -> Result<PreparedObject> {
         let (emitters, others): (Vec<_>, Vec<_>) = shapes.into_iter().partition(|shape| shape.emission.is_some());
+        let (moving, resting): (Vec<_>, Vec<_>) = others.into_iter().partition(|shape| shape.motion.is_some());
+        let shared = if resting.is_empty() { None } else { Some(self.group(resting)?) };
+        let mut movers = Vec::new();
+        for shape in moving {
+            if let Some(motion) = shape.motion.clone() {
+                movers.push((self.group(vec![shape])?, motion));
+            }
+        }
+        Ok(PreparedObject { shared, movers, emitters })
+    }
+
+    /// An object of these shapes.
+    fn group(&mut self, shapes: Vec<PreparedShape>) -> Result<ObjectId> {
         let mut object = Object::default();
-        for shape in others {
+        for shape in shapes {
             object.shapes.push(self.place(shape, &DAffine3::IDENTITY)?);
         }
-        let shared = (!object.shapes.is_empty()).then(|| {
-            self.geometry.objects.push(object);
-            ObjectId::new(self.geometry.objects.len() - 1)
-        });
-        Ok(PreparedObject { shared, emitters })
+        self.geometry.objects.push(object);
+        Ok(ObjectId::new(self.geometry.objects.len() - 1))
+    }
+
+    fn push_instance(&mut self, path: &str, object: ObjectId, motion: &Motion) -> Result<()> {
+        let instance = Instance::moving(object, motion.clone()).ok_or_else(|| self.files.error(path, super::SINGULAR))?;
+        self.geometry.instances.push(instance);
+        Ok(())
     }
 
     /// Adds instances and those inside of them; [`Nesting`] has checked that this ends.
@@ -69,18 +92,25 @@ impl Builder {
             if level.nesting.is_empty(name) {
                 continue;
             }
-            let path = format!("{}[{i}].transform", level.path);
-            let transform = self.files.transform(&path, &instance.transform, &level.outer)?;
+            let path = format!("{}[{i}]", level.path);
+            let place = format!("{path}.transform");
+            let map = self.files.transform(&place, &instance.transform, &DAffine3::IDENTITY)?.world_from_object;
+            let outer = level.outer.after(&self.files.motion(&format!("{path}.motion"), &instance.motion, &map, self.shutter)?);
             if let Some(object) = object.shared {
-                self.geometry.instances.push(Instance { object, transform });
+                self.push_instance(&place, object, &outer)?;
             }
-            let outer = transform.world_from_object;
+            for (object, motion) in &object.movers {
+                self.push_instance(&place, *object, &outer.after(motion))?;
+            }
             for emitter in &object.emitters {
+                let outer = outer.as_constant().ok_or_else(|| {
+                    self.files.error(&format!("{path}.motion"), format!("object \"{name}\" gives off light and cannot move"))
+                })?;
                 let id = self.place(emitter.clone(), &outer)?;
                 self.geometry.world.push(id);
             }
             let path = format!("objects.{name}.instances");
-            self.add_instances(&Level { path: &path, outer, ..*level }, &inner.instances)?;
+            self.add_instances(&Level { path: &path, outer: &outer, ..*level }, &inner.instances)?;
         }
         Ok(())
     }
@@ -93,5 +123,5 @@ struct Level<'a> {
     nesting: &'a Nesting<'a>,
     objects: &'a BTreeMap<&'a str, PreparedObject>,
     path: &'a str,
-    outer: DAffine3,
+    outer: &'a Motion,
 }

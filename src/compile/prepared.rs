@@ -9,7 +9,7 @@ use crate::id::{LightGroupId, MaterialId, ShapeId};
 use crate::import::MeshData;
 use crate::light::{AreaLight, Emission, Light};
 use crate::material::ColorInput;
-use crate::math::{DAffine3, Transform};
+use crate::math::{DAffine3, Motion, Transform};
 use crate::scene::Surface;
 
 /// A shape that knows everything but its final place.
@@ -18,6 +18,8 @@ pub struct PreparedShape {
     form: Form,
     /// The shape's own transform.
     map: DAffine3,
+    /// How it moves, its own transform included.
+    pub motion: Option<Motion>,
     reverse_normal: bool,
     material: MaterialId,
     /// Light that it gives off, not black.
@@ -39,6 +41,8 @@ enum Form {
     Mesh {
         data: MeshData,
         shading: MeshShadingDesc,
+        /// Its vertices at later times.
+        later: Vec<MeshData>,
         /// Where it was read, relative to the scene.
         file: Option<String>,
     },
@@ -51,17 +55,22 @@ impl Builder {
         let material = self.materials.find(&self.files, path, common.material)?;
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
+        let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map, self.shutter)?;
+        let motion = motion.as_constant().is_none().then_some(motion);
         let emission = self.emission(path, &common)?;
+        if motion.is_some() && emission.is_some() {
+            return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
+        }
         let form = match desc {
-            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, material, emission),
-            ShapeDesc::Cube(_) => Form::Mesh { data: meshes::cube(), shading: MeshShadingDesc::Flat, file: None },
+            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), material, emission),
+            ShapeDesc::Cube(_) => Form::Mesh { data: meshes::cube(), shading: MeshShadingDesc::Flat, later: Vec::new(), file: None },
             _ => match shapes::compile(&self.files, path, desc)? {
                 Some(surface) => Form::Analytic(surface),
                 None => return Ok(Vec::new()),
             },
         };
         let reverse_normal = common.reverse_normal;
-        Ok(vec![PreparedShape { form, map, reverse_normal, material, emission, path: path.into() }])
+        Ok(vec![PreparedShape { form, map, motion, reverse_normal, material, emission, path: path.into() }])
     }
 
     fn prepare_mesh(
@@ -69,21 +78,28 @@ impl Builder {
         path: &str,
         desc: &MeshDesc,
         map: &DAffine3,
+        motion: Option<&Motion>,
         material: MaterialId,
         emission: Option<PreparedEmission>,
     ) -> Result<Vec<PreparedShape>> {
         let mut prepared = Vec::new();
         for loaded in meshes::load(&self.files, path, desc)? {
+            let moves = motion.is_some() || !loaded.later.is_empty();
             let (mut material, mut emission) = (material, emission);
             if let Some(mtl) = &loaded.material {
                 let from_mtl =
                     materials::from_mtl(mtl).map_err(|message| meshes::refusal(&self.files, path, desc.file.as_deref(), message))?;
                 material = self.materials.push(from_mtl.material);
-                emission = emission.or(from_mtl.radiance.map(|radiance| PreparedEmission { emission: Emission::constant(radiance), group: None }));
+                emission =
+                    emission.or(from_mtl.radiance.map(|radiance| PreparedEmission { emission: Emission::constant(radiance), group: None }));
+            }
+            if moves && emission.is_some() {
+                return Err(self.files.error(path, "a shape that gives off light cannot move"));
             }
             prepared.push(PreparedShape {
-                form: Form::Mesh { data: loaded.data, shading: desc.shading, file: desc.file.clone() },
+                form: Form::Mesh { data: loaded.data, shading: desc.shading, later: loaded.later, file: desc.file.clone() },
                 map: *map,
+                motion: motion.cloned(),
                 reverse_normal: desc.reverse_normal,
                 material,
                 emission,
@@ -114,7 +130,9 @@ impl Builder {
 
     /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
     pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3) -> Result<ShapeId> {
-        let PreparedShape { form, map, reverse_normal, material, emission, path } = prepared;
+        let PreparedShape { form, map, motion, reverse_normal, material, emission, path } = prepared;
+        // What moves is placed by its instance.
+        let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform = Transform::new(*outer * map).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
         let shape = match form {
             Form::Analytic(surface) => {
@@ -122,9 +140,9 @@ impl Builder {
                 placed.reverse_normal = reverse_normal;
                 Shape::Analytic(placed)
             }
-            Form::Mesh { data, shading, file } => {
+            Form::Mesh { data, shading, later, file } => {
                 let placement = meshes::Placement { transform: &transform, shading, reverse_normal };
-                Shape::Mesh(meshes::place(&self.files, &path, file.as_deref(), data, placement)?)
+                Shape::Mesh(meshes::place(&self.files, &path, file.as_deref(), data, later, placement)?)
             }
         };
         let bounds = shape.bounds();

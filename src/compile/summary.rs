@@ -125,6 +125,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (f.delta_materials, "mirror or glass"),
         (f.anisotropic, "anisotropic materials"),
         (f.lens, "lens"),
+        (f.motion, "motion"),
     ]
     .into_iter()
     .filter(|(used, _)| *used)

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::TransformDesc;
+use super::{KeyframeDesc, TransformDesc};
 
 /// A camera. Placed either by `position`, `look_at` and `up`, or by `transform`, which maps camera space (looking along -Z, +Y up) to the
 /// world.
@@ -46,9 +46,13 @@ pub struct CameraDesc {
     /// reflections and light are not cut. Default: 0.
     #[serde(default)]
     pub near: f64,
-    /// When the shutter opens and closes, in the time of the scene's motion: finite, the second not below the first. Default: [0, 1].
+    /// When the shutter opens and closes, in the time of the keyframes of all `motion`: finite, the second not below the first. Where both
+    /// are the same, the picture shows that moment without blur. Default: [0, 1].
     #[serde(default = "default_shutter")]
     pub shutter: [f64; 2],
+    /// How the camera moves: what its placement is followed by at each time, rotations and translations. Default: not at all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub motion: Vec<KeyframeDesc>,
 }
 
 /// How points of the picture become directions.

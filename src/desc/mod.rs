@@ -21,7 +21,7 @@ pub use shape::{
     ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, ObjectDesc, ProfileDesc, QuadDesc,
     RevolutionDesc, ShapeCommon, ShapeDesc, SphereDesc,
 };
-pub use transform::{ScaleDesc, TransformDesc, TransformStepDesc};
+pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::TransformDesc;
+use super::{KeyframeDesc, TransformDesc};
 
 /// Declares the shapes: a struct for each, the fields that all share, and the enum over them.
 macro_rules! shapes {
@@ -23,6 +23,9 @@ macro_rules! shapes {
                 /// Where the shape stands.
                 #[serde(default)]
                 pub transform: TransformDesc,
+                /// How the shape moves, after `transform`. Default: not at all.
+                #[serde(default, skip_serializing_if = "Vec::is_empty")]
+                pub motion: Vec<KeyframeDesc>,
                 /// Light that the shape gives off.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub emission: Option<EmissionDesc>,
@@ -47,6 +50,7 @@ macro_rules! shapes {
                         name: shape.name.as_deref(),
                         material: shape.material.as_deref(),
                         transform: &shape.transform,
+                        motion: &shape.motion,
                         emission: shape.emission.as_ref(),
                         reverse_normal: shape.reverse_normal,
                     },)*
@@ -65,6 +69,8 @@ pub struct ShapeCommon<'a> {
     pub material: Option<&'a str>,
     /// Where the shape stands.
     pub transform: &'a TransformDesc,
+    /// How it moves.
+    pub motion: &'a [KeyframeDesc],
     /// Light that the shape gives off.
     pub emission: Option<&'a EmissionDesc>,
     /// Whether the front is the side against the shape's own normal.
@@ -92,6 +98,13 @@ shapes! {
         /// Inline: a uv for each vertex.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         uvs: Option<Vec<[f32; 2]>>,
+        /// A mesh that deforms: the files with its vertices at further times, evenly spaced until the shutter closes, as many and in the same
+        /// order as in `file`, which has those at its opening. Between them vertices move along straight lines.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        deform_files: Vec<String>,
+        /// Inline: as `deform_files`, the positions at further times.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        deform_positions: Vec<Vec<[f32; 3]>>,
         /// How normals are found. Default: given ones are interpolated, else the mesh is flat.
         #[serde(default)]
         shading: MeshShadingDesc,
@@ -256,4 +269,7 @@ pub struct InstanceDesc {
     /// Where it stands.
     #[serde(default)]
     pub transform: TransformDesc,
+    /// How it moves, after `transform`. Default: not at all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub motion: Vec<KeyframeDesc>,
 }

@@ -8,6 +8,18 @@ use serde::{Deserialize, Serialize};
 #[serde(transparent)]
 pub struct TransformDesc(pub Vec<TransformStepDesc>);
 
+/// A transform at one time of a motion. Between two keyframes translation, rotation (the short way round, evenly) and stretch are
+/// interpolated each by itself; before the first and after the last the motion rests.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct KeyframeDesc {
+    /// When, in the time in which the camera's `shutter` is given: from 0 to 1 by default. Times must grow; they may lie outside of it.
+    pub time: f64,
+    /// The transform at that time.
+    #[serde(default)]
+    pub transform: TransformDesc,
+}
+
 /// One step of a transform.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]

@@ -1,9 +1,11 @@
 //! Objects and their instances: one level; deeper nesting is flattened before it gets here.
 
+use std::borrow::Cow;
+
 use super::{Hit, Shape, SurfaceInteraction};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Aabb, Bounds, Ray, Transform, Vec3};
+use crate::math::{Aabb, Bounds, Motion, Ray, Transform, Vec3};
 
 /// A group of shapes in a space of its own.
 #[derive(Clone, Debug, Default)]
@@ -17,26 +19,53 @@ pub struct Object {
 pub struct Instance {
     /// What is placed.
     pub object: ObjectId,
-    /// Where.
+    /// Where; of an instance that moves, at the opening of the shutter.
     pub transform: Transform,
+    /// How it moves.
+    pub motion: Option<Box<Motion>>,
 }
 
 impl Instance {
-    /// World bounds of this instance of an object with the given bounds.
+    /// An instance at rest.
+    pub fn new(object: ObjectId, transform: Transform) -> Self {
+        Self { object, transform, motion: None }
+    }
+
+    /// An instance that moves, or rests if the motion is constant. `None` if the motion is singular.
+    pub fn moving(object: ObjectId, motion: Motion) -> Option<Self> {
+        let transform = Transform::new(motion.map_at(0.0))?;
+        let motion = motion.as_constant().is_none().then(|| Box::new(motion));
+        Some(Self { object, transform, motion })
+    }
+
+    /// Where it stands at a time from 0 to 1.
+    #[inline]
+    pub fn transform_at(&self, time: f32) -> Cow<'_, Transform> {
+        match &self.motion {
+            None => Cow::Borrowed(&self.transform),
+            Some(motion) => Cow::Owned(motion.at(f64::from(time))),
+        }
+    }
+
+    /// World bounds of this instance of an object with the given bounds, over the whole shutter interval.
     pub fn bounds(&self, object: &Aabb) -> Aabb {
         if object.is_empty() {
             return Aabb::EMPTY;
         }
         let exact = Bounds { min: object.min.as_dvec3(), max: object.max.as_dvec3() };
-        exact.transformed(&self.transform.world_from_object).padded()
+        match &self.motion {
+            None => exact.transformed(&self.transform.world_from_object).padded(),
+            Some(motion) => motion.bounds(&exact).padded(),
+        }
     }
 
     /// `ray` in the object's space, rounded to `f32` as accelerators trace it; `t` keeps its meaning.
     #[inline]
     pub fn object_ray(&self, ray: &Ray) -> Ray {
+        let transform = self.transform_at(ray.time);
         Ray {
-            origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
-            direction: self.transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
+            origin: transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
+            direction: transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
             ..*ray
         }
     }
@@ -48,7 +77,7 @@ impl Instance {
             Shape::Mesh(mesh) => mesh.interaction(&local_ray, hit),
             Shape::Analytic(placed) => placed.interaction(&local_ray, hit),
         }?;
-        let t = &self.transform;
+        let t = &*self.transform_at(ray.time);
         let n_local = local.n_g.as_dvec3();
         let n_world = t.normal(n_local);
         let n_g = n_world.normalize().as_vec3();

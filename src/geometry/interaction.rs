@@ -31,6 +31,8 @@ pub struct SurfaceInteraction {
     pub prim: PrimId,
     /// The instance, or [`Hit::NO_INSTANCE`].
     pub instance: InstanceId,
+    /// Time of the ray that found it; rays from here have the same.
+    pub time: f32,
 }
 
 /// The far end of a shadow ray: a sampled point on a light.
@@ -59,7 +61,7 @@ impl SurfaceInteraction {
     #[inline]
     pub fn spawn(&self, direction: Vec3) -> Ray {
         let side = direction.dot(self.n_g);
-        Ray::new(offset_origin(self.p, self.n_g, self.error, side), direction)
+        Ray { time: self.time, ..Ray::new(offset_origin(self.p, self.n_g, self.error, side), direction) }
     }
 
     /// A ray from here to just before `target`: `t` runs from 0 to the largest number below 1.
@@ -73,7 +75,7 @@ impl SurfaceInteraction {
         let end_error = f64::from(target.error) + 4.0 * UNIT_ROUNDOFF * n.dot(toward.as_dvec3().abs());
         let end = offset_point(target.p, target.n, end_error, side);
         let direction = (end - origin.as_dvec3()).as_vec3();
-        Ray { t_max: 1f32.next_down(), ..Ray::new(origin, direction) }
+        Ray { t_max: 1f32.next_down(), time: self.time, ..Ray::new(origin, direction) }
     }
 }
 
@@ -108,6 +110,7 @@ mod tests {
             shape: ShapeId(0),
             prim: PrimId(0),
             instance: Hit::NO_INSTANCE,
+            time: 0.0,
         }
     }
 

@@ -4,7 +4,7 @@ pub use super::triangle::TrianglePoints;
 use super::{Hit, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
-use crate::math::{Aabb, Ray, Vec2, Vec3};
+use crate::math::{Aabb, Bounds, Ray, Vec2, Vec3};
 
 /// Why a mesh is refused; indices count from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -51,6 +51,17 @@ pub struct Mesh {
     triangles: Vec<[u32; 3]>,
     normals: Option<Vec<[f32; 3]>>,
     uvs: Option<Vec<[f32; 2]>>,
+    /// Of a mesh that deforms, its vertices at further times.
+    later: Vec<MeshStep>,
+}
+
+/// The vertices of a deforming mesh at one time.
+#[derive(Clone, Debug, Default)]
+pub struct MeshStep {
+    /// As many positions as the mesh has.
+    pub positions: Vec<[f32; 3]>,
+    /// As many normals, if the mesh has any.
+    pub normals: Option<Vec<[f32; 3]>>,
 }
 
 impl Mesh {
@@ -94,7 +105,92 @@ impl Mesh {
         }
         positions.push([0.0; 3]);
         positions.shrink_to_fit();
-        Ok(Self { positions, triangles, normals, uvs })
+        Ok(Self { positions, triangles, normals, uvs, later: Vec::new() })
+    }
+
+    /// This mesh deforming: its own vertices are those at the opening of the shutter, `later` has those at further times, evenly spaced to the
+    /// closing. Between them vertices move along straight lines.
+    ///
+    /// # Errors
+    /// If a number is not finite, or there are more or fewer than this mesh has.
+    pub fn deforming(self, later: Vec<MeshStep>) -> Result<Self, MeshError> {
+        let vertices = self.positions().len();
+        let mut checked = Vec::with_capacity(later.len());
+        for step in later {
+            if step.positions.len() != vertices {
+                return Err(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices });
+            }
+            let normals = step.normals.filter(|_| self.has_normals());
+            if self.has_normals() && normals.is_none() {
+                return Err(MeshError::Count { what: "normals at a later time", count: 0, vertices });
+            }
+            let Self { positions, normals, .. } = Self::new(step.positions, self.triangles.clone(), normals, None)?;
+            checked.push(MeshStep { positions, normals });
+        }
+        Ok(Self { later: checked, ..self })
+    }
+
+    /// Whether vertices move.
+    #[inline(always)]
+    pub fn is_deforming(&self) -> bool {
+        !self.later.is_empty()
+    }
+
+    /// [`padded_positions`](Self::padded_positions) at each time, the first one included.
+    pub fn padded_steps(&self) -> impl Iterator<Item = &[[f32; 3]]> {
+        std::iter::once(self.positions.as_slice()).chain(self.later.iter().map(|step| step.positions.as_slice()))
+    }
+
+    /// The two steps around a time from 0 to 1, and how far it is from the first to the second.
+    fn steps_around(&self, time: f32) -> ([usize; 2], f32) {
+        let last = self.later.len();
+        let at = time * last as f32;
+        let first = (at as usize).min(last - 1);
+        ([first, first + 1], at - first as f32)
+    }
+
+    /// The corners of one triangle at a time from 0 to 1.
+    #[inline]
+    pub fn triangle_points_at(&self, prim: PrimId, time: f32) -> TrianglePoints {
+        if self.is_deforming() { self.deformed_points(prim, time) } else { self.triangle_points(prim) }
+    }
+
+    #[inline(never)]
+    fn deformed_points(&self, prim: PrimId, time: f32) -> TrianglePoints {
+        let ([first, second], s) = self.steps_around(time);
+        let positions = |step: usize| if step == 0 { &self.positions } else { &self.later[step - 1].positions };
+        let (from, to) = (positions(first), positions(second));
+        let at = |i: u32| Vec3::from(from[i as usize]) * (1.0 - s) + Vec3::from(to[i as usize]) * s;
+        let [a, b, c] = self.triangles[prim.index()];
+        TrianglePoints { a: at(a), b: at(b), c: at(c) }
+    }
+
+    /// The normals of a triangle's corners at a time from 0 to 1, if normals are interpolated.
+    #[inline]
+    fn corner_normals(&self, prim: PrimId, time: f32) -> Option<[Vec3; 3]> {
+        let normals = self.normals.as_ref()?;
+        let corners = self.triangles[prim.index()];
+        let of = |normals: &[[f32; 3]]| corners.map(|i| Vec3::from(normals[i as usize]));
+        if !self.is_deforming() {
+            return Some(of(normals));
+        }
+        let ([first, second], s) = self.steps_around(time);
+        let step = |step: usize| if step == 0 { Some(normals) } else { self.later[step - 1].normals.as_ref() };
+        let (from, to) = (of(step(first)?), of(step(second)?));
+        Some([0, 1, 2].map(|i| from[i] * (1.0 - s) + to[i] * s))
+    }
+
+    /// Bounds of one triangle over the whole shutter interval.
+    pub fn triangle_bounds(&self, prim: PrimId) -> Aabb {
+        let corners = self.triangles[prim.index()];
+        let of = |bounds: Aabb, positions: &[[f32; 3]]| corners.iter().fold(bounds, |b, &i| b.extended(Vec3::from(positions[i as usize])));
+        let moved = self.padded_steps().fold(Aabb::EMPTY, of);
+        if !self.is_deforming() {
+            return moved;
+        }
+        // A point between two others is rounded three times, and may lie beyond both of them.
+        let exact = Bounds { min: moved.min.as_dvec3(), max: moved.max.as_dvec3() };
+        exact.grown(4.0 * UNIT_ROUNDOFF * exact.min.abs().max(exact.max.abs()).max_element()).padded()
     }
 
     /// The vertices' positions.
@@ -141,6 +237,9 @@ impl Mesh {
 
     /// Bounds of all triangles.
     pub fn bounds(&self) -> Aabb {
+        if self.is_deforming() {
+            return (0..self.triangles.len()).fold(Aabb::EMPTY, |b, i| b.union(&self.triangle_bounds(PrimId::new(i))));
+        }
         self.triangles.iter().flatten().fold(Aabb::EMPTY, |b, &i| b.extended(Vec3::from(self.positions[i as usize])))
     }
 
@@ -148,13 +247,16 @@ impl Mesh {
     pub fn memory_bytes(&self) -> usize {
         let normals = self.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
         let uvs = self.uvs.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
-        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs
+        let of_step =
+            |step: &MeshStep| size_of_val(step.positions.as_slice()) + step.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
+        let later: usize = self.later.iter().map(of_step).sum();
+        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs + later
     }
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
     #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
-        let points = self.triangle_points(hit.prim);
+        let points = self.triangle_points_at(hit.prim, ray.time);
 
         // The hit point in f64, on the plane of the triangle.
         let cross = points.cross();
@@ -170,9 +272,14 @@ impl Mesh {
         // Embree subtracts the origin from the corners and forms the normal in f32: 4 units of roundoff of the extent seen from here.
         let p32 = p.as_vec3();
         let reach = (points.a - p32).abs().max((points.b - p32).abs()).max((points.c - p32).abs());
-        let error = 4.0 * UNIT_ROUNDOFF as f32 * reach.max_element();
+        let mut error = 4.0 * UNIT_ROUNDOFF as f32 * reach.max_element();
+        if self.is_deforming() {
+            // Moving a corner to its place takes three roundings.
+            let size = points.a.abs().max(points.b.abs()).max(points.c.abs());
+            error += 4.0 * UNIT_ROUNDOFF as f32 * n_g.abs().dot(size);
+        }
 
-        let shading = self.shading(hit, &points, n_g);
+        let shading = self.shading(hit, &points, n_g, ray.time);
         Some(SurfaceInteraction {
             p,
             t: t as f32,
@@ -184,20 +291,21 @@ impl Mesh {
             shape: hit.shape,
             prim: hit.prim,
             instance: hit.instance,
+            time: ray.time,
         })
     }
 
     /// Interpolated attributes at a hit.
     #[inline]
-    fn shading(&self, hit: &Hit, points: &TrianglePoints, n_g: Vec3) -> ShadingAttributes {
+    fn shading(&self, hit: &Hit, points: &TrianglePoints, n_g: Vec3, time: f32) -> ShadingAttributes {
         let [a, b, c] = self.triangles[hit.prim.index()].map(|i| i as usize);
         let (u, v) = (hit.u, hit.v);
         let w = 1.0 - u - v;
 
-        let n_s = match &self.normals {
+        let n_s = match self.corner_normals(hit.prim, time) {
             None => n_g,
-            Some(normals) => {
-                let n = Vec3::from(normals[a]) * w + Vec3::from(normals[b]) * u + Vec3::from(normals[c]) * v;
+            Some([n_a, n_b, n_c]) => {
+                let n = n_a * w + n_b * u + n_c * v;
                 let length_squared = n.length_squared();
                 // A vanishing interpolated normal (opposite corners) falls back to the flat one, as does a NaN.
                 if length_squared > 1e-12 {

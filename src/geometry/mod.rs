@@ -1,5 +1,6 @@
 //! Shapes and everything an accelerator sees of a scene: bounds, counts, ids and intersection; nothing of materials or lights.
 
+mod cutout;
 mod disk;
 mod frustum;
 mod hit;
@@ -17,12 +18,13 @@ mod sphere;
 mod testing;
 mod triangle;
 
+pub use cutout::{Coverage, Cutouts};
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use hit::Hit;
 pub use instance::{Instance, Object};
 pub use interaction::{SpawnTarget, SurfaceInteraction};
-pub use mesh::{Mesh, MeshError, TrianglePoints};
+pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
 pub use placed::{Analytic, LocalHit, LocalSurface, Placed, PlacedPoint, ShapeSample};
 pub use profile::Profile;
 pub use quad::Quad;
@@ -33,6 +35,7 @@ pub use sphere::Sphere;
 pub use triangle::{TriangleHit, TriangleRay, TriangleSample};
 
 use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
+use crate::math::float::step_past;
 use crate::math::{Aabb, Ray};
 
 /// A triangle mesh or one analytic surface.
@@ -56,10 +59,10 @@ impl Shape {
         }
     }
 
-    /// Bounds of one primitive, fit for an accelerator (outward, padded on analytic shapes).
+    /// Bounds of one primitive over the whole shutter interval, fit for an accelerator (outward, padded on analytic shapes).
     pub fn prim_bounds(&self, prim: PrimId) -> Aabb {
         match self {
-            Self::Mesh(mesh) => mesh.triangle_points(prim).bounds(),
+            Self::Mesh(mesh) => mesh.triangle_bounds(prim),
             Self::Analytic(placed) => placed.bounds().padded(),
         }
     }
@@ -78,7 +81,7 @@ impl Shape {
         let instance = Hit::NO_INSTANCE;
         match self {
             Self::Mesh(mesh) => {
-                let hit = mesh.triangle_points(prim).intersect(ray)?;
+                let hit = mesh.triangle_points_at(prim, ray.time).intersect(ray)?;
                 Some(Hit { t: hit.t, u: hit.u, v: hit.v, shape, prim, instance })
             }
             Self::Analytic(placed) => {
@@ -100,6 +103,8 @@ pub struct Geometry {
     pub objects: Vec<Object>,
     /// Placements of objects in the world.
     pub instances: Vec<Instance>,
+    /// Which shapes have holes.
+    pub cutouts: Cutouts,
 }
 
 impl Geometry {
@@ -119,6 +124,31 @@ impl Geometry {
     #[inline]
     pub fn object(&self, id: ObjectId) -> &Object {
         &self.objects[id.index()]
+    }
+
+    /// Whether anything moves while the shutter is open.
+    pub fn is_moving(&self) -> bool {
+        let deforming = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.is_deforming());
+        self.shapes.iter().any(deforming) || self.instances.iter().any(|instance| instance.motion.is_some())
+    }
+
+    /// The first hit that counts of `ray` with one primitive. `ray` is in the space the shape is placed in, through `instance`; `key` is that
+    /// of the world-space ray. Any-hit queries use this very function.
+    #[inline]
+    pub fn intersect_prim(&self, ray: &Ray, key: u32, id: ShapeId, prim: PrimId, instance: InstanceId) -> Option<Hit> {
+        let shape = self.shape(id);
+        let mut ray = *ray;
+        loop {
+            let hit = Hit { instance, ..shape.intersect_prim(&ray, id, prim)? };
+            if self.cutouts.counts(&self.shapes, key, &ray, &hit) {
+                return Some(hit);
+            }
+            // A triangle is met once; behind a hole of an analytic surface there may be more of it.
+            ray.t_min = match shape {
+                Shape::Analytic(_) if hit.t < ray.t_max => step_past(hit.t),
+                _ => return None,
+            };
+        }
     }
 
     /// Bounds of everything; empty if there is nothing.
@@ -147,7 +177,7 @@ impl Geometry {
     /// Everything that shading needs about a hit of `ray`, with the hit point recomputed in `f64`.
     ///
     /// `None` if the exact distance is not positive: the hit is a rounding artefact of the accelerator, and the caller looks again from
-    /// [`step_past`](crate::math::float::step_past) of `hit.t`.
+    /// [`step_past`] of `hit.t`.
     #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         if hit.instance == Hit::NO_INSTANCE {

@@ -8,7 +8,7 @@
 //! moves the origin along the ray to the shape before it asks, so that they are relative to the shape's size.
 
 use super::{Disk, Frustum, Hit, Quad, Revolution, Sphere, SurfaceInteraction};
-use crate::math::float::F64_CHAIN_ERROR;
+use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
 use crate::math::{Bounds, DAffine3, DVec3, Ray, RayF64, Transform, Vec2, Vec3};
 
 /// A surface given by a formula.
@@ -207,11 +207,8 @@ impl Placed {
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
-        // The hit itself, whatever the end of the ray is. Through an instance, accelerators move the ray in `f32`, so their distance is
-        // not one of this ray.
-        let t_max = if hit.instance == Hit::NO_INSTANCE { hit.t.next_up() } else { f32::INFINITY };
-        let centered = self.centered_ray(&Ray { t_max, ..*ray });
-        let local_hit = self.shape.intersect(&centered.ray)?;
+        let centered = self.centered_ray(&Ray { t_max: f32::INFINITY, ..*ray });
+        let local_hit = self.hit_near(hit.t, &centered)?;
         let t = local_hit.t + centered.shift;
         if t <= 0.0 {
             return None;
@@ -229,7 +226,26 @@ impl Placed {
             shape: hit.shape,
             prim: hit.prim,
             instance: hit.instance,
+            time: ray.time,
         })
+    }
+
+    /// The hit nearest to the distance `t` of the original ray. It need not be the first: the surface may have holes. It need not be exact
+    /// either: on their way into an instance, accelerators move the ray in `f32`.
+    #[inline]
+    fn hit_near(&self, t: f32, centered: &CenteredRay) -> Option<LocalHit> {
+        let mut nearest = self.shape.intersect(&centered.ray)?;
+        let t = f64::from(t);
+        let target = t - centered.shift;
+        // A few roundings of t are no reason to look further.
+        while target - nearest.t > 8.0 * UNIT_ROUNDOFF * t {
+            let beyond = RayF64 { t_min: nearest.t.next_up(), ..centered.ray };
+            match self.shape.intersect(&beyond) {
+                Some(next) if (next.t - target).abs() < (nearest.t - target).abs() => nearest = next,
+                _ => break,
+            }
+        }
+        Some(nearest)
     }
 
     /// A point chosen on the surface, placed; `u` in the unit square.

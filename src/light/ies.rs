@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::bounds::{EmissionCone, LightBounds};
 use super::{LightSample, PointLight};
 use crate::color::Rgb;
-use crate::math::{DVec3, Frame, Vec3};
+use crate::math::{DVec3, Frame};
 
 /// Intensity by direction: a table over the angle from the nadir and the angle about it, bilinear between.
 #[derive(Clone, Debug, PartialEq)]

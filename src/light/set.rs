@@ -119,8 +119,8 @@ impl LightSet {
         if self.tree.is_some() { LightSelection::Tree } else { LightSelection::Power }
     }
 
-    /// A light for `from`, `u` in the unit square (the second number adds digits to the first, for many lights); `None` if none can shine
-    /// there.
+    /// A light for `from`, `u` in the unit square (the second number adds digits to the first, for many lights); `None` if none shines
+    /// there, as far as the choice has looked.
     #[inline]
     pub fn choose(&self, from: &Receiver, u: [f32; 2]) -> Option<LightChoice> {
         if let Some(near) = &self.tree {
@@ -195,7 +195,9 @@ mod tests {
     use super::*;
     use crate::color::Rgb;
     use crate::light::{DirectionalLight, Environment, PointLight};
-    use crate::math::DVec3;
+    use crate::math::{DVec3, Vec3};
+
+    const ANYWHERE: Receiver = Receiver { p: DVec3::ZERO, n: Vec3::ZERO };
 
     fn point(intensity: f32) -> Light {
         Light::Point(PointLight { position: DVec3::ZERO, intensity: Rgb::splat(intensity) })
@@ -213,33 +215,33 @@ mod tests {
         let n = 1 << 20;
         let mut count = [0u32; 6];
         for i in 0..n {
-            let choice = lights.choose(i as f32 / n as f32).unwrap();
-            assert_eq!(choice.pmf, lights.pmf(choice.id));
+            let choice = lights.choose(&ANYWHERE, [i as f32 / n as f32, 0.0]).unwrap();
+            assert_eq!(choice.pmf, lights.pmf(choice.id, &ANYWHERE));
             count[choice.id.index()] += 1;
         }
         let mut sum = 0.0;
         for (i, &c) in count.iter().enumerate() {
-            let pmf = lights.pmf(LightId::new(i));
+            let pmf = lights.pmf(LightId::new(i), &ANYWHERE);
             assert!((c as f32 / n as f32 - pmf).abs() < 1e-5, "{i}");
             assert_eq!(pmf > 0.0, i != 2, "{i}");
             sum += pmf;
         }
         assert!((sum - 1.0).abs() < 1e-6);
-        assert!(lights.pmf(LightId(1)) + lights.pmf(LightId(4)) >= 0.249);
+        assert!(lights.pmf(LightId(1), &ANYWHERE) + lights.pmf(LightId(4), &ANYWHERE) >= 0.249);
         assert_eq!(lights.at_infinity(), [LightId(1), LightId(4)]);
     }
 
     #[test]
     fn equal_lights_are_chosen_equally() {
         let lights = set(vec![point(2.0); 5]);
-        assert!((0..5).all(|i| (lights.pmf(LightId(i)) - 0.2).abs() < 1e-7));
+        assert!((0..5).all(|i| (lights.pmf(LightId(i), &ANYWHERE) - 0.2).abs() < 1e-7));
     }
 
     #[test]
     fn a_sharp_sun_is_not_visible_and_no_light_is_no_choice() {
         let lights = set(vec![Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0)))]);
-        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0)) == 1.0);
-        assert!(LightSet::default().choose(0.5).is_none() && LightSet::default().is_empty());
-        assert!(set(vec![point(0.0)]).choose(0.5).is_none());
+        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0), &ANYWHERE) == 1.0);
+        assert!(LightSet::default().choose(&ANYWHERE, [0.5, 0.0]).is_none() && LightSet::default().is_empty());
+        assert!(set(vec![point(0.0)]).choose(&ANYWHERE, [0.5, 0.0]).is_none());
     }
 }

@@ -77,6 +77,18 @@ impl Bounds {
         Self { min: self.min.min(p), max: self.max.max(p) }
     }
 
+    /// The smallest box around both.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// This box with `margin` added on each side.
+    #[must_use]
+    pub fn grown(&self, margin: f64) -> Self {
+        Self { min: self.min - margin, max: self.max + margin }
+    }
+
     /// The box around this box after an affine map.
     #[must_use]
     pub fn transformed(&self, map: &DAffine3) -> Self {

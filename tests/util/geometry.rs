@@ -165,7 +165,7 @@ pub fn meshes(meshes: Vec<Mesh>) -> Geometry {
 /// One object of these shapes with an instance for each transform.
 pub fn instances(shapes: Vec<Shape>, transforms: &[Transform]) -> Geometry {
     let objects = vec![Object { shapes: (0..shapes.len()).map(ShapeId::new).collect() }];
-    let instances = transforms.iter().map(|&transform| Instance { object: ObjectId(0), transform }).collect();
+    let instances = transforms.iter().map(|&transform| Instance::new(ObjectId(0), transform)).collect();
     Geometry { shapes, objects, instances, ..Geometry::default() }
 }
 

@@ -1,52 +1,153 @@
-//! The bvh: one leaf with everything.
+//! A bounding volume hierarchy: built by the surface area heuristic, traced eight boxes and four triangles at a time.
 
-use super::inspect::{Item, NodeInfo};
-use super::tree::{Counter, Items, Query, SlabRay, Tree};
+mod binary;
+mod build;
+mod lanes;
+#[cfg(test)]
+mod tests;
+mod traverse;
+mod wide;
+
+use pulp::x86::V3;
+
+use super::inspect::NodeInfo;
+use super::tree::{Counter, Items, Query, Tree};
 use crate::math::Aabb;
+use binary::BinaryTree;
+use build::{Binary, Reference};
+use lanes::Portable;
+use wide::{ChildKind, STACK, WIDTH, Wide};
 
 /// How a BVH is built and traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BvhOptions {
-    /// Triangles may be split between nodes.
-    pub spatial_splits: bool,
     /// Two boxes a node, without SIMD.
     pub binary: bool,
 }
 
-/// The tree.
-pub(super) struct Bvh {
-    items: Vec<Item>,
-    bounds: Aabb,
+/// The hierarchy.
+pub(super) struct Bvh(Form);
+
+enum Form {
+    Empty,
+    Binary(BinaryTree),
+    Wide(Wide, Option<V3>),
+}
+
+struct Run<'r, 'a, C, const ANY: bool> {
+    simd: V3,
+    wide: &'r Wide,
+    query: &'r mut Query<'a, Bvh, C, ANY>,
+}
+
+impl<C: Counter, const ANY: bool> pulp::NullaryFnOnce for Run<'_, '_, C, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        traverse::traverse(self.simd, self.wide, self.query);
+    }
+}
+
+impl Bvh {
+    /// The wide form over at least one item, traced with or without SIMD.
+    fn wide(items: &Items<'_>, simd: Option<V3>) -> Self {
+        let mut tree = Wide::new(&binary(items), items);
+        if tree.depth * (WIDTH - 1) >= STACK {
+            // Halving gives the fewest levels.
+            tree = Wide::new(&Binary::halved(references(items), |item| is_alone(items, item)), items);
+        }
+        Self(Form::Wide(tree, simd))
+    }
+}
+
+fn references(items: &Items<'_>) -> Vec<Reference> {
+    items.bounds.iter().zip(0..).map(|(&bounds, item)| Reference { bounds, item }).collect()
+}
+
+/// What is not a triangle has a leaf for itself.
+fn is_alone(items: &Items<'_>, item: u32) -> bool {
+    items.triangle(item as usize).is_none()
+}
+
+fn binary(items: &Items<'_>) -> Binary {
+    Binary::new(references(items), |item| is_alone(items, item))
 }
 
 impl Tree for Bvh {
     type Options = BvhOptions;
 
-    fn build(items: &Items<'_>, _: &Self::Options) -> Self {
-        Self { items: items.list.clone(), bounds: items.all_bounds() }
+    fn build(items: &Items<'_>, options: &BvhOptions) -> Self {
+        if items.len() == 0 {
+            return Self(Form::Empty);
+        }
+        if options.binary { Self(Form::Binary(BinaryTree::new(binary(items), items))) } else { Self::wide(items, V3::try_new()) }
     }
 
+    #[inline]
     fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Self, C, ANY>) {
-        query.counter.nodes(1);
-        let slab = SlabRay::new(&query.ray, &self.bounds, query.slack());
-        if slab.interval(&self.bounds, query.ray.t_min, query.t_max()).is_some() {
-            let _ = self.items.iter().any(|&item| query.test(item));
+        match &self.0 {
+            Form::Empty => {}
+            Form::Binary(tree) => tree.traverse(query),
+            Form::Wide(wide, Some(simd)) => simd.vectorize(Run { simd: *simd, wide, query }),
+            Form::Wide(wide, None) => traverse::traverse(Portable, wide, query),
         }
     }
 
     fn bounds(&self) -> Aabb {
-        self.bounds
+        match &self.0 {
+            Form::Empty => Aabb::EMPTY,
+            Form::Binary(tree) => tree.bounds(),
+            Form::Wide(wide, _) => wide.bounds,
+        }
     }
 
     fn memory_bytes(&self) -> usize {
-        size_of_val(self.items.as_slice())
+        match &self.0 {
+            Form::Empty => 0,
+            Form::Binary(tree) => tree.memory_bytes(),
+            Form::Wide(wide, _) => wide.memory_bytes(),
+        }
     }
 
     fn visit_nodes(&self, visit: &mut dyn FnMut(&NodeInfo)) {
-        visit(&NodeInfo { bounds: self.bounds, depth: 0, children: 0, items: &self.items });
+        match &self.0 {
+            Form::Empty => {}
+            Form::Binary(tree) => tree.visit_nodes(visit),
+            Form::Wide(wide, _) => visit_wide(wide, visit),
+        }
     }
 
     fn description(&self) -> String {
-        "bvh".into()
+        match &self.0 {
+            Form::Empty => "BVH, empty".into(),
+            Form::Binary(_) => "BVH, 2 wide, scalar".into(),
+            Form::Wide(_, Some(_)) => "BVH, 8 wide, AVX2".into(),
+            Form::Wide(_, None) => "BVH, 8 wide, scalar".into(),
+        }
+    }
+}
+
+fn visit_wide(wide: &Wide, visit: &mut dyn FnMut(&NodeInfo)) {
+    let mut open = vec![(0usize, wide.bounds, 0)];
+    let mut items = Vec::new();
+    while let Some((index, bounds, depth)) = open.pop() {
+        let slots: Vec<_> = (0..WIDTH).filter_map(|slot| wide.nodes[index].get(slot)).collect();
+        visit(&NodeInfo { bounds, depth, children: slots.len() as u32, items: &[] });
+        for (bounds, child) in slots.into_iter().rev() {
+            items.clear();
+            match child.kind() {
+                ChildKind::Node(node) => {
+                    open.push((node as usize, bounds, depth + 1));
+                    continue;
+                }
+                ChildKind::Blocks { first, count } => {
+                    let blocks = &wide.blocks[first as usize..(first + count) as usize];
+                    items.extend(blocks.iter().flat_map(|block| &block.items[..block.count as usize]));
+                }
+                ChildKind::Items { first, count } => items.extend_from_slice(&wide.items[first as usize..(first + count) as usize]),
+            }
+            visit(&NodeInfo { bounds, depth: depth + 1, children: 0, items: &items });
+        }
     }
 }

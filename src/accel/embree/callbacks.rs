@@ -4,8 +4,11 @@ use std::ffi::{CStr, c_char, c_void};
 use std::sync::atomic::Ordering;
 
 use super::device::Monitor;
+use super::gate::Gate;
+use super::packet::INVALID;
 use super::sys;
-use crate::geometry::Placed;
+use crate::geometry::{Geometry, Hit, Instance, Placed};
+use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::Ray;
 
 // `StRay` is `Ray` under its C name.
@@ -40,10 +43,67 @@ pub(super) unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post
 }
 
 /// The distance at which `ray` hits the [`Placed`] behind `shape`; negative on a miss.
-pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *const sys::StRay) -> f32 {
+pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *const sys::StRay, _key: u32, _instance: u32) -> f32 {
     // SAFETY: `shape` was made from a `&Placed` inside the geometry that the accelerator borrows, and `Placed` is not changed by anyone;
     // `ray` points to a ray on the shim's stack, and `StRay` has the layout of `Ray`.
     let (placed, ray) = unsafe { (&*shape.cast::<Placed>(), &*ray.cast::<Ray>()) };
     // Rounding to f32 keeps the order, so the result stays within the ray's interval.
     placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32)
+}
+
+/// Writes `ray` in the space of the moving [`Instance`] behind `instance`; false if it cannot be traced there.
+pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *const sys::StRay, inside: *mut sys::StRay) -> bool {
+    // SAFETY: `instance` was made from a `&Instance` inside the geometry that the accelerator borrows; both rays are on the shim's stack,
+    // and `StRay` has the layout of `Ray`.
+    let (instance, ray) = unsafe { (&*instance.cast::<Instance>(), &*ray.cast::<Ray>()) };
+    let local = instance.object_ray(ray);
+    // SAFETY: as above; every bit pattern is a `Ray`.
+    unsafe { inside.cast::<Ray>().write(local) };
+    Gate::OPEN.admits(&local)
+}
+
+/// A shape with holes, as the user data of its geometry.
+pub(super) struct Cutout {
+    geometry: *const Geometry,
+    shape: ShapeId,
+}
+
+impl Cutout {
+    /// The user data of a shape of `geometry`.
+    pub(super) fn new(geometry: &Geometry, shape: ShapeId) -> Self {
+        Self { geometry, shape }
+    }
+
+    /// # Safety
+    /// The geometry must be alive.
+    unsafe fn geometry(&self) -> &Geometry {
+        // SAFETY: the caller's promise.
+        unsafe { &*self.geometry }
+    }
+
+    /// Our id of Embree's instance number: instances follow the shapes.
+    fn instance(geometry: &Geometry, number: u32) -> InstanceId {
+        if number == INVALID { Hit::NO_INSTANCE } else { InstanceId(number - geometry.shapes.len() as u32) }
+    }
+}
+
+/// As [`intersect_placed`] for the [`Cutout`] of an analytic shape: hits in its holes do not count.
+pub(super) unsafe extern "C" fn intersect_cutout(cutout: *const c_void, ray: *const sys::StRay, key: u32, instance: u32) -> f32 {
+    // SAFETY: `cutout` was made from a `&Cutout` that the accelerator owns; the ray as in `intersect_placed`.
+    let (cutout, ray) = unsafe { (&*cutout.cast::<Cutout>(), &*ray.cast::<Ray>()) };
+    // SAFETY: the accelerator borrows the geometry.
+    let geometry = unsafe { cutout.geometry() };
+    let instance = Cutout::instance(geometry, instance);
+    geometry.intersect_prim(ray, key, cutout.shape, PrimId(0), instance).map_or(-1.0, |hit| hit.t)
+}
+
+/// Whether a hit of a triangle of the [`Cutout`] behind `user` counts.
+pub(super) unsafe extern "C" fn counts(user: *const c_void, ray: *const sys::StRay, key: u32, hit: *const sys::StHit) -> bool {
+    // SAFETY: as in `intersect_cutout`; `hit` points to a hit on the shim's stack.
+    let (cutout, ray, hit) = unsafe { (&*user.cast::<Cutout>(), &*ray.cast::<Ray>(), &*hit) };
+    // SAFETY: the accelerator borrows the geometry.
+    let geometry = unsafe { cutout.geometry() };
+    let instance = Cutout::instance(geometry, hit.instance);
+    let hit = Hit { t: hit.t, u: hit.u, v: hit.v, shape: cutout.shape, prim: PrimId(hit.prim), instance };
+    geometry.cutouts.counts(&geometry.shapes, key, ray, &hit)
 }

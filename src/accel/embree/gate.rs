@@ -17,7 +17,7 @@ pub(super) struct Gate {
 
 impl Gate {
     /// The gate of a scene without instances.
-    const OPEN: Self = Self { origin: f32::INFINITY, direction: f32::INFINITY };
+    pub(super) const OPEN: Self = Self { origin: f32::INFINITY, direction: f32::INFINITY };
 
     /// The gate for these instances: a ray that passes stays valid in the space of each.
     ///
@@ -27,7 +27,8 @@ impl Gate {
         // Half the limit leaves room for rounding.
         const LIMIT: f32 = 0.5 * EMBREE_LARGE;
         let mut gate = Self::OPEN;
-        for (i, instance) in instances.iter().enumerate() {
+        // Instances that move look at each ray themselves.
+        for (i, instance) in instances.iter().enumerate().filter(|(_, instance)| instance.motion.is_none()) {
             let Inverse { reach, offset } = invert_as_embree(instance)
                 .ok_or_else(|| Error::Embree(format!("instance {i}: its transform is too small or too large to be inverted in f32")))?;
             gate.origin = gate.origin.min((LIMIT - offset) / reach);

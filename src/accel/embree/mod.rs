@@ -21,7 +21,7 @@ use crate::math::{Aabb, Ray};
 use device::Device;
 use gate::Gate;
 use packet::{HitPacket, INVALID, ShadowPacket, Tracer, WIDTH};
-use scene::{GeometryHandle, Scene, SceneBuilder, UserShapes};
+use scene::{GeometryHandle, MovingInstances, Scene, SceneBuilder, UserShapes};
 use sys::StHit;
 
 /// How much effort Embree's build makes.
@@ -57,9 +57,11 @@ impl Default for EmbreeOptions {
 ///
 /// With the robust flag no ray slips between the triangles of a closed mesh, and `t_min` and `t_max` are inclusive.
 pub struct EmbreeAccel<'g> {
-    // Dropped in this order: the scene inside refers to the user data and to the device.
+    // Dropped in this order: the scene inside refers to the user data, to the objects' scenes and to the device.
     tracer: Tracer,
     _user_shapes: UserShapes,
+    _moving: MovingInstances,
+    _objects: Vec<Scene>,
     device: Device,
     geometry: &'g Geometry,
     bounds: Aabb,
@@ -82,9 +84,12 @@ impl<'g> EmbreeAccel<'g> {
         let gate = Gate::for_instances(&geometry.instances)?;
         let device = Device::new(threads)?;
         let user_shapes = UserShapes::new(geometry);
-        let scene = build(geometry, &device, &user_shapes, options)?;
-        let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty() };
-        Ok(Self { tracer, _user_shapes: user_shapes, device, geometry, bounds: geometry.bounds() })
+        let shapes = shape_handles(geometry, &device, &user_shapes)?;
+        let objects = object_scenes(geometry, &device, &shapes, options)?;
+        let moving = MovingInstances::new(geometry, &objects);
+        let scene = build_world(geometry, &device, &shapes, &objects, &moving, options)?;
+        let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty(), cutouts: geometry.cutouts.clone() };
+        Ok(Self { tracer, _user_shapes: user_shapes, _moving: moving, _objects: objects, device, geometry, bounds: geometry.bounds() })
     }
 
     /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an object it is the
@@ -102,9 +107,8 @@ impl<'g> EmbreeAccel<'g> {
     }
 }
 
-/// The committed scene of `geometry`. The result must be dropped before `user_shapes`, and while `geometry` is borrowed.
-fn build(geometry: &Geometry, device: &Device, user_shapes: &UserShapes, options: EmbreeOptions) -> Result<Scene> {
-    // One Embree geometry for each shape in use, however many objects share it.
+/// One Embree geometry for each shape in use, however many objects share it.
+fn shape_handles(geometry: &Geometry, device: &Device, user_shapes: &UserShapes) -> Result<Vec<Option<GeometryHandle>>> {
     let mut handles: Vec<Option<GeometryHandle>> = geometry.shapes.iter().map(|_| None).collect();
     let used = geometry.world.iter().chain(geometry.objects.iter().flat_map(|object| &object.shapes));
     for id in used {
@@ -114,18 +118,36 @@ fn build(geometry: &Geometry, device: &Device, user_shapes: &UserShapes, options
             handles[id.index()] = Some(handle);
         }
     }
+    Ok(handles)
+}
 
+/// A committed scene for each object.
+fn object_scenes(geometry: &Geometry, device: &Device, shapes: &[Option<GeometryHandle>], options: EmbreeOptions) -> Result<Vec<Scene>> {
     let object_scene = |ids: &[ShapeId]| -> Result<Scene> {
         let mut builder = SceneBuilder::new(device, options)?;
-        scene::attach_shapes(&mut builder, &handles, ids, |position, _| position)?;
+        scene::attach_shapes(&mut builder, shapes, ids, |position, _| position)?;
         builder.commit()
     };
-    let objects = geometry.objects.iter().map(|object| object_scene(&object.shapes)).collect::<Result<Vec<_>>>()?;
+    geometry.objects.iter().map(|object| object_scene(&object.shapes)).collect()
+}
 
+/// The committed scene of everything. It must be dropped before the user data and the objects' scenes.
+fn build_world(
+    geometry: &Geometry,
+    device: &Device,
+    shapes: &[Option<GeometryHandle>],
+    objects: &[Scene],
+    moving: &MovingInstances,
+    options: EmbreeOptions,
+) -> Result<Scene> {
     let mut world = SceneBuilder::new(device, options)?;
-    scene::attach_shapes(&mut world, &handles, &geometry.world, |_, id| id.index())?;
+    scene::attach_shapes(&mut world, shapes, &geometry.world, |_, id| id.index())?;
     for (i, instance) in geometry.instances.iter().enumerate() {
-        let handle = GeometryHandle::of_instance(device, &objects[instance.object.index()], instance)?;
+        let handle = match moving.get(i) {
+            None => GeometryHandle::of_instance(device, &objects[instance.object.index()], instance)?,
+            // SAFETY: the accelerator borrows the geometry, owns the rest, and drops its scene first.
+            Some(user) => unsafe { GeometryHandle::of_moving_instance(device, user) }?,
+        };
         world.attach(&handle, geometry.shapes.len() + i)?;
     }
     world.commit()

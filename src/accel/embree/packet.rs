@@ -6,6 +6,7 @@ use super::gate::Gate;
 use super::scene::Scene;
 use super::sys::{self, RTCHit16, RTCRay16, RTCRayHit16, StHit};
 use crate::accel::Coherence;
+use crate::geometry::Cutouts;
 use crate::math::{Ray, Vec3};
 
 /// Rays of one packet.
@@ -23,6 +24,8 @@ pub(super) struct Tracer {
     pub(super) gate: Gate,
     /// Whether packets may be traced as frusta: not through instances, since a transform can make a component of the direction tiny.
     pub(super) frusta: bool,
+    /// For the keys of rays, where shapes have holes.
+    pub(super) cutouts: Cutouts,
 }
 
 impl Tracer {
@@ -39,7 +42,7 @@ impl Tracer {
         }
         let mut hit = StHit::default();
         // SAFETY: the scene is committed, `StRay` is `Ray` under its C name, and the ray has passed the gate.
-        let found = unsafe { sys::st_intersect1(self.scene.handle(), c_ray(ray), &mut hit) };
+        let found = unsafe { sys::st_intersect1(self.scene.handle(), c_ray(ray), self.cutouts.key(ray), &mut hit) };
         found.then_some(hit)
     }
 
@@ -50,7 +53,7 @@ impl Tracer {
             return false;
         }
         // SAFETY: as in `intersect`.
-        unsafe { sys::st_occluded1(self.scene.handle(), c_ray(ray)) }
+        unsafe { sys::st_occluded1(self.scene.handle(), c_ray(ray), self.cutouts.key(ray)) }
     }
 }
 
@@ -85,7 +88,7 @@ impl HitPacket {
     /// Traces `rays` side by side; [`hit`](Self::hit) tells the results.
     #[inline]
     pub(super) fn intersect(&mut self, tracer: &Tracer, rays: &[Ray; WIDTH], coherence: Coherence) {
-        fill(&mut self.rayhits.ray, &mut self.valid, &tracer.gate, rays);
+        fill(&mut self.rayhits.ray, &mut self.valid, tracer, rays);
         self.rayhits.hit.geomID = [INVALID; WIDTH];
         self.rayhits.hit.instID = [[INVALID; WIDTH]];
         // SAFETY: the scene is committed, both structs are aligned by their types, and every valid lane has passed the gate.
@@ -135,7 +138,7 @@ impl ShadowPacket {
     /// Traces `rays` side by side and tells which of them hit anything.
     #[inline]
     pub(super) fn occluded(&mut self, tracer: &Tracer, rays: &[Ray; WIDTH], coherence: Coherence) -> [bool; WIDTH] {
-        fill(&mut self.rays, &mut self.valid, &tracer.gate, rays);
+        fill(&mut self.rays, &mut self.valid, tracer, rays);
         // SAFETY: as in `HitPacket::intersect`.
         unsafe { sys::st_occluded16(tracer.scene.handle(), self.valid.0.as_ptr(), &mut self.rays, tracer.as_frustum(coherence)) };
         // A lane that was not traced keeps the finite end of an inactive ray.
@@ -151,14 +154,19 @@ impl ShadowPacket {
 
 /// Writes `rays` into the lanes, and for those that are not fit for a packet harmless numbers and `valid = 0`.
 #[inline(always)]
-fn fill(packet: &mut RTCRay16, valid: &mut Lanes, gate: &Gate, rays: &[Ray; WIDTH]) {
+fn fill(packet: &mut RTCRay16, valid: &mut Lanes, tracer: &Tracer, rays: &[Ray; WIDTH]) {
     // SAFETY: both hold sixteen rays, and `StRay` is `Ray` under its C name.
     unsafe { sys::st_fill16(packet, c_ray(&rays[0])) };
     for lane in 0..WIDTH {
-        valid.0[lane] = -i32::from(gate.admits_to_packet(&get(packet, lane)));
+        valid.0[lane] = -i32::from(tracer.gate.admits_to_packet(&get(packet, lane)));
     }
     if !valid.is_full() {
         disarm(packet, valid);
+    }
+    if !tracer.cutouts.is_empty() {
+        for (id, ray) in packet.id.iter_mut().zip(rays) {
+            *id = tracer.cutouts.key(ray);
+        }
     }
 }
 

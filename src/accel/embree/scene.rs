@@ -4,18 +4,28 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use super::callbacks::intersect_placed;
+use super::callbacks::{Cutout, counts, enter_instance, intersect_cutout, intersect_placed};
 use super::device::Device;
 use super::{EmbreeOptions, EmbreeQuality, sys};
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Instance, Mesh, Placed, Shape};
+use crate::geometry::{Geometry, Instance, Mesh, Shape};
 use crate::id::ShapeId;
 use crate::math::Aabb;
 
-/// The user data of every analytic shape, by [`ShapeId`]; `None` for meshes. Embree keeps addresses into it.
-pub(super) struct UserShapes(Vec<Option<sys::StUserShape>>);
+/// What Embree's callbacks need of one shape. Embree keeps addresses of it.
+pub(super) enum UserData {
+    /// Triangles without holes need nothing.
+    Triangles,
+    /// Triangles with holes.
+    TrianglesWithHoles(sys::StCutout, #[allow(dead_code)] Box<Cutout>),
+    /// An analytic shape, with its own data where it has holes.
+    Analytic(sys::StUserShape, #[allow(dead_code)] Option<Box<Cutout>>),
+}
 
-// SAFETY: the pointers inside lead to `Placed`, which is `Send` and `Sync`, and are only read through.
+/// The user data of every shape, by [`ShapeId`].
+pub(super) struct UserShapes(Vec<UserData>);
+
+// SAFETY: the pointers inside lead to the geometry, which is `Send` and `Sync`, and are only read through.
 unsafe impl Send for UserShapes {}
 // SAFETY: as above.
 unsafe impl Sync for UserShapes {}
@@ -23,25 +33,71 @@ unsafe impl Sync for UserShapes {}
 impl UserShapes {
     /// The table for `geometry`.
     pub(super) fn new(geometry: &Geometry) -> Self {
-        let user_shape = |placed: &Placed| {
-            let Aabb { min, max } = placed.bounds().padded();
-            sys::StUserShape {
-                shape: std::ptr::from_ref(placed).cast::<c_void>(),
-                intersect: Some(intersect_placed),
-                lower: min.to_array(),
-                upper: max.to_array(),
+        let of = |(i, shape): (usize, &Shape)| {
+            let id = ShapeId::new(i);
+            let cutout = geometry.cutouts.has_holes(id).then(|| Box::new(Cutout::new(geometry, id)));
+            match (shape, cutout) {
+                (Shape::Mesh(_), None) => UserData::Triangles,
+                (Shape::Mesh(_), Some(cutout)) => {
+                    let raw = sys::StCutout { user: std::ptr::from_ref(&*cutout).cast::<c_void>(), counts: Some(counts) };
+                    UserData::TrianglesWithHoles(raw, cutout)
+                }
+                (Shape::Analytic(placed), cutout) => {
+                    let Aabb { min, max } = placed.bounds().padded();
+                    let (lower, upper) = (min.to_array(), max.to_array());
+                    let raw = match &cutout {
+                        None => {
+                            let shape = std::ptr::from_ref(placed).cast::<c_void>();
+                            sys::StUserShape { shape, intersect: Some(intersect_placed), lower, upper }
+                        }
+                        Some(cutout) => {
+                            let shape = std::ptr::from_ref(&**cutout).cast::<c_void>();
+                            sys::StUserShape { shape, intersect: Some(intersect_cutout), lower, upper }
+                        }
+                    };
+                    UserData::Analytic(raw, cutout)
+                }
             }
         };
-        let of = |shape: &Shape| match shape {
-            Shape::Mesh(_) => None,
-            Shape::Analytic(placed) => Some(user_shape(placed)),
-        };
-        Self(geometry.shapes.iter().map(of).collect())
+        Self(geometry.shapes.iter().enumerate().map(of).collect())
     }
 
     /// The entry of one shape.
-    pub(super) fn get(&self, id: ShapeId) -> Option<&sys::StUserShape> {
-        self.0[id.index()].as_ref()
+    pub(super) fn get(&self, id: ShapeId) -> &UserData {
+        &self.0[id.index()]
+    }
+}
+
+/// The user data of the instances that move; the others have none. Embree keeps addresses into it.
+pub(super) struct MovingInstances(Vec<Option<sys::StMovingInstance>>);
+
+// SAFETY: the pointers inside lead to the geometry and to Embree's scenes, and are only read through, which both allow from any thread.
+unsafe impl Send for MovingInstances {}
+// SAFETY: as above.
+unsafe impl Sync for MovingInstances {}
+
+impl MovingInstances {
+    /// The table for `geometry`, over the committed scenes of its objects, which must live as long.
+    pub(super) fn new(geometry: &Geometry, objects: &[Scene]) -> Self {
+        let of = |instance: &Instance| {
+            instance.motion.as_ref()?;
+            let object = geometry.object(instance.object);
+            let inside = object.shapes.iter().fold(Aabb::EMPTY, |b, &id| b.union(&geometry.shape(id).bounds()));
+            let Aabb { min, max } = instance.bounds(&inside);
+            Some(sys::StMovingInstance {
+                instance: std::ptr::from_ref(instance).cast::<c_void>(),
+                enter: Some(enter_instance),
+                object: objects[instance.object.index()].handle(),
+                lower: min.to_array(),
+                upper: max.to_array(),
+            })
+        };
+        Self(geometry.instances.iter().map(of).collect())
+    }
+
+    /// The entry of one instance.
+    pub(super) fn get(&self, index: usize) -> Option<&sys::StMovingInstance> {
+        self.0[index].as_ref()
     }
 }
 
@@ -56,17 +112,19 @@ impl GeometryHandle {
     /// The committed geometry of a shape.
     ///
     /// # Safety
-    /// The shape and `user` must outlive every scene the geometry is attached to, and must not move.
-    pub(super) unsafe fn of_shape(device: &Device, shape: &Shape, user: Option<&sys::StUserShape>) -> Result<Self> {
+    /// The shape and its user data must outlive every scene the geometry is attached to, and must not move.
+    pub(super) unsafe fn of_shape(device: &Device, shape: &Shape, user: &UserData) -> Result<Self> {
         match (shape, user) {
             // SAFETY: the caller keeps the mesh alive.
-            (Shape::Mesh(mesh), _) => unsafe { Self::of_mesh(device, mesh) },
-            (Shape::Analytic(_), Some(user)) => {
+            (Shape::Mesh(mesh), UserData::Triangles) => unsafe { Self::of_mesh(device, mesh, None) },
+            // SAFETY: the caller keeps the mesh and the user data alive.
+            (Shape::Mesh(mesh), UserData::TrianglesWithHoles(cutout, _)) => unsafe { Self::of_mesh(device, mesh, Some(cutout)) },
+            (Shape::Analytic(_), UserData::Analytic(user, _)) => {
                 // SAFETY: the device is alive; the caller keeps the user data alive.
                 let handle = unsafe { sys::st_new_user_geometry(device.handle(), user) };
                 Self::new(device, handle)
             }
-            (Shape::Analytic(_), None) => Err(Error::Internal("an analytic shape without its user data".into())),
+            _ => Err(Error::Internal("user data of another shape".into())),
         }
     }
 
@@ -74,17 +132,23 @@ impl GeometryHandle {
     ///
     /// # Safety
     /// As for [`of_shape`](Self::of_shape).
-    unsafe fn of_mesh(device: &Device, mesh: &Mesh) -> Result<Self> {
+    unsafe fn of_mesh(device: &Device, mesh: &Mesh, cutout: Option<&sys::StCutout>) -> Result<Self> {
         // SAFETY: the device is alive.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
         let this = Self::new(device, handle)?;
-        // SAFETY: both buffers hold as many items of that format as are announced; 16 bytes may be read of the last position, since the
+        // SAFETY: all buffers hold as many items of that format as are announced; 16 bytes may be read of the last position, since the
         // mesh keeps one more behind it; Embree only reads them, and the caller keeps them alive.
         unsafe {
-            let positions = mesh.padded_positions();
-            this.share(sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, positions.as_ptr().cast(), positions.len() - 1);
+            sys::rtcSetGeometryTimeStepCount(handle, mesh.padded_steps().count() as u32);
+            for (step, positions) in (0..).zip(mesh.padded_steps()) {
+                let data = positions.as_ptr().cast();
+                this.share(sys::RTC_BUFFER_TYPE_VERTEX, step, sys::RTC_FORMAT_FLOAT3, data, positions.len() - 1);
+            }
             let triangles = mesh.triangles();
-            this.share(sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, triangles.as_ptr().cast(), triangles.len());
+            this.share(sys::RTC_BUFFER_TYPE_INDEX, 0, sys::RTC_FORMAT_UINT3, triangles.as_ptr().cast(), triangles.len());
+            if let Some(cutout) = cutout {
+                sys::st_set_cutout(handle, cutout);
+            }
             sys::rtcCommitGeometry(handle);
         }
         Ok(this)
@@ -94,12 +158,22 @@ impl GeometryHandle {
     ///
     /// # Safety
     /// There must be as many, and they must outlive the geometry.
-    unsafe fn share(&self, kind: sys::RTCBufferType, format: sys::RTCFormat, items: *const c_void, count: usize) {
+    unsafe fn share(&self, kind: sys::RTCBufferType, slot: u32, format: sys::RTCFormat, items: *const c_void, count: usize) {
         // SAFETY: the handle is alive; the rest is the caller's promise.
-        unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, 0, format, items, 0, 12, count) }
+        unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, items, 0, 12, count) }
     }
 
-    /// The committed geometry of an instance of `object`.
+    /// The committed geometry of an instance that moves.
+    ///
+    /// # Safety
+    /// The user data, the instance and the scene it names must outlive every scene the geometry is attached to, and must not move.
+    pub(super) unsafe fn of_moving_instance(device: &Device, user: &sys::StMovingInstance) -> Result<Self> {
+        // SAFETY: the device is alive; the caller keeps the rest alive.
+        let handle = unsafe { sys::st_new_moving_instance(device.handle(), user) };
+        Self::new(device, handle)
+    }
+
+    /// The committed geometry of an instance of `object` at rest.
     pub(super) fn of_instance(device: &Device, object: &Scene, instance: &Instance) -> Result<Self> {
         // SAFETY: the device is alive.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_INSTANCE) };

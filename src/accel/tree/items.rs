@@ -47,12 +47,12 @@ impl<'g> Items<'g> {
         self.list.len()
     }
 
-    /// The corners of an item that is a triangle.
+    /// The corners of an item that is a triangle at rest.
     pub fn triangle(&self, index: usize) -> Option<TrianglePoints> {
         match self.list[index].kind() {
             ItemKind::Prim(shape, prim) => match self.geometry.shape(shape) {
-                Shape::Mesh(mesh) => Some(mesh.triangle_points(prim)),
-                Shape::Analytic(_) => None,
+                Shape::Mesh(mesh) if !mesh.is_deforming() => Some(mesh.triangle_points(prim)),
+                _ => None,
             },
             ItemKind::Instance(_) => None,
         }

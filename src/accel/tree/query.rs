@@ -45,6 +45,8 @@ pub(in crate::accel) struct Query<'a, T, C, const ANY: bool> {
     /// Counts the work.
     pub counter: &'a mut C,
     instance: InstanceId,
+    /// Of the world-space ray, for cut-outs.
+    key: u32,
     accel: &'a TwoLevel<'a, T>,
 }
 
@@ -52,7 +54,8 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
     /// A query of the world; the ray must be valid.
     #[inline(always)]
     pub fn new(accel: &'a TwoLevel<'a, T>, ray: &Ray, counter: &'a mut C) -> Self {
-        Self { ray: *ray, triangle_ray: TriangleRay::from(ray), best: None, counter, instance: Hit::NO_INSTANCE, accel }
+        let key = accel.geometry().cutouts.key(ray);
+        Self { ray: *ray, triangle_ray: TriangleRay::from(ray), best: None, counter, instance: Hit::NO_INSTANCE, key, accel }
     }
 
     /// Largest of the distances that still matter, inclusive.
@@ -73,16 +76,16 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
         match item.kind() {
             ItemKind::Prim(shape, prim) => {
                 self.counter.prims(1);
-                let hit = match self.accel.geometry().shape(shape) {
+                match self.accel.geometry().shape(shape) {
                     Shape::Mesh(mesh) => {
-                        let hit = self.triangle_ray.intersect(&mesh.triangle_points(prim));
-                        hit.map(|hit| Hit { t: hit.t, u: hit.u, v: hit.v, shape, prim, instance: self.instance })
+                        let hit = self.triangle_ray.intersect(&mesh.triangle_points_at(prim, self.ray.time));
+                        hit.is_some_and(|h| self.offer(Hit { t: h.t, u: h.u, v: h.v, shape, prim, instance: self.instance }))
                     }
-                    analytic @ Shape::Analytic(_) => {
-                        analytic.intersect_prim(&self.ray, shape, prim).map(|hit| Hit { instance: self.instance, ..hit })
+                    Shape::Analytic(_) => {
+                        let hit = self.accel.geometry().intersect_prim(&self.ray, self.key, shape, prim, self.instance);
+                        hit.is_some_and(|hit| self.take(hit))
                     }
-                };
-                hit.is_some_and(|hit| self.offer(hit))
+                }
             }
             ItemKind::Instance(id) => self.enter(id),
         }
@@ -94,18 +97,22 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
         self.instance
     }
 
-    /// Takes a hit within the ray's interval, if it is better than the best. True ends the traversal.
+    /// Takes a hit of a triangle within the ray's interval, if it counts and is better than the best. True ends the traversal.
     #[inline(always)]
     pub fn offer(&mut self, hit: Hit) -> bool {
-        if ANY {
-            self.best = Some(hit);
-            return true;
-        }
+        let geometry = self.accel.geometry();
+        let better = ANY || self.best.is_none_or(|best| hit.is_before(&best));
+        better && geometry.cutouts.counts(&geometry.shapes, self.key, &self.ray, &hit) && self.take(hit)
+    }
+
+    /// Takes a hit that counts, if it is better than the best.
+    #[inline(always)]
+    fn take(&mut self, hit: Hit) -> bool {
         if self.best.is_none_or(|best| hit.is_before(&best)) {
             self.best = Some(hit);
             self.set_t_max(hit.t.next_up().min(self.ray.t_max));
         }
-        false
+        ANY
     }
 
     #[inline(always)]
@@ -122,8 +129,15 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
         if !ray.is_valid() {
             return false;
         }
-        let mut inner: Query<'_, T, C, ANY> =
-            Query { triangle_ray: TriangleRay::from(&ray), ray, best: self.best, counter: self.counter, instance: id, accel: self.accel };
+        let mut inner: Query<'_, T, C, ANY> = Query {
+            triangle_ray: TriangleRay::from(&ray),
+            ray,
+            best: self.best,
+            counter: self.counter,
+            instance: id,
+            key: self.key,
+            accel: self.accel,
+        };
         self.accel.object(instance.object).traverse(&mut inner);
         self.best = inner.best;
         let t_max = inner.ray.t_max;

@@ -3,10 +3,10 @@
 use super::{Counter, Items, NotCounted, Query, Tree};
 use crate::accel::Accelerator;
 use crate::accel::inspect::{Inspect, NodeInfo, TraversalCounts};
-use crate::geometry::{Geometry, Hit};
+use crate::geometry::{Geometry, Hit, Instance};
 use crate::id::ObjectId;
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Aabb, DAffine3, Ray, Transform};
+use crate::math::{Aabb, DAffine3, Motion, Ray, Transform};
 
 /// Trees over borrowed geometry.
 pub(in crate::accel) struct TwoLevel<'g, T> {
@@ -33,6 +33,13 @@ impl<'g, T: Tree> TwoLevel<'g, T> {
             Err(_) => build(),
         };
         Self { geometry, world, objects, bounds: geometry.bounds(), instances: InstanceRounding::of(geometry) }
+    }
+
+    /// A tree made by `build` over the world of a geometry without instances.
+    #[cfg(test)]
+    pub fn over_world(geometry: &'g Geometry, build: impl Fn(&Items<'_>) -> T) -> Self {
+        let world = build(&Items::of_world(geometry, &[]));
+        Self { geometry, world, objects: Vec::new(), bounds: geometry.bounds(), instances: None }
     }
 
     /// What all trees are over.
@@ -80,10 +87,13 @@ impl InstanceRounding {
         let bounds = geometry.bounds();
         let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
         let mut rounding: Option<Self> = None;
-        for instance in &geometry.instances {
-            let Transform { world_from_object, object_from_world, .. } = &instance.transform;
-            // One rounding of the origin and one of the direction, each with room for the arithmetic in f64.
-            let relative = (4.0 * UNIT_ROUNDOFF * norm(world_from_object) * norm(object_from_world)) as f32;
+        let at_rest = |instance: &Instance| instance.motion.is_none().then_some(instance.transform);
+        let moving = |instance: &Instance| instance.motion.clone().map(|motion| Motion::sample_times().map(move |time| motion.at(time)));
+        let transforms = geometry.instances.iter().flat_map(|i| at_rest(i).into_iter().chain(moving(i).into_iter().flatten()));
+        for Transform { world_from_object, object_from_world, .. } in transforms {
+            // One rounding of the origin and one of the direction, with room for the arithmetic in f64 and for what lies between the times
+            // at which motions were looked at.
+            let relative = (8.0 * UNIT_ROUNDOFF * norm(&world_from_object) * norm(&object_from_world)) as f32;
             let translation = world_from_object.translation.abs().max_element() as f32;
             let old = rounding.unwrap_or(Self { relative, reach });
             rounding = Some(Self { relative: old.relative.max(relative), reach: old.reach.max(translation) });

@@ -150,7 +150,8 @@ fn a_sphere_light_gives_the_closed_form_irradiance() {
         shape: ShapeId(0),
         prim: PrimId(0),
         emission: WHITE,
-        form: Form::Sphere(SphereEmitter { center: DVec3::new(1.2, 0.0, 1.6), radius: 0.5, inward: false }),
+        luminance: 1.0,
+        form: Form::Sphere(Box::new(SphereEmitter { center: DVec3::new(1.2, 0.0, 1.6), radius: 0.5, inward: false })),
     };
     let e = irradiance(&[light], &Geometry::default(), DVec3::ZERO, DVec3::Z);
     assert!((e / (PI * 0.0625 * 0.8) - 1.0).abs() < 1e-4, "{e}");
@@ -298,10 +299,11 @@ fn a_shadow_ray_reaches_the_light_it_was_made_for() {
                 n_g: Vec3::Z,
                 n_s: Vec3::Z,
                 dp_du: Vec3::ZERO,
-                uv: crate::math::Vec2::ZERO,
+                uv: Vec2::ZERO,
                 shape: ShapeId(9),
                 prim: PrimId(0),
                 instance: Hit::NO_INSTANCE,
+                time: 0.0,
             };
             let ray = from.spawn_to(&target);
             let blocked = (0..2).any(|i| geometry.shape(ShapeId(0)).intersect_prim(&ray, ShapeId(0), PrimId(i)).is_some());

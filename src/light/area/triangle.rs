@@ -2,8 +2,8 @@
 
 use super::SurfaceSample;
 use crate::geometry::TrianglePoints;
-use crate::math::{DVec3, Vec3};
 use crate::math::float::UNIT_ROUNDOFF;
+use crate::math::{DVec3, Vec3};
 
 /// A triangle of a mesh.
 pub(super) struct TriangleEmitter {

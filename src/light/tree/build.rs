@@ -175,4 +175,3 @@ fn partition(items: &mut [Item], passes: impl Fn(&Item) -> bool) -> usize {
     }
     count
 }
-

@@ -71,8 +71,7 @@ impl LightTree {
     /// The cut for a point; `None` where nothing arrives.
     #[inline]
     fn cut(&self, p: Vec3, n: Vec3) -> Option<Cut> {
-        let mut cut =
-            Cut { nodes: [0; MAX_OPEN], importances: [[0.0; WIDTH]; MAX_OPEN], sums: [0.0; MAX_OPEN], count: 1, total: 0.0 };
+        let mut cut = Cut { nodes: [0; MAX_OPEN], importances: [[0.0; WIDTH]; MAX_OPEN], sums: [0.0; MAX_OPEN], count: 1, total: 0.0 };
         let mut i = 0;
         while i < cut.count {
             let node = &self.nodes[cut.nodes[i] as usize];
@@ -138,6 +137,7 @@ impl LightTree {
     }
 
     /// Bytes of the tables.
+    #[cfg(test)]
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.node_places.as_slice()) + size_of_val(self.light_places.as_slice())
     }

@@ -3,9 +3,7 @@ use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Mesh, Placed, Quad, Shape, Sphere};
 use crate::id::{LightId, ShapeId};
 use crate::light::test_support::{Random, assert_chi_squared};
-use crate::light::{
-    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, SpotLight,
-};
+use crate::light::{AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, SpotLight};
 use crate::math::{DAffine3, Transform};
 
 const CLOUD: usize = 40;
@@ -65,8 +63,8 @@ fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
 fn receivers(seed: u64, count: usize) -> Vec<Receiver> {
     let mut random = Random(seed);
     let receiver = |i: usize| {
-        let p = random.direction() * f64::from(random.next()) * if i % 5 == 0 { 50.0 } else { 3.0 };
-        let n = if i % 4 == 0 { Vec3::ZERO } else { random.direction().as_vec3().normalize() };
+        let p = random.direction() * f64::from(random.next()) * if i.is_multiple_of(5) { 50.0 } else { 3.0 };
+        let n = if i.is_multiple_of(4) { Vec3::ZERO } else { random.direction().as_vec3().normalize() };
         Receiver { p, n }
     };
     (0..count).map(receiver).collect()
@@ -78,12 +76,27 @@ fn pmfs(set: &LightSet, from: &Receiver) -> Vec<f64> {
 
 #[test]
 fn probabilities_add_up_to_one() {
+    // What is missing is the chance to end in a group none of whose lights reaches the point, although the group's looser bounds do: rare,
+    // and counted among the choices in the next test.
+    let (mut missing, mut complete) = (0.0, 0);
     for sky in [false, true] {
         let (_, set) = cloud(1, sky);
         for from in receivers(2, 400) {
             let sum: f64 = pmfs(&set, &from).iter().sum();
-            assert!((sum - 1.0).abs() < 1e-5, "{from:?}: {sum}");
+            assert!(sum < 1.0 + 1e-5, "{from:?}: {sum}");
+            missing += (1.0 - sum).max(0.0) / 800.0;
+            complete += usize::from(sum > 1.0 - 1e-5);
         }
+    }
+    assert!(missing < 0.01 && complete > 400, "{missing} {complete}");
+
+    // Where every light reaches every point, nothing is missing.
+    let mut random = Random(9);
+    let point = |_| Light::Point(PointLight { position: 3.0 * random.direction(), intensity: Rgb::splat(1.0 + random.next()) });
+    let set = LightSet::with_selection((0..100).map(point).collect(), &Geometry::default(), LightSelection::Tree);
+    for from in receivers(2, 400) {
+        let sum: f64 = pmfs(&set, &Receiver { n: Vec3::ZERO, ..from }).iter().sum();
+        assert!((sum - 1.0).abs() < 1e-5, "{from:?}: {sum}");
     }
 }
 
@@ -93,10 +106,15 @@ fn lights_are_chosen_as_often_as_their_probability_says() {
         let (_, set) = cloud(3, sky);
         let mut random = Random(4);
         for (k, from) in receivers(5, 8).into_iter().enumerate() {
-            let expected = pmfs(&set, &from);
+            let mut expected = pmfs(&set, &from);
+            // No light at all.
+            expected.push((1.0 - expected.iter().sum::<f64>()).max(0.0));
             let mut counts = vec![0u32; expected.len()];
             for _ in 0..100_000 {
-                let choice = set.choose(&from, random.pair()).unwrap();
+                let Some(choice) = set.choose(&from, random.pair()) else {
+                    counts[expected.len() - 1] += 1;
+                    continue;
+                };
                 assert!((f64::from(choice.pmf) / expected[choice.id.index()] - 1.0).abs() < 1e-5);
                 counts[choice.id.index()] += 1;
             }
@@ -142,7 +160,8 @@ fn near_lights_are_preferred_to_strong_ones_far_away() {
 
 #[test]
 fn any_arrangement_of_lights_makes_a_tree_of_bounded_size() {
-    let arrangements: [(&str, fn(f64) -> DVec3); 4] = [
+    type Arrangement = (&'static str, fn(f64) -> DVec3);
+    let arrangements: [Arrangement; 4] = [
         ("one point", |_| DVec3::ONE),
         ("a line", |i| DVec3::X * i),
         ("growing gaps", |i| DVec3::Y * (i / 100.0).exp2()),
@@ -150,9 +169,8 @@ fn any_arrangement_of_lights_makes_a_tree_of_bounded_size() {
     ];
     for (name, place) in arrangements {
         let n = 5_000;
-        let lights: Vec<Option<_>> = (0..n)
-            .map(|i| PointLight { position: place(f64::from(i)), intensity: Rgb::splat(1.0 + (i % 7) as f32) }.bounds())
-            .collect();
+        let lights: Vec<Option<_>> =
+            (0..n).map(|i| PointLight { position: place(f64::from(i)), intensity: Rgb::splat(1.0 + (i % 7) as f32) }.bounds()).collect();
         let tree = LightTree::new(&lights).unwrap();
         assert!(tree.memory_bytes() < 150 * n as usize, "{name}: {} bytes", tree.memory_bytes());
         let from = Receiver { p: DVec3::new(0.3, 0.2, 0.1), n: Vec3::ZERO };

@@ -265,12 +265,14 @@ fn placed_densities_integrate_to_one() {
 }
 
 #[test]
-fn instances_keep_hits_whose_distance_was_rounded_otherwise() {
+fn hits_whose_distance_was_rounded_otherwise_are_found_again() {
     let placed = Placed::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), Transform::IDENTITY);
     let ray = Ray::new(Vec3::new(0.0, 0.0, -3.0), Vec3::Z);
     let hit = Hit { t: 1.999_99, ..NO_HIT };
-    assert!(placed.interaction(&ray, &hit).is_none());
-    assert!(placed.interaction(&ray, &Hit { instance: InstanceId(0), ..hit }).is_some());
+    assert_eq!(placed.interaction(&ray, &hit).map(|at| at.t), Some(2.0));
+    assert_eq!(placed.interaction(&ray, &Hit { instance: InstanceId(0), ..hit }).map(|at| at.t), Some(2.0));
+    // The far side, seen through a hole in the near one.
+    assert_eq!(placed.interaction(&ray, &Hit { t: 4.000_01, ..hit }).map(|at| at.t), Some(4.0));
     // The end of the ray may be the hit itself.
     assert!(placed.interaction(&Ray { t_max: 2.0, ..ray }, &Hit { t: 2.0, ..NO_HIT }).is_some());
 }

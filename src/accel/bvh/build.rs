@@ -1,0 +1,214 @@
+//! The binary hierarchy: binned surface area heuristic (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies"), built in
+//! parallel, the same for any number of threads.
+
+use crate::math::{Aabb, Vec3};
+
+/// Bins along each axis.
+const BINS: usize = 16;
+
+/// Below this many references a subtree is built by one thread.
+const PARALLEL: usize = 8_192;
+
+/// Below this depth splits halve the references, so that the depth is bounded for any input.
+const MAX_SAH_DEPTH: u32 = 48;
+
+/// Cost of a leaf's test of up to [`BLOCK`] items, in units of the cost of a node.
+const BLOCK_COST: f32 = 1.2;
+
+/// Items that are tested side by side.
+pub(super) const BLOCK: usize = 4;
+
+/// The most items in a leaf.
+pub(super) const MAX_LEAF: usize = 8;
+
+/// An item to be sorted into the hierarchy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reference {
+    pub bounds: Aabb,
+    pub item: u32,
+}
+
+/// A node of the binary hierarchy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BinaryNode {
+    pub bounds: Aabb,
+    /// Of a leaf, its first reference; of an inner node, its second child. The first child follows its parent.
+    pub link: u32,
+    /// How many references a leaf has; zero on inner nodes.
+    pub count: u32,
+}
+
+const UNUSED: BinaryNode = BinaryNode { bounds: Aabb::EMPTY, link: 0, count: 0 };
+
+/// A binary hierarchy; the root is the first node.
+pub(super) struct Binary {
+    /// A node for `n` references is followed by the room that its children may need, so parts of it are unused.
+    pub nodes: Vec<BinaryNode>,
+    pub references: Vec<Reference>,
+}
+
+impl Binary {
+    /// Builds the hierarchy; `references` must not be empty. `is_alone` tells items that may not share a leaf with others.
+    pub fn new(references: Vec<Reference>, is_alone: impl Fn(u32) -> bool + Sync) -> Self {
+        Self::from_depth(references, is_alone, 0)
+    }
+
+    /// As [`new`](Self::new), but every split halves the references.
+    pub fn halved(references: Vec<Reference>, is_alone: impl Fn(u32) -> bool + Sync) -> Self {
+        Self::from_depth(references, is_alone, MAX_SAH_DEPTH)
+    }
+
+    fn from_depth(mut references: Vec<Reference>, is_alone: impl Fn(u32) -> bool + Sync, depth: u32) -> Self {
+        let mut nodes = vec![UNUSED; 2 * references.len() - 1];
+        Builder { is_alone }.build(&mut nodes, &mut references, 0, 0, depth);
+        Self { nodes, references }
+    }
+}
+
+struct Builder<F> {
+    is_alone: F,
+}
+
+#[derive(Clone, Copy)]
+struct Bin {
+    bounds: Aabb,
+    count: u32,
+}
+
+impl<F: Fn(u32) -> bool + Sync> Builder<F> {
+    /// Builds over `refs`, which start at `first`, into `nodes`, which start at `base`.
+    fn build(&self, nodes: &mut [BinaryNode], refs: &mut [Reference], first: usize, base: usize, depth: u32) {
+        let bounds = refs.iter().fold(Aabb::EMPTY, |b, r| b.union(&r.bounds));
+        let split = if self.may_be_leaf(refs) && refs.len() <= 1 { None } else { self.split(refs, &bounds, depth) };
+        let Some(middle) = split else {
+            nodes[0] = BinaryNode { bounds, link: first as u32, count: refs.len() as u32 };
+            return;
+        };
+        let second = 2 * middle;
+        nodes[0] = BinaryNode { bounds, link: (base + second) as u32, count: 0 };
+        let (left_nodes, right_nodes) = nodes[1..].split_at_mut(second - 1);
+        let (left, right) = refs.split_at_mut(middle);
+        let parallel = left.len() + right.len() > PARALLEL;
+        let mut build_left = || self.build(left_nodes, left, first, base + 1, depth + 1);
+        let mut build_right = || self.build(right_nodes, right, first + middle, base + second, depth + 1);
+        if parallel {
+            rayon::join(build_left, build_right);
+        } else {
+            build_left();
+            build_right();
+        }
+    }
+
+    fn may_be_leaf(&self, refs: &[Reference]) -> bool {
+        refs.len() == 1 || (refs.len() <= MAX_LEAF && !refs.iter().any(|r| (self.is_alone)(r.item)))
+    }
+
+    /// Sorts the references into two parts and gives the size of the first; `None` if they are better left together.
+    fn split(&self, refs: &mut [Reference], bounds: &Aabb, depth: u32) -> Option<usize> {
+        let centroids = refs.iter().fold(Aabb::EMPTY, |b, r| b.extended(r.bounds.center()));
+        let best = if depth < MAX_SAH_DEPTH { best_split(refs, &centroids) } else { None };
+        let leaf_cost = bounds.area() * blocks(refs.len() as u32);
+        match best {
+            Some(split) if !self.may_be_leaf(refs) || bounds.area() + split.cost < leaf_cost => {
+                let binning = Binning::new(&centroids, split.axis);
+                let middle = partition(refs, |r| binning.bin(r) < split.bin);
+                (middle > 0 && middle < refs.len()).then_some(middle).or_else(|| halve(refs))
+            }
+            _ if self.may_be_leaf(refs) => None,
+            _ => halve(refs),
+        }
+    }
+}
+
+/// Halves in the present order: where centroids coincide no order is better than another.
+#[allow(clippy::unnecessary_wraps)]
+fn halve(refs: &mut [Reference]) -> Option<usize> {
+    Some(refs.len() / 2)
+}
+
+fn blocks(count: u32) -> f32 {
+    count.div_ceil(BLOCK as u32) as f32 * BLOCK_COST
+}
+
+struct Split {
+    axis: usize,
+    /// The first bin of the second part.
+    bin: usize,
+    cost: f32,
+}
+
+/// Maps centroids to bins along one axis.
+struct Binning {
+    axis: usize,
+    min: f32,
+    scale: f32,
+}
+
+impl Binning {
+    fn new(centroids: &Aabb, axis: usize) -> Self {
+        let size = centroids.max[axis] - centroids.min[axis];
+        Self { axis, min: centroids.min[axis], scale: if size > 0.0 { BINS as f32 / size } else { 0.0 } }
+    }
+
+    #[inline]
+    fn bin(&self, reference: &Reference) -> usize {
+        let at = (reference.bounds.center()[self.axis] - self.min) * self.scale;
+        // A NaN of infinity times zero becomes 0.
+        (at as usize).min(BINS - 1)
+    }
+}
+
+fn best_split(refs: &[Reference], centroids: &Aabb) -> Option<Split> {
+    const EMPTY: Bin = Bin { bounds: Aabb::EMPTY, count: 0 };
+    let mut best: Option<Split> = None;
+    for axis in 0..3 {
+        if !(centroids.max[axis] > centroids.min[axis]) {
+            continue;
+        }
+        let binning = Binning::new(centroids, axis);
+        let mut bins = [EMPTY; BINS];
+        for reference in refs {
+            let bin = &mut bins[binning.bin(reference)];
+            bin.bounds = bin.bounds.union(&reference.bounds);
+            bin.count += 1;
+        }
+        let mut right_cost = [0.0; BINS];
+        let mut right = EMPTY;
+        for i in (1..BINS).rev() {
+            right = Bin { bounds: right.bounds.union(&bins[i].bounds), count: right.count + bins[i].count };
+            right_cost[i] = if right.count == 0 { f32::INFINITY } else { right.bounds.area() * blocks(right.count) };
+        }
+        let mut left = EMPTY;
+        for i in 1..BINS {
+            left = Bin { bounds: left.bounds.union(&bins[i - 1].bounds), count: left.count + bins[i - 1].count };
+            if left.count == 0 {
+                continue;
+            }
+            let cost = left.bounds.area() * blocks(left.count) + right_cost[i];
+            if cost < best.as_ref().map_or(f32::INFINITY, |b| b.cost) {
+                best = Some(Split { axis, bin: i, cost });
+            }
+        }
+    }
+    best
+}
+
+/// Moves what belongs to the first part to the front and counts it.
+fn partition(refs: &mut [Reference], is_first: impl Fn(&Reference) -> bool) -> usize {
+    let (mut i, mut j) = (0, refs.len());
+    while i < j {
+        if is_first(&refs[i]) {
+            i += 1;
+        } else {
+            j -= 1;
+            refs.swap(i, j);
+        }
+    }
+    i
+}
+
+/// The largest half-area split is what the wide form opens first.
+pub(super) fn half_area(bounds: &Aabb) -> f32 {
+    let d: Vec3 = bounds.size();
+    d.x * d.y + d.y * d.z + d.z * d.x
+}

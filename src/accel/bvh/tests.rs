@@ -1,0 +1,213 @@
+use super::build::{BLOCK, MAX_LEAF};
+use super::lanes::{Lanes, Portable, WideRay};
+use super::wide::{Block, Wide, WideNode};
+use super::*;
+use crate::accel::Accelerator;
+use crate::accel::inspect::{Inspect, Item, StructureStats};
+use crate::accel::tree::{SlabRay, TwoLevel};
+use crate::geometry::{Geometry, Hit, Mesh, Shape, TrianglePoints, TriangleRay};
+use crate::id::{PrimId, ShapeId};
+use crate::math::{Ray, Vec3};
+
+/// A fixed sequence in place of random numbers.
+struct Sequence(u64);
+
+impl Sequence {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn vec(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        ((self.next() * 0.5 + 0.5) * n as f32) as usize % n
+    }
+}
+
+/// Points on a coarse grid now and then, so that edges, corners and planes are met exactly.
+fn corner(random: &mut Sequence) -> Vec3 {
+    let p = random.vec();
+    if random.below(2) == 0 { (p * 4.0).round() * 0.25 } else { p }
+}
+
+fn ray(random: &mut Sequence) -> Ray {
+    let origin = corner(random) * 2.0;
+    let direction = match random.below(4) {
+        0 => [Vec3::X, -Vec3::Y, Vec3::new(0.0, -0.0, 1.0), Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1e-38, 1e-42)][random.below(5)],
+        1 => corner(random) - origin,
+        _ => random.vec(),
+    };
+    let t_max = if random.below(3) == 0 { random.next().abs() * 3.0 } else { f32::INFINITY };
+    Ray { t_max, t_min: if random.below(3) == 0 { t_max.min(0.3) } else { 0.0 }, ..Ray::new(origin, direction) }
+}
+
+fn block(triangles: &[TrianglePoints]) -> Block {
+    let mut block =
+        Block { corners: [[[0.0; BLOCK]; 3]; 3], items: [Item::prim(ShapeId(0), PrimId(0)); BLOCK], count: triangles.len() as u32 };
+    for (lane, t) in triangles.iter().enumerate() {
+        for (corner, p) in [t.a, t.b, t.c].into_iter().enumerate() {
+            for axis in 0..3 {
+                block.corners[corner][axis][lane] = p[axis];
+            }
+        }
+    }
+    block
+}
+
+#[test]
+fn lanes_answer_as_the_shared_triangle_test_bit_for_bit() {
+    let mut random = Sequence(5);
+    let mut hits = 0;
+    for _ in 0..60_000 {
+        let triangles: Vec<_> = (0..BLOCK)
+            .map(|i| {
+                let (a, b) = (corner(&mut random), corner(&mut random));
+                let c = if i == 3 && random.below(2) == 0 { a.lerp(b, 0.5) } else { corner(&mut random) };
+                TrianglePoints { a, b, c }
+            })
+            .collect();
+        let ray = ray(&mut random);
+        if !ray.is_valid() {
+            continue;
+        }
+        let (block, ray) = (block(&triangles), TriangleRay::from(&ray));
+        let expected: Vec<_> = triangles.iter().map(|t| ray.intersect(t)).collect();
+        let check = |found: Option<lanes::BlockHits>, what: &str| {
+            for (lane, expected) in expected.iter().enumerate() {
+                let found = found.as_ref().filter(|hits| hits.mask >> lane & 1 == 1);
+                let found = found.map(|h| [h.t[lane], h.u[lane], h.v[lane]].map(|x| (x as f32).to_bits()));
+                assert_eq!(found, expected.map(|h| [h.t, h.u, h.v].map(f32::to_bits)), "{what}: {ray:?} {:?}", triangles[lane]);
+            }
+        };
+        check(Portable.intersect(&block, &ray), "portable");
+        if let Some(simd) = V3::try_new() {
+            check(simd.intersect(&block, &ray), "AVX2");
+        }
+        hits += expected.iter().flatten().count();
+    }
+    assert!(hits > 5_000, "{hits}");
+}
+
+#[test]
+fn lanes_open_the_boxes_that_the_scalar_test_opens() {
+    let mut random = Sequence(6);
+    for _ in 0..60_000 {
+        let boxes: Vec<_> = (0..WIDTH)
+            .map(|_| {
+                let (a, b) = (corner(&mut random), corner(&mut random));
+                Aabb { min: a.min(b), max: a.max(b) }
+            })
+            .collect();
+        let used = random.below(WIDTH + 1);
+        let mut node = WideNode::EMPTY;
+        for (slot, bounds) in boxes[..used].iter().enumerate() {
+            node.set(slot, bounds, wide::Child::NONE);
+        }
+        let ray = ray(&mut random);
+        if !ray.is_valid() {
+            continue;
+        }
+        let slab = SlabRay::new(&ray, &Aabb { min: -Vec3::ONE, max: Vec3::ONE }, 0.0);
+        let wide_ray = WideRay::new(slab);
+        let (mask, enter) = Portable.enter(&node, &wide_ray, ray.t_min, ray.t_max);
+        for (slot, bounds) in boxes.iter().enumerate() {
+            let scalar = slab.interval(bounds, ray.t_min, ray.t_max).filter(|_| slot < used);
+            assert_eq!(mask >> slot & 1 == 1, scalar.is_some());
+            assert!(scalar.is_none_or(|(near, _)| near == enter[slot]));
+        }
+        if let Some(simd) = V3::try_new() {
+            let (simd_mask, simd_enter) = simd.enter(&node, &wide_ray, ray.t_min, ray.t_max);
+            assert_eq!((simd_mask, simd_enter.map(f32::to_bits)), (mask, enter.map(f32::to_bits)));
+        }
+    }
+}
+
+fn mesh(triangles: &[[Vec3; 3]]) -> Geometry {
+    let positions = triangles.iter().flatten().map(Vec3::to_array).collect();
+    let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mesh = Mesh::new(positions, indices, None, None).unwrap();
+    Geometry { shapes: vec![Shape::Mesh(mesh)], world: vec![ShapeId(0)], ..Geometry::default() }
+}
+
+fn soup(random: &mut Sequence, count: usize) -> Geometry {
+    let triangles: Vec<_> = (0..count)
+        .map(|_| {
+            let center = corner(random);
+            [0, 1, 2].map(|_| center + 0.1 * corner(random))
+        })
+        .collect();
+    mesh(&triangles)
+}
+
+#[test]
+fn without_simd_the_answers_are_the_same() {
+    let mut random = Sequence(7);
+    let geometry = soup(&mut random, 3_000);
+    let simd = TwoLevel::<Bvh>::new(&geometry, &BvhOptions::default(), 1);
+    let portable = TwoLevel::<Bvh>::over_world(&geometry, |items| Bvh::wide(items, None));
+    assert!(portable.description().contains("scalar"));
+    let mut hits = 0;
+    for _ in 0..20_000 {
+        let ray = ray(&mut random);
+        let hit: Option<Hit> = simd.intersect(&ray);
+        assert_eq!(portable.intersect(&ray), hit, "{ray:?}");
+        assert_eq!(portable.occluded(&ray), hit.is_some(), "{ray:?}");
+        hits += usize::from(hit.is_some());
+    }
+    assert!(hits > 2_000, "{hits}");
+}
+
+#[test]
+fn any_number_of_threads_builds_the_same_tree() {
+    let geometry = soup(&mut Sequence(8), 30_000);
+    let nodes = |threads: usize| {
+        let accel = TwoLevel::<Bvh>::new(&geometry, &BvhOptions::default(), threads);
+        let mut nodes = Vec::new();
+        accel.visit_nodes(&mut |node| nodes.push((node.bounds, node.depth, node.children, node.items.to_vec())));
+        nodes
+    };
+    assert_eq!(nodes(1), nodes(2));
+}
+
+#[test]
+fn garbage_ends_in_a_bounded_tree() {
+    let mut random = Sequence(9);
+    let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let fan = |i: usize| [Vec3::ZERO, Vec3::new((i as f32).sin(), (i as f32).cos(), 0.1), Vec3::new((i as f32).cos(), 0.2, 1.0)];
+    // Each triangle half as large as the one before: the worst for a surface area heuristic.
+    let shrinking = |i: usize| one.map(|p| p * 0.5f32.powi(i as i32 % 120) + Vec3::splat(0.5f32.powi(i as i32 % 120)));
+    let mixed = |i: usize| {
+        let size = if i.is_multiple_of(2) { 1e15 } else { 1e-15 };
+        [random.vec() * size, random.vec() * size, random.vec() * size]
+    };
+    let cases: [(&str, Vec<[Vec3; 3]>); 4] = [
+        ("identical", vec![one; 100_000]),
+        ("one point", (0..1000).map(fan).collect()),
+        ("shrinking", (0..5_000).map(shrinking).collect()),
+        ("huge and tiny", (0..2_000).map(mixed).collect()),
+    ];
+    for (name, triangles) in cases {
+        let geometry = mesh(&triangles);
+        for binary in [false, true] {
+            let accel = TwoLevel::<Bvh>::new(&geometry, &BvhOptions { binary }, 0);
+            let stats = StructureStats::of(&accel);
+            assert_eq!(stats.references, triangles.len() as u64, "{name}");
+            assert!(stats.max_leaf <= MAX_LEAF as u64 && stats.max_depth <= 48 + 17, "{name}: {stats:?}");
+            assert!(accel.memory_bytes() <= 400 * triangles.len() + 1024, "{name}: {}", accel.memory_bytes());
+            let ray = Ray::new(Vec3::new(0.2, 0.2, -3.0), Vec3::Z);
+            assert_eq!(accel.occluded(&ray), accel.intersect(&ray).is_some(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_stack_holds_the_deepest_tree() {
+    // The builder halves below its depth cap; this bounds the levels of the wide form for four billion references.
+    let geometry = soup(&mut Sequence(10), 5_000);
+    let items = Items::of_shapes(&geometry, &geometry.world);
+    let Form::Wide(Wide { depth, .. }, _) = Bvh::wide(&items, None).0 else { panic!("a wide tree") };
+    assert!(depth * (WIDTH - 1) < STACK, "{depth}");
+}

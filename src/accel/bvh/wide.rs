@@ -1,0 +1,183 @@
+//! The wide hierarchy: eight boxes a node, triangles in blocks.
+
+use super::build::{BLOCK, Binary, BinaryNode, half_area};
+use crate::accel::inspect::Item;
+use crate::accel::tree::Items;
+use crate::math::Aabb;
+
+/// Children of a node.
+pub(super) const WIDTH: usize = 8;
+
+/// The most entries that wait on the stack: seven a level.
+pub(super) const STACK: usize = 256;
+
+/// A reference to a child: an inner node, a run of triangle blocks, or a run of other items.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Child(u32);
+
+/// A [`Child`] taken apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ChildKind {
+    Node(u32),
+    Blocks { first: u32, count: u32 },
+    Items { first: u32, count: u32 },
+}
+
+impl Child {
+    const INDEX_BITS: u32 = 27;
+    const MAX_COUNT: u32 = 7;
+    /// Behind an empty box, never opened.
+    pub const NONE: Self = Self(u32::MAX);
+
+    fn node(index: usize) -> Self {
+        Self(index as u32)
+    }
+
+    fn run(tag: u32, first: usize, count: usize) -> Self {
+        debug_assert!(count as u32 <= Self::MAX_COUNT && first < 1 << Self::INDEX_BITS);
+        Self(tag << 30 | (count as u32) << Self::INDEX_BITS | first as u32)
+    }
+
+    #[inline(always)]
+    pub fn is_node(self) -> bool {
+        self.0 >> 30 == 0
+    }
+
+    #[inline(always)]
+    pub fn kind(self) -> ChildKind {
+        let first = self.0 & ((1 << Self::INDEX_BITS) - 1);
+        let count = self.0 >> Self::INDEX_BITS & Self::MAX_COUNT;
+        match self.0 >> 30 {
+            0 => ChildKind::Node(self.0),
+            1 => ChildKind::Blocks { first, count },
+            _ => ChildKind::Items { first, count },
+        }
+    }
+}
+
+/// Boxes of up to eight children. Unused ones are empty: no ray meets them.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct WideNode {
+    /// For each axis the smallest, then the largest coordinates: row `2 axis + side`.
+    pub planes: [[f32; WIDTH]; 6],
+    pub children: [Child; WIDTH],
+}
+
+impl WideNode {
+    pub const EMPTY: Self = {
+        let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
+        Self { planes: [low, high, low, high, low, high], children: [Child::NONE; WIDTH] }
+    };
+
+    pub fn set(&mut self, slot: usize, bounds: &Aabb, child: Child) {
+        for axis in 0..3 {
+            self.planes[2 * axis][slot] = bounds.min[axis];
+            self.planes[2 * axis + 1][slot] = bounds.max[axis];
+        }
+        self.children[slot] = child;
+    }
+
+    /// The box and the child in a slot in use.
+    pub fn get(&self, slot: usize) -> Option<(Aabb, Child)> {
+        let side = |side: usize| [0, 1, 2].map(|axis| self.planes[2 * axis + side][slot]).into();
+        (self.children[slot] != Child::NONE).then(|| (Aabb { min: side(0), max: side(1) }, self.children[slot]))
+    }
+}
+
+/// Up to four triangles side by side. Unused lanes repeat the first triangle under its own ids, which changes no answer.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
+pub(super) struct Block {
+    /// Coordinates by corner, then axis.
+    pub corners: [[[f32; BLOCK]; 3]; 3],
+    pub items: [Item; BLOCK],
+    /// Lanes in use.
+    pub count: u32,
+}
+
+/// The wide hierarchy.
+pub(super) struct Wide {
+    pub nodes: Vec<WideNode>,
+    pub blocks: Vec<Block>,
+    pub items: Vec<Item>,
+    pub bounds: Aabb,
+    /// Levels of nodes.
+    pub depth: usize,
+}
+
+impl Wide {
+    /// From a binary hierarchy, opening the child with the largest area until there are eight.
+    pub fn new(binary: &Binary, items: &Items<'_>) -> Self {
+        let mut wide = Self { nodes: Vec::new(), blocks: Vec::new(), items: Vec::new(), bounds: binary.nodes[0].bounds, depth: 0 };
+        wide.nodes.reserve(binary.references.len() / 8 + 1);
+        wide.blocks.reserve(binary.references.len() / 3 + 1);
+        wide.nodes.push(WideNode::EMPTY);
+        let mut open = vec![(0, 0, 1)];
+        while let Some((source, target, depth)) = open.pop() {
+            wide.depth = wide.depth.max(depth);
+            let (children, count) = gather(binary, source);
+            for (slot, &index) in children[..count].iter().enumerate() {
+                let node = &binary.nodes[index];
+                let child = if node.count == 0 {
+                    wide.nodes.push(WideNode::EMPTY);
+                    open.push((index, wide.nodes.len() - 1, depth + 1));
+                    Child::node(wide.nodes.len() - 1)
+                } else {
+                    wide.leaf(binary, node, items)
+                };
+                wide.nodes[target].set(slot, &node.bounds, child);
+            }
+        }
+        wide.nodes.shrink_to_fit();
+        wide.blocks.shrink_to_fit();
+        wide
+    }
+
+    fn leaf(&mut self, binary: &Binary, node: &BinaryNode, items: &Items<'_>) -> Child {
+        let references = &binary.references[node.link as usize..][..node.count as usize];
+        if items.triangle(references[0].item as usize).is_none() {
+            let first = self.items.len();
+            self.items.extend(references.iter().map(|r| items.list[r.item as usize]));
+            return Child::run(2, first, references.len());
+        }
+        let first = self.blocks.len();
+        for chunk in references.chunks(BLOCK) {
+            let mut block =
+                Block { corners: [[[0.0; BLOCK]; 3]; 3], items: [items.list[chunk[0].item as usize]; BLOCK], count: chunk.len() as u32 };
+            for lane in 0..BLOCK {
+                let item = chunk.get(lane).unwrap_or(&chunk[0]).item as usize;
+                let Some(points) = items.triangle(item) else { continue };
+                block.items[lane] = items.list[item];
+                for (corner, p) in [points.a, points.b, points.c].into_iter().enumerate() {
+                    for axis in 0..3 {
+                        block.corners[corner][axis][lane] = p[axis];
+                    }
+                }
+            }
+            self.blocks.push(block);
+        }
+        Child::run(1, first, self.blocks.len() - first)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice()) + size_of_val(self.items.as_slice())
+    }
+}
+
+/// Up to eight nodes below `root` that together hold all of it; the root itself if it is a leaf.
+fn gather(binary: &Binary, root: usize) -> ([usize; WIDTH], usize) {
+    let mut children = [root; WIDTH];
+    let mut count = 1;
+    while count < WIDTH {
+        let inner = (0..count).filter(|&i| binary.nodes[children[i]].count == 0);
+        let area = |i: &usize| half_area(&binary.nodes[children[*i]].bounds);
+        let Some(largest) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+        let node = children[largest];
+        children[largest] = node + 1;
+        children[count] = binary.nodes[node].link as usize;
+        count += 1;
+    }
+    (children, count)
+}

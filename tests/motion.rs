@@ -1,0 +1,232 @@
+use steradian::accel::{AccelKind, Coherence, build};
+use steradian::geometry::{Geometry, Instance, Mesh, MeshStep, Object, Shape};
+use steradian::id::{ObjectId, ShapeId};
+use steradian::math::{DAffine3, DMat3, DVec3, Motion, Ray};
+
+use serde_json::{Value, json};
+
+use crate::util::folder::Folder;
+use crate::util::geometry::{Rng, cube, ids, meshes, placed_analytic_shapes, ray_through, soup};
+use crate::util::render::{Estimate, probe, render};
+
+fn place(rng: &mut Rng, reach: f64) -> DAffine3 {
+    DAffine3 { matrix3: rng.rotation() * rng.range(0.5, 1.2), translation: reach * rng.cube() }
+}
+
+fn motion(rng: &mut Rng) -> Motion {
+    let keyframed = |rng: &mut Rng| Motion::keyframed(&[(0.0, place(rng, 1.5)), (0.4, place(rng, 1.5)), (1.0, place(rng, 1.5))]).unwrap();
+    let outer = keyframed(rng);
+    if rng.unit() < 0.5 { outer.after(&keyframed(rng)) } else { outer }
+}
+
+/// Analytic shapes and triangles, moving and at rest.
+fn moving_scene(rng: &mut Rng) -> Geometry {
+    let mut shapes = placed_analytic_shapes(rng, DVec3::ZERO);
+    shapes.push(Shape::Mesh(soup(rng, 60, 0.5)));
+    shapes.push(Shape::Mesh(cube(DMat3::IDENTITY * 0.5, DVec3::ZERO)));
+    shapes.push(Shape::Mesh(soup(rng, 60, 0.4)));
+    let world = vec![ShapeId::new(shapes.len() - 1)];
+    let objects = (0..shapes.len() - 1).map(|i| Object { shapes: vec![ShapeId::new(i)] }).collect();
+    let mut instances: Vec<_> = (0..shapes.len() - 1).map(|i| Instance::moving(ObjectId::new(i), motion(rng)).unwrap()).collect();
+    instances.push(Instance::moving(ObjectId(0), Motion::constant(place(rng, 1.5))).unwrap());
+    assert!(instances.last().unwrap().motion.is_none());
+    Geometry { shapes, world, objects, instances, ..Geometry::default() }
+}
+
+/// A mesh whose vertices move along a path of three corners.
+fn deforming(rng: &mut Rng, triangles: usize) -> Mesh {
+    let start = soup(rng, triangles, 0.4);
+    let step = |rng: &mut Rng| MeshStep {
+        positions: start.positions().iter().map(|p| (DVec3::from(p.map(f64::from)) + 0.5 * rng.cube()).as_vec3().to_array()).collect(),
+        normals: None,
+    };
+    let later = vec![step(rng), step(rng)];
+    start.clone().deforming(later).unwrap()
+}
+
+fn rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
+    let time = |rng: &mut Rng, i: usize| [0.0, 0.4, 0.5, 1.0, rng.unit() as f32][i % 5];
+    (0..count).map(|i| Ray { time: time(rng, i), ..ray_through(5.0 * rng.cube(), 2.0 * rng.cube()) }).collect()
+}
+
+#[test]
+fn every_accelerator_sees_the_same_motion() {
+    let mut rng = Rng::new(81);
+    let mut mixed = moving_scene(&mut rng);
+    mixed.shapes.push(Shape::Mesh(deforming(&mut rng, 80)));
+    mixed.world.push(ShapeId::new(mixed.shapes.len() - 1));
+    for geometry in [mixed, moving_scene(&mut rng), meshes(vec![deforming(&mut rng, 200), soup(&mut rng, 50, 0.3)])] {
+        let rays = rays(&mut rng, 6_000);
+        let oracle = build(AccelKind::Linear, &geometry, 1).unwrap();
+        let expected: Vec<_> = rays.iter().map(|ray| oracle.intersect(ray)).collect();
+        assert!(expected.iter().flatten().count() > 500);
+        for (kind, name) in AccelKind::ALL {
+            let accel = build(kind, &geometry, 1).unwrap();
+            let mut hits = vec![None; rays.len()];
+            accel.intersect_batch(&rays, &mut hits, Coherence::Incoherent);
+            let mut different = 0;
+            for ((ray, hit), expected) in rays.iter().zip(&hits).zip(&expected) {
+                assert_eq!(accel.occluded(ray), hit.is_some(), "{name}: {ray:?}");
+                let same = hit.map(|h| ids(&h)) == expected.map(|h| ids(&h));
+                different += usize::from(!same);
+                if let (true, Some(a), Some(b)) = (same, hit, expected) {
+                    assert!((a.t - b.t).abs() <= 2e-4 * b.t, "{name}: {a:?} {b:?}");
+                }
+                if !matches!(kind, AccelKind::Embree(_)) {
+                    assert_eq!(hit, expected, "{name}: {ray:?}");
+                }
+            }
+            // Rays through an edge, where roundings decide.
+            assert!(different <= 3, "{name}: {different}");
+        }
+    }
+}
+
+#[test]
+fn at_each_time_a_moving_scene_is_one_at_rest() {
+    let mut rng = Rng::new(82);
+    let mut geometry = moving_scene(&mut rng);
+    geometry.shapes.push(Shape::Mesh(deforming(&mut rng, 80)));
+    geometry.world.push(ShapeId::new(geometry.shapes.len() - 1));
+    let moving = build(AccelKind::EMBREE, &geometry, 1).unwrap();
+    for time in [0.0f32, 0.2, 0.4, 0.75, 1.0] {
+        let mut frozen = geometry.clone();
+        for instance in &mut frozen.instances {
+            *instance = Instance::new(instance.object, *instance.transform_at(time));
+        }
+        for shape in &mut frozen.shapes {
+            if let Shape::Mesh(mesh) = shape
+                && mesh.is_deforming()
+            {
+                let points = (0..mesh.triangles().len()).flat_map(|i| {
+                    let t = mesh.triangle_points_at(steradian::id::PrimId::new(i), time);
+                    [t.a, t.b, t.c].map(|p| p.to_array())
+                });
+                let positions: Vec<_> = points.collect();
+                let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+                *mesh = Mesh::new(positions, triangles, None, None).unwrap();
+            }
+        }
+        let still = build(AccelKind::EMBREE, &frozen, 1).unwrap();
+        let (mut hits, mut different) = (0, 0);
+        for ray in rays(&mut rng, 3_000) {
+            let ray = Ray { time, ..ray };
+            let (a, b) = (moving.intersect(&ray), still.intersect(&ray));
+            hits += usize::from(a.is_some());
+            different += usize::from(a.map(|h| ids(&h)) != b.map(|h| ids(&h)));
+            let (Some(a), Some(b)) = (a, b) else { continue };
+            if ids(&a) != ids(&b) {
+                continue;
+            }
+            let (a, b) = (geometry.interaction(&ray, &a).unwrap(), frozen.interaction(&ray, &b).unwrap());
+            assert!((a.p - b.p).length() < 1e-5 && (a.n_g - b.n_g).length() < 1e-3, "{a:?} {b:?}");
+            assert_eq!(a.time, time);
+            assert_eq!(a.spawn(a.n_g).time, time);
+        }
+        assert!(hits > 300 && different <= 2, "{time}: {different} of {hits}");
+    }
+}
+
+#[test]
+fn rays_that_leave_a_moving_surface_do_not_find_it_again() {
+    let mut rng = Rng::new(83);
+    let geometry = {
+        let shapes =
+            placed_analytic_shapes(&mut rng, DVec3::ZERO).into_iter().take(1).chain([Shape::Mesh(cube(DMat3::IDENTITY, DVec3::ZERO))]);
+        let shapes: Vec<_> = shapes.collect();
+        let objects = (0..shapes.len()).map(|i| Object { shapes: vec![ShapeId::new(i)] }).collect();
+        let instances = (0..shapes.len()).map(|i| Instance::moving(ObjectId::new(i), motion(&mut rng)).unwrap()).collect();
+        Geometry { shapes, objects, instances, ..Geometry::default() }
+    };
+    for (kind, name) in AccelKind::ALL {
+        let accel = build(kind, &geometry, 1).unwrap();
+        let mut left = 0;
+        for ray in rays(&mut rng, 4_000) {
+            let Some(hit) = accel.intersect(&ray) else { continue };
+            let Some(at) = geometry.interaction(&ray, &hit) else { continue };
+            // Out of a convex body nothing of it is in the way.
+            let n = if at.n_g.dot(ray.direction) < 0.0 { at.n_g } else { -at.n_g };
+            if at.n_g.dot(ray.direction) > 0.0 {
+                continue;
+            }
+            let out = at.spawn((n + 0.9 * rng.direction().as_vec3()).normalize());
+            left += 1;
+            let again = accel.intersect(&out).filter(|hit| hit.instance == at.instance && hit.t < 1e-3);
+            assert!(again.is_none(), "{name}: {at:?} {again:?}");
+        }
+        assert!(left > 200, "{name}: {left}");
+    }
+}
+
+/// A black card that passes before a white sky, in the middle of the picture for half of the time.
+fn passing_card(shapes: Value, rest: Value) -> Value {
+    let mut scene = json!({
+        "materials": { "black": { "type": "diffuse", "albedo": 0 } },
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+        "shapes": shapes,
+    });
+    crate::util::render::merge(&mut scene, rest);
+    let mut scene = probe([0.0, 0.0, 5.0], [0.0, 0.0, 0.0], scene);
+    scene["camera"]["up"] = json!([0, 1, 0]);
+    scene
+}
+
+#[test]
+fn a_card_is_seen_as_long_as_it_is_there() {
+    let card = json!({ "type": "quad", "material": "black", "origin": [-0.5, -1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0] });
+    let path = json!([{ "time": 0, "transform": [{ "translate": [-1, 0, 0] }] }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }]);
+    let mut moving = card.clone();
+    moving["motion"] = path.clone();
+    let ball = json!({ "type": "sphere", "material": "black", "radius": 0.5, "motion": path });
+    let deforming = json!({
+        "type": "mesh", "material": "black", "triangles": [[0, 1, 2], [0, 2, 3]],
+        "positions": [[-1.5, -1, 0], [-0.5, -1, 0], [-0.5, 1, 0], [-1.5, 1, 0]],
+        "deform_positions": [[[0.5, -1, 0], [1.5, -1, 0], [1.5, 1, 0], [0.5, 1, 0]]],
+    });
+    let scenes = [
+        ("shape", passing_card(json!([moving]), json!({}))),
+        ("sphere", passing_card(json!([ball]), json!({}))),
+        ("deforming mesh", passing_card(json!([deforming]), json!({}))),
+        (
+            "instance",
+            passing_card(json!([]), json!({ "objects": { "o": { "shapes": [card] } }, "instances": [{ "object": "o", "motion": path }] })),
+        ),
+        (
+            "shape in an instance",
+            passing_card(json!([]), json!({ "objects": { "o": { "shapes": [moving] } }, "instances": [{ "object": "o" }] })),
+        ),
+    ];
+    for (what, scene) in scenes {
+        Estimate::of(&render(&scene), 1).assert_is(0.5, what);
+    }
+}
+
+#[test]
+fn what_cannot_move_is_refused_with_its_place() {
+    let still = json!({ "time": 0.5 });
+    let flat = json!({ "time": 1, "transform": [{ "scale": [1, 0, 1] }] });
+    let mirrored = json!({ "time": 1, "transform": [{ "scale": [1, -1, 1] }] });
+    let shifted = json!({ "time": 1, "transform": [{ "translate": [1, 0, 0] }] });
+    let lamp = json!({ "radiance": [1, 1, 1] });
+    let triangle = json!([[0, 0, 0], [1, 0, 0], [0, 1, 0]]);
+    let cases = [
+        (json!({ "type": "sphere", "motion": [still, flat] }), "shapes[0].motion[1].transform", "singular"),
+        (json!({ "type": "sphere", "motion": [still, mirrored] }), "shapes[0].motion", "singular"),
+        (json!({ "type": "sphere", "motion": [still, still] }), "shapes[0].motion[1].time", "grow"),
+        (json!({ "type": "sphere", "motion": [still, shifted], "emission": lamp }), "shapes[0].motion", "light"),
+        (
+            json!({ "type": "mesh", "positions": triangle, "triangles": [[0, 1, 2]], "deform_positions": [[[0, 0, 0]]] }),
+            "shapes[0]",
+            "1 for 3 vertices",
+        ),
+        (
+            json!({ "type": "mesh", "positions": triangle, "triangles": [[0, 1, 2]], "deform_files": ["a.obj"] }),
+            "shapes[0]",
+            "a mesh needs either",
+        ),
+    ];
+    for (shape, place, message) in cases {
+        let error = Folder::new().compile(&passing_card(json!([shape]), json!({}))).unwrap_err().to_string();
+        assert!(error.contains(place) && error.contains(message), "{error}");
+    }
+}
