@@ -56,7 +56,7 @@ impl Builder {
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
         let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map, self.shutter)?;
-        let motion = motion.as_constant().is_none().then_some(motion);
+        let (map, motion) = motion.as_constant().map_or((map, Some(motion)), |rest| (rest, None));
         let emission = self.emission(path, &common)?;
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
