@@ -38,4 +38,6 @@ ids! {
     TextureId,
     /// A light.
     LightId,
+    /// A group of lights.
+    LightGroupId,
 }

@@ -33,6 +33,7 @@ pub struct MaterialTable {
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
     names: HashMap<String, MaterialId>,
+    texture_names: HashMap<String, ColorInput>,
 }
 
 impl MaterialTable {
@@ -46,7 +47,8 @@ impl MaterialTable {
             inputs.insert(name.as_str(), compile_texture(files, &format!("textures.{name}"), texture, &mut textures)?);
         }
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
-        let mut table = Self { materials: vec![default], textures, names: HashMap::new() };
+        let texture_names = inputs.iter().map(|(name, input)| ((*name).to_owned(), *input)).collect();
+        let mut table = Self { materials: vec![default], textures, names: HashMap::new(), texture_names };
         let compiler = Compiler { files, inputs };
         for (name, material) in &desc.materials {
             let material = compiler.material(&format!("materials.{name}"), material)?;
@@ -60,6 +62,12 @@ impl MaterialTable {
     pub fn push(&mut self, material: Material) -> MaterialId {
         self.materials.push(material);
         MaterialId::new(self.materials.len() - 1)
+    }
+
+    /// The texture of a name, or its colour if that is constant.
+    pub fn texture(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
+        let found = self.texture_names.get(name).copied();
+        found.ok_or_else(|| files.unknown(path, "texture", name, self.texture_names.keys().map(String::as_str)))
     }
 
     /// The id of a name, or of the default.

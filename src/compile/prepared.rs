@@ -5,9 +5,10 @@ use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
 use crate::error::Result;
 use crate::geometry::{Analytic, Placed, Shape};
-use crate::id::{LightId, MaterialId, ShapeId};
+use crate::id::{LightGroupId, MaterialId, ShapeId};
 use crate::import::MeshData;
 use crate::light::{AreaLight, Emission, Light};
+use crate::material::ColorInput;
 use crate::math::{DAffine3, Motion, Transform};
 use crate::scene::Surface;
 
@@ -22,9 +23,16 @@ pub struct PreparedShape {
     reverse_normal: bool,
     material: MaterialId,
     /// Light that it gives off, not black.
-    pub emission: Option<Emission>,
+    pub emission: Option<PreparedEmission>,
     /// Where the scene has it.
     path: String,
+}
+
+/// Light given off, and the group it belongs to.
+#[derive(Clone, Copy, Debug)]
+pub struct PreparedEmission {
+    emission: Emission,
+    group: Option<LightGroupId>,
 }
 
 #[derive(Clone, Debug)]
@@ -47,8 +55,8 @@ impl Builder {
         let material = self.materials.find(&self.files, path, common.material)?;
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
-        let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map)?;
-        let motion = motion.as_constant().is_none().then_some(motion);
+        let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map, self.shutter)?;
+        let (map, motion) = motion.as_constant().map_or((map, Some(motion)), |rest| (rest, None));
         let emission = self.emission(path, &common)?;
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
@@ -72,7 +80,7 @@ impl Builder {
         map: &DAffine3,
         motion: Option<&Motion>,
         material: MaterialId,
-        emission: Option<Emission>,
+        emission: Option<PreparedEmission>,
     ) -> Result<Vec<PreparedShape>> {
         let mut prepared = Vec::new();
         for loaded in meshes::load(&self.files, path, desc)? {
@@ -82,7 +90,8 @@ impl Builder {
                 let from_mtl =
                     materials::from_mtl(mtl).map_err(|message| meshes::refusal(&self.files, path, desc.file.as_deref(), message))?;
                 material = self.materials.push(from_mtl.material);
-                emission = emission.or(from_mtl.radiance.map(|radiance| Emission { radiance, two_sided: false }));
+                emission =
+                    emission.or(from_mtl.radiance.map(|radiance| PreparedEmission { emission: Emission::constant(radiance), group: None }));
             }
             if moves && emission.is_some() {
                 return Err(self.files.error(path, "a shape that gives off light cannot move"));
@@ -100,12 +109,23 @@ impl Builder {
         Ok(prepared)
     }
 
-    fn emission(&self, path: &str, common: &ShapeCommon) -> Result<Option<Emission>> {
-        let Some(emission) = common.emission else {
+    fn emission(&mut self, path: &str, common: &ShapeCommon) -> Result<Option<PreparedEmission>> {
+        let Some(desc) = common.emission else {
             return Ok(None);
         };
-        let radiance = Rgb::from(self.files.emitted(&format!("{path}.emission.radiance"), emission.radiance)?);
-        Ok((!radiance.is_black()).then_some(Emission { radiance, two_sided: emission.two_sided }))
+        let path = format!("{path}.emission");
+        let radiance = Rgb::from(self.files.emitted(&format!("{path}.radiance"), desc.radiance)?);
+        let group = self.lights.group(&self.files, &path, desc.group.as_deref())?;
+        let input = match &desc.texture {
+            None => ColorInput::Constant(Rgb::WHITE),
+            Some(name) => self.materials.texture(&self.files, &format!("{path}.texture"), name)?,
+        };
+        let (radiance, texture) = match input {
+            ColorInput::Constant(color) => (radiance * color, None),
+            ColorInput::Texture(id) => (radiance, Some(id)),
+        };
+        let emission = Emission { radiance, two_sided: desc.two_sided, texture };
+        Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
     /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
@@ -132,14 +152,13 @@ impl Builder {
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
         let mut surface = Surface { material, first_light: None, single_light: false };
-        if let Some(emission) = emission {
-            let lights = AreaLight::for_shape(id, emission, &self.geometry);
+        if let Some(PreparedEmission { emission, group }) = emission {
+            let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures);
             if !lights.iter().any(|light| light.area() > 0.0) {
                 return Err(self.files.error(&format!("{path}.emission"), "the light has no area"));
             }
-            surface.first_light = Some(LightId::new(self.lights.len()));
             surface.single_light = lights.len() == 1;
-            self.lights.extend(lights.into_iter().map(Light::Area));
+            surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
         }
         self.surfaces.push(surface);
         Ok(id)

@@ -12,8 +12,8 @@ mod settings;
 mod shape;
 mod transform;
 
-pub use camera::{CameraDesc, LensDesc};
-pub use light::{DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
+pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
+pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
 pub use material::{ColorDesc, MaterialDesc, RoughnessDesc, TextureDesc};
 pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};

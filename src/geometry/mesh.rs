@@ -228,6 +228,13 @@ impl Mesh {
         TrianglePoints { a: at(a), b: at(b), c: at(c) }
     }
 
+    /// The uv at barycentric coordinates `u`, `v` of a triangle's second and third vertex; without uvs these coordinates themselves.
+    pub fn uv(&self, prim: PrimId, u: f32, v: f32) -> Vec2 {
+        let Some(uvs) = &self.uvs else { return Vec2::new(u, v) };
+        let [a, b, c] = self.triangles[prim.index()].map(|i| Vec2::from(uvs[i as usize]));
+        a * (1.0 - u - v) + b * u + c * v
+    }
+
     /// Bounds of all triangles.
     pub fn bounds(&self) -> Aabb {
         if self.is_deforming() {

@@ -98,6 +98,16 @@ impl Analytic {
         each!(self, shape => shape.area())
     }
 
+    /// Surface parameters at the point `p` that [`sample`](Self::sample) finds with `u`.
+    fn uv(&self, p: DVec3, u: [f64; 2]) -> [f64; 2] {
+        let profile = match self {
+            Self::Revolution(revolution) => revolution.sampled_profile(u),
+            _ => 0.0,
+        };
+        let still = RayF64 { origin: p, direction: DVec3::Z, t_min: 0.0, t_max: 0.0 };
+        self.surface(&still, &LocalHit { t: 0.0, profile }).uv
+    }
+
     /// A point chosen on the surface; `u` in the unit square.
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
         each!(self, shape => shape.sample(u))
@@ -243,6 +253,12 @@ impl Placed {
     pub fn sample_area(&self, u: [f32; 2]) -> PlacedPoint {
         let sample = self.shape.sample([f64::from(u[0]), f64::from(u[1])]);
         self.place(sample.p, sample.n, sample.pdf_area)
+    }
+
+    /// Surface parameters at a placed point of the surface; where the shape's sampling found it, with `u`.
+    pub fn uv(&self, p: DVec3, u: [f32; 2]) -> Vec2 {
+        let [s, t] = self.shape.uv(self.transform.inverse_point(p), u.map(f64::from));
+        Vec2::new(s as f32, t as f32)
     }
 
     /// The density (with respect to placed area) with which [`Placed::sample_area`] finds the point where `ray` hits; `None` on a miss.

@@ -3,6 +3,7 @@
 mod comments;
 mod environment_image;
 mod fault;
+mod ies;
 mod mesh_data;
 mod obj;
 mod obj_check;
@@ -10,6 +11,7 @@ mod ply;
 mod scene_file;
 
 pub use environment_image::{RgbImage, read_rgb_image};
+pub use ies::{IesData, read_ies};
 pub use mesh_data::MeshData;
 pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::read_ply;

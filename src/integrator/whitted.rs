@@ -81,7 +81,7 @@ fn direct_light(
     light: &Light,
     counts: &mut RayCounts,
 ) -> Rgb {
-    let Some(sample) = light.sample(&world.scene.geometry, at.p, [0.5; 2]) else {
+    let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2]) else {
         return Rgb::BLACK;
     };
     let scattered = bsdf.eval(wo, frame.to_local(sample.wi)).value * sample.radiance / sample.pdf;
