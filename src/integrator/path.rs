@@ -178,8 +178,11 @@ impl PathIntegrator {
     /// What a contribution brings that was scattered so many times between the light and the camera.
     #[inline]
     fn clamped(&self, contribution: Rgb, scatterings: u32) -> Rgb {
+        if self.clamp == f32::INFINITY || scatterings <= 1 {
+            return contribution;
+        }
         let largest = contribution.max_channel();
-        if scatterings > 1 && largest > self.clamp { contribution * (self.clamp / largest) } else { contribution }
+        if largest > self.clamp { contribution * (self.clamp / largest) } else { contribution }
     }
 
     /// Weight of light that was found by following `direction`, against finding it by sampling the light with density `light_pdf`.
