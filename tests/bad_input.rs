@@ -151,6 +151,57 @@ fn materials_out_of_range() {
 }
 
 #[test]
+fn principled_materials_out_of_range() {
+    let with = |key: &str, value: Value| json!({ "type": "principled", key: value });
+    let place = "materials.glass";
+    let mut faults: Vec<(Value, String, &str)> = vec![
+        (with("base_color", json!([0.5, 2, 0.5])), format!("{place}.base_color"), "2.0"),
+        (with("base_color", json!({ "texture": "nowhere" })), format!("{place}.base_color"), "no texture"),
+        (with("ior", json!(0.9)), format!("{place}.ior"), "0.9"),
+        (with("ior", json!(11)), format!("{place}.ior"), "11"),
+        (json!({ "type": "principled", "ior": 1.5, "specular": 0.5 }), place.to_owned(), "either `specular` or `ior`"),
+        (with("diffuse_transmission", json!(0.5)), format!("{place}.diffuse_transmission"), "`thin`"),
+        (with("thin", json!(1)), format!("{place}.thin"), "boolean"),
+        (with("multiscatter", json!("no")), format!("{place}.multiscatter"), "boolean"),
+        (with("metalic", json!(1)), place.to_owned(), "did you mean `metallic`?"),
+        (with("metallic", json!([1, 2])), format!("{place}.metallic"), "expected a number"),
+    ];
+    let scalars = [
+        "metallic",
+        "roughness",
+        "anisotropic",
+        "specular",
+        "specular_tint",
+        "sheen",
+        "sheen_tint",
+        "clearcoat",
+        "clearcoat_gloss",
+        "subsurface",
+        "transmission",
+        "diffuse_transmission",
+    ];
+    for key in scalars {
+        faults.push((with(key, json!(1.25)), format!("{place}.{key}"), "1.25"));
+        faults.push((with(key, json!(-0.5)), format!("{place}.{key}"), "-0.5"));
+        faults.push((with(key, json!({ "texture": "tile" })), format!("{place}.{key}"), "did you mean \"tiles\"?"));
+    }
+    let folder = Folder::new();
+    for (value, place, word) in faults {
+        let mut scene = good_scene();
+        set(&mut scene, "materials.glass", value);
+        assert_error(&folder, &scene, ErrorKind::Scene, &[&format!("{place}: "), word]);
+    }
+    // And without a fault, with a texture for a number.
+    let mut scene = good_scene();
+    set(
+        &mut scene,
+        "materials.glass",
+        json!({ "type": "principled", "roughness": { "texture": "tiles" }, "metallic": { "texture": "grey" } }),
+    );
+    folder.compile(&scene).unwrap();
+}
+
+#[test]
 fn lights_out_of_range() {
     assert_faults(&[
         ("lights[0].intensity", json!([1, -1, 1]), "lights[0].intensity", "-1"),

@@ -5,20 +5,24 @@
 
 mod conductor;
 mod dielectric;
+mod energy;
 pub mod fresnel;
 mod lambert;
 mod microfacet;
 mod mirror;
 mod plastic;
+mod principled;
 #[cfg(test)]
 mod tests;
 
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
+pub use energy::bake as bake_energy_tables;
 pub use lambert::Lambert;
 pub use microfacet::{Ggx, SMOOTH_ALPHA};
 pub use mirror::Mirror;
 pub use plastic::Plastic;
+pub use principled::{Principled, PrincipledParameters};
 
 use crate::color::Rgb;
 use crate::math::Vec3;
@@ -64,7 +68,12 @@ pub enum Bsdf {
     Dielectric(Dielectric),
     /// A diffuse base under a smooth or rough dielectric coat.
     Plastic(Plastic),
+    /// Disney's model.
+    Principled(Principled),
 }
+
+// Made anew at every hit: no kind may make the others slower to pass around.
+const _: () = assert!(size_of::<Bsdf>() <= 96);
 
 macro_rules! each {
     ($self:expr, $bsdf:ident => $body:expr) => {
@@ -74,6 +83,7 @@ macro_rules! each {
             Bsdf::Conductor($bsdf) => $body,
             Bsdf::Dielectric($bsdf) => $body,
             Bsdf::Plastic($bsdf) => $body,
+            Bsdf::Principled($bsdf) => $body,
         }
     };
 }
@@ -105,6 +115,7 @@ impl Bsdf {
             Self::Conductor(bsdf) => bsdf.is_anisotropic(),
             Self::Dielectric(bsdf) => bsdf.is_anisotropic(),
             Self::Plastic(bsdf) => bsdf.is_anisotropic(),
+            Self::Principled(bsdf) => bsdf.is_anisotropic(),
         }
     }
 

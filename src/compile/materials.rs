@@ -6,11 +6,11 @@ use std::fmt::Debug;
 use super::Files;
 use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, SceneDesc, TextureDesc};
+use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, ScalarDesc, SceneDesc, TextureDesc};
 use crate::error::Result;
 use crate::id::{MaterialId, TextureId};
 use crate::import::ObjMaterial;
-use crate::material::{ColorInput, Material};
+use crate::material::{ColorInput, Material, ScalarInput, Varying};
 use crate::math::Vec2;
 use crate::texture::{Checker, Texture};
 
@@ -87,8 +87,8 @@ fn compile_texture(files: &Files, path: &str, desc: &TextureDesc, textures: &mut
     })
 }
 
-struct Compiler<'a> {
-    files: &'a Files,
+pub(super) struct Compiler<'a> {
+    pub(super) files: &'a Files,
     inputs: HashMap<&'a str, ColorInput>,
 }
 
@@ -96,10 +96,7 @@ impl Compiler<'_> {
     fn material(&self, path: &str, desc: &MaterialDesc) -> Result<Material> {
         let files = self.files;
         Ok(match desc {
-            MaterialDesc::Diffuse { albedo } => match self.color(&format!("{path}.albedo"), albedo)? {
-                ColorInput::Constant(albedo) => Lambert { albedo }.into(),
-                albedo @ ColorInput::Texture(_) => Material::Diffuse { albedo },
-            },
+            MaterialDesc::Diffuse { albedo } => Varying::Diffuse { albedo: self.color(&format!("{path}.albedo"), albedo)? }.into(),
             MaterialDesc::Mirror { reflectance } => {
                 Mirror { reflectance: self.constant(&format!("{path}.reflectance"), reflectance)? }.into()
             }
@@ -117,22 +114,34 @@ impl Compiler<'_> {
                     return Err(files.error(&format!("{path}.ior"), format!("must be above 1 and at most 10, not {ior}")));
                 }
                 let alpha = self.alpha(path, *roughness, *alpha)?;
-                match self.color(&format!("{path}.albedo"), albedo)? {
-                    ColorInput::Constant(albedo) => Plastic::new(albedo, *ior, alpha).into(),
-                    albedo @ ColorInput::Texture(_) => Material::Plastic { base: Plastic::new(Rgb::BLACK, *ior, alpha), albedo },
-                }
+                let albedo = self.color(&format!("{path}.albedo"), albedo)?;
+                Varying::Plastic { base: Plastic::new(Rgb::BLACK, *ior, alpha), albedo }.into()
             }
+            MaterialDesc::Principled(desc) => Varying::Principled(self.principled(path, desc)?).into(),
         })
     }
 
-    fn color(&self, path: &str, desc: &ColorDesc) -> Result<ColorInput> {
+    pub(super) fn color(&self, path: &str, desc: &ColorDesc) -> Result<ColorInput> {
         Ok(match desc {
             ColorDesc::Grey(v) => ColorInput::Constant(self.files.reflectance(path, [*v; 3])?.into()),
             ColorDesc::Rgb(v) => ColorInput::Constant(self.files.reflectance(path, *v)?.into()),
-            ColorDesc::Texture { texture } => {
-                let found = self.inputs.get(texture.as_str()).copied();
-                found.ok_or_else(|| self.files.unknown(path, "texture", texture, self.inputs.keys().copied()))?
-            }
+            ColorDesc::Texture { texture } => self.texture(path, texture)?,
+        })
+    }
+
+    fn texture(&self, path: &str, name: &str) -> Result<ColorInput> {
+        let found = self.inputs.get(name).copied();
+        found.ok_or_else(|| self.files.unknown(path, "texture", name, self.inputs.keys().copied()))
+    }
+
+    /// A number within `[0, 1]`.
+    pub(super) fn scalar(&self, path: &str, desc: &ScalarDesc) -> Result<ScalarInput> {
+        Ok(match desc {
+            ScalarDesc::Constant(value) => ScalarInput::Constant(self.files.within(path, f64::from(*value), 0.0, 1.0)? as f32),
+            ScalarDesc::Texture { texture } => match self.texture(path, texture)? {
+                ColorInput::Constant(color) => ScalarInput::Constant(color.luminance().clamp(0.0, 1.0)),
+                ColorInput::Texture(id) => ScalarInput::Texture(id),
+            },
         })
     }
 

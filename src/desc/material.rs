@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::PrincipledDesc;
+
 /// A colour: `[r, g, b]`, one number for grey, or `{ "texture": "name" }`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields, expecting = "expected a colour: [red, green, blue], one number for grey, or { \"texture\": name }")]
@@ -11,6 +13,19 @@ pub enum ColorDesc {
     Grey(f32),
     /// Linear red, green, blue.
     Rgb([f32; 3]),
+    /// A texture by name.
+    Texture {
+        /// The texture's name.
+        texture: String,
+    },
+}
+
+/// A number within `[0, 1]`, or `{ "texture": "name" }`: the luminance of its colour, clamped.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields, expecting = "expected a number, or { \"texture\": name }")]
+pub enum ScalarDesc {
+    /// The same everywhere.
+    Constant(f32),
     /// A texture by name.
     Texture {
         /// The texture's name.
@@ -92,6 +107,8 @@ pub enum MaterialDesc {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         alpha: Option<RoughnessDesc>,
     },
+    /// Disney's principled model, for most surfaces.
+    Principled(Box<PrincipledDesc>),
 }
 
 fn half() -> ColorDesc {

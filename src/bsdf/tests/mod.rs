@@ -3,6 +3,7 @@
 mod energy;
 mod limits;
 mod microfacet;
+mod principled;
 mod sampling;
 
 use super::*;
