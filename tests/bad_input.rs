@@ -157,7 +157,7 @@ fn principled_materials_out_of_range() {
     let mut faults: Vec<(Value, String, &str)> = vec![
         (with("base_color", json!([0.5, 2, 0.5])), format!("{place}.base_color"), "2.0"),
         (with("base_color", json!({ "texture": "nowhere" })), format!("{place}.base_color"), "no texture"),
-        (with("ior", json!(0.9)), format!("{place}.ior"), "0.9"),
+        (with("ior", json!(0.75)), format!("{place}.ior"), "0.75"),
         (with("ior", json!(11)), format!("{place}.ior"), "11"),
         (json!({ "type": "principled", "ior": 1.5, "specular": 0.5 }), place.to_owned(), "either `specular` or `ior`"),
         (with("diffuse_transmission", json!(0.5)), format!("{place}.diffuse_transmission"), "`thin`"),

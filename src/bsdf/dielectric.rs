@@ -12,7 +12,8 @@
 //!
 //! What microfacets lose is shared out to both sides by two lobes as in [`energy`](super::energy): with `L` what is lost of diffuse light from
 //! each side and `F` the mean reflectance from the thinner one, `(1 - F) min(L, L') / L` of what is lost on the thinner side crosses, and
-//! `1 / ior²` times that with `L'` on the denser one, so that nothing is lost and what crosses is reciprocal.
+//! `1 / ior²` times that with `L'` on the denser one, so that nothing is lost and what crosses is reciprocal. What anisotropic microfacets
+//! lose is not known closely enough, and stays lost.
 //!
 //! Reflection and refraction share the height-correlated G2, as in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition.
 
@@ -74,7 +75,9 @@ impl Dielectric {
     /// A boundary of which the caller knows that it is rough.
     #[inline]
     pub(super) fn rough(ior: f32, ggx: Ggx, multiscatter: bool) -> Self {
-        Self { ior, ggx, multiple: multiscatter.then(|| multiple_scattering(ior, &ggx)) }
+        let [ax, ay] = ggx.alpha();
+        let is_known = multiscatter && ax == ay;
+        Self { ior, ggx, multiple: is_known.then(|| multiple_scattering(ior, &ggx)) }
     }
 
     /// Without the light that microfacets scatter several times.
