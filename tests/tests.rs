@@ -18,6 +18,8 @@ mod determinism;
 mod light_transport;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
 mod motion;
+/// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.
+mod own_accelerators;
 /// Meshes, comments, names and transforms of scene files, read as users write them.
 mod scene_files;
 /// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
