@@ -16,6 +16,8 @@ mod degenerate_input;
 mod determinism;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
+/// Materials as scenes use them.
+mod materials;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
 mod motion;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.

@@ -18,7 +18,7 @@ pub struct Conductor {
     index: [ComplexIndex; 3],
     tint: Rgb,
     ggx: Ggx,
-    /// Reflectance under diffuse light, tint included.
+    /// Reflectance under diffuse light without the tint.
     average: Rgb,
     /// Colour of light scattered several times, over `pi (1 - E_avg)`.
     multiple: Rgb,
@@ -31,7 +31,7 @@ impl Conductor {
     /// reflectance.
     pub fn new(eta: Rgb, k: Rgb, alpha: [f32; 2], tint: Rgb) -> Self {
         let index = [ComplexIndex::new(eta.r, k.r), ComplexIndex::new(eta.g, k.g), ComplexIndex::new(eta.b, k.b)];
-        let average = tint * Rgb::from(index.map(ComplexIndex::average));
+        let average = Rgb::from(index.map(ComplexIndex::average));
         let metal = Self { index, tint, ggx: Ggx::new(alpha), average, multiple: Rgb::BLACK, share: 0.0 };
         metal.with_multiple_scattering()
     }
@@ -43,20 +43,19 @@ impl Conductor {
     }
 
     fn with_multiple_scattering(self) -> Self {
-        if self.ggx.is_smooth() || self.average.is_black() {
+        let average = self.tint * self.average;
+        if self.ggx.is_smooth() || average.is_black() {
             return self;
         }
         let lost = Energy::new(&self.ggx).mirrors_lost();
-        let color = self.average.map(|f| multiple_color(f, 1.0 - lost));
-        Self { multiple: color / (PI * lost), share: color.mean() / self.average.mean(), ..self }
+        let color = average.map(|f| multiple_color(f, 1.0 - lost));
+        Self { multiple: color / (PI * lost), share: color.mean() / average.mean(), ..self }
     }
 
     /// The same metal with other roughness and tint.
     #[must_use]
-    pub fn with_surface(self, alpha: [f32; 2], tint: Rgb, multiscatter: bool) -> Self {
-        let average = tint * Rgb::from(self.index.map(ComplexIndex::average));
-        let metal = Self { tint, ggx: Ggx::new(alpha), average, ..self.single_scattering() };
-        if multiscatter { metal.with_multiple_scattering() } else { metal }
+    pub fn with_surface(self, alpha: [f32; 2], tint: Rgb) -> Self {
+        Self { tint, ggx: Ggx::new(alpha), ..self.single_scattering() }.with_multiple_scattering()
     }
 
     #[inline]

@@ -3,6 +3,7 @@
 
 mod camera;
 mod check;
+mod composites;
 mod lights;
 mod materials;
 mod meshes;
@@ -108,7 +109,7 @@ impl Builder {
             environment: sky,
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
-            textures: materials.iter().any(|m| !matches!(m, Material::Constant(_))),
+            textures: materials.iter().any(Material::is_textured),
             delta_materials: materials.iter().any(Material::is_delta),
             anisotropic: materials.iter().any(Material::is_anisotropic),
             lens: camera.lens().is_some(),

@@ -27,7 +27,8 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::energy::{Energy, principled_clear_coat, principled_diffuse, principled_sheen, schlick_weight};
 use super::microfacet::{MIN_COSINE, reflect};
-use super::{BsdfEval, BsdfSample, Dielectric, Ggx, fresnel};
+use super::thin::pane_reflectance;
+use super::{BsdfEval, BsdfSample, Dielectric, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
@@ -350,7 +351,7 @@ impl Principled {
     #[inline]
     fn eval_sheet(&self, o: Vec3, i: Vec3, reflects: bool) -> BsdfEval {
         let facet = self.ggx.reflection(o, i);
-        let reflectance = sheet_reflectance(facet.cos, self.ior);
+        let reflectance = pane_reflectance(facet.cos, self.ior);
         let fraction = if reflects { reflectance } else { 1.0 - reflectance };
         BsdfEval { value: Rgb::splat(fraction * facet.value), pdf: fraction * facet.pdf }
     }
@@ -414,13 +415,18 @@ impl Principled {
         let m = self.ggx.sample_visible_normal(o, u);
         let cos = o.dot(m);
         let reflected = above(reflect(o, m, cos))?;
-        let reflects = u_glass < sheet_reflectance(cos.clamp(0.0, 1.0), self.ior);
+        let reflects = u_glass < pane_reflectance(cos.clamp(0.0, 1.0), self.ior);
         Some(if reflects { reflected } else { vec3(reflected.x, reflected.y, -reflected.z) })
     }
 
     /// Whether the highlight is stretched.
     pub fn is_anisotropic(&self) -> bool {
         self.ggx.alpha()[0] != self.ggx.alpha()[1]
+    }
+
+    /// Whether light can cross the surface.
+    pub fn transmits(&self) -> bool {
+        self.glass > 0.0 || self.diffuse_transmission > 0.0
     }
 
     /// Never.
@@ -445,13 +451,6 @@ impl Principled {
 #[inline]
 fn mix(a: Rgb, b: Rgb, amount: f32) -> Rgb {
     a * (1.0 - amount) + b * amount
-}
-
-/// Reflectance of a sheet: `R + T² R + T² R³ + ...` with `R + T = 1`.
-#[inline]
-fn sheet_reflectance(cos: f32, ior: f32) -> f32 {
-    let once = fresnel::dielectric(cos, ior).reflectance;
-    2.0 * once / (1.0 + once)
 }
 
 /// Colour that several reflections leave where Schlick's reflectance is `f` ahead and one reflection releases `average` of diffuse light.
