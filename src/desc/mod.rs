@@ -8,14 +8,16 @@ mod camera;
 mod light;
 mod material;
 mod output;
+mod principled;
 mod settings;
 mod shape;
 mod transform;
 
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
-pub use material::{ColorDesc, MaterialDesc, RoughnessDesc, TextureDesc};
+pub use material::{ColorDesc, MaterialDesc, RoughnessDesc, ScalarDesc, TextureDesc};
 pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
+pub use principled::PrincipledDesc;
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
 pub use shape::{
     ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, ObjectDesc, ProfileDesc, QuadDesc,

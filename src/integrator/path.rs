@@ -310,7 +310,7 @@ impl<'a> Vertex<'a> {
         // Near silhouettes an interpolated normal may face away although the surface faces us; the flat one is right there.
         let n_s = if back.dot(at.n_s) * cos_geometric > 0.0 { at.n_s } else { at.n_g };
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
-        let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
+        let bsdf = world.scene.bsdf(at, ray.direction);
         Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric }
     }
 

@@ -44,7 +44,7 @@ impl Whitted {
         if depth >= self.max_depth {
             return radiance;
         }
-        let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
+        let bsdf = world.scene.bsdf(at, ray.direction);
         let frame = Frame::from_normal(at.n_s);
         let wo = frame.to_local(-ray.direction);
 

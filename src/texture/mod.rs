@@ -22,4 +22,10 @@ impl Texture {
             Self::Checker(checker) => checker.color(uv),
         }
     }
+
+    /// One number at `uv`, for roughness and the like: the luminance of the colour.
+    #[inline]
+    pub fn scalar(&self, uv: Vec2) -> f32 {
+        self.color(uv).luminance()
+    }
 }
