@@ -1,4 +1,4 @@
-//! Compares renders of `scenes/` with independent reference images of the same scenes, block by block.
+//! Compares renders of `scenes/` and `benches/scenes/` with independent reference images of the same scenes, block by block.
 //!
 //! `cargo run --release --example compare_refs -- [REFS] [--spp N] [SCENE...]`: `REFS` (default `../shared/refs`) holds, for each scene
 //! (default: cornell, glass, analytic), `SCENE.exr` and its two independent halves `SCENE.half0.exr` and `SCENE.half1.exr`. Two renders of
@@ -97,10 +97,11 @@ fn compare_scene(name: &str, arguments: &Arguments, out: &Path) -> Result<bool> 
 }
 
 fn render_scene(name: &str, spp: u32, seed: u64) -> Result<Image> {
-    let path = Path::new("scenes").join(format!("{name}.json"));
-    let desc = import::load_scene(&path)?;
+    let folders = ["scenes", "benches/scenes"].map(|folder| Path::new(folder).join(format!("{name}.json")));
+    let path = folders.iter().find(|path| path.exists()).unwrap_or(&folders[0]);
+    let desc = import::load_scene(path)?;
     let settings = Settings::new(&desc, &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() })?;
-    let scene = compile::compile(&desc, &path)?;
+    let scene = compile::compile(&desc, path)?;
     let accel = accel::build(AccelKind::EMBREE, &scene.geometry, settings.threads)?;
     Ok(render::render(&scene, &*accel, &settings, &Silent, &AtomicBool::new(false))?.image)
 }
