@@ -2,9 +2,10 @@
 
 use crate::camera::Camera;
 use crate::geometry::Geometry;
-use crate::id::{LightId, MaterialId, PrimId, ShapeId};
+use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId, TextureId};
 use crate::light::LightSet;
 use crate::material::Material;
+use crate::relief::Relief;
 use crate::texture::Texture;
 
 /// How a shape looks.
@@ -12,6 +13,10 @@ use crate::texture::Texture;
 pub struct Surface {
     /// Its material.
     pub material: MaterialId,
+    /// Where its shading normals come from, if not from the shape alone.
+    pub relief: Option<ReliefId>,
+    /// How much of it is there, by its luminance or the channel it says; all of it without one.
+    pub alpha: Option<TextureId>,
     /// The light of its first primitive if it emits; the others follow.
     pub first_light: Option<LightId>,
     /// Whether all primitives are one light: an analytic shape, or two triangles that make up a parallelogram.
@@ -40,6 +45,8 @@ pub struct Features {
     pub instances: bool,
     /// Some material is textured.
     pub textures: bool,
+    /// Some surface has a normal map or a bump map.
+    pub reliefs: bool,
     /// Some material has only delta lobes.
     pub delta_materials: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
@@ -59,7 +66,9 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Materials, by [`MaterialId`].
     pub materials: Vec<Material>,
-    /// Textures, by [`TextureId`](crate::id::TextureId).
+    /// Reliefs, by [`ReliefId`].
+    pub reliefs: Vec<Relief>,
+    /// Textures, by [`TextureId`].
     pub textures: Vec<Texture>,
     /// Lights and their choice.
     pub lights: LightSet,

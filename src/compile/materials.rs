@@ -1,18 +1,18 @@
-//! Materials and textures: names to ids, parameters to BSDFs.
+//! Materials: names to ids, parameters to BSDFs.
 
 use std::collections::HashMap;
 use std::fmt::Debug;
 
 use super::Files;
+use super::textures::TextureTable;
 use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, SceneDesc, TextureDesc};
+use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, SceneDesc};
 use crate::error::Result;
-use crate::id::{MaterialId, TextureId};
+use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
 use crate::material::{ColorInput, Material};
-use crate::math::Vec2;
-use crate::texture::{Checker, Texture};
+use crate::relief::Relief;
 
 /// Real and imaginary part of the index of refraction for red, green and blue (650, 550 and 450 nm; refractiveindex.info: Johnson and Christy
 /// for noble metals, iron, chromium and titanium; Rakic for aluminium and tungsten; Querry for brass).
@@ -31,8 +31,25 @@ const METALS: &[(&str, [f32; 3], [f32; 3])] = &[
 /// All materials and textures, with their names.
 pub struct MaterialTable {
     pub materials: Vec<Material>,
-    pub textures: Vec<Texture>,
-    names: HashMap<String, MaterialId>,
+    pub textures: TextureTable,
+    pub reliefs: Vec<Relief>,
+    names: HashMap<String, Look>,
+}
+
+/// How a shape looks: what a material of the scene file comes to.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    pub material: MaterialId,
+    pub relief: Option<ReliefId>,
+    /// How much of the surface is there.
+    pub alpha: Option<TextureId>,
+}
+
+impl Look {
+    /// A material alone.
+    pub fn plain(material: MaterialId) -> Self {
+        Self { material, relief: None, alpha: None }
+    }
 }
 
 impl MaterialTable {
@@ -40,19 +57,19 @@ impl MaterialTable {
     pub const DEFAULT: MaterialId = MaterialId(0);
 
     pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
-        let mut textures = Vec::new();
-        let mut inputs = HashMap::new();
-        for (name, texture) in &desc.textures {
-            inputs.insert(name.as_str(), compile_texture(files, &format!("textures.{name}"), texture, &mut textures)?);
-        }
+        let textures = TextureTable::new(files, desc)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
-        let mut table = Self { materials: vec![default], textures, names: HashMap::new() };
-        let compiler = Compiler { files, inputs };
+        let mut table = Self { materials: vec![default], textures, reliefs: Vec::new(), names: HashMap::new() };
         for (name, material) in &desc.materials {
+            if matches!(material, MaterialDesc::Relief { .. }) {
+                continue;
+            }
+            let compiler = Compiler { files, textures: &table.textures };
             let material = compiler.material(&format!("materials.{name}"), material)?;
             let id = table.push(material);
-            table.names.insert(name.clone(), id);
+            table.names.insert(name.clone(), Look::plain(id));
         }
+        table.add_reliefs(files, desc)?;
         Ok(table)
     }
 
@@ -62,34 +79,34 @@ impl MaterialTable {
         MaterialId::new(self.materials.len() - 1)
     }
 
-    /// The id of a name, or of the default.
-    pub fn find(&self, files: &Files, path: &str, name: Option<&str>) -> Result<MaterialId> {
+    /// Gives a look a name.
+    pub(super) fn insert(&mut self, name: String, look: Look) {
+        self.names.insert(name, look);
+    }
+
+    /// Whether a surface without uv cannot look so.
+    pub fn needs_uv(&self, look: &Look) -> bool {
+        look.relief.is_some() || look.alpha.is_some() || !matches!(self.materials[look.material.index()], Material::Constant(_))
+    }
+
+    /// Whether a surface's normals come from a normal map.
+    pub fn has_normal_map(&self, look: &Look) -> bool {
+        look.relief.is_some_and(|id| matches!(self.reliefs[id.index()], Relief::NormalMap { .. }))
+    }
+
+    /// What a name stands for, or the default.
+    pub fn find(&self, files: &Files, path: &str, name: Option<&str>) -> Result<Look> {
         let Some(name) = name else {
-            return Ok(Self::DEFAULT);
+            return Ok(Look::plain(Self::DEFAULT));
         };
         let found = self.names.get(name).copied();
         found.ok_or_else(|| files.unknown(&format!("{path}.material"), "material", name, self.names.keys().map(String::as_str)))
     }
 }
 
-fn compile_texture(files: &Files, path: &str, desc: &TextureDesc, textures: &mut Vec<Texture>) -> Result<ColorInput> {
-    let color = |key: &str, value: [f32; 3]| files.reflectance(&format!("{path}.{key}"), value).map(Rgb::from);
-    Ok(match desc {
-        TextureDesc::Constant { color: value } => ColorInput::Constant(color("color", *value)?),
-        TextureDesc::Checker { color0, color1, scale } => {
-            if !scale.iter().all(|s| s.is_finite()) {
-                return Err(files.error(&format!("{path}.scale"), "is not finite"));
-            }
-            let colors = [color("color0", *color0)?, color("color1", *color1)?];
-            textures.push(Texture::Checker(Checker { colors, scale: Vec2::from(*scale) }));
-            ColorInput::Texture(TextureId::new(textures.len() - 1))
-        }
-    })
-}
-
 struct Compiler<'a> {
     files: &'a Files,
-    inputs: HashMap<&'a str, ColorInput>,
+    textures: &'a TextureTable,
 }
 
 impl Compiler<'_> {
@@ -100,6 +117,7 @@ impl Compiler<'_> {
                 ColorInput::Constant(albedo) => Lambert { albedo }.into(),
                 albedo @ ColorInput::Texture(_) => Material::Diffuse { albedo },
             },
+            MaterialDesc::Relief { .. } => return Err(files.error(path, "a material cannot consist of one with relief")),
             MaterialDesc::Mirror { reflectance } => {
                 Mirror { reflectance: self.constant(&format!("{path}.reflectance"), reflectance)? }.into()
             }
@@ -129,10 +147,7 @@ impl Compiler<'_> {
         Ok(match desc {
             ColorDesc::Grey(v) => ColorInput::Constant(self.files.reflectance(path, [*v; 3])?.into()),
             ColorDesc::Rgb(v) => ColorInput::Constant(self.files.reflectance(path, *v)?.into()),
-            ColorDesc::Texture { texture } => {
-                let found = self.inputs.get(texture.as_str()).copied();
-                found.ok_or_else(|| self.files.unknown(path, "texture", texture, self.inputs.keys().copied()))?
-            }
+            ColorDesc::Texture { texture } => self.textures.reflectance(self.files, path, texture)?,
         })
     }
 

@@ -6,12 +6,16 @@ mod check;
 mod lights;
 mod materials;
 mod meshes;
+mod mtl;
 mod nesting;
+mod normals;
 mod objects;
 mod prepared;
+mod reliefs;
 mod settings;
 mod shapes;
 mod summary;
+mod textures;
 mod transforms;
 
 pub use settings::check_settings;
@@ -110,6 +114,7 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(|m| !matches!(m, Material::Constant(_))),
+            reliefs: self.surfaces.iter().any(|surface| surface.relief.is_some()),
             delta_materials: materials.iter().any(Material::is_delta),
             anisotropic: has_bsdf(Bsdf::is_anisotropic),
             lens: camera.lens().is_some(),
@@ -119,7 +124,8 @@ impl Builder {
             geometry: self.geometry,
             surfaces: self.surfaces,
             materials,
-            textures: self.materials.textures,
+            reliefs: self.materials.reliefs,
+            textures: self.materials.textures.textures,
             lights,
             camera,
             features,

@@ -1,11 +1,13 @@
 //! Shapes of the scene file: loaded and checked once, placed once or (emitters of objects) once per instance.
 
-use super::{Builder, materials, meshes, shapes};
+use super::materials::Look;
+use super::normals::Smoothing;
+use super::{Builder, meshes, shapes};
 use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
 use crate::error::Result;
 use crate::geometry::{Analytic, Placed, Shape};
-use crate::id::{LightId, MaterialId, ShapeId};
+use crate::id::{LightId, ShapeId};
 use crate::import::MeshData;
 use crate::light::{AreaLight, Emission, Light};
 use crate::math::{DAffine3, Motion, Transform};
@@ -20,7 +22,7 @@ pub struct PreparedShape {
     /// How it moves, its own transform included.
     pub motion: Option<Motion>,
     reverse_normal: bool,
-    material: MaterialId,
+    look: Look,
     /// Light that it gives off, not black.
     pub emission: Option<Emission>,
     /// Where the scene has it.
@@ -33,6 +35,7 @@ enum Form {
     Mesh {
         data: MeshData,
         shading: MeshShadingDesc,
+        smoothing: Smoothing,
         /// Its vertices at later times.
         later: Vec<MeshData>,
         /// Where it was read, relative to the scene.
@@ -44,7 +47,7 @@ impl Builder {
     /// Loads and checks one shape of the scene file; an OBJ file may bring several.
     pub(super) fn prepare(&mut self, path: &str, desc: &ShapeDesc) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
-        let material = self.materials.find(&self.files, path, common.material)?;
+        let look = self.materials.find(&self.files, path, common.material)?;
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
         let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map)?;
@@ -54,15 +57,21 @@ impl Builder {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
         }
         let form = match desc {
-            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), material, emission),
-            ShapeDesc::Cube(_) => Form::Mesh { data: meshes::cube(), shading: MeshShadingDesc::Flat, later: Vec::new(), file: None },
+            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), look, emission),
+            ShapeDesc::Cube(_) => Form::Mesh {
+                data: meshes::cube(),
+                shading: MeshShadingDesc::Flat,
+                smoothing: Smoothing::default(),
+                later: Vec::new(),
+                file: None,
+            },
             _ => match shapes::compile(&self.files, path, desc)? {
                 Some(surface) => Form::Analytic(surface),
                 None => return Ok(Vec::new()),
             },
         };
         let reverse_normal = common.reverse_normal;
-        Ok(vec![PreparedShape { form, map, motion, reverse_normal, material, emission, path: path.into() }])
+        Ok(vec![PreparedShape { form, map, motion, reverse_normal, look, emission, path: path.into() }])
     }
 
     fn prepare_mesh(
@@ -71,33 +80,45 @@ impl Builder {
         desc: &MeshDesc,
         map: &DAffine3,
         motion: Option<&Motion>,
-        material: MaterialId,
+        look: Look,
         emission: Option<Emission>,
     ) -> Result<Vec<PreparedShape>> {
+        let smoothing = self.smoothing(path, desc)?;
         let mut prepared = Vec::new();
         for loaded in meshes::load(&self.files, path, desc)? {
             let moves = motion.is_some() || !loaded.later.is_empty();
-            let (mut material, mut emission) = (material, emission);
+            let (mut look, mut emission) = (look, emission);
+            let has_uvs = loaded.data.uvs.is_some();
             if let Some(mtl) = &loaded.material {
-                let from_mtl =
-                    materials::from_mtl(mtl).map_err(|message| meshes::refusal(&self.files, path, desc.file.as_deref(), message))?;
-                material = self.materials.push(from_mtl.material);
+                let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
+                look = from_mtl.look;
                 emission = emission.or(from_mtl.radiance.map(|radiance| Emission { radiance, two_sided: false }));
+            }
+            if !has_uvs && self.materials.needs_uv(&look) {
+                return Err(meshes::refusal(&self.files, path, desc.file.as_deref(), "the material has textures, but the mesh has no uv".into()));
             }
             if moves && emission.is_some() {
                 return Err(self.files.error(path, "a shape that gives off light cannot move"));
             }
             prepared.push(PreparedShape {
-                form: Form::Mesh { data: loaded.data, shading: desc.shading, later: loaded.later, file: desc.file.clone() },
+                form: Form::Mesh { data: loaded.data, shading: desc.shading, smoothing, later: loaded.later, file: desc.file.clone() },
                 map: *map,
                 motion: motion.cloned(),
                 reverse_normal: desc.reverse_normal,
-                material,
+                look,
                 emission,
                 path: path.into(),
             });
         }
         Ok(prepared)
+    }
+
+    fn smoothing(&self, path: &str, desc: &MeshDesc) -> Result<Smoothing> {
+        let crease = desc.crease_angle_degrees;
+        let crease = crease.map(|angle| self.files.within(&format!("{path}.crease_angle_degrees"), angle, 0.0, 180.0)).transpose()?;
+        // A rounding must not make creases where triangles are coplanar or the angle is that of all edges.
+        let crease_cosine = crease.filter(|&angle| angle < 180.0).map(|angle| angle.to_radians().cos() - 1e-6);
+        Ok(Smoothing { weight: desc.normal_weight, crease_cosine })
     }
 
     fn emission(&self, path: &str, common: &ShapeCommon) -> Result<Option<Emission>> {
@@ -110,7 +131,7 @@ impl Builder {
 
     /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
     pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3) -> Result<ShapeId> {
-        let PreparedShape { form, map, motion, reverse_normal, material, emission, path } = prepared;
+        let PreparedShape { form, map, motion, reverse_normal, look, emission, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform = Transform::new(*outer * map).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
@@ -120,9 +141,10 @@ impl Builder {
                 placed.reverse_normal = reverse_normal;
                 Shape::Analytic(placed)
             }
-            Form::Mesh { data, shading, later, file } => {
-                let placement = meshes::Placement { transform: &transform, shading, reverse_normal };
-                Shape::Mesh(meshes::place(&self.files, &path, file.as_deref(), data, later, placement)?)
+            Form::Mesh { data, shading, smoothing, later, file } => {
+                let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal };
+                let mesh = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)?;
+                Shape::Mesh(if self.materials.has_normal_map(&look) { mesh.with_tangents() } else { mesh })
             }
         };
         let bounds = shape.bounds();
@@ -131,7 +153,7 @@ impl Builder {
         }
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
-        let mut surface = Surface { material, first_light: None, single_light: false };
+        let mut surface = Surface { material: look.material, relief: look.relief, alpha: look.alpha, first_light: None, single_light: false };
         if let Some(emission) = emission {
             let lights = AreaLight::for_shape(id, emission, &self.geometry);
             if !lights.iter().any(|light| light.area() > 0.0) {

@@ -112,6 +112,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (f.analytic_shapes, "analytic shapes"),
         (f.instances, "instances"),
         (f.textures, "textures"),
+        (f.reliefs, "normal or bump maps"),
         (f.delta_materials, "mirror or glass"),
         (f.anisotropic, "anisotropic materials"),
         (f.lens, "lens"),

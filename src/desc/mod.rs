@@ -10,17 +10,19 @@ mod material;
 mod output;
 mod settings;
 mod shape;
+mod texture;
 mod transform;
 
 pub use camera::{CameraDesc, LensDesc};
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
-pub use material::{ColorDesc, MaterialDesc, RoughnessDesc, TextureDesc};
+pub use material::{BumpMapDesc, ColorDesc, MaterialDesc, NormalMapDesc, RoughnessDesc};
 pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
 pub use shape::{
-    ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, ObjectDesc, ProfileDesc, QuadDesc,
-    RevolutionDesc, ShapeCommon, ShapeDesc, SphereDesc,
+    ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ObjectDesc, ProfileDesc,
+    QuadDesc, RevolutionDesc, ShapeCommon, ShapeDesc, SphereDesc,
 };
+pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};
 
 use std::collections::BTreeMap;

@@ -14,6 +14,7 @@ mod revolution;
 mod sector;
 mod shape_error;
 mod sphere;
+mod tangents;
 #[cfg(test)]
 mod testing;
 mod triangle;

@@ -212,6 +212,7 @@ impl Placed {
             n_g: placed.n,
             n_s: placed.n,
             dp_du: self.transform.vector(surface.dp_du).as_vec3(),
+            dp_dv: self.transform.vector(surface.dp_dv).as_vec3(),
             uv: Vec2::new(surface.uv[0] as f32, surface.uv[1] as f32),
             shape: hit.shape,
             prim: hit.prim,

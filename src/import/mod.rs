@@ -3,14 +3,19 @@
 mod comments;
 mod environment_image;
 mod fault;
+mod image_file;
+mod jpeg_check;
 mod mesh_data;
+mod mtl_maps;
 mod obj;
 mod obj_check;
 mod ply;
 mod scene_file;
 
 pub use environment_image::{RgbImage, read_rgb_image};
+pub use image_file::{ImageData, Samples, read_image};
 pub use mesh_data::MeshData;
+pub use mtl_maps::{ObjMap, ObjMaps};
 pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::read_ply;
 pub use scene_file::{closest_name, load_scene, parse_scene};

@@ -37,7 +37,18 @@ impl<'a> World<'a> {
     pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
         let hit = hit?;
         let at = self.scene.geometry.interaction(ray, &hit);
-        if at.is_some() { at } else { self.retrace(ray, hit) }
+        let at = if at.is_some() { at } else { self.retrace(ray, hit) };
+        if self.scene.features.reliefs { at.map(|at| self.with_relief(at)) } else { at }
+    }
+
+    /// With the shading normal that the surface's relief gives.
+    #[inline(never)]
+    fn with_relief(&self, at: SurfaceInteraction) -> SurfaceInteraction {
+        let scene = self.scene;
+        match scene.surface(at.shape).relief {
+            Some(id) => SurfaceInteraction { n_s: scene.reliefs[id.index()].normal(&scene.geometry, &scene.textures, &at), ..at },
+            None => at,
+        }
     }
 
     #[cold]

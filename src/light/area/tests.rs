@@ -298,6 +298,7 @@ fn a_shadow_ray_reaches_the_light_it_was_made_for() {
                 n_g: Vec3::Z,
                 n_s: Vec3::Z,
                 dp_du: Vec3::ZERO,
+                dp_dv: Vec3::ZERO,
                 uv: crate::math::Vec2::ZERO,
                 shape: ShapeId(9),
                 prim: PrimId(0),
