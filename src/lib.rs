@@ -24,6 +24,7 @@
 //! | 9 | `bin/steradian` |
 
 pub mod accel;
+pub mod bench;
 pub mod bsdf;
 pub mod camera;
 pub mod color;

@@ -4,6 +4,8 @@
 mod accel_agreement;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
+/// Accelerators compared from the command line.
+mod bench_accel;
 /// The program as a user runs it: exit codes, what it writes, what it says.
 mod cli;
 /// Surfaces with holes, the same ones for every accelerator and every kind of query.

@@ -13,6 +13,7 @@ const LAYERS: &[(u32, &[&str])] = &[
     (5, &["scene"]),
     (6, &["integrator", "compile"]),
     (7, &["render"]),
+    (8, &["bench"]),
 ];
 
 /// Imports narrower than the layer number allows.

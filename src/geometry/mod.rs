@@ -178,7 +178,7 @@ impl Geometry {
     /// Everything that shading needs about a hit of `ray`, with the hit point recomputed in `f64`.
     ///
     /// `None` if the exact distance is not positive: the hit is a rounding artefact of the accelerator, and the caller looks again from
-    /// [`step_past`](crate::math::float::step_past) of `hit.t`.
+    /// [`step_past`] of `hit.t`.
     #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         if hit.instance == Hit::NO_INSTANCE {

@@ -1,9 +1,12 @@
 //! What the octree, the kd-tree and the BVH have in common: the items they are built over, the query that visits them, conservative slabs,
 //! and instances as a second level.
 
+mod clip;
 mod items;
 mod query;
 mod slab;
+#[cfg(test)]
+pub(super) mod testing;
 mod two_level;
 
 pub(super) use items::Items;

@@ -71,12 +71,72 @@ pub enum Command {
     /// (reference² + 0.01), psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
     #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
     Compare(CompareArgs),
+    /// Measure
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// Print completions for a shell
     #[command(after_help = "Example:\n  steradian completions bash > ~/.local/share/bash-completion/completions/steradian")]
     Completions {
         /// The shell.
         shell: Shell,
     },
+}
+
+const BENCH_ACCEL_EXAMPLES: &str = "\
+Examples:
+  steradian bench accel scenes/cornell.json
+      All accelerators on the scene's own rays, as tables on stdout.
+  steradian bench accel scenes/*.json --accel embree,embree:high,bvh,kdtree --out report
+      Several scenes; report/accel.html has plots, .md, .csv and .json the same figures.
+  steradian bench accel --scaling 1e3..1e7 --accel embree,bvh,kdtree,octree --out growth
+      Cost over the number of triangles of a generated mesh.
+  steradian bench accel scene.json --accel linear,embree --ray=0,0,5,0,0,-1
+      What each accelerator says of one ray: origin, direction, and optionally t_min, t_max, time.
+
+Rays are recorded once from a render of the scene with one sample a pixel: camera, shadow (any hit), first bounce, deep bounce, ambient occlusion
+(any hit). Every accelerator traces the very same rays, in turn, round after round. Answers are compared with those of linear.
+Ctrl-C ends after the present step and reports what there is.";
+
+/// What to measure.
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Compare accelerators on the same rays
+    #[command(after_help = BENCH_ACCEL_EXAMPLES)]
+    Accel(BenchAccelArgs),
+}
+
+/// Arguments of `bench accel`.
+#[derive(Debug, Args)]
+pub struct BenchAccelArgs {
+    /// Scene files
+    pub scenes: Vec<PathBuf>,
+    /// Accelerators, with options such as embree:high. Default: embree,bvh,kdtree,octree,linear
+    #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help())]
+    pub accel: Vec<AccelKind>,
+    /// Rays of each kind, about
+    #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = clap::value_parser!(u32).range(16..=100_000_000))]
+    pub rays: u32,
+    /// Numbers of threads. Default: 1 and all
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub threads: Vec<u32>,
+    /// Rounds after the one that warms up
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub rounds: u32,
+    /// Also measure a generated mesh with growing numbers of triangles, such as 1e3..1e7
+    #[arg(long, value_name = "FROM..TO", value_parser = parse_range)]
+    pub scaling: Option<[usize; 2]>,
+    /// Folder for accel.html, accel.md, accel.csv and accel.json; without it tables go to stdout
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Without --out: print JSON instead of tables
+    #[arg(long)]
+    pub json: bool,
+    /// Trace only this ray and print each accelerator's answer
+    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN[,TMAX[,TIME]]]", allow_hyphen_values = true)]
+    pub ray: Option<String>,
+    /// Say nothing but results and errors
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// Arguments of `render`.
@@ -207,6 +267,12 @@ fn accel_help() -> String {
     let line = |(name, what): &(&str, &str)| format!("  {name:<16}{what}");
     let lines: Vec<_> = AccelKind::CHOICES.iter().map(line).collect();
     format!("What finds hits; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}", lines.join("\n"))
+}
+
+fn parse_range(text: &str) -> Result<[usize; 2], String> {
+    let number = |word: &str| word.trim().parse::<f64>().ok().filter(|n| (100.0..=1e9).contains(n)).map(|n| n as usize);
+    let ends = text.split_once("..").and_then(|(from, to)| Some([number(from)?, number(to)?]));
+    ends.filter(|[from, to]| from <= to).ok_or_else(|| "expected two numbers of triangles from 100 to 1e9, such as 1e3..1e7".to_owned())
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {

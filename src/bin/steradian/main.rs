@@ -1,6 +1,7 @@
 //! The program `steradian`: results go to stdout, messages to stderr.
 
 mod args;
+mod bench;
 mod compare;
 mod info;
 mod interrupt;
@@ -37,6 +38,7 @@ fn run(cli: Cli) -> Result<u8> {
     match cli.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Info(arguments) => info::run(&arguments).map(|()| 0),
+        Command::Bench(command) => bench::run(&command),
         Command::Schema => text::print(&import::schema()).map(|()| 0),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
         Command::Completions { shell } => {

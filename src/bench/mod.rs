@@ -1,0 +1,36 @@
+//! Accelerators compared on the same rays: record, replay, check, report.
+
+pub mod agreement;
+mod epo;
+mod machine;
+mod measure;
+mod record;
+pub mod report;
+mod scaling;
+
+pub use machine::Machine;
+pub use measure::{AccelReport, BuildReport, KindReport, Mode, Options, RateReport, SceneReport, bench_scene};
+pub use record::{RayKind, RaySet, record};
+pub use scaling::{ScalingPoint, ScalingReport, bench_scaling, bumpy_sphere, fitted_slope};
+
+/// Is told what a benchmark is doing, and may end it.
+pub trait Watch: Sync {
+    /// A step begins.
+    fn step(&self, what: &str);
+
+    /// Whether to end after the present step with what there is.
+    fn is_stopped(&self) -> bool;
+}
+
+/// The middle of the values, and the lowest and highest; zeros if there are none.
+pub fn median_and_range(values: &[f64]) -> [f64; 3] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match (sorted.first(), sorted.last()) {
+        (Some(&low), Some(&high)) => {
+            let n = sorted.len();
+            [0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]), low, high]
+        }
+        _ => [0.0; 3],
+    }
+}

@@ -1,0 +1,161 @@
+//! Plots as SVG.
+
+use plotters::coord::CoordTranslate;
+use plotters::prelude::*;
+
+use crate::error::{Error, Result};
+
+const SIZE: (u32, u32) = (960, 420);
+
+/// Colours that stay apart for colour-blind readers (Okabe and Ito, "Color Universal Design").
+const COLORS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(90, 90, 90),
+    RGBColor(148, 103, 30),
+];
+
+/// Values by group, with the lowest and highest of each as a whisker.
+pub struct Series {
+    pub name: String,
+    /// Median, lowest, highest for each group.
+    pub values: Vec<Option<[f64; 3]>>,
+}
+
+/// A curve on logarithmic axes.
+pub struct Curve {
+    pub name: String,
+    pub points: Vec<(f64, f64)>,
+}
+
+fn failed(error: impl std::fmt::Display) -> Error {
+    Error::Internal(format!("a plot cannot be drawn: {error}"))
+}
+
+/// Bars side by side in groups.
+pub fn bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String> {
+    let top = series.iter().flat_map(|s| s.values.iter().flatten()).map(|v| v[2]).fold(0.0, f64::max).max(1e-9) * 1.05;
+    let last = groups.len() as f64 - 0.5;
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(failed)?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(12)
+            .margin_right(20)
+            .x_label_area_size(34)
+            .y_label_area_size(64)
+            .build_cartesian_2d(-0.5..last, 0.0..top)
+            .map_err(failed)?;
+        let name = |x: &f64| {
+            let near = (x - x.round()).abs() < 1e-6 && *x > -0.25;
+            if near { groups.get(x.round() as usize).map_or(String::new(), |name| (*name).to_owned()) } else { String::new() }
+        };
+        let labels = 2 * groups.len() + 1;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .x_labels(labels)
+            .x_label_formatter(&name)
+            .y_desc(unit)
+            .label_style(("sans-serif", 14))
+            .axis_desc_style(("sans-serif", 14))
+            .draw()
+            .map_err(failed)?;
+        let width = 0.84 / series.len().max(1) as f64;
+        for (i, s) in series.iter().enumerate() {
+            let color = COLORS[i % COLORS.len()];
+            let left = |group: usize| group as f64 - 0.42 + width * i as f64;
+            let present = || s.values.iter().enumerate().filter_map(|(group, value)| value.map(|v| (left(group), v)));
+            chart
+                .draw_series(present().map(|(x, v)| Rectangle::new([(x + 0.06 * width, 0.0), (x + 0.94 * width, v[0])], color.filled())))
+                .map_err(failed)?
+                .label(&s.name)
+                .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], color.filled()));
+            chart
+                .draw_series(present().map(|(x, v)| {
+                    let middle = x + 0.5 * width;
+                    PathElement::new(vec![(middle, v[1]), (middle, v[2])], BLACK.stroke_width(1))
+                }))
+                .map_err(failed)?;
+        }
+        legend(&mut chart, SeriesLabelPosition::UpperRight)?;
+        root.present().map_err(failed)?;
+    }
+    Ok(svg)
+}
+
+/// Curves on logarithmic axes, with dots at the points if there are few.
+pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, marks: &[(f64, f64)]) -> Result<String> {
+    let all = || curves.iter().flat_map(|c| &c.points);
+    let range = |of: fn(&(f64, f64)) -> f64| {
+        let (low, high) = all().map(of).filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0), |(low, high), v| (v.min(low), v.max(high)));
+        if low < high { low * 0.9..high * 1.1 } else { 0.1..10.0 }
+    };
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(failed)?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(12)
+            .margin_right(28)
+            .x_label_area_size(44)
+            .y_label_area_size(72)
+            .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .light_line_style(RGBColor(235, 235, 235))
+            .x_desc(x_label)
+            .y_desc(y_label)
+            .x_label_formatter(&|x| short(*x))
+            .y_label_formatter(&|y| short(*y))
+            .label_style(("sans-serif", 14))
+            .axis_desc_style(("sans-serif", 14))
+            .draw()
+            .map_err(failed)?;
+        for (i, curve) in curves.iter().enumerate() {
+            let color = COLORS[i % COLORS.len()];
+            chart
+                .draw_series(LineSeries::new(curve.points.iter().copied(), color.stroke_width(2)))
+                .map_err(failed)?
+                .label(&curve.name)
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], color.stroke_width(3)));
+            if curve.points.len() <= 12 {
+                chart.draw_series(curve.points.iter().map(|p| Circle::new(*p, 3, color.filled()))).map_err(failed)?;
+            }
+        }
+        chart.draw_series(marks.iter().map(|p| Circle::new(*p, 5, BLACK.stroke_width(2)))).map_err(failed)?;
+        legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
+        root.present().map_err(failed)?;
+    }
+    Ok(svg)
+}
+
+fn legend<'a, CT>(chart: &mut ChartContext<'a, SVGBackend<'a>, CT>, position: SeriesLabelPosition) -> Result<()>
+where
+    CT: CoordTranslate,
+{
+    chart
+        .configure_series_labels()
+        .position(position)
+        .margin(8)
+        .background_style(WHITE.mix(0.85))
+        .border_style(RGBColor(200, 200, 200))
+        .label_font(("sans-serif", 14))
+        .draw()
+        .map_err(failed)
+}
+
+/// A number in few characters: `1000000` is `1e6`.
+fn short(value: f64) -> String {
+    if (0.01..10_000.0).contains(&value) {
+        let text = format!("{value:.3}");
+        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    format!("{value:.0e}")
+}

@@ -1,0 +1,178 @@
+//! Cost as the number of triangles grows.
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::{Options, Watch, median_and_range};
+use crate::accel::{self, AccelKind};
+use crate::error::{Error, Result};
+use crate::geometry::{Geometry, Mesh, Shape};
+use crate::id::ShapeId;
+use crate::math::{DVec3, Ray, Vec3};
+
+/// Rays for each number of triangles.
+const RAYS: usize = 200_000;
+
+/// Costs over several numbers of triangles.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScalingReport {
+    /// Measured costs.
+    pub points: Vec<ScalingPoint>,
+    /// By accelerator: slopes of the logarithms of the time per ray and of the time of a build over the logarithm of the number of triangles.
+    pub slopes: Vec<(String, f64, f64)>,
+}
+
+/// Cost of one accelerator on a mesh of one size.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScalingPoint {
+    /// The accelerator.
+    pub accel: String,
+    /// Triangles.
+    pub triangles: usize,
+    /// Time of a build with all threads, in milliseconds.
+    pub build_milliseconds: f64,
+    /// Time per ray on one thread, in nanoseconds: the median of the rounds.
+    pub nanoseconds_per_ray: f64,
+    /// Bytes per triangle.
+    pub bytes_per_triangle: f64,
+}
+
+/// A closed mesh of about this many triangles: a sphere with bumps of several sizes.
+///
+/// # Errors
+/// If `triangles` does not fit into 32-bit indices.
+pub fn bumpy_sphere(triangles: usize) -> Result<Mesh> {
+    // 2 slices (rings - 1) triangles, with twice as many slices as rings.
+    let rings = ((triangles as f64 / 4.0).sqrt().round() as u32).max(3);
+    let slices = 2 * rings;
+    let point = |ring: u32, slice: u32| {
+        let (theta, phi) =
+            (std::f64::consts::PI * f64::from(ring) / f64::from(rings), std::f64::consts::TAU * f64::from(slice) / f64::from(slices));
+        let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+        let bump = |f: f64| (f * d.x).sin() * (f * d.y + 1.0).cos() * (f * d.z + 2.0).sin() / f;
+        (d * (1.0 + 0.6 * bump(5.0) + 0.6 * bump(17.0) + 0.6 * bump(71.0))).as_vec3().to_array()
+    };
+    let mut positions = vec![point(0, 0)];
+    positions.extend((1..rings).flat_map(|ring| (0..slices).map(move |slice| (ring, slice))).map(|(ring, slice)| point(ring, slice)));
+    positions.push(point(rings, 0));
+    let last = positions.len() as u32 - 1;
+    let at = |ring: u32, slice: u32| 1 + (ring - 1) * slices + slice % slices;
+    let mut indices = Vec::with_capacity(triangles);
+    for slice in 0..slices {
+        indices.push([0, at(1, slice + 1), at(1, slice)]);
+        for ring in 1..rings - 1 {
+            let [a, b, c, d] = [at(ring, slice), at(ring, slice + 1), at(ring + 1, slice + 1), at(ring + 1, slice)];
+            indices.extend([[a, b, c], [a, c, d]]);
+        }
+        indices.push([last, at(rings - 1, slice), at(rings - 1, slice + 1)]);
+    }
+    Mesh::new(positions, indices, None, None).map_err(|e| Error::Internal(e.to_string()))
+}
+
+/// Rays from around the mesh into it, without coherence.
+fn rays() -> Vec<Ray> {
+    let point = |i: usize, radius: f32, shift: f32| {
+        let (u, v) = ((i as f32 * 0.754_877_7 + shift) % 1.0, (i as f32 * 0.569_840_3 + shift) % 1.0);
+        let z = 2.0 * u - 1.0;
+        let (sin, cos) = (std::f32::consts::TAU * v).sin_cos();
+        Vec3::new(cos, sin, 0.0) * ((1.0 - z * z).max(0.0).sqrt() * radius) + Vec3::Z * (z * radius)
+    };
+    (0..RAYS)
+        .map(|i| {
+            let from = point(i, 3.0, 0.0);
+            Ray::new(from, (point(i, 1.0, 0.37) - from).normalize())
+        })
+        .collect()
+}
+
+/// Builds and traces meshes of growing size, from `first` to `last` triangles by factors of ten.
+///
+/// # Errors
+/// If an accelerator cannot be built.
+pub fn bench_scaling(first: usize, last: usize, options: &Options, watch: &dyn Watch) -> Result<ScalingReport> {
+    let rays = rays();
+    let mut points: Vec<ScalingPoint> = Vec::new();
+    let mut triangles = first.max(100);
+    while triangles <= last && !watch.is_stopped() {
+        watch.step(&format!("scaling: {triangles} triangles"));
+        let mesh = bumpy_sphere(triangles)?;
+        let count = mesh.triangles().len();
+        let geometry = Geometry { shapes: vec![Shape::Mesh(mesh)], world: vec![ShapeId(0)], ..Geometry::default() };
+        for &kind in &options.accels {
+            let affordable = if kind == AccelKind::Linear { (options.linear_tests as usize / count).min(RAYS) } else { RAYS };
+            if watch.is_stopped() || affordable < 16 {
+                continue;
+            }
+            watch.step(&format!("scaling: {triangles} triangles, {kind}"));
+            let start = Instant::now();
+            let accel = accel::build(kind, &geometry, 0)?;
+            let build_milliseconds = start.elapsed().as_secs_f64() * 1e3;
+            let mut times = Vec::new();
+            for round in 0..=options.rounds.min(3) {
+                let start = Instant::now();
+                std::hint::black_box(rays[..affordable].iter().filter(|ray| accel.intersect(ray).is_some()).count());
+                if round > 0 {
+                    times.push(start.elapsed().as_secs_f64() * 1e9 / affordable as f64);
+                }
+            }
+            points.push(ScalingPoint {
+                accel: kind.to_string(),
+                triangles: count,
+                build_milliseconds,
+                nanoseconds_per_ray: median_and_range(&times)[0],
+                bytes_per_triangle: accel.memory_bytes() as f64 / count as f64,
+            });
+        }
+        triangles *= 10;
+    }
+    let slope = |name: &str, cost: fn(&ScalingPoint) -> f64| {
+        let of_accel: Vec<_> = points.iter().filter(|p| p.accel == name).map(|p| (p.triangles as f64, cost(p))).collect();
+        fitted_slope(&of_accel)
+    };
+    let names: Vec<String> = options.accels.iter().map(ToString::to_string).collect();
+    let slopes = names.into_iter().filter_map(|name| {
+        let of_rays = slope(&name, |p| p.nanoseconds_per_ray)?;
+        let of_builds = slope(&name, |p| p.build_milliseconds).unwrap_or(0.0);
+        Some((name, of_rays, of_builds))
+    });
+    let slopes = slopes.collect();
+    Ok(ScalingReport { points, slopes })
+}
+
+/// The slope of the straight line fitted to the logarithms of both coordinates by least squares; `None` for fewer than two points.
+pub fn fitted_slope(points: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<_> = points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.ln(), y.ln())).collect();
+    let n = logs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / n;
+    let (mx, my) = (mean(|p| p.0), mean(|p| p.1));
+    let sxx: f64 = logs.iter().map(|p| (p.0 - mx).powi(2)).sum();
+    let sxy: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+    (logs.len() > 1 && sxx > 0.0).then(|| sxy / sxx)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_power_law_has_its_exponent_as_slope() {
+        let points: Vec<_> = [1e3, 1e4, 1e5].iter().map(|x: &f64| (*x, 7.0 * x.powf(0.25))).collect();
+        assert!((fitted_slope(&points).unwrap() - 0.25).abs() < 1e-12);
+        assert!(fitted_slope(&points[..1]).is_none());
+    }
+
+    #[test]
+    fn the_mesh_is_closed_and_of_the_size_asked_for() {
+        for n in [1_000, 10_000] {
+            let mesh = bumpy_sphere(n).unwrap();
+            let count = mesh.triangles().len();
+            assert!(count.abs_diff(n) * 10 < n, "{count}");
+            // Every edge has two sides.
+            let edges = mesh.triangles().iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]);
+            let set: std::collections::HashSet<_> = edges.clone().collect();
+            assert_eq!(set.len(), 3 * count);
+            assert!(edges.into_iter().all(|(a, b)| set.contains(&(b, a))));
+        }
+    }
+}

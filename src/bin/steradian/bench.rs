@@ -1,0 +1,125 @@
+//! `steradian bench`.
+
+use std::path::Path;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use steradian::accel::{self, AccelKind};
+use steradian::bench::agreement::{describe, parse_ray};
+use steradian::bench::report::Report;
+use steradian::bench::{Machine, Options, SceneReport, Watch, bench_scaling, bench_scene, record};
+use steradian::render::{Overrides, Settings};
+use steradian::{Error, Result, compile, import};
+
+use crate::args::{BenchAccelArgs, BenchCommand};
+use crate::interrupt::Interrupt;
+use crate::text;
+
+/// Runs a benchmark; the result is the exit code.
+pub fn run(command: &BenchCommand) -> Result<u8> {
+    match command {
+        BenchCommand::Accel(arguments) => accel(arguments),
+    }
+}
+
+fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
+    if arguments.scenes.is_empty() && arguments.scaling.is_none() {
+        return Err(Error::Usage("nothing to measure: name a scene, or give --scaling".into()));
+    }
+    if let Some(ray) = &arguments.ray {
+        return replay(arguments, ray).map(|()| 0);
+    }
+    if let Some(folder) = &arguments.out {
+        // A slip in the name is found before the work, not after it.
+        std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.clone(), message: e.to_string() })?;
+        steradian::output::check_creatable(&folder.join("accel.json"))?;
+    }
+    let interrupt = Interrupt::listen()?;
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let options = options(arguments);
+    let machine = Machine::here();
+    let mut scenes: Vec<SceneReport> = Vec::new();
+    for path in &arguments.scenes {
+        if watch.is_stopped() {
+            break;
+        }
+        watch.step(&format!("{}: loading", path.display()));
+        let desc = import::load_scene(path)?;
+        let settings = Settings::new(&desc, &Overrides { default_outputs: vec!["unused.exr".into()], ..Overrides::default() })?;
+        let scene = compile::compile(&desc, path)?;
+        watch.step(&format!("{}: recording rays", path.display()));
+        let recorder = accel::build(AccelKind::EMBREE, &scene.geometry, 0)?;
+        let rays = record(&scene, &*recorder, &settings, arguments.rays as usize)?;
+        drop(recorder);
+        let name = path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
+        scenes.push(bench_scene(&name, &scene.geometry, &rays, &options, &watch)?);
+    }
+    let scaling = match arguments.scaling {
+        Some([first, last]) if !watch.is_stopped() => Some(bench_scaling(first, last, &options, &watch)?),
+        _ => None,
+    };
+    watch.bar.finish_and_clear();
+    let command = std::iter::once("steradian".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
+    let report = Report { machine, command, scenes, scaling };
+    match &arguments.out {
+        Some(folder) => {
+            report.write_to(folder)?;
+            if !arguments.quiet {
+                text::print(&format!("accel.html, accel.md, accel.csv and accel.json are in {}", folder.display()))?;
+            }
+        }
+        None if arguments.json => text::print(&report.json()?)?,
+        None => text::print(report.markdown().trim_end())?,
+    }
+    Ok(if watch.is_stopped() { interrupt.exit_code() } else { 0 })
+}
+
+fn options(arguments: &BenchAccelArgs) -> Options {
+    let defaults = Options::default();
+    Options {
+        accels: if arguments.accel.is_empty() { defaults.accels } else { arguments.accel.clone() },
+        threads: if arguments.threads.is_empty() { defaults.threads } else { arguments.threads.iter().map(|&n| n as usize).collect() },
+        rounds: arguments.rounds as usize,
+        ..defaults
+    }
+}
+
+/// What each accelerator says of one ray.
+fn replay(arguments: &BenchAccelArgs, ray: &str) -> Result<()> {
+    let ray = parse_ray(ray).map_err(|message| Error::Usage(format!("--ray: {message}")))?;
+    for path in &arguments.scenes {
+        let scene = compile::compile(&import::load_scene(path)?, path)?;
+        for kind in options(arguments).accels {
+            let accel = accel::build(kind, &scene.geometry, 0)?;
+            let any = if accel.occluded(&ray) { "occluded" } else { "free" };
+            text::print(&format!("{}: {kind:<16}{any}, {}", show(path), describe(accel.intersect(&ray).as_ref())))?;
+        }
+    }
+    Ok(())
+}
+
+fn show(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// The present step on stderr.
+struct Steps<'a> {
+    bar: ProgressBar,
+    interrupt: &'a Interrupt,
+}
+
+impl Watch for Steps<'_> {
+    fn step(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+        self.bar.tick();
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.interrupt.stop.load(std::sync::atomic::Ordering::Relaxed)
+    }
+}
+
+fn spinner(quiet: bool) -> ProgressBar {
+    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let style = ProgressStyle::with_template("{elapsed} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
+    ProgressBar::with_draw_target(None, target).with_style(style)
+}
