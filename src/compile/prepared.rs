@@ -95,7 +95,12 @@ impl Builder {
                 emission = emission.or(from_mtl.radiance.map(|radiance| Emission { radiance, two_sided: false }));
             }
             if !has_uvs && self.materials.needs_uv(&look) {
-                return Err(meshes::refusal(&self.files, path, desc.file.as_deref(), "the material has textures, but the mesh has no uv".into()));
+                return Err(meshes::refusal(
+                    &self.files,
+                    path,
+                    desc.file.as_deref(),
+                    "the material has textures, but the mesh has no uv".into(),
+                ));
             }
             if moves && emission.is_some() {
                 return Err(self.files.error(path, "a shape that gives off light cannot move"));
@@ -153,7 +158,8 @@ impl Builder {
         }
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
-        let mut surface = Surface { material: look.material, relief: look.relief, alpha: look.alpha, first_light: None, single_light: false };
+        let mut surface =
+            Surface { material: look.material, relief: look.relief, alpha: look.alpha, first_light: None, single_light: false };
         if let Some(emission) = emission {
             let lights = AreaLight::for_shape(id, emission, &self.geometry);
             if !lights.iter().any(|light| light.area() > 0.0) {

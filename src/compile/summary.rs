@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::geometry::{Analytic, Shape};
 use crate::light::Light;
 use crate::scene::Scene;
+use crate::texture::Texture;
 
 /// Counts, bounds and features of a scene.
 #[derive(Clone, Debug, Serialize)]
@@ -27,7 +28,7 @@ pub struct Summary {
     pub lights: BTreeMap<&'static str, usize>,
     /// Materials, the default one included.
     pub materials: usize,
-    /// Textures.
+    /// Textures that vary; constant ones are colours.
     pub textures: usize,
     /// Smallest and largest coordinates, in world units; absent if there is no shape.
     pub bounds: Option<[[f32; 3]; 2]>,
@@ -73,7 +74,7 @@ impl Summary {
             instances: geometry.instances.len(),
             lights,
             materials: scene.materials.len(),
-            textures: scene.textures.len(),
+            textures: scene.textures.iter().filter(|texture| !matches!(texture, Texture::Constant(_))).count(),
             bounds: (!bounds.is_empty()).then(|| [bounds.min.to_array(), bounds.max.to_array()]),
             geometry_bytes: geometry.memory_bytes(),
             features: features(scene),

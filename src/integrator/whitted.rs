@@ -7,8 +7,8 @@ use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::SurfaceInteraction;
 use crate::light::{Light, ShadowTarget};
-use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::Ray;
+use crate::math::float::ONE_MINUS_EPSILON;
 
 /// Whitted's ray tracing. Area lights shine from their middle, so shadows are hard; scattering that is neither mirror-like nor lit by a
 /// light contributes only through the ambient term.

@@ -1,6 +1,7 @@
 use super::*;
 use crate::color::{linear_from_srgb, srgb_from_linear};
 use crate::import::{ImageData, Samples};
+use crate::texture::ImageError;
 use half::f16;
 
 fn image(width: usize, height: usize, channels: usize, samples: Samples) -> Arc<Image> {
@@ -136,7 +137,9 @@ fn numbers_are_channels_grey_or_luminance() {
         assert!((bitmap.scalar(Vec2::ZERO) - expected).abs() < 1e-6);
         assert!((bitmap.color(Vec2::ZERO).b - expected).abs() < 1e-6);
         let inverted = Bitmap { invert: true, ..bitmap };
-        assert!((inverted.scalar(Vec2::ZERO) - (1.0 - expected)).abs() < 1e-6 && (inverted.color(Vec2::ZERO).r - (1.0 - expected)).abs() < 1e-6);
+        assert!(
+            (inverted.scalar(Vec2::ZERO) - (1.0 - expected)).abs() < 1e-6 && (inverted.color(Vec2::ZERO).r - (1.0 - expected)).abs() < 1e-6
+        );
     }
     let luminance = Rgb::new(0.2, 0.4, 0.6).luminance();
     assert!((of(&color, None).scalar(Vec2::ZERO) - luminance).abs() < 1e-6);
