@@ -30,6 +30,7 @@ fn build() -> Result<(), String> {
         .flag(&define)
         .std("c11")
         .opt_level(2)
+        .flag_if_supported("-fno-plt")
         .try_compile("steradian_embree_shim")
         .map_err(|error| format!("the C shim does not compile; on Debian: apt install build-essential ({})", one_line(&error)))?;
 

@@ -223,26 +223,17 @@ RTCGeometry st_new_moving_instance(RTCDevice device, const struct StMovingInstan
     return new_user_geometry(device, instance, moving_bounds, moving_intersect, moving_occluded);
 }
 
-bool st_intersect1(RTCScene scene, const struct StRay *ray, uint32_t key, struct StHit *hit) {
-    struct RTCRayHit rayhit;
-    set_ray(&rayhit.ray, ray, key);
-    rayhit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rayhit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    trace_closest(scene, &rayhit, RTC_INVALID_GEOMETRY_ID);
-    if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    const struct StHit found = {rayhit.ray.tfar, rayhit.hit.u, rayhit.hit.v, rayhit.hit.primID, rayhit.hit.geomID, rayhit.hit.instID[0]};
-    *hit = found;
-    return true;
-}
-
-bool st_occluded1(RTCScene scene, const struct StRay *ray, uint32_t key) {
-    struct RTCRay traced;
-    set_ray(&traced, ray, key);
-    trace_any(scene, &traced, RTC_INVALID_GEOMETRY_ID);
-    return traced.tfar < 0.0f;
-}
-
 #if RTC_VERSION_MAJOR == 3
+
+void st_intersect1(RTCScene scene, struct StQuery *query, struct RTCRayHit *rayhit) {
+    rtcInitIntersectContext(&query->context);
+    rtcIntersect1(scene, &query->context, rayhit);
+}
+
+void st_occluded1(RTCScene scene, struct StQuery *query, struct RTCRay *ray) {
+    rtcInitIntersectContext(&query->context);
+    rtcOccluded1(scene, &query->context, ray);
+}
 
 static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit, unsigned instance) {
     struct RTCIntersectContext context;
@@ -273,6 +264,20 @@ void st_occluded16(RTCScene scene, const int32_t *valid, struct RTCRay16 *rays, 
 }
 
 #else
+
+void st_intersect1(RTCScene scene, struct StQuery *query, struct RTCRayHit *rayhit) {
+    rtcInitRayQueryContext(&query->context);
+    rtcInitIntersectArguments(&query->intersect);
+    query->intersect.context = &query->context;
+    rtcIntersect1(scene, rayhit, &query->intersect);
+}
+
+void st_occluded1(RTCScene scene, struct StQuery *query, struct RTCRay *ray) {
+    rtcInitRayQueryContext(&query->context);
+    rtcInitOccludedArguments(&query->occluded);
+    query->occluded.context = &query->context;
+    rtcOccluded1(scene, ray, &query->occluded);
+}
 
 static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit, unsigned instance) {
     struct RTCRayQueryContext context;

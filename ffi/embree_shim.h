@@ -73,11 +73,22 @@ struct StCutout {
 /* Lets hits of triangles count only where `cutout` says so. To be called before the geometry is committed. */
 void st_set_cutout(RTCGeometry triangles, const struct StCutout *cutout);
 
-/* The closest hit, written to `hit`; false on a miss, when `hit` is left alone. Callbacks get `key` as the ray's id. */
-bool st_intersect1(RTCScene scene, const struct StRay *ray, uint32_t key, struct StHit *hit);
+/* Room for what Embree is called with. The caller owns it, so that the calls below are jumps and cost no frame of their own. */
+struct StQuery {
+#if STERADIAN_EMBREE == 4
+    struct RTCRayQueryContext context;
+    struct RTCIntersectArguments intersect;
+    struct RTCOccludedArguments occluded;
+#else
+    struct RTCIntersectContext context;
+#endif
+};
 
-/* Whether there is any hit. */
-bool st_occluded1(RTCScene scene, const struct StRay *ray, uint32_t key);
+/* The closest hit of a ray; its geometry number and its instance number are set to RTC_INVALID_GEOMETRY_ID before. */
+void st_intersect1(RTCScene scene, struct StQuery *query, struct RTCRayHit *rayhit);
+
+/* Whether there is any hit: then `tfar` is negative infinity. */
+void st_occluded1(RTCScene scene, struct StQuery *query, struct RTCRay *ray);
 
 /* Writes sixteen rays into the lanes of a packet; mask, id and flags stay as they are. */
 void st_fill16(struct RTCRay16 *packet, const struct StRay *rays);

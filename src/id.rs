@@ -40,4 +40,6 @@ ids! {
     ReliefId,
     /// A light.
     LightId,
+    /// A group of lights.
+    LightGroupId,
 }

@@ -43,13 +43,13 @@ impl Relief {
         Self::BumpMap { texture, height, step: texel.unwrap_or(Vec2::splat(1.0 / 1024.0)) }
     }
 
-    /// The shading normal at a point: unit, in the hemisphere of the geometric normal.
-    pub fn normal(&self, geometry: &Geometry, textures: &[Texture], at: &SurfaceInteraction) -> Vec3 {
+    /// The shading normal at a point with its change with v: unit, in the hemisphere of the geometric normal.
+    pub fn normal(&self, geometry: &Geometry, textures: &[Texture], at: &SurfaceInteraction, dp_dv: Vec3) -> Vec3 {
         let n = match self {
             Self::NormalMap { texture, axes } => {
                 let rgb = textures[texture.index()].color(at.uv);
                 let tilt = vec2(2.0 * rgb.r - 1.0, 2.0 * rgb.g - 1.0);
-                let [tangent, bitangent] = tangents(geometry, at);
+                let [tangent, bitangent] = tangents(geometry, at, dp_dv);
                 tangent * axes[0].dot(tilt) + bitangent * axes[1].dot(tilt) + at.n_s * (2.0 * rgb.b - 1.0)
             }
             Self::BumpMap { texture, height, step } => {
@@ -57,7 +57,7 @@ impl Relief {
                 let rise = |step: Vec2| texture.scalar(at.uv + 0.5 * step) - texture.scalar(at.uv - 0.5 * step);
                 let slope_u = rise(vec2(step.x, 0.0)) / step.x;
                 let slope_v = rise(vec2(0.0, step.y)) / step.y;
-                at.n_s - surface_gradient(at, slope_u, slope_v) * *height
+                at.n_s - surface_gradient(at, dp_dv, slope_u, slope_v) * *height
             }
         };
         above_surface(n.normalize_or_zero(), at)
@@ -65,21 +65,30 @@ impl Relief {
 }
 
 /// Tangent and bitangent that normal maps refer to. Those of meshes made for normal maps are as baked; others are unit and perpendicular.
-fn tangents(geometry: &Geometry, at: &SurfaceInteraction) -> [Vec3; 2] {
+fn tangents(geometry: &Geometry, at: &SurfaceInteraction, dp_dv: Vec3) -> [Vec3; 2] {
     if let Shape::Mesh(mesh) = geometry.shape(at.shape)
         && mesh.has_tangents()
     {
-        return [at.dp_du, at.dp_dv];
+        if !at.is_instanced() {
+            return [at.dp_du, dp_dv];
+        }
+        // An instance turns tangents, but must not make the relief steeper by its scale.
+        let baked = geometry.instance(at.instance).transform_at(at.time).inverse_vector(at.dp_du.as_dvec3());
+        return right_angled(at, at.dp_du.normalize_or_zero() * baked.length() as f32, dp_dv);
     }
-    let tangent = (at.dp_du - at.n_s * at.n_s.dot(at.dp_du)).normalize_or_zero();
+    right_angled(at, (at.dp_du - at.n_s * at.n_s.dot(at.dp_du)).normalize_or_zero(), dp_dv)
+}
+
+/// A tangent, and the bitangent across it and the normal on the side of v.
+fn right_angled(at: &SurfaceInteraction, tangent: Vec3, dp_dv: Vec3) -> [Vec3; 2] {
     let bitangent = at.n_s.cross(tangent);
-    [tangent, if bitangent.dot(at.dp_dv) < 0.0 { -bitangent } else { bitangent }]
+    [tangent, if bitangent.dot(dp_dv) < 0.0 { -bitangent } else { bitangent }]
 }
 
 /// The gradient on the surface of a function with these slopes along u and v (Mikkelsen, "Bump Mapping Unparametrized Surfaces on the GPU");
 /// zero where u and v have no directions.
-fn surface_gradient(at: &SurfaceInteraction, slope_u: f32, slope_v: f32) -> Vec3 {
-    let (across_u, across_v) = (at.dp_dv.cross(at.n_s), at.n_s.cross(at.dp_du));
+fn surface_gradient(at: &SurfaceInteraction, dp_dv: Vec3, slope_u: f32, slope_v: f32) -> Vec3 {
+    let (across_u, across_v) = (dp_dv.cross(at.n_s), at.n_s.cross(at.dp_du));
     let gradient = (across_u * slope_u + across_v * slope_v) / at.dp_du.dot(across_u);
     if gradient.is_finite() { gradient } else { Vec3::ZERO }
 }

@@ -1,9 +1,9 @@
-//! A scene ready to render: tables and ids, no names and no paths.
+//! A scene ready to render: tables and ids, no paths and no names but those of light groups, which become layers.
 
 use crate::camera::Camera;
 use crate::geometry::Geometry;
 use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId, TextureId};
-use crate::light::LightSet;
+use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
 use crate::relief::Relief;
 use crate::texture::Texture;
@@ -72,6 +72,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Lights and their choice.
     pub lights: LightSet,
+    /// Which lights belong together, by name.
+    pub light_groups: LightGroups,
     /// The camera.
     pub camera: Camera,
     /// What the scene uses.

@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use crate::util::render::{Estimate, merge, pixels, probe, render};
+use crate::util::render::{Estimate, assert_blocks_agree, assert_irradiance, block_means, floor_probe, merge, pixels, probe, render};
 
 /// Inside a closed sphere of albedo 1/2 that emits 1/2: radiance 1/2 + 1/4 + 1/8 + ... = 1.
 fn furnace(max_depth: u32, rr_depth: u32) -> Value {
@@ -103,32 +103,6 @@ fn rough_materials_never_gain_energy() {
         let estimate = Estimate::of(&render(&scene), 1);
         assert!(estimate.mean <= 1.0 + 5.5 * estimate.error + 2e-3, "{material}: {estimate:?}");
         assert!(estimate.mean > least, "{material}: {estimate:?}");
-    }
-}
-
-/// A white diffuse floor at y = 0 seen from above at `at`: its radiance times pi is the irradiance.
-fn floor_probe(at: [f64; 3], lights: Value) -> Value {
-    let mut scene = probe(
-        [at[0] + 0.6, at[1] + 0.45, at[2] - 0.3],
-        at,
-        json!({
-            "integrator": { "type": "path", "max_depth": 2 },
-            "materials": { "white": { "type": "diffuse", "albedo": 1.0 }, "black": { "type": "diffuse", "albedo": 0.0 } },
-            "shapes": [{ "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] }]
-        }),
-    );
-    for light in lights.as_array().unwrap() {
-        scene["shapes"].as_array_mut().unwrap().push(light.clone());
-    }
-    scene
-}
-
-fn assert_irradiance(scene: &Value, expected: f64, what: &str) {
-    for strategy in ["mis", "light", "bsdf"] {
-        let mut scene = scene.clone();
-        scene["integrator"]["strategy"] = json!(strategy);
-        let estimate = Estimate::of(&render(&scene), 0);
-        estimate.assert_is(expected / std::f64::consts::PI, &format!("{what}, {strategy}"));
     }
 }
 
@@ -238,34 +212,6 @@ fn the_strategies_agree_on_three_scenes() {
         let (mis, light, bsdf) = (blocks("mis"), blocks("light"), blocks("bsdf"));
         assert_blocks_agree(&mis, &light, &format!("{name}: mis against light"));
         assert_blocks_agree(&mis, &bsdf, &format!("{name}: mis against bsdf"));
-    }
-}
-
-/// Means over 12 x 12 pixels of all channels together.
-fn block_means(image: &steradian::film::Image) -> Vec<f64> {
-    let [width, _] = image.size;
-    let blocks = width as usize / 12;
-    let mut sums = vec![0.0; blocks * blocks];
-    for (i, p) in pixels(image).enumerate() {
-        let (x, y) = (i % width as usize, i / width as usize);
-        sums[y / 12 * blocks + x / 12] += p.iter().map(|&c| f64::from(c)).sum::<f64>() / 144.0;
-    }
-    sums
-}
-
-/// Welch's test for each block: t with about 14 degrees of freedom, |t| < 11 has a false-alarm rate below 1e-7.
-#[track_caller]
-fn assert_blocks_agree(a: &[Vec<f64>], b: &[Vec<f64>], what: &str) {
-    let moments = |runs: &[Vec<f64>], block: usize| {
-        let n = runs.len() as f64;
-        let mean = runs.iter().map(|r| r[block]).sum::<f64>() / n;
-        let variance = runs.iter().map(|r| (r[block] - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        (mean, variance / n)
-    };
-    for block in 0..a[0].len() {
-        let ((ma, va), (mb, vb)) = (moments(a, block), moments(b, block));
-        let t = (ma - mb) / (va + vb).sqrt();
-        assert!(t.abs() < 11.0 && ma > 0.0, "{what}, block {block}: {ma} against {mb}, t = {t}");
     }
 }
 

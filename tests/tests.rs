@@ -6,6 +6,8 @@ mod accel_agreement;
 mod bad_input;
 /// Accelerators compared from the command line.
 mod bench_accel;
+/// What the cameras of the scene file see.
+mod cameras;
 /// The program as a user runs it: exit codes, what it writes, what it says.
 mod cli;
 /// Surfaces with holes, the same ones for every accelerator and every kind of query.
@@ -14,10 +16,20 @@ mod cutouts;
 mod degenerate_input;
 /// The same picture for any number of threads, any crop, any accelerator; samples can be replayed.
 mod determinism;
+/// Known flaws of renderers in camera and film: each test fails on the flawed formula.
+mod flaws_of_camera;
+/// Known flaws of renderers in lights and light transport: each test fails on the flawed formula.
+mod flaws_of_light;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
+/// Measured and textured lights, lamps in objects, groups, clamping.
+mod lights;
+/// Choosing among many lights.
+mod many_lights;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
 mod motion;
+/// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.
+mod own_accelerators;
 /// Normal maps, bump maps and smooth normals, without leaks and black rims.
 mod relief;
 /// Meshes, comments, names and transforms of scene files, read as users write them.

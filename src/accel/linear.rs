@@ -1,7 +1,7 @@
 //! Every primitive of every shape for every ray: slow, and right by inspection. The other accelerators are tested against it.
 
 use super::Accelerator;
-use crate::geometry::{Geometry, Hit};
+use crate::geometry::{Geometry, Hit, Shape, TriangleHit, TriangleRay};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::{Aabb, Ray};
 
@@ -28,6 +28,15 @@ impl<'g> LinearAccel<'g> {
         })
     }
 
+    /// The hit with one primitive; `triangle_ray` is `ray` prepared for triangles.
+    #[inline(always)]
+    fn test(&self, ray: &Ray, triangle_ray: &TriangleRay, key: u32, id: ShapeId, prim: PrimId, instance: InstanceId) -> Option<Hit> {
+        let Shape::Mesh(mesh) = self.geometry.shape(id) else { return self.geometry.intersect_prim(ray, key, id, prim, instance) };
+        let TriangleHit { t, u, v } = triangle_ray.intersect(&mesh.triangle_points_at(prim, ray.time))?;
+        let hit = Hit { t, u, v, shape: id, prim, instance };
+        self.geometry.cutouts.counts(&self.geometry.shapes, key, ray, &hit).then_some(hit)
+    }
+
     fn prims(&self, id: ShapeId) -> impl Iterator<Item = PrimId> {
         (0..self.geometry.shape(id).prim_count()).map(PrimId::new)
     }
@@ -42,11 +51,13 @@ impl Accelerator for LinearAccel<'_> {
         let mut closest: Option<Hit> = None;
         self.any_group(ray, |local, ids, instance| {
             let mut local = *local;
+            let mut triangle_ray = TriangleRay::from(&local);
             for &id in ids {
                 for prim in self.prims(id) {
                     // One float beyond the best hit, so that a hit which rounds to the same distance takes part in the tie.
                     local.t_max = closest.map_or(ray.t_max, |best| best.t.next_up().min(ray.t_max));
-                    let Some(hit) = self.geometry.intersect_prim(&local, key, id, prim, instance) else { continue };
+                    triangle_ray.t_max = f64::from(local.t_max);
+                    let Some(hit) = self.test(&local, &triangle_ray, key, id, prim, instance) else { continue };
                     if closest.is_none_or(|best| hit.is_before(&best)) {
                         closest = Some(hit);
                     }
@@ -59,10 +70,11 @@ impl Accelerator for LinearAccel<'_> {
 
     fn occluded(&self, ray: &Ray) -> bool {
         let key = self.geometry.cutouts.key(ray);
-        let hits = |local: &Ray, id: ShapeId, instance| {
-            self.prims(id).any(|prim| self.geometry.intersect_prim(local, key, id, prim, instance).is_some())
+        let group = |local: &Ray, ids: &[ShapeId], instance| {
+            let triangle_ray = TriangleRay::from(local);
+            ids.iter().any(|&id| self.prims(id).any(|prim| self.test(local, &triangle_ray, key, id, prim, instance).is_some()))
         };
-        ray.is_valid() && self.any_group(ray, |local, ids, instance| ids.iter().any(|&id| hits(local, id, instance)))
+        ray.is_valid() && self.any_group(ray, group)
     }
 
     fn bounds(&self) -> Aabb {

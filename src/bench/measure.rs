@@ -31,7 +31,7 @@ impl Default for Options {
         let all = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = if all > 1 { vec![1, all] } else { vec![1] };
         let accels = AccelKind::ALL.iter().map(|(kind, _)| *kind).collect();
-        Self { accels, threads, rounds: 5, linear_tests: 50_000_000 }
+        Self { accels, threads, rounds: 5, linear_tests: 10_000_000 }
     }
 }
 

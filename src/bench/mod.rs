@@ -4,14 +4,20 @@ pub mod agreement;
 mod epo;
 mod machine;
 mod measure;
+mod mesh;
+mod naive;
 mod record;
 pub mod report;
+mod reports;
 mod scaling;
 
 pub use machine::Machine;
 pub use measure::{AccelReport, BuildReport, KindReport, Mode, Options, RateReport, SceneReport, bench_scene};
+pub use mesh::{bumpy_sphere, head};
+pub use naive::{MatrixLinear, NaiveBvh, NaiveKdTree, NaiveOctree};
 pub use record::{RayKind, RaySet, record};
-pub use scaling::{ScalingPoint, ScalingReport, bench_scaling, bumpy_sphere, fitted_slope};
+pub use reports::{Comparison, ReportsOptions, ReportsReport, Row, bench_reports};
+pub use scaling::{ScalingPoint, ScalingReport, bench_scaling, fitted_slope};
 
 /// Is told what a benchmark is doing, and may end it.
 pub trait Watch: Sync {

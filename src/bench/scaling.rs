@@ -4,12 +4,10 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::{Options, Watch, median_and_range};
+use super::{Options, Watch, median_and_range, mesh::sphere_geometry};
 use crate::accel::{self, AccelKind};
-use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Mesh, Shape};
-use crate::id::ShapeId;
-use crate::math::{DVec3, Ray, Vec3};
+use crate::error::Result;
+use crate::math::{Ray, Vec3};
 
 /// Rays for each number of triangles.
 const RAYS: usize = 200_000;
@@ -38,38 +36,6 @@ pub struct ScalingPoint {
     pub bytes_per_triangle: f64,
 }
 
-/// A closed mesh of about this many triangles: a sphere with bumps of several sizes.
-///
-/// # Errors
-/// If `triangles` does not fit into 32-bit indices.
-pub fn bumpy_sphere(triangles: usize) -> Result<Mesh> {
-    // 2 slices (rings - 1) triangles, with twice as many slices as rings.
-    let rings = ((triangles as f64 / 4.0).sqrt().round() as u32).max(3);
-    let slices = 2 * rings;
-    let point = |ring: u32, slice: u32| {
-        let (theta, phi) =
-            (std::f64::consts::PI * f64::from(ring) / f64::from(rings), std::f64::consts::TAU * f64::from(slice) / f64::from(slices));
-        let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
-        let bump = |f: f64| (f * d.x).sin() * (f * d.y + 1.0).cos() * (f * d.z + 2.0).sin() / f;
-        (d * (1.0 + 0.6 * bump(5.0) + 0.6 * bump(17.0) + 0.6 * bump(71.0))).as_vec3().to_array()
-    };
-    let mut positions = vec![point(0, 0)];
-    positions.extend((1..rings).flat_map(|ring| (0..slices).map(move |slice| (ring, slice))).map(|(ring, slice)| point(ring, slice)));
-    positions.push(point(rings, 0));
-    let last = positions.len() as u32 - 1;
-    let at = |ring: u32, slice: u32| 1 + (ring - 1) * slices + slice % slices;
-    let mut indices = Vec::with_capacity(triangles);
-    for slice in 0..slices {
-        indices.push([0, at(1, slice + 1), at(1, slice)]);
-        for ring in 1..rings - 1 {
-            let [a, b, c, d] = [at(ring, slice), at(ring, slice + 1), at(ring + 1, slice + 1), at(ring + 1, slice)];
-            indices.extend([[a, b, c], [a, c, d]]);
-        }
-        indices.push([last, at(rings - 1, slice), at(rings - 1, slice + 1)]);
-    }
-    Mesh::new(positions, indices, None, None).map_err(|e| Error::Internal(e.to_string()))
-}
-
 /// Rays from around the mesh into it, without coherence.
 fn rays() -> Vec<Ray> {
     let point = |i: usize, radius: f32, shift: f32| {
@@ -96,9 +62,8 @@ pub fn bench_scaling(first: usize, last: usize, options: &Options, watch: &dyn W
     let mut triangles = first.max(100);
     while triangles <= last && !watch.is_stopped() {
         watch.step(&format!("scaling: {triangles} triangles"));
-        let mesh = bumpy_sphere(triangles)?;
-        let count = mesh.triangles().len();
-        let geometry = Geometry { shapes: vec![Shape::Mesh(mesh)], world: vec![ShapeId(0)], ..Geometry::default() };
+        let geometry = sphere_geometry(triangles);
+        let count = geometry.shapes[0].prim_count();
         for &kind in &options.accels {
             let affordable = if kind == AccelKind::Linear { (options.linear_tests as usize / count).min(RAYS) } else { RAYS };
             if watch.is_stopped() || affordable < 16 {
@@ -160,19 +125,5 @@ mod tests {
         let points: Vec<_> = [1e3, 1e4, 1e5].iter().map(|x: &f64| (*x, 7.0 * x.powf(0.25))).collect();
         assert!((fitted_slope(&points).unwrap() - 0.25).abs() < 1e-12);
         assert!(fitted_slope(&points[..1]).is_none());
-    }
-
-    #[test]
-    fn the_mesh_is_closed_and_of_the_size_asked_for() {
-        for n in [1_000, 10_000] {
-            let mesh = bumpy_sphere(n).unwrap();
-            let count = mesh.triangles().len();
-            assert!(count.abs_diff(n) * 10 < n, "{count}");
-            // Every edge has two sides.
-            let edges = mesh.triangles().iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]);
-            let set: std::collections::HashSet<_> = edges.clone().collect();
-            assert_eq!(set.len(), 3 * count);
-            assert!(edges.into_iter().all(|(a, b)| set.contains(&(b, a))));
-        }
     }
 }

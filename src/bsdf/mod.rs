@@ -98,6 +98,12 @@ impl Bsdf {
         each!(self, bsdf => bsdf.is_delta())
     }
 
+    /// Whether light may cross the surface; otherwise nothing arrives but from the side of `wo`.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        matches!(self, Self::Dielectric(_))
+    }
+
     /// Whether scattering depends on the direction of the frame's tangents.
     pub fn is_anisotropic(&self) -> bool {
         match self {

@@ -1,21 +1,97 @@
 //! The camera.
 
 use super::Files;
-use crate::camera::{Camera, Lens};
-use crate::desc::{CameraDesc, LensDesc};
+use super::transforms::Shutter;
+use crate::camera::{Blades, Camera, Framing, Lens, Projection, lens_equation};
+use crate::desc::{CameraDesc, CameraKindDesc, KeyframeDesc, LensDesc};
 use crate::error::Result;
-use crate::math::{DAffine3, DMat3, DVec3, Transform};
+use crate::math::{DAffine3, DMat3, DVec3, Motion, Transform};
+
+const DEFAULT_FOV_DEGREES: f64 = 40.0;
+
+/// Blades beyond this number cannot be told from a disk.
+const MAX_BLADES: u32 = 64;
 
 /// The camera, placed by a rotation and a translation.
 pub fn compile(files: &Files, desc: &CameraDesc) -> Result<Camera> {
-    let fov = desc.vertical_fov_degrees;
+    refuse_foreign_keys(files, desc)?;
+    let fov = desc.vertical_fov_degrees.unwrap_or(DEFAULT_FOV_DEGREES);
     if !(fov > 0.0 && fov < 180.0) {
         return Err(files.error("camera.vertical_fov_degrees", format!("must be above 0 and below 180, not {fov}")));
     }
     let map = placement(files, desc)?;
     let transform = Transform::new(map).ok_or_else(|| files.error("camera.transform", "the transform is singular"))?;
-    let lens = desc.lens.as_ref().map(|lens| compile_lens(files, lens, &transform)).transpose()?;
-    Ok(Camera::new(transform, fov.to_radians(), lens))
+    let projection = match desc.kind {
+        CameraKindDesc::Perspective => {
+            let half_height = (0.5 * fov.to_radians()).tan();
+            let lens = desc.lens.as_ref().map(|lens| compile_lens(files, lens, &transform, half_height)).transpose()?;
+            Projection::Perspective { half_height, lens }
+        }
+        CameraKindDesc::Orthographic => {
+            let height = desc.view_height.ok_or_else(|| files.error("camera", "an orthographic camera needs a `view_height`"))?;
+            Projection::Orthographic { half_height: 0.5 * files.positive("camera.view_height", height)? }
+        }
+        CameraKindDesc::Environment => Projection::Environment,
+    };
+    if !(desc.near >= 0.0 && desc.near.is_finite()) {
+        return Err(files.error("camera.near", format!("must be finite and not negative, not {}", desc.near)));
+    }
+    let motion = motion(files, &desc.motion, &map, shutter(files, desc)?)?;
+    let camera = Camera::new(transform, projection).with_framing(framing(files, desc)?).with_near(desc.near).with_shutter(desc.shutter);
+    camera.with_motion(motion).ok_or_else(|| files.error("camera.motion", "the motion is singular"))
+}
+
+/// When the shutter is open.
+pub fn shutter(files: &Files, desc: &CameraDesc) -> Result<Shutter> {
+    let [open, close] = desc.shutter;
+    if !(open.is_finite() && close.is_finite() && open <= close && (close - open).is_finite()) {
+        return Err(files.error("camera.shutter", format!("must be finite and not close before it opens, not {:?}", desc.shutter)));
+    }
+    Ok(Shutter { open, close })
+}
+
+/// How the camera moves from where `map` puts it.
+fn motion(files: &Files, keyframes: &[KeyframeDesc], map: &DAffine3, shutter: Shutter) -> Result<Motion> {
+    for (i, keyframe) in keyframes.iter().enumerate() {
+        let path = format!("camera.motion[{i}].transform");
+        let step = files.transform(&path, &keyframe.transform, &DAffine3::IDENTITY)?;
+        if step.swaps_handedness() || !step.uniform_scale().is_some_and(|scale| (scale - 1.0).abs() < 1e-6) {
+            return Err(files.error(&path, "must be a rotation and translation: a camera cannot be scaled"));
+        }
+    }
+    files.motion("camera.motion", keyframes, map, shutter)
+}
+
+/// Keys that mean nothing to this type of camera.
+fn refuse_foreign_keys(files: &Files, desc: &CameraDesc) -> Result<()> {
+    use CameraKindDesc::{Environment, Orthographic, Perspective};
+    let keys: [(&str, bool, &[CameraKindDesc]); 5] = [
+        ("vertical_fov_degrees", desc.vertical_fov_degrees.is_some(), &[Perspective]),
+        ("lens", desc.lens.is_some(), &[Perspective]),
+        ("view_height", desc.view_height.is_some(), &[Orthographic]),
+        ("shift", desc.shift.is_some(), &[Perspective, Orthographic]),
+        ("pixel_aspect", desc.pixel_aspect.is_some(), &[Perspective, Orthographic]),
+    ];
+    for (key, given, kinds) in keys {
+        if given && !kinds.contains(&desc.kind) {
+            let kind = match desc.kind {
+                Perspective => "a perspective",
+                Orthographic => "an orthographic",
+                Environment => "an environment",
+            };
+            return Err(files.error(&format!("camera.{key}"), format!("means nothing to {kind} camera")));
+        }
+    }
+    Ok(())
+}
+
+fn framing(files: &Files, desc: &CameraDesc) -> Result<Framing> {
+    let pixel_aspect = files.within("camera.pixel_aspect", desc.pixel_aspect.unwrap_or(1.0), 0.01, 100.0)?;
+    let shift = desc.shift.unwrap_or_default();
+    for share in shift {
+        files.within("camera.shift", share, -10.0, 10.0)?;
+    }
+    Ok(Framing { pixel_aspect, shift })
 }
 
 fn placement(files: &Files, desc: &CameraDesc) -> Result<DAffine3> {
@@ -44,27 +120,72 @@ fn rigid(map: &DAffine3) -> Option<DAffine3> {
     })
 }
 
-fn compile_lens(files: &Files, desc: &LensDesc, camera: &Transform) -> Result<Lens> {
-    let radius = match (desc.radius, desc.f_number, desc.focal_length) {
-        (Some(radius), None, None) => files.positive("camera.lens.radius", radius)?,
-        (None, Some(f_number), Some(focal_length)) => {
-            files.positive("camera.lens.focal_length", focal_length)? / (2.0 * files.positive("camera.lens.f_number", f_number)?)
-        }
-        _ => return Err(files.error("camera.lens", "give either `radius`, or `f_number` and `focal_length`")),
+fn compile_lens(files: &Files, desc: &LensDesc, camera: &Transform, half_height: f64) -> Result<Lens> {
+    let positive = |key: &str, value: Option<f64>| value.map(|v| files.positive(&format!("camera.lens.{key}"), v)).transpose();
+    let (radius, f_number) = (positive("radius", desc.radius)?, positive("f_number", desc.f_number)?);
+    let focal_length = positive("focal_length", desc.focal_length)?;
+    let focus = focus_distance(files, desc, camera)?;
+    let sensor = match (positive("sensor_distance", desc.sensor_distance)?, positive("sensor_height", desc.sensor_height)?) {
+        (Some(_), Some(_)) => return Err(files.error("camera.lens", "give either `sensor_distance` or `sensor_height`")),
+        (None, Some(height)) => Some(height / (2.0 * half_height)),
+        (distance, None) => distance,
     };
-    let focus_distance = match (desc.focus_distance, desc.focus_point) {
-        (Some(distance), None) => files.positive("camera.lens.focus_distance", distance)?,
+
+    // Any two of focal length, sensor distance and focus distance give the third.
+    let (focal_length, focus_distance) = match (focal_length, sensor, focus) {
+        (Some(_), Some(_), Some(_)) => {
+            let message = "`focal_length`, the sensor and the focus are one too many: two of them give the third by the lens equation";
+            return Err(files.error("camera.lens", message));
+        }
+        (Some(f), Some(a), None) => {
+            let b = lens_equation(f, a).filter(|b| b.is_finite());
+            let b = b.ok_or_else(|| {
+                files.error("camera.lens", format!("nothing is in focus: the sensor's distance {a} must be above the focal length {f}"))
+            })?;
+            (Some(f), b)
+        }
+        (None, Some(a), Some(b)) => (Some(1.0 / (1.0 / a + 1.0 / b)), b),
+        (f, None, Some(b)) => (f, b),
+        (_, _, None) => {
+            let message = "give `focus_distance` or `focus_point`, or `focal_length` with `sensor_distance` or `sensor_height`";
+            return Err(files.error("camera.lens", message));
+        }
+    };
+    let radius = match (radius, f_number, focal_length) {
+        (Some(radius), None, _) => radius,
+        (None, Some(n), Some(f)) => f / (2.0 * n),
+        (None, Some(_), None) => {
+            return Err(files.error("camera.lens", "`f_number` needs `focal_length`, or a sensor from which to find it"));
+        }
+        _ => return Err(files.error("camera.lens", "give either `radius` or `f_number`")),
+    };
+    let blades = desc.blades.map(|blades| {
+        if !(3..=MAX_BLADES).contains(&blades.count) {
+            return Err(files.error("camera.lens.blades.count", format!("must be from 3 to {MAX_BLADES}, not {}", blades.count)));
+        }
+        if !blades.rotation_degrees.is_finite() {
+            return Err(files.error("camera.lens.blades.rotation_degrees", "the angle is not finite"));
+        }
+        Ok(Blades { count: blades.count, rotation: blades.rotation_degrees.to_radians() })
+    });
+    Ok(Lens { radius, focus_distance, blades: blades.transpose()? })
+}
+
+/// The focus if it is given.
+fn focus_distance(files: &Files, desc: &LensDesc, camera: &Transform) -> Result<Option<f64>> {
+    match (desc.focus_distance, desc.focus_point) {
+        (None, None) => Ok(None),
+        (Some(distance), None) => files.positive("camera.lens.focus_distance", distance).map(Some),
         (None, Some(point)) => {
             let point: DVec3 = files.vector("camera.lens.focus_point", point)?;
             let depth = -camera.inverse_point(point).z;
             if depth.is_nan() || depth <= 0.0 {
                 return Err(files.error("camera.lens.focus_point", "the point lies behind the camera"));
             }
-            depth
+            Ok(Some(depth))
         }
-        _ => return Err(files.error("camera.lens", "give either `focus_distance` or `focus_point`")),
-    };
-    Ok(Lens { radius, focus_distance })
+        (Some(_), Some(_)) => Err(files.error("camera.lens", "give either `focus_distance` or `focus_point`")),
+    }
 }
 
 #[cfg(test)]
@@ -75,20 +196,44 @@ mod tests {
         compile(&Files { scene: "s.json".into() }, &serde_json::from_str(json).unwrap())
     }
 
+    fn lens(json: &str) -> Lens {
+        *camera(&format!(r#"{{ "position": [0, 0, 5], "look_at": [0, 0, 0], "vertical_fov_degrees": 90, "lens": {json} }}"#))
+            .unwrap()
+            .lens()
+            .unwrap()
+    }
+
     #[test]
     fn both_ways_of_placing_agree() {
         let a = camera(r#"{ "position": [1, 2, 3], "look_at": [4, 1, 0] }"#).unwrap();
         let b = camera(r#"{ "transform": [{ "look_at": { "from": [1, 2, 3], "to": [4, 1, 0] } }] }"#).unwrap();
         assert_eq!(a.position(), b.position());
-        assert!((a.axis() - b.axis()).length() < 1e-7);
+        assert!((a.axis() - b.axis()).length() < 1e-7 && (a.up() - b.up()).length() < 1e-7);
+        assert!(matches!(a.projection(), Projection::Perspective { lens: None, .. }));
     }
 
     #[test]
-    fn a_focus_point_gives_its_depth_and_an_f_number_the_radius() {
-        let json =
-            r#"{ "position": [0, 0, 5], "look_at": [0, 0, 0], "lens": { "f_number": 2, "focal_length": 0.05, "focus_point": [3, 1, 1] } }"#;
-        let lens = *camera(json).unwrap().lens().unwrap();
-        assert!((lens.focus_distance - 4.0).abs() < 1e-12 && (lens.radius - 0.0125).abs() < 1e-15);
+    fn a_focus_point_gives_its_depth() {
+        assert!((lens(r#"{ "radius": 1, "focus_point": [3, 1, 1] }"#).focus_distance - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_aperture_of_f_number_n_has_the_radius_f_over_2n() {
+        // Not 2 f / N, which is four times as large.
+        let given = lens(r#"{ "f_number": 2, "focal_length": 0.05, "focus_distance": 4 }"#);
+        assert!((given.radius - 0.0125).abs() < 1e-15);
+        // The focal length of the lens that the picture is taken with: 90 degrees on a sensor 0.1 high are 0.05 from sensor to lens.
+        let derived = lens(r#"{ "f_number": 2, "sensor_height": 0.1, "focus_distance": 4 }"#);
+        let f = 1.0 / (1.0 / 0.05 + 1.0 / 4.0);
+        assert!((derived.radius - f / 4.0).abs() < 1e-15 && derived.focus_distance == 4.0);
+    }
+
+    #[test]
+    fn the_lens_equation_gives_the_focus() {
+        for sensor in [r#""sensor_distance": 0.0505"#, r#""sensor_height": 0.101"#] {
+            let lens = lens(&format!(r#"{{ "radius": 0.01, "focal_length": 0.05, {sensor} }}"#));
+            assert!((1.0 / lens.focus_distance + 1.0 / 0.0505 - 1.0 / 0.05).abs() < 1e-9, "{lens:?}");
+        }
     }
 
     #[test]

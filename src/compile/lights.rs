@@ -1,12 +1,53 @@
-//! Lights that are not shapes.
+//! Lights that are not shapes, and groups of lights.
+
+use std::sync::Arc;
 
 use super::Files;
 use crate::color::Rgb;
-use crate::desc::{EnvironmentLightDesc, LightDesc};
+use crate::desc::{EnvironmentLightDesc, IesLightDesc, LightDesc};
 use crate::error::Result;
-use crate::import::{AssetError, read_rgb_image};
-use crate::light::{DirectionalLight, Environment, EnvironmentMap, Light, PointLight, SpotLight};
-use crate::math::{DAffine3, DMat3};
+use crate::id::{LightGroupId, LightId};
+use crate::import::{AssetError, read_ies, read_rgb_image};
+use crate::light::{DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, SpotLight};
+use crate::math::{DAffine3, DMat3, DVec3};
+
+/// All lights so far, with their groups.
+#[derive(Default)]
+pub struct LightTable {
+    pub lights: Vec<Light>,
+    /// By light.
+    groups: Vec<Option<LightGroupId>>,
+    names: Vec<String>,
+}
+
+impl LightTable {
+    /// The id of a group's name; a new one if it is new.
+    pub fn group(&mut self, files: &Files, path: &str, name: Option<&str>) -> Result<Option<LightGroupId>> {
+        let Some(name) = name else { return Ok(None) };
+        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+            let message = format!("\"{name}\" must be made of letters, digits and underscores: it becomes the name of a layer");
+            return Err(files.error(&format!("{path}.group"), message));
+        }
+        let index = self.names.iter().position(|known| known == name).unwrap_or_else(|| {
+            self.names.push(name.into());
+            self.names.len() - 1
+        });
+        Ok(Some(LightGroupId::new(index)))
+    }
+
+    /// Adds lights of one group; the id of the first.
+    pub fn add(&mut self, lights: impl IntoIterator<Item = Light>, group: Option<LightGroupId>) -> LightId {
+        let first = LightId::new(self.lights.len());
+        self.lights.extend(lights);
+        self.groups.resize(self.lights.len(), group);
+        first
+    }
+
+    /// The groups of all lights.
+    pub fn groups(&mut self) -> LightGroups {
+        LightGroups::new(std::mem::take(&mut self.names), self.groups.iter().copied())
+    }
+}
 
 /// One entry of `lights`.
 pub fn compile(files: &Files, path: &str, desc: &LightDesc) -> Result<Light> {
@@ -27,8 +68,9 @@ pub fn compile(files: &Files, path: &str, desc: &LightDesc) -> Result<Light> {
             let beam = light.beam_angle_degrees.unwrap_or(0.75 * cutoff);
             let beam = files.within(&at("beam_angle_degrees"), beam, 0.0, cutoff)?;
             let intensity = files.emitted(&at("intensity"), light.intensity)?.into();
-            Light::Spot(SpotLight::new(position, axis, intensity, beam.to_radians(), cutoff.to_radians()))
+            Light::Spot(Box::new(SpotLight::new(position, axis, intensity, beam.to_radians(), cutoff.to_radians())))
         }
+        LightDesc::Ies(light) => Light::Ies(Box::new(ies(files, path, light)?)),
         LightDesc::Directional(light) => {
             let direction = files.direction(&at("direction"), light.direction)?;
             let irradiance = files.emitted(&at("irradiance"), light.irradiance)?.into();
@@ -36,10 +78,32 @@ pub fn compile(files: &Files, path: &str, desc: &LightDesc) -> Result<Light> {
             if !(0.0..180.0).contains(&diameter) {
                 return Err(files.error(&at("angular_diameter_degrees"), format!("must be from 0 to below 180, not {diameter}")));
             }
-            Light::Directional(DirectionalLight::new(direction, irradiance, diameter.to_radians()))
+            Light::Directional(Box::new(DirectionalLight::new(direction, irradiance, diameter.to_radians())))
         }
         LightDesc::Environment(light) => Light::Environment(environment(files, path, light)?),
     })
+}
+
+fn ies(files: &Files, path: &str, desc: &IesLightDesc) -> Result<IesLight> {
+    let position = files.vector(&format!("{path}.position"), desc.position)?;
+    let nadir = match desc.look_at {
+        None => -DVec3::Y,
+        Some(target) => {
+            let place = format!("{path}.look_at");
+            let toward = files.vector(&place, target)? - position;
+            toward.try_normalize().ok_or_else(|| files.error(&place, "is the light's own position"))?
+        }
+    };
+    if !desc.rotation_degrees.is_finite() {
+        return Err(files.error(&format!("{path}.rotation_degrees"), "the angle is not finite"));
+    }
+    let intensity = files.emitted(&format!("{path}.intensity"), desc.intensity)?.into();
+    let place = format!("{path}.file");
+    let asset = files.asset(&desc.file);
+    let data = read_ies(&asset).map_err(|e| files.asset_error(&place, &asset, e))?;
+    let profile = IesProfile::new(data.vertical, data.horizontal, data.candela);
+    let profile = profile.ok_or_else(|| files.asset_error(&place, &asset, AssetError::Malformed("no table of intensities".into())))?;
+    Ok(IesLight::new(position, nadir, desc.rotation_degrees.to_radians(), intensity, Arc::new(profile)))
 }
 
 fn environment(files: &Files, path: &str, desc: &EnvironmentLightDesc) -> Result<Environment> {

@@ -28,11 +28,13 @@ use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::import::AssetError;
-use crate::light::{Light, LightSet};
+use crate::light::LightSet;
 use crate::material::Material;
 use crate::scene::{Features, Scene, Surface};
 
+use lights::LightTable;
 use materials::MaterialTable;
+use transforms::Shutter;
 
 /// Compiles a scene; the files it names are looked up beside `scene_file`.
 ///
@@ -42,12 +44,16 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
     check_settings(desc, scene_file)?;
     let files = Files { scene: scene_file.into() };
     let camera = camera::compile(&files, &desc.camera)?;
+    let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
-    let mut builder = Builder { files, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: Vec::new() };
+    let mut builder =
+        Builder { files, shutter, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: LightTable::default() };
     builder.add_world(desc)?;
     for (i, light) in desc.lights.iter().enumerate() {
-        let light = lights::compile(&builder.files, &format!("lights[{i}]"), light)?;
-        builder.lights.push(light);
+        let path = format!("lights[{i}]");
+        let group = builder.lights.group(&builder.files, &path, light.group())?;
+        let light = lights::compile(&builder.files, &path, light)?;
+        builder.lights.add([light], group);
     }
     builder.finish(desc, camera)
 }
@@ -87,22 +93,24 @@ impl Files {
 /// A scene under construction.
 struct Builder {
     files: Files,
+    shutter: Shutter,
     materials: MaterialTable,
     geometry: Geometry,
     /// By shape.
     surfaces: Vec<Surface>,
-    lights: Vec<Light>,
+    lights: LightTable,
 }
 
 impl Builder {
-    fn finish(self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
+    fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
         let files = &self.files;
-        let lights = LightSet::new(self.lights, &self.geometry);
+        let light_groups = self.lights.groups();
+        let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();
         if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky {
             return Err(files.error("shapes", "there is nothing to see: no shapes, no instances and no environment"));
         }
-        if lights.choose(0.0).is_none() && needs_light(&desc.integrator) {
+        if !lights.shines() && needs_light(&desc.integrator) {
             let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
             return Err(files.error("lights", message));
         }
@@ -118,7 +126,7 @@ impl Builder {
             delta_materials: materials.iter().any(Material::is_delta),
             anisotropic: has_bsdf(Bsdf::is_anisotropic),
             lens: camera.lens().is_some(),
-            motion: self.geometry.is_moving(),
+            motion: self.geometry.is_moving() || camera.is_moving(),
         };
         Ok(Scene {
             geometry: self.geometry,
@@ -127,6 +135,7 @@ impl Builder {
             reliefs: self.materials.reliefs,
             textures: self.materials.textures.textures,
             lights,
+            light_groups,
             camera,
             features,
         })

@@ -95,7 +95,7 @@ impl Builder {
             let path = format!("{}[{i}]", level.path);
             let place = format!("{path}.transform");
             let map = self.files.transform(&place, &instance.transform, &DAffine3::IDENTITY)?.world_from_object;
-            let outer = level.outer.after(&self.files.motion(&format!("{path}.motion"), &instance.motion, &map)?);
+            let outer = level.outer.after(&self.files.motion(&format!("{path}.motion"), &instance.motion, &map, self.shutter)?);
             if let Some(object) = object.shared {
                 self.push_instance(&place, object, &outer)?;
             }

@@ -7,9 +7,10 @@ use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
 use crate::error::Result;
 use crate::geometry::{Analytic, Placed, Shape};
-use crate::id::{LightId, ShapeId};
+use crate::id::{LightGroupId, ShapeId};
 use crate::import::MeshData;
 use crate::light::{AreaLight, Emission, Light};
+use crate::material::ColorInput;
 use crate::math::{DAffine3, Motion, Transform};
 use crate::scene::Surface;
 
@@ -24,9 +25,16 @@ pub struct PreparedShape {
     reverse_normal: bool,
     look: Look,
     /// Light that it gives off, not black.
-    pub emission: Option<Emission>,
+    pub emission: Option<PreparedEmission>,
     /// Where the scene has it.
     path: String,
+}
+
+/// Light given off, and the group it belongs to.
+#[derive(Clone, Copy, Debug)]
+pub struct PreparedEmission {
+    emission: Emission,
+    group: Option<LightGroupId>,
 }
 
 #[derive(Clone, Debug)]
@@ -50,8 +58,8 @@ impl Builder {
         let look = self.materials.find(&self.files, path, common.material)?;
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
-        let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map)?;
-        let motion = motion.as_constant().is_none().then_some(motion);
+        let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map, self.shutter)?;
+        let (map, motion) = motion.as_constant().map_or((map, Some(motion)), |rest| (rest, None));
         let emission = self.emission(path, &common)?;
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
@@ -81,7 +89,7 @@ impl Builder {
         map: &DAffine3,
         motion: Option<&Motion>,
         look: Look,
-        emission: Option<Emission>,
+        emission: Option<PreparedEmission>,
     ) -> Result<Vec<PreparedShape>> {
         let smoothing = self.smoothing(path, desc)?;
         let mut prepared = Vec::new();
@@ -92,7 +100,8 @@ impl Builder {
             if let Some(mtl) = &loaded.material {
                 let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
                 look = from_mtl.look;
-                emission = emission.or(from_mtl.radiance.map(|radiance| Emission { radiance, two_sided: false }));
+                emission =
+                    emission.or(from_mtl.radiance.map(|radiance| PreparedEmission { emission: Emission::constant(radiance), group: None }));
             }
             if !has_uvs && self.materials.needs_uv(&look) {
                 return Err(meshes::refusal(
@@ -126,12 +135,23 @@ impl Builder {
         Ok(Smoothing { weight: desc.normal_weight, crease_cosine })
     }
 
-    fn emission(&self, path: &str, common: &ShapeCommon) -> Result<Option<Emission>> {
-        let Some(emission) = common.emission else {
+    fn emission(&mut self, path: &str, common: &ShapeCommon) -> Result<Option<PreparedEmission>> {
+        let Some(desc) = common.emission else {
             return Ok(None);
         };
-        let radiance = Rgb::from(self.files.emitted(&format!("{path}.emission.radiance"), emission.radiance)?);
-        Ok((!radiance.is_black()).then_some(Emission { radiance, two_sided: emission.two_sided }))
+        let path = format!("{path}.emission");
+        let radiance = Rgb::from(self.files.emitted(&format!("{path}.radiance"), desc.radiance)?);
+        let group = self.lights.group(&self.files, &path, desc.group.as_deref())?;
+        let input = match &desc.texture {
+            None => ColorInput::Constant(Rgb::WHITE),
+            Some(name) => self.materials.textures.radiance(&self.files, &format!("{path}.texture"), name)?,
+        };
+        let (radiance, texture) = match input {
+            ColorInput::Constant(color) => (radiance * color, None),
+            ColorInput::Texture(id) => (radiance, Some(id)),
+        };
+        let emission = Emission { radiance, two_sided: desc.two_sided, texture };
+        Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
     /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
@@ -160,14 +180,13 @@ impl Builder {
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
         let mut surface =
             Surface { material: look.material, relief: look.relief, alpha: look.alpha, first_light: None, single_light: false };
-        if let Some(emission) = emission {
-            let lights = AreaLight::for_shape(id, emission, &self.geometry);
+        if let Some(PreparedEmission { emission, group }) = emission {
+            let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
             if !lights.iter().any(|light| light.area() > 0.0) {
                 return Err(self.files.error(&format!("{path}.emission"), "the light has no area"));
             }
-            surface.first_light = Some(LightId::new(self.lights.len()));
             surface.single_light = lights.len() == 1;
-            self.lights.extend(lights.into_iter().map(Light::Area));
+            surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
         }
         self.surfaces.push(surface);
         Ok(id)

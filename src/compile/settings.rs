@@ -62,6 +62,9 @@ fn check_integrator(files: &Files, integrator: &IntegratorDesc) -> Result<()> {
     match *integrator {
         IntegratorDesc::Path { max_depth: 0, .. } => return Err(files.error("integrator.max_depth", "must be at least 1")),
         IntegratorDesc::Path { rr_depth: 0, .. } => return Err(files.error("integrator.rr_depth", "must be at least 1")),
+        IntegratorDesc::Path { clamp: Some(clamp), .. } => {
+            files.positive("integrator.clamp", f64::from(clamp))?;
+        }
         IntegratorDesc::Whitted { max_depth, ambient } => {
             if max_depth == 0 || max_depth > 64 {
                 return Err(files.error("integrator.max_depth", format!("must be from 1 to 64, not {max_depth}")));

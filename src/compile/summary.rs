@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::geometry::{Analytic, Shape};
-use crate::light::Light;
+use crate::light::{Light, LightSelection};
 use crate::scene::Scene;
 use crate::texture::Texture;
 
@@ -26,6 +26,10 @@ pub struct Summary {
     pub instances: usize,
     /// Lights by kind; each emissive triangle counts.
     pub lights: BTreeMap<&'static str, usize>,
+    /// How a light is chosen among them: by its power, or by a tree that knows where lights are and where they shine.
+    pub light_selection: &'static str,
+    /// Names of light groups.
+    pub light_groups: Vec<String>,
     /// Materials, the default one included.
     pub materials: usize,
     /// Textures that vary; constant ones are colours.
@@ -59,6 +63,7 @@ impl Summary {
                 Light::Area(_) => "area",
                 Light::Point(_) => "point",
                 Light::Spot(_) => "spot",
+                Light::Ies(_) => "ies",
                 Light::Directional(_) => "directional",
                 Light::Environment(_) => "environment",
             };
@@ -73,6 +78,11 @@ impl Summary {
             objects: geometry.objects.len(),
             instances: geometry.instances.len(),
             lights,
+            light_selection: match scene.lights.selection() {
+                LightSelection::Power => "power",
+                LightSelection::Tree => "tree",
+            },
+            light_groups: scene.light_groups.names().to_vec(),
             materials: scene.materials.len(),
             textures: scene.textures.iter().filter(|texture| !matches!(texture, Texture::Constant(_))).count(),
             bounds: (!bounds.is_empty()).then(|| [bounds.min.to_array(), bounds.max.to_array()]),

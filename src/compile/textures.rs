@@ -81,6 +81,19 @@ impl TextureTable {
         })
     }
 
+    /// The texture that `path` names, for light given off: no channel is below 0.
+    pub fn radiance(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
+        let id = self.find(files, path, name, TextureUse::Color)?;
+        let [min, _] = self.get(id).range();
+        if min < 0.0 {
+            return Err(files.error(path, format!("the texture \"{name}\" goes down to {min}: light is not negative")));
+        }
+        Ok(match self.get(id) {
+            Texture::Constant(color) => ColorInput::Constant(*color),
+            _ => ColorInput::Texture(id),
+        })
+    }
+
     /// Refuses a texture with colours that a surface cannot reflect; the error says what it does.
     pub fn check_reflectance(&self, id: TextureId) -> Result<(), String> {
         let [min, max] = self.get(id).range();

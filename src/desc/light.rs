@@ -13,10 +13,25 @@ pub enum LightDesc {
     Point(PointLightDesc),
     /// Radiant intensity from a point within a cone.
     Spot(SpotLightDesc),
+    /// Radiant intensity by direction, as a luminaire was measured.
+    Ies(IesLightDesc),
     /// Light from infinitely far away, such as the sun.
     Directional(DirectionalLightDesc),
     /// Light from every direction, constant or from an image.
     Environment(EnvironmentLightDesc),
+}
+
+impl LightDesc {
+    /// The group that the light is in.
+    pub fn group(&self) -> Option<&str> {
+        match self {
+            Self::Point(light) => light.group.as_deref(),
+            Self::Spot(light) => light.group.as_deref(),
+            Self::Ies(light) => light.group.as_deref(),
+            Self::Directional(light) => light.group.as_deref(),
+            Self::Environment(light) => light.group.as_deref(),
+        }
+    }
 }
 
 /// A point light: the irradiance at distance d is `intensity / d²`.
@@ -27,6 +42,9 @@ pub struct PointLightDesc {
     pub position: [f64; 3],
     /// Radiant intensity (power per solid angle), linear RGB.
     pub intensity: [f32; 3],
+    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
 }
 
 /// A spot light: full intensity within `beam_angle_degrees`, none outside `cutoff_angle_degrees`, a smooth fall between.
@@ -45,10 +63,41 @@ pub struct SpotLightDesc {
     /// Half-angle in degrees within which the intensity is full. Default: three quarters of the cutoff.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam_angle_degrees: Option<f64>,
+    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
 }
 
 fn default_cutoff() -> f64 {
     20.0
+}
+
+/// A light as measured: a photometric file (IES LM-63, type C) gives the intensity by direction, bilinear between its angles, nothing
+/// beyond them.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IesLightDesc {
+    /// The `.ies` file, relative to the scene file. Its multipliers and ballast factors are applied; tables for a tilted lamp are not.
+    pub file: String,
+    /// Where the light stands.
+    pub position: [f64; 3],
+    /// A point that the file's nadir (vertical angle 0) is turned to. Default: straight down, along -Y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look_at: Option<[f64; 3]>,
+    /// Turn about the nadir in degrees, counter-clockwise seen along it (from above, if the light hangs). Without a turn, the file's
+    /// horizontal angle 0 points towards +X (+Y, if the nadir lies along X). Default: 0.
+    #[serde(default)]
+    pub rotation_degrees: f64,
+    /// Radiant intensity for each candela of the file, linear RGB. Default: [1, 1, 1].
+    #[serde(default = "white")]
+    pub intensity: [f32; 3],
+    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
 }
 
 /// A directional light.
@@ -63,6 +112,9 @@ pub struct DirectionalLightDesc {
     /// angle is visible to rays that leave the scene. Default: 0.
     #[serde(default)]
     pub angular_diameter_degrees: f64,
+    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
 }
 
 /// Light from every direction; give `radiance` or `file`.
@@ -82,6 +134,9 @@ pub struct EnvironmentLightDesc {
     /// Rotation of the environment (translations are ignored; scales are an error).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transform: Option<TransformDesc>,
+    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
 }
 
 fn one() -> f32 {

@@ -13,8 +13,8 @@ mod shape;
 mod texture;
 mod transform;
 
-pub use camera::{CameraDesc, LensDesc};
-pub use light::{DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
+pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
+pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
 pub use material::{BumpMapDesc, ColorDesc, MaterialDesc, NormalMapDesc, RoughnessDesc};
 pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};

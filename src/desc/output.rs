@@ -39,7 +39,7 @@ impl OutputDesc {
 /// A layer beside the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 pub enum LayerDesc {
-    /// Depth along the view axis (not ray length), in world units; 1e10 where nothing was hit.
+    /// Depth along the view axis (not ray length), or the distance from an environment camera, in world units; 1e10 where nothing was hit.
     Z,
     /// Shading normal in world space; zero where nothing was hit.
     N,

@@ -144,6 +144,10 @@ pub enum IntegratorDesc {
         /// How directions towards lights are found.
         #[serde(default)]
         strategy: StrategyDesc,
+        /// Takes the noise of rare bright paths, and some light with it: biased. No single path that was scattered more than once brings a
+        /// channel more than this, above 0. Default: no limit, no bias.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        clamp: Option<f32>,
     },
     /// Whitted's ray tracing: mirror reflection, refraction, hard shadows, and an ambient term.
     Whitted {
@@ -179,7 +183,7 @@ pub enum IntegratorDesc {
 
 impl Default for IntegratorDesc {
     fn default() -> Self {
-        Self::Path { max_depth: default_max_depth(), rr_depth: default_rr_depth(), strategy: StrategyDesc::default() }
+        Self::Path { max_depth: default_max_depth(), rr_depth: default_rr_depth(), strategy: StrategyDesc::default(), clamp: None }
     }
 }
 

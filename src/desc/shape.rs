@@ -263,9 +263,15 @@ fn quad_edge_v() -> [f64; 3] {
 pub struct EmissionDesc {
     /// Radiance, linear RGB.
     pub radiance: [f32; 3],
+    /// A texture by name whose colour multiplies the radiance. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub texture: Option<String>,
     /// Whether both sides emit; otherwise only the front does.
     #[serde(default)]
     pub two_sided: bool,
+    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
 }
 
 /// A group of shapes, and instances of other objects.

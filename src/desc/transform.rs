@@ -13,7 +13,7 @@ pub struct TransformDesc(pub Vec<TransformStepDesc>);
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KeyframeDesc {
-    /// When: the camera's shutter opens at 0 and closes at 1. Times must grow.
+    /// When, in the time in which the camera's `shutter` is given: from 0 to 1 by default. Times must grow; they may lie outside of it.
     pub time: f64,
     /// The transform at that time.
     #[serde(default)]

@@ -99,13 +99,12 @@ impl Instance {
             n_g,
             n_s: if n_s.dot(n_g) < 0.0 { -n_s } else { n_s },
             dp_du: finite_or_zero(t.vector(local.dp_du.as_dvec3()).as_vec3()),
-            dp_dv: finite_or_zero(t.vector(local.dp_dv.as_dvec3()).as_vec3()),
             instance: hit.instance,
             ..local
         })
     }
 }
 
-fn finite_or_zero(v: Vec3) -> Vec3 {
+pub(super) fn finite_or_zero(v: Vec3) -> Vec3 {
     if v.is_finite() { v } else { Vec3::ZERO }
 }

@@ -23,8 +23,6 @@ pub struct SurfaceInteraction {
     pub n_s: Vec3,
     /// Change of the point with `u`; any length, zero where the surface has no parametrisation.
     pub dp_du: Vec3,
-    /// Change of the point with `v`, likewise.
-    pub dp_dv: Vec3,
     /// Surface parameters; see each shape.
     pub uv: Vec2,
     /// The shape.
@@ -108,7 +106,6 @@ mod tests {
             n_g: n,
             n_s: n,
             dp_du: Vec3::ZERO,
-            dp_dv: Vec3::ZERO,
             uv: Vec2::ZERO,
             shape: ShapeId(0),
             prim: PrimId(0),

@@ -231,6 +231,13 @@ impl Mesh {
         TrianglePoints { a: at(a), b: at(b), c: at(c) }
     }
 
+    /// The uv at barycentric coordinates `u`, `v` of a triangle's second and third vertex; without uvs these coordinates themselves.
+    pub fn uv(&self, prim: PrimId, u: f32, v: f32) -> Vec2 {
+        let Some(uvs) = &self.uvs else { return Vec2::new(u, v) };
+        let [a, b, c] = self.triangles[prim.index()].map(|i| Vec2::from(uvs[i as usize]));
+        a * (1.0 - u - v) + b * u + c * v
+    }
+
     /// Bounds of all triangles.
     pub fn bounds(&self) -> Aabb {
         if self.is_deforming() {
@@ -253,6 +260,12 @@ impl Mesh {
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
     #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        self.interaction_and_dp_dv(ray, hit).map(|(at, _)| at)
+    }
+
+    /// The interaction with the change of the point with v.
+    #[inline(always)]
+    pub(super) fn interaction_and_dp_dv(&self, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
         let points = self.triangle_points_at(hit.prim, ray.time);
 
         // The hit point in f64, on the plane of the triangle.
@@ -277,20 +290,20 @@ impl Mesh {
         }
 
         let shading = self.shading(hit, &points, n_g, ray.time);
-        Some(SurfaceInteraction {
+        let at = SurfaceInteraction {
             p,
             t: t as f32,
             error,
             n_g,
             n_s: shading.n_s,
             dp_du: shading.dp_du,
-            dp_dv: shading.dp_dv,
             uv: shading.uv,
             shape: hit.shape,
             prim: hit.prim,
             instance: hit.instance,
             time: ray.time,
-        })
+        };
+        Some((at, shading.dp_dv))
     }
 
     /// Interpolated attributes at a hit.

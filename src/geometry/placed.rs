@@ -98,6 +98,16 @@ impl Analytic {
         each!(self, shape => shape.area())
     }
 
+    /// Surface parameters at the point `p` that [`sample`](Self::sample) finds with `u`.
+    fn uv(&self, p: DVec3, u: [f64; 2]) -> [f64; 2] {
+        let profile = match self {
+            Self::Revolution(revolution) => revolution.sampled_profile(u),
+            _ => 0.0,
+        };
+        let still = RayF64 { origin: p, direction: DVec3::Z, t_min: 0.0, t_max: 0.0 };
+        self.surface(&still, &LocalHit { t: 0.0, profile }).uv
+    }
+
     /// A point chosen on the surface; `u` in the unit square.
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
         each!(self, shape => shape.sample(u))
@@ -197,6 +207,12 @@ impl Placed {
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        self.interaction_and_dp_dv(ray, hit).map(|(at, _)| at)
+    }
+
+    /// The interaction with the change of the point with v.
+    #[inline(always)]
+    pub(super) fn interaction_and_dp_dv(&self, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
         let centered = self.centered_ray(&Ray { t_max: f32::INFINITY, ..*ray });
         let local_hit = self.hit_near(hit.t, &centered)?;
         let t = local_hit.t + centered.shift;
@@ -205,20 +221,20 @@ impl Placed {
         }
         let surface = self.shape.surface(&centered.ray, &local_hit);
         let placed = self.place(surface.p, surface.n, surface.pdf_area);
-        Some(SurfaceInteraction {
+        let at = SurfaceInteraction {
             p: placed.p,
             t: t as f32,
             error: self.error,
             n_g: placed.n,
             n_s: placed.n,
             dp_du: self.transform.vector(surface.dp_du).as_vec3(),
-            dp_dv: self.transform.vector(surface.dp_dv).as_vec3(),
             uv: Vec2::new(surface.uv[0] as f32, surface.uv[1] as f32),
             shape: hit.shape,
             prim: hit.prim,
             instance: hit.instance,
             time: ray.time,
-        })
+        };
+        Some((at, self.transform.vector(surface.dp_dv).as_vec3()))
     }
 
     /// The hit nearest to the distance `t` of the original ray. It need not be the first: the surface may have holes. It need not be exact
@@ -244,6 +260,12 @@ impl Placed {
     pub fn sample_area(&self, u: [f32; 2]) -> PlacedPoint {
         let sample = self.shape.sample([f64::from(u[0]), f64::from(u[1])]);
         self.place(sample.p, sample.n, sample.pdf_area)
+    }
+
+    /// Surface parameters at a placed point of the surface; where the shape's sampling found it, with `u`.
+    pub fn uv(&self, p: DVec3, u: [f32; 2]) -> Vec2 {
+        let [s, t] = self.shape.uv(self.transform.inverse_point(p), u.map(f64::from));
+        Vec2::new(s as f32, t as f32)
     }
 
     /// The density (with respect to placed area) with which [`Placed::sample_area`] finds the point where `ray` hits; `None` on a miss.

@@ -136,6 +136,12 @@ impl Revolution {
         self.area
     }
 
+    /// The profile parameter, `segment + s`, of the point that [`sample`](Self::sample) finds with `u`.
+    pub fn sampled_profile(&self, u: [f64; 2]) -> f64 {
+        let at = self.density.sample(u[1]);
+        at.segment as f64 + at.s
+    }
+
     /// A point chosen nearly uniformly by area; the density is the actual one.
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
         let at = self.density.sample(u[1]);

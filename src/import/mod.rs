@@ -3,6 +3,7 @@
 mod comments;
 mod environment_image;
 mod fault;
+mod ies;
 mod image_file;
 mod jpeg_check;
 mod mesh_data;
@@ -13,6 +14,7 @@ mod ply;
 mod scene_file;
 
 pub use environment_image::{RgbImage, read_rgb_image};
+pub use ies::{IesData, read_ies};
 pub use image_file::{ImageData, Samples, read_image};
 pub use mesh_data::MeshData;
 pub use mtl_maps::{ObjMap, ObjMaps};

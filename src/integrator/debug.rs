@@ -30,7 +30,7 @@ impl View {
             Self::Normal => from_normal(at.n_g),
             Self::ShadingNormal => from_normal(at.n_s),
             Self::Uv => Rgb::new(at.uv.x, at.uv.y, 0.0),
-            Self::Depth => Rgb::splat(world.scene.camera.depth(at.p)),
+            Self::Depth => Rgb::splat(world.scene.camera.depth(at.p, at.time)),
             Self::PrimitiveId => {
                 let (instance, shape, prim) = at.ids();
                 color_of(instance.0 ^ shape.0.wrapping_mul(0x9e37_79b9) ^ prim.0.wrapping_mul(0x85eb_ca6b))

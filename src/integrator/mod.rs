@@ -29,7 +29,7 @@ pub mod dimensions {
     /// Time within the shutter interval (one), of scenes in which something moves.
     pub const TIME: u32 = u32::MAX;
 
-    /// Choice of a light (one) and a direction towards it (two), at the vertex with this many bounces before it.
+    /// Choice of a light (one, and one for its last digits) and a direction towards it (two), at the vertex with this many bounces before it.
     pub const fn light(bounce: u32) -> u32 {
         1 + 2 * bounce
     }
@@ -95,9 +95,14 @@ pub trait Integrator: Send + Sync {
 pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Box<dyn Integrator> {
     let view = |view| Box::new(DebugView { view, needs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy } => {
-            Box::new(PathIntegrator { max_depth, rr_depth, strategy: strategy.into(), sampler, needs })
-        }
+        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp } => Box::new(PathIntegrator {
+            max_depth,
+            rr_depth,
+            strategy: strategy.into(),
+            clamp: clamp.unwrap_or(f32::INFINITY),
+            sampler,
+            needs,
+        }),
         IntegratorDesc::Whitted { max_depth, ambient } => Box::new(Whitted { max_depth, ambient: ambient.into(), needs }),
         IntegratorDesc::Normal => view(View::Normal),
         IntegratorDesc::ShadingNormal => view(View::ShadingNormal),
@@ -124,7 +129,7 @@ impl From<StrategyDesc> for Strategy {
 fn surface_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInteraction, direction: crate::math::Vec3) -> SurfaceSample {
     let mut sample = SurfaceSample::default();
     if needs.geometry {
-        sample.depth = world.scene.camera.depth(at.p);
+        sample.depth = world.scene.camera.depth(at.p, at.time);
         sample.normal = at.n_s;
         sample.position = at.p.as_vec3();
     }

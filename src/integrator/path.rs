@@ -12,7 +12,7 @@ use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::{Light, ShadowTarget};
+use crate::light::{Light, Receiver, ShadowTarget};
 use crate::math::{DVec3, Frame, Ray, Vec3};
 use crate::sampling::{PixelSeed, Sampler, power_heuristic};
 
@@ -37,6 +37,8 @@ pub struct PathIntegrator {
     pub rr_depth: u32,
     /// How directions towards lights are found.
     pub strategy: Strategy,
+    /// Largest channel that a single contribution of indirect light keeps: less noise for too little light. Infinite for no bias.
+    pub clamp: f32,
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
@@ -57,7 +59,7 @@ struct Path {
     seed: PixelSeed,
     sample: u32,
     /// Where the last direction was chosen, for the density of light sampling.
-    from: DVec3,
+    from: Receiver,
 }
 
 /// Light that reaches a path if its shadow ray is free.
@@ -102,7 +104,7 @@ impl PathIntegrator {
                 slot: slot as u32,
                 seed: sample.seed,
                 sample: sample.sample,
-                from: DVec3::ZERO,
+                from: Receiver { p: DVec3::ZERO, n: Vec3::ZERO },
             });
         }
 
@@ -145,7 +147,7 @@ impl PathIntegrator {
             let ray = rays[i];
             let sample = &mut out[path.slot as usize];
             let Some(at) = world.resolve(&ray, hits[i]) else {
-                sample.radiance += path.throughput * self.escaped(world, &path, ray.direction);
+                sample.radiance += self.clamped(path.throughput * self.escaped(world, &path, ray.direction), bounce);
                 continue;
             };
             if bounce == 0 {
@@ -154,7 +156,7 @@ impl PathIntegrator {
                     sample.surface = surface_sample(world, self.needs, &at, ray.direction);
                 }
             }
-            sample.radiance += path.throughput * self.emitted(world, &path, &ray, &at);
+            sample.radiance += self.clamped(path.throughput * self.emitted(world, &path, &ray, &at), bounce);
             if bounce + 1 >= self.max_depth {
                 continue;
             }
@@ -162,7 +164,7 @@ impl PathIntegrator {
             let vertex = Vertex::new(world, &at, &ray);
             if let Some(shadow) = self.sample_light(world, &path, &vertex, bounce) {
                 shadow_rays.push(shadow.ray);
-                pending.push(Pending { contribution: shadow.contribution, slot: path.slot });
+                pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
             }
             if let Some(next) = self.scatter(world, &mut path, &vertex, bounce) {
                 paths[alive] = path;
@@ -172,6 +174,13 @@ impl PathIntegrator {
         }
         paths.truncate(alive);
         rays.truncate(alive);
+    }
+
+    /// What a contribution brings that was scattered so many times between the light and the camera.
+    #[inline]
+    fn clamped(&self, contribution: Rgb, scatterings: u32) -> Rgb {
+        let largest = contribution.max_channel();
+        if scatterings > 1 && largest > self.clamp { contribution * (self.clamp / largest) } else { contribution }
     }
 
     /// Weight of light that was found by following `direction`, against finding it by sampling the light with density `light_pdf`.
@@ -193,7 +202,7 @@ impl PathIntegrator {
         for &id in world.scene.lights.at_infinity() {
             let found = world.scene.lights.get(id).eval_at_infinity(direction);
             if !found.radiance.is_black() {
-                radiance += found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id));
+                radiance += found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from));
             }
         }
         radiance
@@ -208,11 +217,11 @@ impl PathIntegrator {
         let Light::Area(light) = world.scene.lights.get(id) else {
             return Rgb::BLACK;
         };
-        let radiance = light.radiance(at, -ray.direction);
+        let radiance = light.radiance(&world.scene.textures, at, -ray.direction);
         if radiance.is_black() || path.pdf == f32::INFINITY || self.strategy != Strategy::Mis {
             return radiance * self.found_by_chance(path, 0.0);
         }
-        let light_pdf = light.pdf(&world.scene.geometry, path.from, ray, at) * world.scene.lights.pmf(id);
+        let light_pdf = light.pdf(&world.scene.geometry, path.from.p, ray, at) * world.scene.lights.pmf(id, &path.from);
         radiance * self.found_by_chance(path, light_pdf)
     }
 
@@ -223,9 +232,9 @@ impl PathIntegrator {
             return None;
         }
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::light(bounce));
-        let choice = world.scene.lights.choose(u[0])?;
+        let choice = world.scene.lights.choose(&vertex.receiver(), [u[0], u[3]])?;
         let light = world.scene.lights.get(choice.id);
-        let sample = light.sample(&world.scene.geometry, vertex.at.p, [u[1], u[2]])?;
+        let sample = light.sample(&world.scene.geometry, &world.scene.textures, vertex.at.p, [u[1], u[2]])?;
         if self.strategy == Strategy::Bsdf && !sample.is_delta {
             return None;
         }
@@ -270,7 +279,7 @@ impl PathIntegrator {
 
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         path.pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        path.from = vertex.at.p;
+        path.from = vertex.receiver();
         Some(vertex.at.spawn(direction))
     }
 }
@@ -290,7 +299,7 @@ pub(super) struct Vertex<'a> {
     pub wo: Vec3,
     /// Cosine between the direction back and the geometric normal.
     cos_geometric: f32,
-    /// Cosine between the shading and the geometric normal, if they differ.
+    /// Cosine between the shading and the geometric normal, if they differ by a normal map or a bump map.
     cos_normals: Option<f32>,
 }
 
@@ -302,8 +311,17 @@ impl<'a> Vertex<'a> {
         let n_s = facing_normal(back, at.n_s, at.n_g);
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
         let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
-        let cos_normals = (n_s != at.n_g).then(|| n_s.dot(at.n_g));
+        // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
+        let has_relief = world.scene.features.reliefs && world.scene.surface(at.shape).relief.is_some();
+        let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
         Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric, cos_normals }
+    }
+
+    /// The point and the side of it that light must reach.
+    #[inline]
+    fn receiver(&self) -> Receiver {
+        let n = if self.bsdf.transmits() { Vec3::ZERO } else { self.frame.z * 1f32.copysign(self.wo.z) };
+        Receiver { p: self.at.p, n }
     }
 
     /// What the surface lets through of light from a direction, beyond its BSDF: nothing where the shading frame and the geometry disagree on

@@ -1,5 +1,5 @@
-//! Shading normals that differ from the surface's own, on smooth meshes and under normal maps: no reflection below the surface, no hard edge
-//! where the surface turns away from the light.
+//! Shading normals that differ from the surface's own, on smooth meshes and under normal maps: no reflection below the surface, and under
+//! normal maps no hard edge where the surface turns away from the light.
 
 use crate::math::Vec3;
 

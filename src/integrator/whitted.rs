@@ -76,7 +76,7 @@ impl Whitted {
 /// Light that arrives from the middle of one light and is scattered back.
 fn direct_light(world: &World, vertex: &Vertex, light: &Light, counts: &mut RayCounts) -> Rgb {
     let at = vertex.at;
-    let Some(sample) = light.sample(&world.scene.geometry, at.p, [0.5; 2]) else {
+    let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2]) else {
         return Rgb::BLACK;
     };
     let Some(eval) = vertex.eval(sample.wi) else {

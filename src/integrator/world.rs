@@ -36,19 +36,24 @@ impl<'a> World<'a> {
     #[inline]
     pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
         let hit = hit?;
-        let at = self.scene.geometry.interaction(ray, &hit);
-        let at = if at.is_some() { at } else { self.retrace(ray, hit) };
-        if self.scene.features.reliefs { at.map(|at| self.with_relief(at)) } else { at }
+        match self.scene.geometry.interaction(ray, &hit) {
+            Some(at) => Some(self.finished(ray, &hit, at)),
+            None => self.retrace(ray, hit),
+        }
     }
 
-    /// With the shading normal that the surface's relief gives.
+    /// With the shading normal that the surface's relief gives, if it has one.
+    #[inline(always)]
+    fn finished(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
+        if self.scene.features.reliefs { self.with_relief(ray, hit, at) } else { at }
+    }
+
     #[inline(never)]
-    fn with_relief(&self, at: SurfaceInteraction) -> SurfaceInteraction {
+    fn with_relief(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
         let scene = self.scene;
-        match scene.surface(at.shape).relief {
-            Some(id) => SurfaceInteraction { n_s: scene.reliefs[id.index()].normal(&scene.geometry, &scene.textures, &at), ..at },
-            None => at,
-        }
+        let Some(id) = scene.surface(at.shape).relief else { return at };
+        let dp_dv = scene.geometry.dp_dv(ray, hit);
+        SurfaceInteraction { n_s: scene.reliefs[id.index()].normal(&scene.geometry, &scene.textures, &at, dp_dv), ..at }
     }
 
     #[cold]
@@ -58,7 +63,7 @@ impl<'a> World<'a> {
             ray.t_min = step_past(hit.t);
             hit = self.accel.intersect(&ray)?;
             if let Some(at) = self.scene.geometry.interaction(&ray, &hit) {
-                return Some(at);
+                return Some(self.finished(&ray, &hit, at));
             }
         }
         None
@@ -68,7 +73,7 @@ impl<'a> World<'a> {
     pub fn emitted(&self, at: &SurfaceInteraction, wo: Vec3) -> Rgb {
         let light = self.scene.surface(at.shape).light(at.prim).map(|id| self.scene.lights.get(id));
         match light {
-            Some(Light::Area(light)) => light.radiance(at, wo),
+            Some(Light::Area(light)) => light.radiance(&self.scene.textures, at, wo),
             _ => Rgb::BLACK,
         }
     }

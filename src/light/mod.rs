@@ -1,26 +1,35 @@
 //! Lights, how one is chosen, and how a direction towards it is chosen.
 
 mod area;
+mod bounds;
 mod directional;
 mod environment;
+mod groups;
+mod ies;
 mod point;
 mod set;
 mod spot;
 #[cfg(test)]
 mod test_support;
+mod tree;
 
 pub use area::{AreaLight, Emission};
 pub use directional::DirectionalLight;
 pub use environment::{Environment, EnvironmentMap, EnvironmentMapError};
+pub use groups::LightGroups;
+pub use ies::{IesLight, IesProfile};
 pub use point::PointLight;
-pub use set::{LightChoice, LightSet};
+pub use set::{LightChoice, LightSelection, LightSet};
 pub use spot::SpotLight;
+pub use tree::Receiver;
 
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnTarget};
 use crate::math::{DVec2, DVec3, Vec3};
+use crate::texture::Texture;
+use bounds::LightBounds;
 
-/// A light of the scene.
+/// A light of the scene. There may be millions of emissive triangles, so everything else is boxed where it is larger.
 #[derive(Clone, Debug)]
 pub enum Light {
     /// An emissive shape, or one triangle of an emissive mesh.
@@ -28,9 +37,11 @@ pub enum Light {
     /// Radiant intensity from a point.
     Point(PointLight),
     /// Radiant intensity within a cone.
-    Spot(SpotLight),
+    Spot(Box<SpotLight>),
+    /// Radiant intensity as measured of a luminaire.
+    Ies(Box<IesLight>),
     /// Light from far away within a small (or no) angle.
-    Directional(DirectionalLight),
+    Directional(Box<DirectionalLight>),
     /// Light from everywhere.
     Environment(Environment),
 }
@@ -83,7 +94,7 @@ impl Light {
         match self {
             Self::Directional(light) => !light.is_delta(),
             Self::Environment(_) => true,
-            Self::Area(_) | Self::Point(_) | Self::Spot(_) => false,
+            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Ies(_) => false,
         }
     }
 
@@ -94,7 +105,7 @@ impl Light {
         match self {
             Self::Environment(light) => light.eval(wi),
             Self::Directional(light) => light.eval(wi),
-            Self::Area(_) | Self::Point(_) | Self::Spot(_) => InfinityEval::default(),
+            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Ies(_) => InfinityEval::default(),
         }
     }
 
@@ -105,13 +116,25 @@ impl Light {
 
     /// Light that arrives at `p` from a chosen direction, `u` in the unit square; `None` where nothing can arrive.
     #[inline]
-    pub fn sample(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
-            Self::Area(light) => light.sample(geometry, p, u),
+            Self::Area(light) => light.sample(geometry, textures, p, u),
             Self::Point(light) => light.sample(p),
             Self::Spot(light) => light.sample(p),
+            Self::Ies(light) => light.sample(p),
             Self::Directional(light) => light.sample(u),
             Self::Environment(light) => light.sample(u),
+        }
+    }
+
+    /// Where the light is and how it shines; `None` for lights at infinity and those that do not shine.
+    fn bounds(&self, geometry: &Geometry) -> Option<LightBounds> {
+        match self {
+            Self::Area(light) => light.bounds(geometry),
+            Self::Point(light) => light.bounds(),
+            Self::Spot(light) => light.bounds(),
+            Self::Ies(light) => light.bounds(),
+            Self::Directional(_) | Self::Environment(_) => None,
         }
     }
 
@@ -121,6 +144,7 @@ impl Light {
             Self::Area(light) => light.power(),
             Self::Point(light) => light.power(),
             Self::Spot(light) => light.power(),
+            Self::Ies(light) => light.power(),
             Self::Directional(light) => light.power(scene_radius),
             Self::Environment(light) => light.power(scene_radius),
         }

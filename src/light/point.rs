@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::bounds::{EmissionCone, LightBounds};
 use super::{LightSample, ShadowTarget};
 use crate::color::Rgb;
 use crate::geometry::SpawnTarget;
@@ -34,6 +35,12 @@ impl PointLight {
             is_delta: true,
             target: ShadowTarget::Point(SpawnTarget { p: self.position, n: Vec3::ZERO, error: 0.0 }),
         })
+    }
+
+    /// For the choice of a light.
+    pub(super) fn bounds(&self) -> Option<LightBounds> {
+        let intensity = f64::from(self.intensity.luminance());
+        (intensity > 0.0).then(|| LightBounds::at_point(self.position, EmissionCone::SPHERE, intensity))
     }
 
     /// Emitted power, as luminance.

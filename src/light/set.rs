@@ -1,8 +1,10 @@
 //! All lights of a scene, and which one a path looks at.
 
 use super::Light;
+use super::tree::{LightTree, Receiver};
 use crate::geometry::Geometry;
 use crate::id::LightId;
+use crate::math::float::ONE_MINUS_EPSILON;
 use crate::sampling::AliasTable;
 
 /// A light chosen by [`LightSet::choose`].
@@ -12,21 +14,43 @@ pub struct LightChoice {
     pub id: LightId,
     /// Probability of the choice.
     pub pmf: f32,
-    /// What is left of the random number, uniform in `[0, 1)`.
-    pub u: f32,
+}
+
+/// How a light is chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightSelection {
+    /// In proportion to its power, whoever asks.
+    Power,
+    /// In proportion to an estimate of what arrives where it is asked for, by a tree; lights at infinity by their power.
+    Tree,
 }
 
 /// All lights of a scene and the probability with which each is chosen.
 ///
-/// A light is chosen in proportion to its power, but not without limits. What a light at infinity gives to a scene depends on the scene's
-/// size more than on what the camera sees; so if there are both lights at infinity and others, either kind has at least a quarter of the
-/// choices. Within a kind a twentieth of the choices is spread evenly, so that no light of positive power starves beside a strong one.
+/// Few lights are chosen in proportion to their power, many by a tree that knows where they are and where they shine. What a light at
+/// infinity gives to a scene depends on the scene's size more than on what the camera sees; so if there are both lights at infinity and
+/// others, either kind has at least a quarter of the choices. Where power decides, a twentieth of the choices of a kind is spread evenly,
+/// so that no light of positive power starves beside a strong one.
 #[derive(Clone, Debug, Default)]
 pub struct LightSet {
     lights: Vec<Light>,
+    /// All lights, or (beside a tree) those at infinity.
     table: Option<AliasTable>,
+    tree: Option<Box<NearLights>>,
     at_infinity: Vec<LightId>,
 }
+
+/// Lights that are not at infinity.
+#[derive(Clone, Debug)]
+struct NearLights {
+    tree: LightTree,
+    /// Probability of choosing one of them, rather than one at infinity.
+    share: f32,
+}
+
+/// From so many lights on that are not at infinity, a tree chooses. Where time is equal, it halves the error of 16 lights, and gains nothing
+/// on 3 or 4.
+const TREE_FROM: usize = 6;
 
 /// Least share of the choices for lights at infinity, and for all others, if both exist.
 const LEAST_SHARE: f64 = 0.25;
@@ -37,6 +61,13 @@ const EVEN_SHARE: f64 = 0.05;
 impl LightSet {
     /// All lights of a scene; [`LightId`]s count in the order given.
     pub fn new(lights: Vec<Light>, geometry: &Geometry) -> Self {
+        let near = lights.iter().filter(|light| !light.is_at_infinity()).count();
+        let selection = if near >= TREE_FROM { LightSelection::Tree } else { LightSelection::Power };
+        Self::with_selection(lights, geometry, selection)
+    }
+
+    /// [`Self::new`] with a given way of choosing: noise and time differ, the picture does not.
+    pub fn with_selection(lights: Vec<Light>, geometry: &Geometry, selection: LightSelection) -> Self {
         let bounds = geometry.bounds();
         let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().as_dvec3().length() };
         let power = |light: &Light| {
@@ -45,9 +76,21 @@ impl LightSet {
         };
         let powers: Vec<f64> = lights.iter().map(power).collect();
         let far: Vec<bool> = lights.iter().map(Light::is_at_infinity).collect();
-        let table = AliasTable::new(&probabilities(&powers, &far));
+        let mut probabilities = probabilities(&powers, &far);
         let at_infinity = (0..lights.len()).filter(|&i| lights[i].is_visible_at_infinity()).map(LightId::new).collect();
-        Self { lights, table, at_infinity }
+        let tree = match selection {
+            LightSelection::Power => None,
+            LightSelection::Tree => {
+                let of = |i: usize| if probabilities[i] > 0.0 { lights[i].bounds(geometry) } else { None };
+                LightTree::new(&(0..lights.len()).map(of).collect::<Vec<_>>())
+            }
+        };
+        let tree = tree.map(|tree| {
+            let share = probabilities.iter().zip(&far).filter(|(_, far)| !**far).map(|(p, _)| p).sum::<f64>().min(1.0);
+            probabilities.iter_mut().zip(&far).filter(|(_, far)| !**far).for_each(|(p, _)| *p = 0.0);
+            Box::new(NearLights { tree, share: share as f32 })
+        });
+        Self { lights, table: AliasTable::new(&probabilities), tree, at_infinity }
     }
 
     /// All lights, by [`LightId`].
@@ -66,18 +109,50 @@ impl LightSet {
         self.lights.is_empty()
     }
 
-    /// A light, `u` in `[0, 1)`; `None` if there are none that emit.
-    #[inline]
-    pub fn choose(&self, u: f32) -> Option<LightChoice> {
-        let table = self.table.as_ref()?;
-        let chosen = table.sample(u);
-        Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index), u: chosen.u })
+    /// Whether any light shines.
+    pub fn shines(&self) -> bool {
+        self.table.is_some() || self.tree.is_some()
     }
 
-    /// Probability with which a light is chosen.
+    /// How a light is chosen.
+    pub fn selection(&self) -> LightSelection {
+        if self.tree.is_some() { LightSelection::Tree } else { LightSelection::Power }
+    }
+
+    /// A light for `from`, `u` in the unit square (the second number adds digits to the first, for many lights); `None` if none shines
+    /// there, as far as the choice has looked.
     #[inline]
-    pub fn pmf(&self, id: LightId) -> f32 {
-        self.table.as_ref().map_or(0.0, |table| table.pmf(id.index()))
+    pub fn choose(&self, from: &Receiver, u: [f32; 2]) -> Option<LightChoice> {
+        if let Some(near) = &self.tree {
+            return self.choose_by_tree(near, from, u);
+        }
+        let table = self.table.as_ref()?;
+        let chosen = table.sample(u[0]);
+        Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index) })
+    }
+
+    fn choose_by_tree(&self, near: &NearLights, from: &Receiver, u: [f32; 2]) -> Option<LightChoice> {
+        // Random numbers are multiples of 2^-24.
+        let u = f64::from(u[0]) + f64::from(u[1]) * (1.0 / 16_777_216.0);
+        let share = f64::from(near.share);
+        if u < share {
+            let chosen = near.tree.choose(from, u / share)?;
+            return Some(LightChoice { id: LightId(chosen.light), pmf: chosen.pmf * near.share });
+        }
+        let table = self.table.as_ref()?;
+        let chosen = table.sample(((u - share) / (1.0 - share)).clamp(0.0, f64::from(ONE_MINUS_EPSILON)) as f32);
+        Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index) * (1.0 - near.share) })
+    }
+
+    /// Probability with which [`choose`](Self::choose) finds a light for `from`.
+    #[inline]
+    pub fn pmf(&self, id: LightId, from: &Receiver) -> f32 {
+        let by_power = self.table.as_ref().map_or(0.0, |table| table.pmf(id.index()));
+        match &self.tree {
+            None => by_power,
+            Some(near) if by_power > 0.0 => by_power * (1.0 - near.share),
+            Some(near) => near.tree.pmf(from, id.0) * near.share,
+        }
     }
 
     /// The lights that rays leaving the scene can see: environments, and directional lights with an angle.
@@ -120,7 +195,9 @@ mod tests {
     use super::*;
     use crate::color::Rgb;
     use crate::light::{DirectionalLight, Environment, PointLight};
-    use crate::math::DVec3;
+    use crate::math::{DVec3, Vec3};
+
+    const ANYWHERE: Receiver = Receiver { p: DVec3::ZERO, n: Vec3::ZERO };
 
     fn point(intensity: f32) -> Light {
         Light::Point(PointLight { position: DVec3::ZERO, intensity: Rgb::splat(intensity) })
@@ -132,39 +209,39 @@ mod tests {
 
     #[test]
     fn probabilities_add_up_and_are_those_of_the_choice() {
-        let sun = Light::Directional(DirectionalLight::new(-DVec3::Y, Rgb::splat(3.0), 0.01));
+        let sun = Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::splat(3.0), 0.01)));
         let sky = Light::Environment(Environment::Constant(Rgb::splat(1e-9)));
         let lights = set(vec![point(1.0), sun, point(0.0), point(1e-30), sky, point(50.0)]);
         let n = 1 << 20;
         let mut count = [0u32; 6];
         for i in 0..n {
-            let choice = lights.choose(i as f32 / n as f32).unwrap();
-            assert_eq!(choice.pmf, lights.pmf(choice.id));
+            let choice = lights.choose(&ANYWHERE, [i as f32 / n as f32, 0.0]).unwrap();
+            assert_eq!(choice.pmf, lights.pmf(choice.id, &ANYWHERE));
             count[choice.id.index()] += 1;
         }
         let mut sum = 0.0;
         for (i, &c) in count.iter().enumerate() {
-            let pmf = lights.pmf(LightId::new(i));
+            let pmf = lights.pmf(LightId::new(i), &ANYWHERE);
             assert!((c as f32 / n as f32 - pmf).abs() < 1e-5, "{i}");
             assert_eq!(pmf > 0.0, i != 2, "{i}");
             sum += pmf;
         }
         assert!((sum - 1.0).abs() < 1e-6);
-        assert!(lights.pmf(LightId(1)) + lights.pmf(LightId(4)) >= 0.249);
+        assert!(lights.pmf(LightId(1), &ANYWHERE) + lights.pmf(LightId(4), &ANYWHERE) >= 0.249);
         assert_eq!(lights.at_infinity(), [LightId(1), LightId(4)]);
     }
 
     #[test]
     fn equal_lights_are_chosen_equally() {
         let lights = set(vec![point(2.0); 5]);
-        assert!((0..5).all(|i| (lights.pmf(LightId(i)) - 0.2).abs() < 1e-7));
+        assert!((0..5).all(|i| (lights.pmf(LightId(i), &ANYWHERE) - 0.2).abs() < 1e-7));
     }
 
     #[test]
     fn a_sharp_sun_is_not_visible_and_no_light_is_no_choice() {
-        let lights = set(vec![Light::Directional(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0))]);
-        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0)) == 1.0);
-        assert!(LightSet::default().choose(0.5).is_none() && LightSet::default().is_empty());
-        assert!(set(vec![point(0.0)]).choose(0.5).is_none());
+        let lights = set(vec![Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0)))]);
+        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0), &ANYWHERE) == 1.0);
+        assert!(LightSet::default().choose(&ANYWHERE, [0.5, 0.0]).is_none() && LightSet::default().is_empty());
+        assert!(set(vec![point(0.0)]).choose(&ANYWHERE, [0.5, 0.0]).is_none());
     }
 }

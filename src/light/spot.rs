@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::bounds::{EmissionCone, LightBounds};
 use super::{LightSample, PointLight};
 use crate::color::Rgb;
 use crate::math::{DVec3, Vec3};
@@ -66,6 +67,13 @@ impl SpotLight {
         // The arctangent keeps its digits where the arccosine loses them.
         let angle = w.cross(self.axis).length().atan2(cos);
         ((self.cutoff as f32 - angle) * self.slope).clamp(0.0, 1.0)
+    }
+
+    /// For the choice of a light.
+    pub(super) fn bounds(&self) -> Option<LightBounds> {
+        let intensity = f64::from(self.source.intensity.luminance());
+        let cone = EmissionCone { axis: self.axis, spread: self.beam as f32, reach: (self.cutoff - self.beam) as f32 };
+        (intensity > 0.0).then(|| LightBounds::at_point(self.source.position, cone, intensity))
     }
 
     /// Emitted power, as luminance.

@@ -12,7 +12,7 @@ mod trig;
 
 pub use aabb::{Aabb, Bounds};
 pub use frame::Frame;
-pub use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3, dvec2, dvec3, vec2, vec3};
+pub use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3, Vec4, dvec2, dvec3, vec2, vec3};
 pub use motion::Motion;
 pub use ray::{Ray, RayF64};
 pub use roots::{Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, solve_quadratic};

@@ -35,6 +35,7 @@ pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderI
     let full = Vec2(image.size[0] as usize, image.size[1] as usize);
     file.attributes = ImageAttributes::new(IntegerBounds::new(Vec2(0, 0), full));
     file.attributes.chromaticities = Some(REC709);
+    file.attributes.pixel_aspect = info.pixel_aspect.unwrap_or(1.0);
     write_atomically(path, |out| file.write().to_buffered(out).map_err(|e| e.to_string()))
 }
 

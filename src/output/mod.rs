@@ -52,6 +52,8 @@ pub struct RenderInfo {
     pub render_seconds: f64,
     /// World to camera, for row vectors (the translation in the last row); camera space has +X right, +Y up, +Z forward.
     pub world_to_camera: Option<[[f32; 4]; 4]>,
+    /// Width of a pixel over its height; 1 if not given.
+    pub pixel_aspect: Option<f32>,
 }
 
 /// Writes `image` where and how `output` says.

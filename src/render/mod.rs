@@ -97,10 +97,10 @@ impl<'a> Job<'a> {
             let u = self.sampler.sample_4d(seed, sample, dimensions::CAMERA);
             let filter = self.filter.sample([u[0], u[1]]);
             let film = Vec2::new(x as f32 + 0.5 + filter.offset.x, y as f32 + 0.5 + filter.offset.y);
-            let mut ray = self.world.scene.camera.ray(film, self.size, [u[2], u[3]]);
-            if self.world.scene.features.motion {
-                ray.time = self.sampler.sample_4d(seed, sample, dimensions::TIME)[0];
-            }
+            let camera = &self.world.scene.camera;
+            let moves = self.world.scene.features.motion;
+            let time = if moves { camera.time(self.sampler.sample_4d(seed, sample, dimensions::TIME)[0]) } else { 0.0 };
+            let ray = camera.ray(film, self.size, [u[2], u[3]], time);
             batch.samples.push(CameraSample { ray: self.world.approach(ray), seed, sample });
             batch.weights[slot as usize] = filter.weight;
         }

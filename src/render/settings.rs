@@ -70,6 +70,8 @@ pub struct Overrides {
     pub max_depth: Option<u32>,
     /// `--strategy`.
     pub strategy: Option<StrategyDesc>,
+    /// `--clamp`; infinity stands for no limit.
+    pub clamp: Option<f32>,
     /// `--time-limit`, in seconds.
     pub time_limit: Option<f64>,
     /// `--output`: these files in place of the scene's.
@@ -166,6 +168,15 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
         };
         *strategy = chosen;
     }
+    if let Some(limit) = overrides.clamp {
+        let IntegratorDesc::Path { clamp, .. } = &mut integrator else {
+            return Err(usage("--clamp: only the integrator path can be clamped"));
+        };
+        if !(limit > 0.0) {
+            return Err(usage(format!("--clamp {limit}: a number above 0, or inf for no limit")));
+        }
+        *clamp = Some(limit).filter(|limit| limit.is_finite());
+    }
     Ok(integrator)
 }
 
@@ -255,7 +266,7 @@ mod tests {
         let s = Settings::new(&scene(SCENE), &Overrides::default()).unwrap();
         assert_eq!((s.size, s.crop), ([100, 50], Crop { x: 10, y: 20, width: 30, height: 30 }));
         assert_eq!((s.sampler, s.spp, s.seed), (SamplerKind::Independent, 16, 3));
-        assert!(matches!(s.integrator, IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis }));
+        assert!(matches!(s.integrator, IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis, clamp: None }));
         assert_eq!(s.layers, [LayerKind::N].into_iter().collect());
         assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::EMBREE, None, 2));
         assert!(s.threads >= 1);
@@ -274,6 +285,7 @@ mod tests {
             sampler: Some(SamplerKindDesc::Sobol),
             max_depth: Some(4),
             strategy: Some(StrategyDesc::Light),
+            clamp: Some(2.5),
             time_limit: Some(1.5),
             layers: vec![LayerDesc::Z, LayerDesc::Albedo],
             float: true,
@@ -284,7 +296,7 @@ mod tests {
         assert_eq!((s.size, s.crop, s.threads), ([200, 80], Crop { x: 0, y: 0, width: 5, height: 6 }, 3));
         assert_eq!((s.sampler, s.spp, s.seed, s.accel), (SamplerKind::Sobol, 7, 1, AccelKind::Linear));
         // The same integrator: parameters that are not changed stay the scene's.
-        assert_eq!(s.integrator, IntegratorDesc::Path { max_depth: 4, rr_depth: 3, strategy: StrategyDesc::Light });
+        assert_eq!(s.integrator, IntegratorDesc::Path { max_depth: 4, rr_depth: 3, strategy: StrategyDesc::Light, clamp: Some(2.5) });
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));
         assert_eq!(
             (s.outputs[0].layers.as_slice(), s.outputs[0].pixel_type),
@@ -322,6 +334,9 @@ mod tests {
             ("--max-depth", Overrides { max_depth: Some(0), ..d() }),
             ("--max-depth", Overrides { max_depth: Some(3), integrator: Some(IntegratorDesc::Normal), ..d() }),
             ("--strategy", Overrides { strategy: Some(StrategyDesc::Bsdf), integrator: Some(IntegratorDesc::Uv), ..d() }),
+            ("--clamp", Overrides { clamp: Some(0.0), ..d() }),
+            ("--clamp", Overrides { clamp: Some(f32::NAN), ..d() }),
+            ("--clamp", Overrides { clamp: Some(1.0), integrator: Some(IntegratorDesc::Uv), ..d() }),
             ("--time-limit", Overrides { time_limit: Some(0.0), ..d() }),
             ("--time-limit", Overrides { time_limit: Some(f64::NAN), ..d() }),
             ("--layers", Overrides { layers: vec![LayerDesc::Z], outputs: vec!["a.png".to_owned()], ..d() }),

@@ -1,7 +1,6 @@
 //! Textures: colours and numbers as functions of uv.
 //!
-//! Lookups are points: no mip levels, no footprints. A path tracer's samples of a pixel integrate over its footprint anyway;
-//! `docs/textures.md` has the figures.
+//! Lookups are points: no mip levels, no footprints. The samples of a pixel integrate over its footprint.
 
 mod bitmap;
 mod checker;

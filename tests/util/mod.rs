@@ -3,3 +3,4 @@
 pub mod folder;
 pub mod geometry;
 pub mod render;
+pub mod scenes;

@@ -90,3 +90,59 @@ pub fn pixels(image: &Image) -> impl Iterator<Item = [f32; 3]> + '_ {
     let [width, height] = image.size;
     (0..height).flat_map(move |y| (0..width).filter_map(move |x| image.rgb(x, y)))
 }
+
+/// A white diffuse floor at y = 0 seen from above at `at`: its radiance times pi is the irradiance.
+pub fn floor_probe(at: [f64; 3], lights: Value) -> Value {
+    let mut scene = probe(
+        [at[0] + 0.6, at[1] + 0.45, at[2] - 0.3],
+        at,
+        json!({
+            "integrator": { "type": "path", "max_depth": 2 },
+            "materials": { "white": { "type": "diffuse", "albedo": 1.0 }, "black": { "type": "diffuse", "albedo": 0.0 } },
+            "shapes": [{ "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] }]
+        }),
+    );
+    for light in lights.as_array().unwrap() {
+        scene["shapes"].as_array_mut().unwrap().push(light.clone());
+    }
+    scene
+}
+
+/// Asserts the irradiance on the floor of [`floor_probe`], by every strategy.
+#[track_caller]
+pub fn assert_irradiance(scene: &Value, expected: f64, what: &str) {
+    for strategy in ["mis", "light", "bsdf"] {
+        let mut scene = scene.clone();
+        scene["integrator"]["strategy"] = json!(strategy);
+        let estimate = Estimate::of(&render(&scene), 0);
+        estimate.assert_is(expected / std::f64::consts::PI, &format!("{what}, {strategy}"));
+    }
+}
+
+/// Means over 12 x 12 pixels of all channels together.
+pub fn block_means(image: &Image) -> Vec<f64> {
+    let [width, _] = image.size;
+    let blocks = width as usize / 12;
+    let mut sums = vec![0.0; blocks * blocks];
+    for (i, p) in pixels(image).enumerate() {
+        let (x, y) = (i % width as usize, i / width as usize);
+        sums[y / 12 * blocks + x / 12] += p.iter().map(|&c| f64::from(c)).sum::<f64>() / 144.0;
+    }
+    sums
+}
+
+/// Welch's test for each block: t with about 14 degrees of freedom, |t| < 11 has a false-alarm rate below 1e-7.
+#[track_caller]
+pub fn assert_blocks_agree(a: &[Vec<f64>], b: &[Vec<f64>], what: &str) {
+    let moments = |runs: &[Vec<f64>], block: usize| {
+        let n = runs.len() as f64;
+        let mean = runs.iter().map(|r| r[block]).sum::<f64>() / n;
+        let variance = runs.iter().map(|r| (r[block] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (mean, variance / n)
+    };
+    for block in 0..a[0].len() {
+        let ((ma, va), (mb, vb)) = (moments(a, block), moments(b, block));
+        let t = (ma - mb) / (va + vb).sqrt();
+        assert!(t.abs() < 11.0 && ma > 0.0, "{what}, block {block}: {ma} against {mb}, t = {t}");
+    }
+}

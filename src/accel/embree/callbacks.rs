@@ -4,7 +4,7 @@ use std::ffi::{CStr, c_char, c_void};
 use std::sync::atomic::Ordering;
 
 use super::device::Monitor;
-use super::gate::Gate;
+use super::gate::{Gate, RayWords};
 use super::packet::INVALID;
 use super::sys;
 use crate::geometry::{Geometry, Hit, Instance, Placed};
@@ -59,7 +59,7 @@ pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *co
     let local = instance.object_ray(ray);
     // SAFETY: as above; every bit pattern is a `Ray`.
     unsafe { inside.cast::<Ray>().write(local) };
-    Gate::OPEN.admits(&local)
+    Gate::OPEN.admits(&RayWords::new(&local))
 }
 
 /// A shape with holes, as the user data of its geometry.

@@ -4,20 +4,35 @@
 use crate::error::{Error, Result};
 use crate::geometry::Instance;
 use crate::math::float::EMBREE_LARGE;
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec3, Vec4};
 
 /// The limits on rays of one accelerator.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gate {
-    /// Largest magnitude of a coordinate of the origin; infinite if there are no instances, where [`Ray::is_valid`] is enough.
+    /// Largest magnitude of a coordinate of the origin; without instances, that of [`Ray::is_valid`].
     origin: f32,
     /// Largest magnitude of a component of the direction.
     direction: f32,
+    low_o: Vec4,
+    high_o: Vec4,
+    low_d: Vec4,
+    high_d: Vec4,
 }
 
 impl Gate {
     /// The gate of a scene without instances.
-    pub(super) const OPEN: Self = Self { origin: f32::INFINITY, direction: f32::INFINITY };
+    pub(super) const OPEN: Self = Self::new(EMBREE_LARGE.next_down(), EMBREE_LARGE.next_down());
+
+    const fn new(origin: f32, direction: f32) -> Self {
+        Self {
+            origin,
+            direction,
+            low_o: Vec4::new(-origin, -origin, -origin, 0.0),
+            high_o: Vec4::new(origin, origin, origin, f32::MAX),
+            low_d: Vec4::new(-direction, -direction, -direction, 0.0),
+            high_d: Vec4::new(direction, direction, direction, 1.0),
+        }
+    }
 
     /// The gate for these instances: a ray that passes stays valid in the space of each.
     ///
@@ -31,18 +46,20 @@ impl Gate {
         for (i, instance) in instances.iter().enumerate().filter(|(_, instance)| instance.motion.is_none()) {
             let Inverse { reach, offset } = invert_as_embree(instance)
                 .ok_or_else(|| Error::Embree(format!("instance {i}: its transform is too small or too large to be inverted in f32")))?;
-            gate.origin = gate.origin.min((LIMIT - offset) / reach);
-            gate.direction = gate.direction.min(LIMIT / reach);
+            gate = Self::new(gate.origin.min((LIMIT - offset) / reach), gate.direction.min(LIMIT / reach));
         }
         Ok(gate)
     }
 
-    /// Whether `ray` may be handed to Embree. Every other ray hits nothing; so does one with `t_max = 0`, which Embree's closest-hit query
-    /// passes over and its any-hit query does not.
+    /// Whether `ray` may be handed to Embree: it is [valid](Ray::is_valid) and within the limits. Every other ray hits nothing; so does one
+    /// with `t_max = 0`, which Embree's closest-hit query passes over and its any-hit query does not.
     #[inline(always)]
-    pub(super) fn admits(&self, ray: &Ray) -> bool {
-        let within = |v: Vec3, limit: f32| (v.x.abs() <= limit) & (v.y.abs() <= limit) & (v.z.abs() <= limit);
-        ray.is_valid() & (ray.t_max > 0.0) & within(ray.origin, self.origin) & within(ray.direction, self.direction)
+    pub(super) fn admits(&self, ray: &RayWords) -> bool {
+        let RayWords { origin_t_min: o, direction_time: d, t_max } = *ray;
+        // Every comparison with a NaN is false.
+        let within = o.cmpge(self.low_o) & o.cmple(self.high_o) & d.cmpge(self.low_d) & d.cmple(self.high_d);
+        let still = d.cmpeq(Vec4::ZERO).bitmask() & 0b111 == 0b111;
+        within.all() && !still && o.w <= t_max && t_max > 0.0
     }
 
     /// Whether `ray` may be traced side by side with others. Embree sorts the rays of a packet by the signs of their directions but takes
@@ -51,7 +68,25 @@ impl Gate {
     #[inline(always)]
     pub(super) fn admits_to_packet(&self, ray: &Ray) -> bool {
         let tame = |x: f32| (x == 0.0) | (x.abs() >= SMALLEST_RECIPROCAL);
-        self.admits(ray) & (ray.t_min < ray.t_max) & tame(ray.direction.x) & tame(ray.direction.y) & tame(ray.direction.z)
+        let within = |v: Vec3, limit: f32| (v.x.abs() <= limit) & (v.y.abs() <= limit) & (v.z.abs() <= limit);
+        let admitted = ray.is_valid() & (ray.t_max > 0.0) & within(ray.origin, self.origin) & within(ray.direction, self.direction);
+        admitted & (ray.t_min < ray.t_max) & tame(ray.direction.x) & tame(ray.direction.y) & tame(ray.direction.z)
+    }
+}
+
+/// A ray in registers, in the order in which Embree reads it.
+#[derive(Clone, Copy)]
+pub(super) struct RayWords {
+    pub(super) origin_t_min: Vec4,
+    pub(super) direction_time: Vec4,
+    pub(super) t_max: f32,
+}
+
+impl RayWords {
+    #[inline(always)]
+    pub(super) fn new(ray: &Ray) -> Self {
+        let [o, d] = [ray.origin, ray.direction];
+        Self { origin_t_min: Vec4::new(o.x, o.y, o.z, ray.t_min), direction_time: Vec4::new(d.x, d.y, d.z, ray.time), t_max: ray.t_max }
     }
 }
 

@@ -2,12 +2,14 @@
 //!
 //! A packet is filled lane by lane; the gate then runs over whole rows, which the compiler turns into vector code.
 
-use super::gate::Gate;
+use std::mem::MaybeUninit;
+
+use super::gate::{Gate, RayWords};
 use super::scene::Scene;
-use super::sys::{self, RTCHit16, RTCRay16, RTCRayHit16, StHit};
+use super::sys::{self, RTCHit16, RTCRay, RTCRay16, RTCRayHit, RTCRayHit16, StHit};
 use crate::accel::Coherence;
 use crate::geometry::Cutouts;
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec3, Vec4};
 
 /// Rays of one packet.
 pub(super) const WIDTH: usize = 16;
@@ -35,25 +37,69 @@ impl Tracer {
     }
 
     /// The closest hit of one ray.
-    #[inline]
+    #[inline(always)]
     pub(super) fn intersect(&self, ray: &Ray) -> Option<StHit> {
-        if !self.gate.admits(ray) {
+        let words = RayWords::new(ray);
+        if !self.gate.admits(&words) {
             return None;
         }
-        let mut hit = StHit::default();
-        // SAFETY: the scene is committed, `StRay` is `Ray` under its C name, and the ray has passed the gate.
-        let found = unsafe { sys::st_intersect1(self.scene.handle(), c_ray(ray), self.cutouts.key(ray), &mut hit) };
-        found.then_some(hit)
+        let mut rayhit = MaybeUninit::<RTCRayHit>::uninit();
+        let rayhit = rayhit.as_mut_ptr();
+        // SAFETY: the pointer is to memory of that type; all that Embree reads is written before it is called, with a ray that has passed the
+        // gate and a scene that is committed; all that is read after a hit Embree has written.
+        unsafe {
+            set_ray(&raw mut (*rayhit).ray, &words, self.cutouts.key(ray));
+            (&raw mut (*rayhit).hit.geomID).write(INVALID);
+            (&raw mut (*rayhit).hit.instID[0]).write(INVALID);
+            let mut query = MaybeUninit::<sys::StQuery>::uninit();
+            sys::st_intersect1(self.scene.handle(), query.as_mut_ptr(), rayhit);
+            // Embree has just written these one by one; read together they would wait for its stores to reach the cache.
+            let hit = &raw const (*rayhit).hit;
+            let geometry = (&raw const (*hit).geomID).read_volatile();
+            (geometry != INVALID).then(|| StHit {
+                t: (&raw const (*rayhit).ray.tfar).read_volatile(),
+                u: (&raw const (*hit).u).read_volatile(),
+                v: (&raw const (*hit).v).read_volatile(),
+                prim: (&raw const (*hit).primID).read_volatile(),
+                geometry,
+                instance: (&raw const (*hit).instID[0]).read_volatile(),
+            })
+        }
     }
 
     /// Whether one ray hits anything.
-    #[inline]
+    #[inline(always)]
     pub(super) fn occluded(&self, ray: &Ray) -> bool {
-        if !self.gate.admits(ray) {
+        let words = RayWords::new(ray);
+        if !self.gate.admits(&words) {
             return false;
         }
+        let mut out = MaybeUninit::<RTCRay>::uninit();
+        let out = out.as_mut_ptr();
         // SAFETY: as in `intersect`.
-        unsafe { sys::st_occluded1(self.scene.handle(), c_ray(ray), self.cutouts.key(ray)) }
+        unsafe {
+            set_ray(out, &words, self.cutouts.key(ray));
+            let mut query = MaybeUninit::<sys::StQuery>::uninit();
+            sys::st_occluded1(self.scene.handle(), query.as_mut_ptr(), out);
+            (*out).tfar < 0.0
+        }
+    }
+}
+
+/// Writes a ray in pieces of 16 bytes, which Embree reads at once; smaller ones could not be forwarded from the store buffer.
+///
+/// # Safety
+/// `out` points to memory for an `RTCRay`, initialised or not.
+#[inline(always)]
+unsafe fn set_ray(out: *mut RTCRay, words: &RayWords, key: u32) {
+    // SAFETY: by the contract; an `RTCRay` is aligned to 16 bytes and starts with origin and `tnear`, then direction and time.
+    unsafe {
+        out.cast::<Vec4>().write(words.origin_t_min);
+        out.cast::<Vec4>().add(1).write(words.direction_time);
+        (&raw mut (*out).tfar).write(words.t_max);
+        (&raw mut (*out).mask).write(ALL_GEOMETRIES);
+        (&raw mut (*out).id).write(key);
+        (&raw mut (*out).flags).write(0);
     }
 }
 

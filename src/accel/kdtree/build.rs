@@ -93,9 +93,8 @@ impl Builder<'_> {
         }
         let plane = if self.median { middle(&cell.bounds) } else { best_plane(cell) }?;
         let leaf_cost = count as f32;
-        let bad_splits = cell.bad_splits + u32::from(!self.median && plane.cost > leaf_cost);
         let hopeless = plane.cost > 4.0 * leaf_cost && count < 16;
-        if !self.median && (bad_splits >= MAX_BAD_SPLITS || hopeless) {
+        if !self.median && hopeless {
             return None;
         }
         let (mut below, mut above) = (cell.bounds, cell.bounds);
@@ -119,7 +118,10 @@ impl Builder<'_> {
             }
         }
         let total = lower.len() + upper.len();
-        if lower.len().max(upper.len()) == count && (self.median || total > count) || total as f64 > cell.budget {
+        // A half that keeps everything still pays where the other one is cut off with a few large parts, so only the sum of both is judged.
+        let is_bad = if self.median { lower.len().min(upper.len()) == count } else { plane.cost > leaf_cost };
+        let bad_splits = cell.bad_splits + u32::from(is_bad);
+        if bad_splits >= MAX_BAD_SPLITS || total as f64 > cell.budget {
             return None;
         }
         let half = |bounds: Aabb, parts: Vec<Part>| {

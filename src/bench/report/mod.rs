@@ -9,7 +9,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Machine, ScalingReport, SceneReport};
+use super::{Machine, ReportsReport, ScalingReport, SceneReport};
 use crate::error::{Error, Result};
 
 /// Everything a benchmark of accelerators has found.
@@ -23,6 +23,21 @@ pub struct Report {
     pub scenes: Vec<SceneReport>,
     /// Cost over the number of triangles, if asked for.
     pub scaling: Option<ScalingReport>,
+}
+
+impl ReportsReport {
+    /// As JSON.
+    ///
+    /// # Errors
+    /// None in practice.
+    pub fn json(&self) -> Result<String> {
+        serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))
+    }
+
+    /// Tables, each with the sentences that explain its ratios.
+    pub fn markdown(&self) -> String {
+        markdown::write_reports(self)
+    }
 }
 
 impl Report {

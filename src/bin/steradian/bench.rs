@@ -6,11 +6,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use steradian::accel::{self, AccelKind};
 use steradian::bench::agreement::{describe, parse_ray};
 use steradian::bench::report::Report;
-use steradian::bench::{Machine, Options, SceneReport, Watch, bench_scaling, bench_scene, record};
+use steradian::bench::{Machine, Options, ReportsOptions, SceneReport, Watch, bench_reports, bench_scaling, bench_scene, record};
 use steradian::render::{Overrides, Settings};
 use steradian::{Error, Result, compile, import};
 
-use crate::args::{BenchAccelArgs, BenchCommand};
+use crate::args::{BenchAccelArgs, BenchCommand, BenchReportsArgs};
 use crate::interrupt::Interrupt;
 use crate::text;
 
@@ -18,6 +18,7 @@ use crate::text;
 pub fn run(command: &BenchCommand) -> Result<u8> {
     match command {
         BenchCommand::Accel(arguments) => accel(arguments),
+        BenchCommand::Reports(arguments) => reports(arguments),
     }
 }
 
@@ -70,6 +71,17 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         None if arguments.json => text::print(&report.json()?)?,
         None => text::print(report.markdown().trim_end())?,
     }
+    Ok(if watch.is_stopped() { interrupt.exit_code() } else { 0 })
+}
+
+fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
+    let interrupt = Interrupt::listen()?;
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let defaults = ReportsOptions::default();
+    let tests = if arguments.full { u64::MAX } else { defaults.tests };
+    let report = bench_reports(&ReportsOptions { size: arguments.size, rounds: arguments.rounds as usize, tests }, &watch)?;
+    watch.bar.finish_and_clear();
+    text::print(if arguments.json { report.json()? } else { report.markdown() }.trim_end())?;
     Ok(if watch.is_stopped() { interrupt.exit_code() } else { 0 })
 }
 

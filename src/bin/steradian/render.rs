@@ -6,7 +6,7 @@ use std::time::Instant;
 use steradian::accel::{self, Accelerator};
 use steradian::camera::Camera;
 use steradian::film::{LayerSet, PixelSample};
-use steradian::math::{Vec2, Vec3};
+use steradian::math::Vec3;
 use steradian::output::{self, RenderInfo};
 use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Settings, Stats};
 use steradian::{Result, compile, import};
@@ -50,7 +50,8 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
     let info = RenderInfo {
         samples_per_pixel: stats.spp_done,
         render_seconds: stats.render_seconds,
-        world_to_camera: Some(world_to_camera(&scene.camera, settings.size)),
+        world_to_camera: Some(world_to_camera(&scene.camera)),
+        pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
     };
     for desc in &settings.outputs {
         output::write(desc, &result.image, &info)?;
@@ -143,11 +144,8 @@ fn describe_sample(sample: &PixelSample) -> String {
 }
 
 /// World to camera as OpenEXR has it: for row vectors, with +X right, +Y up and +Z forward.
-fn world_to_camera(camera: &Camera, size: [u32; 2]) -> [[f32; 4]; 4] {
-    // The ray through the middle of the upper edge lies in the plane of the view axis and the camera's upright.
-    let forward = camera.axis();
-    let upper = camera.ray(Vec2::new(0.5 * size[0] as f32, 0.0), size, [0.5; 2]).direction;
-    let up = (upper - forward * upper.dot(forward)).normalize_or(Vec3::Y);
+fn world_to_camera(camera: &Camera) -> [[f32; 4]; 4] {
+    let (forward, up) = (camera.axis(), camera.up());
     let axes = [forward.cross(up), up, forward].map(Vec3::as_dvec3);
     let position = camera.position();
     let mut rows = [[0.0; 4]; 4];
@@ -165,14 +163,15 @@ fn world_to_camera(camera: &Camera, size: [u32; 2]) -> [[f32; 4]; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use steradian::camera::Projection;
     use steradian::math::{DAffine3, DVec3, Transform};
 
     #[test]
     fn points_before_the_camera_have_positive_depth_and_the_right_side_is_right() {
         let turn = DAffine3::from_rotation_y(0.7) * DAffine3::from_rotation_x(-0.4);
         let place = DAffine3::from_translation(DVec3::new(1.0, 2.0, 3.0)) * turn;
-        let camera = Camera::new(Transform::new(place).unwrap(), 1.0, None);
-        let m = world_to_camera(&camera, [640, 360]);
+        let camera = Camera::new(Transform::new(place).unwrap(), Projection::Environment);
+        let m = world_to_camera(&camera);
         let map = |p: DVec3| -> [f64; 3] {
             let row = [p.x, p.y, p.z, 1.0];
             std::array::from_fn(|j| (0..4).map(|i| row[i] * f64::from(m[i][j])).sum())

@@ -7,8 +7,8 @@ use crate::light::test_support::Random;
 use crate::math::float::step_past;
 use crate::math::{DAffine3, DMat3, Transform};
 
-const WHITE: Emission = Emission { radiance: Rgb::WHITE, two_sided: false };
-const TWO_SIDED: Emission = Emission { radiance: Rgb::WHITE, two_sided: true };
+const WHITE: Emission = Emission::constant(Rgb::WHITE);
+const TWO_SIDED: Emission = Emission { two_sided: true, ..WHITE };
 
 fn place(shape: Analytic, map: DAffine3) -> Geometry {
     let placed = Placed::new(shape, Transform::new(map).unwrap());
@@ -16,7 +16,7 @@ fn place(shape: Analytic, map: DAffine3) -> Geometry {
 }
 
 fn light(geometry: &Geometry, emission: Emission) -> AreaLight {
-    AreaLight::new(ShapeId(0), PrimId(0), emission, geometry)
+    AreaLight::new(ShapeId(0), PrimId(0), emission, geometry, &[])
 }
 
 fn sphere() -> Analytic {
@@ -56,7 +56,7 @@ fn a_placed_sphere_gives_the_closed_form_irradiance() {
     assert!((light.power() / (4.0 * PI * PI * 0.25) - 1.0).abs() < 1e-6);
     assert_samples_are_hits(&geometry, &light, DVec3::ZERO, 1e-4);
     assert_samples_are_hits(&geometry, &light, DVec3::new(1.2, 0.3, 2.2), 1e-4);
-    assert!(light.sample(&geometry, DVec3::new(1.2, 0.1, 1.5), [0.5; 2]).is_none());
+    assert!(light.sample(&geometry, &[], DVec3::new(1.2, 0.1, 1.5), [0.5; 2]).is_none());
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn a_sphere_turned_inside_out_lights_its_inside() {
         assert!((e / PI - 1.0).abs() < 1e-3, "{e}");
         assert_samples_are_hits(&geometry, &light, p.into(), 1e-4);
     }
-    assert!(light.sample(&geometry, DVec3::splat(9.0), [0.5; 2]).is_none());
+    assert!(light.sample(&geometry, &[], DVec3::splat(9.0), [0.5; 2]).is_none());
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn a_quad_light_gives_lamberts_irradiance() {
     let light = light(&geometry, WHITE);
     let e = irradiance(std::slice::from_ref(&light), &geometry, DVec3::ZERO, DVec3::Z);
     assert!((e / 0.718_688_9 - 1.0).abs() < 1e-4, "{e}");
-    assert!(light.sample(&geometry, DVec3::new(0.0, 0.0, 2.0), [0.5; 2]).is_none());
+    assert!(light.sample(&geometry, &[], DVec3::new(0.0, 0.0, 2.0), [0.5; 2]).is_none());
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn partial_emitters_are_sampled_within_their_clips() {
         let mut random = Random(13);
         let p = DVec3::new(3.0, -2.0, 4.0);
         for _ in 0..5000 {
-            let Some(s) = light.sample(&geometry, p, random.pair()) else { continue };
+            let Some(s) = light.sample(&geometry, &[], p, random.pair()) else { continue };
             let ShadowTarget::Point(target) = s.target else { panic!("an area light is not at infinity") };
             let q = placed.transform.inverse_point(target.p);
             let (rho, phi) = (q.x.hypot(q.y), q.y.atan2(q.x).rem_euclid(TAU));
@@ -154,7 +154,7 @@ fn densities_integrate_to_one() {
             let integral = sum * 4.0 * PI / f64::from(n * n);
             let mut expected = 0.0;
             for _ in 0..n * n {
-                if let Some(LightSample { wi, target: ShadowTarget::Point(target), .. }) = light.sample(&geometry, p, random.pair()) {
+                if let Some(LightSample { wi, target: ShadowTarget::Point(target), .. }) = light.sample(&geometry, &[], p, random.pair()) {
                     expected += f64::from(u8::from(target.n.dot(wi).abs() > EDGE_ON)) / f64::from(n * n);
                 }
             }

@@ -2,6 +2,7 @@
 
 mod parallelogram;
 mod sphere;
+mod textured;
 mod triangle;
 
 use std::f64::consts::PI;
@@ -10,12 +11,14 @@ use parallelogram::ParallelogramEmitter;
 use sphere::SphereEmitter;
 use triangle::{TriangleEmitter, triangle_error};
 
+use super::bounds::{EmissionCone, LightBounds, to_positive};
 use super::{LightSample, ShadowTarget};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Mesh, Placed, Shape, SpawnTarget, SurfaceInteraction};
-use crate::id::{PrimId, ShapeId};
+use crate::id::{PrimId, ShapeId, TextureId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{DVec3, Ray, Vec3};
+use crate::math::{DVec3, Ray, Vec2, Vec3};
+use crate::texture::Texture;
 
 /// Light given off by a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,11 +27,30 @@ pub struct Emission {
     pub radiance: Rgb,
     /// Whether the back emits too.
     pub two_sided: bool,
+    /// A texture over the surface's uv that multiplies the radiance.
+    pub texture: Option<TextureId>,
+}
+
+impl Emission {
+    /// The same radiance from every point of the front.
+    pub const fn constant(radiance: Rgb) -> Self {
+        Self { radiance, two_sided: false, texture: None }
+    }
+
+    /// Radiance at a point of the surface.
+    #[inline]
+    fn at(&self, textures: &[Texture], uv: impl FnOnce() -> Vec2) -> Rgb {
+        match self.texture {
+            None => self.radiance,
+            Some(id) => self.radiance * textures[id.index()].color(uv()),
+        }
+    }
 }
 
 /// An emissive analytic shape, one triangle of an emissive mesh, or a mesh of two triangles that make up a parallelogram.
 ///
-/// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by area.
+/// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by area. Quads with a
+/// texture are sampled by its brightness in half of the cases.
 #[derive(Clone, Debug)]
 pub struct AreaLight {
     /// The shape.
@@ -37,15 +59,20 @@ pub struct AreaLight {
     pub prim: PrimId,
     /// What it emits.
     pub emission: Emission,
+    /// Mean of the radiance's luminance over the surface; above 0 wherever anything is emitted.
+    luminance: f32,
     form: Form,
 }
 
-/// What is known of the surface before any point asks.
+/// What is known of the surface before any point asks. Meshes may have millions of triangles, so this is small.
 #[derive(Clone, Debug)]
 enum Form {
-    Sphere(SphereEmitter),
-    Parallelogram(ParallelogramEmitter),
-    Triangle(TriangleEmitter),
+    Sphere(Box<SphereEmitter>),
+    Parallelogram(Box<ParallelogramEmitter>),
+    /// A triangle of a mesh, which is looked up again.
+    Triangle {
+        area: f64,
+    },
     /// Any analytic shape, by its own sampling; of this world area.
     Placed {
         area: f64,
@@ -87,43 +114,57 @@ impl SurfaceSample {
 
 impl AreaLight {
     /// The light of one primitive of a shape that stands in the world (not within an object).
-    pub fn new(shape: ShapeId, prim: PrimId, emission: Emission, geometry: &Geometry) -> Self {
-        let form = match geometry.shape(shape) {
-            Shape::Mesh(mesh) => Form::Triangle(TriangleEmitter::new(&mesh.triangle_points(prim))),
+    pub fn new(shape: ShapeId, prim: PrimId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Self {
+        let mut form = match geometry.shape(shape) {
+            Shape::Mesh(mesh) => Form::Triangle { area: TriangleEmitter::new(&mesh.triangle_points(prim)).area() },
             Shape::Analytic(placed) => Form::analytic(placed),
         };
-        Self { shape, prim, emission, form }
+        let mut luminance = emission.radiance.luminance();
+        if let Some(id) = emission.texture {
+            let texture = &textures[id.index()];
+            luminance *= textured::mean_luminance(geometry.shape(shape), prim, texture);
+            if let Form::Parallelogram(quad) = &mut form {
+                quad.texels = textured::density(texture).map(Box::new);
+            }
+        }
+        Self { shape, prim, emission, luminance, form }
     }
 
     /// The lights of a shape that stands in the world: one for each triangle of a mesh in their order, or a single one for an analytic
-    /// shape and for a mesh of two triangles that make up a parallelogram.
+    /// shape and for a mesh of two triangles that make up a parallelogram (without a texture).
     ///
     /// The `single_light` of the scene's surface is to be set if there is only one.
-    pub fn for_shape(shape: ShapeId, emission: Emission, geometry: &Geometry) -> Vec<Self> {
+    pub fn for_shape(shape: ShapeId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Vec<Self> {
         let first = PrimId(0);
         if let Shape::Mesh(mesh) = geometry.shape(shape) {
-            if let Some(form) = Form::two_triangles(mesh) {
-                return vec![Self { shape, prim: first, emission, form }];
+            if let Some(form) = Form::two_triangles(mesh).filter(|_| emission.texture.is_none()) {
+                return vec![Self { shape, prim: first, emission, luminance: emission.radiance.luminance(), form }];
             }
-            return (0..mesh.triangles().len()).map(|i| Self::new(shape, PrimId::new(i), emission, geometry)).collect();
+            return (0..mesh.triangles().len()).map(|i| Self::new(shape, PrimId::new(i), emission, geometry, textures)).collect();
         }
-        vec![Self::new(shape, first, emission, geometry)]
+        vec![Self::new(shape, first, emission, geometry, textures)]
     }
 
     /// Radiance leaving the point towards `wo` (unit, away from the surface).
     #[inline]
-    pub fn radiance(&self, at: &SurfaceInteraction, wo: Vec3) -> Rgb {
-        if self.emission.two_sided || at.n_g.dot(wo) > 0.0 { self.emission.radiance } else { Rgb::BLACK }
+    pub fn radiance(&self, textures: &[Texture], at: &SurfaceInteraction, wo: Vec3) -> Rgb {
+        if self.emission.two_sided || at.n_g.dot(wo) > 0.0 { self.emission.at(textures, || at.uv) } else { Rgb::BLACK }
     }
 
     /// Light that arrives at `p` from a chosen point of the surface; `None` where `p` sees the dark side.
     #[inline]
-    pub fn sample(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
         let both = self.emission.two_sided;
         let (sample, error) = match &self.form {
             Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
             Form::Parallelogram(quad) if both || quad.sees_front(p) => (quad.sample(p, u)?, quad.error),
-            Form::Triangle(triangle) if both || triangle.sees_front(p) => (triangle.sample(p, u)?, triangle.error),
+            Form::Triangle { .. } => {
+                let triangle = self.triangle(geometry)?;
+                if !(both || triangle.sees_front(p)) {
+                    return None;
+                }
+                (triangle.sample(p, u)?, triangle.error)
+            }
             Form::Placed { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
                 let point = placed.sample_area(u);
@@ -135,8 +176,18 @@ impl AreaLight {
             }
             _ => return None,
         };
+        let radiance = self.emission.at(textures, || textured::uv(geometry.shape(self.shape), self.prim, sample.p, u));
         let target = ShadowTarget::Point(SpawnTarget { p: sample.p, n: sample.n, error });
-        Some(LightSample { wi: sample.wi, radiance: self.emission.radiance, pdf: sample.pdf, is_delta: false, target })
+        Some(LightSample { wi: sample.wi, radiance, pdf: sample.pdf, is_delta: false, target })
+    }
+
+    /// The triangle of a mesh.
+    #[inline]
+    fn triangle(&self, geometry: &Geometry) -> Option<TriangleEmitter> {
+        match geometry.shape(self.shape) {
+            Shape::Mesh(mesh) => Some(TriangleEmitter::new(&mesh.triangle_points(self.prim))),
+            Shape::Analytic(_) => None,
+        }
     }
 
     /// Density per solid angle with which [`sample`](Self::sample) from `p` would have chosen the direction of `ray` (unit), which starts
@@ -149,7 +200,7 @@ impl AreaLight {
         match &self.form {
             Form::Sphere(sphere) => sphere.pdf(p, at.p),
             Form::Parallelogram(quad) => quad.pdf(p, at.p),
-            Form::Triangle(triangle) => triangle.pdf(p, at.p),
+            Form::Triangle { area } => SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
             Form::Placed { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return 0.0 };
                 // Where the normal does not tell how densely the shape is sampled, the hit itself must.
@@ -164,31 +215,47 @@ impl AreaLight {
         match &self.form {
             Form::Sphere(sphere) => sphere.area(),
             Form::Parallelogram(quad) => quad.area(),
-            Form::Triangle(triangle) => triangle.area(),
-            Form::Placed { area } => *area,
+            Form::Triangle { area } | Form::Placed { area } => *area,
         }
+    }
+
+    /// For the choice of a light.
+    pub(super) fn bounds(&self, geometry: &Geometry) -> Option<LightBounds> {
+        let shape = geometry.shape(self.shape);
+        let (bounds, normal) = match &self.form {
+            Form::Sphere(_) => (shape.bounds(), None),
+            Form::Parallelogram(quad) => (shape.bounds(), Some(quad.normal())),
+            Form::Triangle { .. } => (shape.prim_bounds(self.prim), self.triangle(geometry).map(|triangle| triangle.normal())),
+            Form::Placed { .. } => (shape.bounds(), flat_normal(shape)),
+        };
+        let cone = normal.map_or(EmissionCone::SPHERE, EmissionCone::flat);
+        // Of a closed convex surface, a quarter of the area is seen from far away.
+        let seen = self.area() * if normal.is_some() { 1.0 } else { 0.25 };
+        let intensity = seen * f64::from(self.luminance);
+        let two_sided = self.emission.two_sided && normal.is_some();
+        (intensity > 0.0).then(|| LightBounds { bounds, cone, two_sided, intensity: to_positive(intensity) })
     }
 
     /// Emitted power, as luminance.
     pub fn power(&self) -> f64 {
         let sides = if self.emission.two_sided { 2.0 } else { 1.0 };
-        sides * PI * self.area() * f64::from(self.emission.radiance.luminance())
+        sides * PI * self.area() * f64::from(self.luminance)
     }
 }
 
 impl Form {
     fn analytic(placed: &Placed) -> Self {
         match (&placed.shape, placed.transform.uniform_scale()) {
-            (Analytic::Sphere(sphere), Some(scale)) if sphere.is_full() => Self::Sphere(SphereEmitter {
+            (Analytic::Sphere(sphere), Some(scale)) if sphere.is_full() => Self::Sphere(Box::new(SphereEmitter {
                 center: placed.transform.point(DVec3::ZERO),
                 radius: sphere.radius() * scale,
                 inward: placed.reverse_normal,
-            }),
+            })),
             (Analytic::Quad(quad), _) => {
                 let map = &placed.transform;
                 let front = placed.sample_area([0.5; 2]).n.as_dvec3();
                 ParallelogramEmitter::new(map.point(quad.origin()), map.vector(quad.edge_u()), map.vector(quad.edge_v()), front, 0.0)
-                    .map_or(Self::Placed { area: 0.0 }, Self::Parallelogram)
+                    .map_or(Self::Placed { area: 0.0 }, |quad| Self::Parallelogram(Box::new(quad)))
             }
             _ => Self::Placed { area: placed_area(placed) },
         }
@@ -217,7 +284,15 @@ impl Form {
             return None;
         }
         let error = triangle_error(&first).max(triangle_error(&second)) + gap as f32;
-        ParallelogramEmitter::new(origin, edge_u, edge_v, first.cross(), error).map(Self::Parallelogram)
+        ParallelogramEmitter::new(origin, edge_u, edge_v, first.cross(), error).map(|quad| Self::Parallelogram(Box::new(quad)))
+    }
+}
+
+/// Unit normal of a flat shape, towards its front.
+fn flat_normal(shape: &Shape) -> Option<Vec3> {
+    match shape {
+        Shape::Analytic(placed) if matches!(placed.shape, Analytic::Disk(_) | Analytic::Quad(_)) => Some(placed.sample_area([0.5; 2]).n),
+        _ => None,
     }
 }
 

@@ -2,7 +2,8 @@
 //! Spherical Rectangles"), all others by area.
 
 use super::SurfaceSample;
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
+use crate::sampling::Piecewise2d;
 
 /// A parallelogram in the world.
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub(super) struct ParallelogramEmitter {
     /// Bound on the error of the surface's position as an accelerator sees it.
     pub error: f32,
     is_rectangle: bool,
+    /// Density over the edges by the brightness of a texture; half of the samples are chosen by it.
+    pub texels: Option<Box<Piecewise2d>>,
 }
 
 /// Cosine between edges up to which a parallelogram counts as a rectangle; densities are off by about as much.
@@ -63,11 +66,17 @@ impl ParallelogramEmitter {
             area,
             error,
             is_rectangle: edge_u.dot(edge_v).abs() <= RIGHT_ANGLE * length_u * length_v,
+            texels: None,
         })
     }
 
     pub fn area(&self) -> f64 {
         self.area
+    }
+
+    /// Unit normal, towards the front.
+    pub fn normal(&self) -> Vec3 {
+        self.normal.as_vec3()
     }
 
     /// Whether `p` sees the front.
@@ -88,6 +97,28 @@ impl ParallelogramEmitter {
     /// A point as seen from `p`; `None` in the plane.
     #[inline]
     pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+        match &self.texels {
+            None => self.sample_by_size(p, u),
+            Some(texels) => self.sample_textured(texels, p, u),
+        }
+    }
+
+    /// A point chosen by the brightness of its texel in half of the cases, by what `p` sees of the surface in the others.
+    fn sample_textured(&self, texels: &Piecewise2d, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+        let mut sample = if u[0] < 0.5 {
+            self.sample_by_size(p, [2.0 * u[0], u[1]])?
+        } else {
+            let [x, y] = texels.sample([2.0 * u[0] - 1.0, u[1]]).uv;
+            let q = self.point(f64::from(x) * self.length_u, f64::from(y) * self.length_v);
+            SurfaceSample::from_area(p, q, self.normal, 1.0 / self.area)?
+        };
+        sample.pdf = self.pdf(p, sample.p);
+        (sample.pdf > 0.0).then_some(sample)
+    }
+
+    /// A point that does not depend on the texture.
+    #[inline]
+    fn sample_by_size(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
         let view = self.view(p);
         let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };
         let Some(solid_angle) = by_solid_angle else {
@@ -110,6 +141,24 @@ impl ParallelogramEmitter {
     /// Density per solid angle with which `sample` from `p` finds the point `q`.
     #[inline]
     pub fn pdf(&self, p: DVec3, q: DVec3) -> f32 {
+        let by_size = self.pdf_by_size(p, q);
+        let Some(texels) = &self.texels else { return by_size };
+        let by_texel = f64::from(texels.pdf(self.uv(q))) / self.area;
+        0.5 * (by_size + SurfaceSample::pdf_from_area(p, q, self.normal, by_texel))
+    }
+
+    /// Shares of the edges at the point `q` of the surface.
+    fn uv(&self, q: DVec3) -> [f32; 2] {
+        // With non-perpendicular edges, each coordinate is the area opposite to it.
+        let d = q - self.corner;
+        let whole = self.axis_u.cross(self.axis_v);
+        let (u, v) = (d.cross(self.axis_v).dot(whole), self.axis_u.cross(d).dot(whole));
+        let scale = 1.0 / whole.length_squared();
+        [(u * scale / self.length_u) as f32, (v * scale / self.length_v) as f32]
+    }
+
+    #[inline]
+    fn pdf_by_size(&self, p: DVec3, q: DVec3) -> f32 {
         let by_solid_angle = if self.is_rectangle { self.view(p).usable_solid_angle() } else { None };
         match by_solid_angle {
             Some(solid_angle) => (1.0 / solid_angle) as f32,

@@ -4,7 +4,7 @@ use super::*;
 use crate::geometry::Hit;
 use crate::light::test_support::{Random, assert_chi_squared};
 
-const WHITE: Emission = Emission { radiance: Rgb::WHITE, two_sided: false };
+const WHITE: Emission = Emission::constant(Rgb::WHITE);
 
 fn scene(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Geometry {
     let mesh = Mesh::new(positions.to_vec(), triangles.to_vec(), None, None).unwrap();
@@ -23,7 +23,7 @@ pub(super) fn irradiance(lights: &[AreaLight], geometry: &Geometry, p: DVec3, n:
     for light in lights {
         for i in 0..grid * grid {
             let u = [((i % grid) as f32 + 0.5) / grid as f32, ((i / grid) as f32 + 0.5) / grid as f32];
-            if let Some(s) = light.sample(geometry, p, u) {
+            if let Some(s) = light.sample(geometry, &[], p, u) {
                 sum += f64::from(s.radiance.g) * n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf);
             }
         }
@@ -37,7 +37,7 @@ pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p:
     let (mut hits, n) = (0, 2000);
     let p = p.as_vec3().as_dvec3();
     for _ in 0..n {
-        let Some(s) = light.sample(geometry, p, random.pair()) else { continue };
+        let Some(s) = light.sample(geometry, &[], p, random.pair()) else { continue };
         let ray = Ray::new(p.as_vec3(), s.wi);
         let shape = geometry.shape(light.shape);
         // Curved shapes may be met earlier than at the sample: it is then shadowed, or the hit is another point.
@@ -56,7 +56,7 @@ pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p:
         hits += 1;
         let pdf = light.pdf(geometry, p, &ray, &at);
         assert!((pdf - s.pdf).abs() <= tolerance * s.pdf, "{pdf} {} at {:?}", s.pdf, at.p);
-        assert_eq!(light.radiance(&at, -s.wi), s.radiance);
+        assert_eq!(light.radiance(&[], &at, -s.wi), s.radiance);
     }
     assert!(hits > n / 20, "{hits}");
 }
@@ -68,7 +68,7 @@ pub(super) fn assert_power_flows_out(geometry: &Geometry, light: &AreaLight, cen
     let mut sum = 0.0;
     for _ in 0..n {
         let outward = random.direction();
-        if let Some(s) = light.sample(geometry, center + outward * radius, random.pair()) {
+        if let Some(s) = light.sample(geometry, &[], center + outward * radius, random.pair()) {
             sum += f64::from(s.radiance.luminance()) * -outward.dot(s.wi.as_dvec3()) / f64::from(s.pdf);
         }
     }
@@ -150,7 +150,8 @@ fn a_sphere_light_gives_the_closed_form_irradiance() {
         shape: ShapeId(0),
         prim: PrimId(0),
         emission: WHITE,
-        form: Form::Sphere(SphereEmitter { center: DVec3::new(1.2, 0.0, 1.6), radius: 0.5, inward: false }),
+        luminance: 1.0,
+        form: Form::Sphere(Box::new(SphereEmitter { center: DVec3::new(1.2, 0.0, 1.6), radius: 0.5, inward: false })),
     };
     let e = irradiance(&[light], &Geometry::default(), DVec3::ZERO, DVec3::Z);
     assert!((e / (PI * 0.0625 * 0.8) - 1.0).abs() < 1e-4, "{e}");
@@ -159,18 +160,18 @@ fn a_sphere_light_gives_the_closed_form_irradiance() {
 #[test]
 fn a_rectangle_light_gives_lamberts_irradiance() {
     let geometry = ceiling();
-    let one = AreaLight::for_shape(ShapeId(0), WHITE, &geometry);
-    let two: Vec<_> = (0..2).map(|i| AreaLight::new(ShapeId(0), PrimId(i), WHITE, &geometry)).collect();
+    let one = AreaLight::for_shape(ShapeId(0), WHITE, &geometry, &[]);
+    let two: Vec<_> = (0..2).map(|i| AreaLight::new(ShapeId(0), PrimId(i), WHITE, &geometry, &[])).collect();
     assert_eq!(one.len(), 1);
     // Lambert's formula for polygons: E = L / 2 sum acos(a·b) n·(a x b) / |a x b|.
     for lights in [&one, &two] {
         let e = irradiance(lights, &geometry, DVec3::ZERO, DVec3::Z);
         assert!((e / 0.718_688_9 - 1.0).abs() < 1e-4, "{e}");
     }
-    assert!(one[0].sample(&geometry, DVec3::new(0.0, 0.0, 1.5), [0.5; 2]).is_none());
-    assert!(one[0].sample(&geometry, DVec3::new(3.0, 0.0, 1.0), [0.5; 2]).is_none());
+    assert!(one[0].sample(&geometry, &[], DVec3::new(0.0, 0.0, 1.5), [0.5; 2]).is_none());
+    assert!(one[0].sample(&geometry, &[], DVec3::new(3.0, 0.0, 1.0), [0.5; 2]).is_none());
     let both = AreaLight { emission: Emission { two_sided: true, ..WHITE }, ..one[0].clone() };
-    assert!(both.sample(&geometry, DVec3::new(0.0, 0.0, 1.5), [0.5; 2]).is_some());
+    assert!(both.sample(&geometry, &[], DVec3::new(0.0, 0.0, 1.5), [0.5; 2]).is_some());
     assert_eq!(both.power(), 2.0 * one[0].power());
 }
 
@@ -231,9 +232,9 @@ fn hits_have_the_density_of_samples() {
     let rectangle = ceiling();
     let skewed = scene(&[[0.0, 0.0, 2.0], [0.5, 1.0, 2.0], [1.5, 1.0, 2.5], [1.0, 0.0, 2.5]], &[[0, 1, 2], [0, 2, 3]]);
     for geometry in [rectangle, skewed] {
-        let mut lights = AreaLight::for_shape(ShapeId(0), WHITE, &geometry);
+        let mut lights = AreaLight::for_shape(ShapeId(0), WHITE, &geometry, &[]);
         assert_eq!(lights.len(), 1);
-        lights.extend((0..2).map(|i| AreaLight::new(ShapeId(0), PrimId(i), WHITE, &geometry)));
+        lights.extend((0..2).map(|i| AreaLight::new(ShapeId(0), PrimId(i), WHITE, &geometry, &[])));
         for light in &lights {
             for p in [DVec3::ZERO, DVec3::new(0.2, 0.1, 0.9), DVec3::new(7.0, -5.0, -2.0)] {
                 assert_samples_are_hits(&geometry, light, p, 1e-4);
@@ -248,7 +249,7 @@ fn each_light_has_its_own_area() {
     let mut geometry = ceiling();
     let small = scene(&[[0.0, 0.0, 2.0], [0.0, 0.1, 2.0], [0.1, 0.1, 2.0], [0.1, 0.0, 2.0]], &[[0, 1, 2], [0, 2, 3]]);
     geometry.shapes.extend(small.shapes);
-    let [large, small] = [0, 1].map(|i| AreaLight::for_shape(ShapeId(i), WHITE, &geometry).remove(0));
+    let [large, small] = [0, 1].map(|i| AreaLight::for_shape(ShapeId(i), WHITE, &geometry, &[]).remove(0));
     assert!((large.area() - 1.0).abs() < 1e-6 && (small.area() - 0.01).abs() < 1e-8);
     assert!((small.power() / (0.01 * PI) - 1.0).abs() < 1e-5);
 }
@@ -256,7 +257,7 @@ fn each_light_has_its_own_area() {
 #[test]
 fn only_parallelograms_are_single_lights() {
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.2, 1.1, 0.0], [1.0, 1.0, 1e-3]];
-    let count = |triangles: &[[u32; 3]]| AreaLight::for_shape(ShapeId(0), WHITE, &scene(&corners, triangles)).len();
+    let count = |triangles: &[[u32; 3]]| AreaLight::for_shape(ShapeId(0), WHITE, &scene(&corners, triangles), &[]).len();
     for rotation in 0..3 {
         let turned = |t: [u32; 3]| [t[rotation], t[(rotation + 1) % 3], t[(rotation + 2) % 3]];
         assert_eq!(count(&[[0, 1, 2], turned([0, 2, 3])]), 1);
@@ -274,9 +275,9 @@ fn only_parallelograms_are_single_lights() {
 #[test]
 fn triangles_without_area_give_no_light() {
     let geometry = scene(&[[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], &[[0, 1, 2], [0, 0, 1]]);
-    for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry) {
+    for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry, &[]) {
         let both = AreaLight { emission: Emission { two_sided: true, ..WHITE }, ..light };
-        assert!(both.sample(&geometry, DVec3::new(0.3, 0.2, 1.0), [0.3, 0.6]).is_none());
+        assert!(both.sample(&geometry, &[], DVec3::new(0.3, 0.2, 1.0), [0.3, 0.6]).is_none());
         assert_eq!(both.power(), 0.0);
     }
 }
@@ -284,12 +285,12 @@ fn triangles_without_area_give_no_light() {
 #[test]
 fn a_shadow_ray_reaches_the_light_it_was_made_for() {
     let geometry = ceiling();
-    for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry) {
+    for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry, &[]) {
         let mut random = Random(5);
         for _ in 0..20_000 {
             let distance = 10f64.powf(f64::from(random.next()) * 7.0 - 3.0);
             let p = DVec3::new(0.1, 0.2, 1.0 - distance);
-            let Some(s) = light.sample(&geometry, p, random.pair()) else { continue };
+            let Some(s) = light.sample(&geometry, &[], p, random.pair()) else { continue };
             let ShadowTarget::Point(target) = s.target else { panic!("an area light is not at infinity") };
             let from = SurfaceInteraction {
                 p,
@@ -298,8 +299,7 @@ fn a_shadow_ray_reaches_the_light_it_was_made_for() {
                 n_g: Vec3::Z,
                 n_s: Vec3::Z,
                 dp_du: Vec3::ZERO,
-                dp_dv: Vec3::ZERO,
-                uv: crate::math::Vec2::ZERO,
+                uv: Vec2::ZERO,
                 shape: ShapeId(9),
                 prim: PrimId(0),
                 instance: Hit::NO_INSTANCE,

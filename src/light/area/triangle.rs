@@ -2,11 +2,10 @@
 
 use super::SurfaceSample;
 use crate::geometry::TrianglePoints;
-use crate::math::DVec3;
 use crate::math::float::UNIT_ROUNDOFF;
+use crate::math::{DVec3, Vec3};
 
 /// A triangle of a mesh.
-#[derive(Clone, Debug)]
 pub(super) struct TriangleEmitter {
     corner: DVec3,
     edge_u: DVec3,
@@ -42,6 +41,11 @@ impl TriangleEmitter {
         self.area
     }
 
+    /// Unit normal, towards the front.
+    pub fn normal(&self) -> Vec3 {
+        self.normal.as_vec3()
+    }
+
     /// Whether `p` sees the front.
     #[inline]
     pub fn sees_front(&self, p: DVec3) -> bool {
@@ -59,11 +63,5 @@ impl TriangleEmitter {
             b += b - c;
         }
         SurfaceSample::from_area(p, self.corner + self.edge_u * b + self.edge_v * c, self.normal, 1.0 / self.area)
-    }
-
-    /// Density per solid angle with which `sample` from `p` finds the point `q`.
-    #[inline]
-    pub fn pdf(&self, p: DVec3, q: DVec3) -> f32 {
-        SurfaceSample::pdf_from_area(p, q, self.normal, 1.0 / self.area)
     }
 }

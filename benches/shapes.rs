@@ -1,0 +1,86 @@
+//! Nanoseconds per ray of analytic shapes: the test alone, through Embree as user geometry, and of a mesh of the same sphere through Embree.
+//! Answers are compared before anything is timed. One thread.
+
+#[path = "common/mod.rs"]
+mod common;
+
+use std::f64::consts::TAU;
+use std::hint::black_box;
+use std::time::Duration;
+
+use common::models::tessellated_sphere;
+use common::rays::Random;
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use steradian::accel::{self, AccelKind, Accelerator};
+use steradian::geometry::{Analytic, Disk, Frustum, Geometry, Hit, Placed, Profile, Quad, Revolution, Shape, Sphere};
+use steradian::id::{PrimId, ShapeId};
+use steradian::math::{DVec3, Ray, Transform, Vec3};
+
+const RAYS: usize = 16_384;
+
+fn shapes() -> Vec<(&'static str, Analytic)> {
+    let vase = Profile::bezier(&[[0.2, -0.9], [1.1, -0.5], [0.1, 0.2], [0.6, 0.9]]).expect("a profile");
+    let quad = Quad::new(DVec3::new(-1.0, -1.0, 0.0), 2.0 * DVec3::X, 2.0 * DVec3::Y);
+    vec![
+        ("sphere", Analytic::Sphere(Sphere::full(1.0).expect("valid"))),
+        ("disk", Analytic::Disk(Disk::new(1.0, 0.0, TAU).expect("valid"))),
+        ("ring", Analytic::Disk(Disk::new(1.0, 0.4, 5.0).expect("valid"))),
+        ("quad", Analytic::Quad(quad.expect("valid"))),
+        ("cylinder", Analytic::Frustum(Frustum::cylinder(0.6, 1.5, TAU).expect("valid"))),
+        ("cone", Analytic::Frustum(Frustum::new(0.8, 0.0, 1.2, TAU).expect("valid"))),
+        ("revolution", Analytic::Revolution(Revolution::new(&vase, TAU).expect("valid"))),
+    ]
+}
+
+fn world(shape: Analytic) -> Geometry {
+    let shapes = vec![Shape::Analytic(Placed::new(shape, Transform::IDENTITY))];
+    Geometry { shapes, world: vec![ShapeId(0)], ..Geometry::default() }
+}
+
+/// From a sphere of radius 3 to points of the bounds.
+fn rays(geometry: &Geometry) -> Vec<Ray> {
+    let bounds = geometry.bounds();
+    let mut random = Random(3);
+    let ray = |_| {
+        let from = 3.0 * random.direction();
+        let at = [random.unit(), random.unit(), random.unit()].map(|u| u as f32);
+        let to = bounds.min + bounds.size() * Vec3::from(at);
+        Ray::new(from, (to - from).normalize())
+    };
+    (0..RAYS).map(ray).collect()
+}
+
+fn shape_tests(criterion: &mut Criterion) {
+    for (name, shape) in shapes() {
+        let geometry = world(shape);
+        let rays = rays(&geometry);
+        let embree = accel::build(AccelKind::EMBREE, &geometry, 1).expect("builds");
+        let direct = |ray: &Ray| geometry.intersect_prim(ray, 0, ShapeId(0), PrimId(0), Hit::NO_INSTANCE);
+        let hits = rays.iter().filter(|ray| direct(ray).is_some()).count();
+        assert!(hits > RAYS / 10, "{name}: {hits}");
+        for ray in &rays {
+            assert_eq!(direct(ray), embree.intersect(ray), "{name}: {ray:?}");
+        }
+        let mut group = criterion.benchmark_group(format!("shapes/{name}"));
+        group.sample_size(20).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_millis(1000));
+        group.throughput(Throughput::Elements(RAYS as u64));
+        group.bench_function("test alone", |b| b.iter(|| black_box(&rays).iter().filter(|ray| direct(ray).is_some()).count()));
+        group.bench_function("embree", |b| b.iter(|| black_box(&rays).iter().filter(|ray| embree.intersect(ray).is_some()).count()));
+        if name == "sphere" {
+            for cells in [4, 16, 64] {
+                let mesh = tessellated_sphere(cells);
+                let accel = accel::build(AccelKind::EMBREE, &mesh, 1).expect("builds");
+                // The mesh is inscribed: a ray that hits it hits the sphere.
+                let count = |accel: &dyn Accelerator| rays.iter().filter(|ray| accel.intersect(ray).is_some()).count();
+                let found = count(&*accel);
+                assert!(found <= hits && found * 100 > hits * (99 - 80 / cells as usize), "{found} of {hits}");
+                let triangles = mesh.shapes[0].prim_count();
+                group.bench_function(format!("embree, {triangles} triangles"), |b| b.iter(|| count(black_box(&*accel))));
+            }
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, shape_tests);
+criterion_main!(benches);

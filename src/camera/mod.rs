@@ -1,0 +1,210 @@
+//! Cameras: perspective (pinhole or thin lens), orthographic, and the environment camera that sees every direction.
+
+mod lens;
+#[cfg(test)]
+mod tests;
+
+pub use lens::{Blades, Lens, lens_equation};
+
+use std::f64::consts::{PI, TAU};
+
+use crate::math::{DAffine3, DVec3, Motion, Ray, Transform, Vec2, Vec3};
+
+/// How points of the picture become directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// All rays of a pinhole (or of each point of a lens) leave from one point.
+    Perspective {
+        /// Half the picture's height at unit distance: the tangent of half the vertical angle of view, above 0.
+        half_height: f64,
+        /// A thin lens; without it everything is in focus.
+        lens: Option<Lens>,
+    },
+    /// All rays are parallel.
+    Orthographic {
+        /// Half the picture's height in world units, above 0.
+        half_height: f64,
+    },
+    /// Every direction: columns are the azimuth about +Y, rows the angle from +Y, laid out as in environment lights (the middle of the
+    /// picture is -Z, +X lies at three quarters of the width).
+    Environment,
+}
+
+/// Where the picture lies in what the projection sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Framing {
+    /// Width of a pixel over its height, above 0.
+    pub pixel_aspect: f64,
+    /// By how much of its width and height the picture is moved to the right and up, as by a lens that is moved against its film.
+    pub shift: [f64; 2],
+}
+
+impl Default for Framing {
+    fn default() -> Self {
+        Self { pixel_aspect: 1.0, shift: [0.0; 2] }
+    }
+}
+
+/// A camera that looks along its local -Z with +Y up.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    /// At the opening of the shutter, if the camera moves.
+    world_from_camera: Transform,
+    motion: Option<Box<Motion>>,
+    projection: Projection,
+    /// Of perspective and orthographic cameras.
+    framing: Framing,
+    near: f64,
+    shutter: [f64; 2],
+}
+
+impl Camera {
+    /// A camera placed by a rotation and translation.
+    pub fn new(world_from_camera: Transform, projection: Projection) -> Self {
+        Self { world_from_camera, motion: None, projection, framing: Framing::default(), near: 0.0, shutter: [0.0, 1.0] }
+    }
+
+    /// This camera with another framing; environment cameras have none.
+    #[must_use]
+    pub fn with_framing(self, framing: Framing) -> Self {
+        Self { framing, ..self }
+    }
+
+    /// This camera, which does not see what is nearer than `near`: in depth along the view axis, or in distance for an environment camera.
+    #[must_use]
+    pub fn with_near(self, near: f64) -> Self {
+        Self { near, ..self }
+    }
+
+    /// This camera with another shutter interval, `open <= close`, in the scene's time.
+    #[must_use]
+    pub fn with_shutter(self, shutter: [f64; 2]) -> Self {
+        Self { shutter, ..self }
+    }
+
+    /// This camera on the way of `motion`, which rotates and translates (and takes the place of where it stood). Its times are shares of the
+    /// shutter interval; a constant one makes the camera rest. `None` if the motion is singular.
+    pub fn with_motion(self, motion: Motion) -> Option<Self> {
+        let world_from_camera = Transform::new(motion.map_at(0.0))?;
+        let motion = motion.as_constant().is_none().then(|| Box::new(motion));
+        Some(Self { world_from_camera, motion, ..self })
+    }
+
+    /// Whether the camera moves while the shutter is open.
+    pub fn is_moving(&self) -> bool {
+        self.motion.is_some()
+    }
+
+    /// The projection.
+    pub fn projection(&self) -> &Projection {
+        &self.projection
+    }
+
+    /// The lens, if any.
+    pub fn lens(&self) -> Option<&Lens> {
+        match &self.projection {
+            Projection::Perspective { lens, .. } => lens.as_ref(),
+            Projection::Orthographic { .. } | Projection::Environment => None,
+        }
+    }
+
+    /// The framing; without a meaning for environment cameras.
+    pub fn framing(&self) -> Framing {
+        self.framing
+    }
+
+    /// When the shutter opens and closes, in the scene's time.
+    pub fn shutter(&self) -> [f64; 2] {
+        self.shutter
+    }
+
+    /// The [time of a ray](Ray::time) for `u` in `[0, 1)`: uniform over the shutter interval, 0 if that has no length.
+    #[inline]
+    pub fn time(&self, u: f32) -> f32 {
+        if self.shutter[1] > self.shutter[0] { u } else { 0.0 }
+    }
+
+    /// Where the camera stands when the shutter opens.
+    pub fn position(&self) -> DVec3 {
+        self.world_from_camera.point(DVec3::ZERO)
+    }
+
+    /// Camera to world at the [time of a ray](Ray::time).
+    #[inline]
+    fn map_at(&self, time: f32) -> DAffine3 {
+        match &self.motion {
+            None => self.world_from_camera.world_from_object,
+            Some(motion) => motion.map_at(f64::from(time)),
+        }
+    }
+
+    /// The ray through `film`, in pixels from the upper left corner of a picture of `size` pixels, from the point of the lens that `lens_u`
+    /// (in the unit square) chooses, at a [time](Self::time). The direction is unit.
+    #[inline]
+    pub fn ray(&self, film: Vec2, size: [u32; 2], lens_u: [f32; 2], time: f32) -> Ray {
+        let (mut origin, direction) = match &self.projection {
+            Projection::Perspective { half_height, lens } => {
+                let toward = self.on_picture(film, size, *half_height);
+                match lens {
+                    None => (DVec3::ZERO, toward),
+                    Some(lens) => {
+                        let on_lens = lens.sample(lens_u).extend(0.0);
+                        (on_lens, toward * lens.focus_distance - on_lens)
+                    }
+                }
+            }
+            Projection::Orthographic { half_height } => (self.on_picture(film, size, *half_height) + DVec3::Z, -DVec3::Z),
+            Projection::Environment => (DVec3::ZERO, everywhere(film, size)),
+        };
+        if self.near > 0.0 {
+            let unit = if matches!(self.projection, Projection::Environment) { 1.0 } else { -direction.z };
+            origin += direction * (self.near / unit);
+        }
+        let map = self.map_at(time);
+        let (origin, direction) = (map.transform_point3(origin), map.transform_vector3(direction).normalize());
+        Ray { time, ..Ray::new(origin.as_vec3(), direction.as_vec3()) }
+    }
+
+    /// The point of a picture at z = -1.
+    #[inline]
+    fn on_picture(&self, film: Vec2, size: [u32; 2], half_height: f64) -> DVec3 {
+        let (width, height) = (f64::from(size[0]), f64::from(size[1]));
+        let scale = 2.0 * half_height / height;
+        let [right, up] = self.framing.shift;
+        let x = (f64::from(film.x) - (0.5 - right) * width) * scale * self.framing.pixel_aspect;
+        let y = ((0.5 + up) * height - f64::from(film.y)) * scale;
+        DVec3::new(x, y, -1.0)
+    }
+
+    /// Depth of a world point at the [time of a ray](Ray::time): along the view axis, or the distance from an environment camera.
+    #[inline]
+    pub fn depth(&self, p: DVec3, time: f32) -> f32 {
+        let local = match &self.motion {
+            None => self.world_from_camera.inverse_point(p),
+            Some(motion) => motion.map_at(f64::from(time)).inverse().transform_point3(p),
+        };
+        match self.projection {
+            Projection::Perspective { .. } | Projection::Orthographic { .. } => -local.z as f32,
+            Projection::Environment => local.length() as f32,
+        }
+    }
+
+    /// Unit view direction in the world when the shutter opens.
+    pub fn axis(&self) -> Vec3 {
+        self.world_from_camera.vector(-DVec3::Z).normalize().as_vec3()
+    }
+
+    /// Unit upward direction in the world, perpendicular to the view direction, when the shutter opens.
+    pub fn up(&self) -> Vec3 {
+        self.world_from_camera.vector(DVec3::Y).normalize().as_vec3()
+    }
+}
+
+/// The unit direction of a point of a lat-long picture. Above the upper edge the picture goes on over the pole, as filters need it.
+#[inline]
+fn everywhere(film: Vec2, size: [u32; 2]) -> DVec3 {
+    let azimuth = TAU * (f64::from(film.x) / f64::from(size[0]) - 0.5);
+    let theta = PI * f64::from(film.y) / f64::from(size[1]);
+    let ((sin_a, cos_a), (sin_t, cos_t)) = (azimuth.sin_cos(), theta.sin_cos());
+    DVec3::new(sin_a * sin_t, cos_t, -cos_a * sin_t)
+}

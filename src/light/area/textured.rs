@@ -1,0 +1,57 @@
+//! Textures on surfaces that emit.
+
+use crate::geometry::Shape;
+use crate::id::PrimId;
+use crate::math::{DVec3, Vec2};
+use crate::sampling::{Piecewise2d, warp};
+use crate::texture::Texture;
+
+/// Cells of a density along each side, and lookups along each side of a cell.
+const CELLS: usize = 64;
+const LOOKUPS: usize = 3;
+
+/// Lookups along each side for the mean over a triangle.
+const TRIANGLE_LOOKUPS: usize = 4;
+
+/// What a texture counts at least: lookups may all meet black and miss a bright spot, and a light that counts nothing is never chosen.
+const LEAST_MEAN: f32 = 1e-3;
+
+/// Surface parameters at the point `p` of a shape that its sampling found with `u`.
+pub(super) fn uv(shape: &Shape, prim: PrimId, p: DVec3, u: [f32; 2]) -> Vec2 {
+    match shape {
+        Shape::Mesh(mesh) => {
+            let [b, c] = warp::uniform_triangle(u);
+            mesh.uv(prim, b, c)
+        }
+        Shape::Analytic(placed) => placed.uv(p, u),
+    }
+}
+
+/// Mean luminance of a texture over a primitive, about, and above 0.
+pub(super) fn mean_luminance(shape: &Shape, prim: PrimId, texture: &Texture) -> f32 {
+    let side = if matches!(shape, Shape::Mesh(_)) { TRIANGLE_LOOKUPS } else { CELLS };
+    let middle = |i: usize| (i as f32 + 0.5) / side as f32;
+    let at = |i: usize| {
+        let u = [middle(i % side), middle(i / side)];
+        let p = match shape {
+            Shape::Mesh(_) => DVec3::ZERO,
+            Shape::Analytic(placed) => placed.sample_area(u).p,
+        };
+        texture.color(uv(shape, prim, p, u)).luminance()
+    };
+    let mean = (0..side * side).map(at).sum::<f32>() / (side * side) as f32;
+    mean.max(LEAST_MEAN)
+}
+
+/// The density over the unit square that follows a texture's brightness; `None` if it is black.
+pub(super) fn density(texture: &Texture) -> Option<Piecewise2d> {
+    let n = CELLS * LOOKUPS;
+    let middle = |i: usize| (i as f32 + 0.5) / n as f32;
+    let mut weights = vec![0.0; CELLS * CELLS];
+    for y in 0..n {
+        for x in 0..n {
+            weights[y / LOOKUPS * CELLS + x / LOOKUPS] += texture.color(Vec2::new(middle(x), middle(y))).luminance();
+        }
+    }
+    Piecewise2d::new(CELLS, CELLS, &weights)
+}

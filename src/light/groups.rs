@@ -1,0 +1,33 @@
+//! Named groups of lights.
+
+use crate::id::{LightGroupId, LightId};
+
+/// Which lights belong together, by name: what each group gives to the picture can be told apart.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LightGroups {
+    names: Vec<String>,
+    /// By light, [`NO_GROUP`] for those in none; empty if there are no groups at all.
+    of_light: Vec<u32>,
+}
+
+/// The entry of a light in no group.
+const NO_GROUP: u32 = u32::MAX;
+
+impl LightGroups {
+    /// Groups by [`LightGroupId`], and the group of each light.
+    pub fn new(names: Vec<String>, of_light: impl ExactSizeIterator<Item = Option<LightGroupId>>) -> Self {
+        let of_light = if names.is_empty() { Vec::new() } else { of_light.map(|id| id.map_or(NO_GROUP, |id| id.0)).collect() };
+        Self { names, of_light }
+    }
+
+    /// Names, by [`LightGroupId`].
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The group of a light, if it is in one.
+    #[inline]
+    pub fn of(&self, light: LightId) -> Option<LightGroupId> {
+        self.of_light.get(light.index()).copied().filter(|&id| id != NO_GROUP).map(LightGroupId)
+    }
+}

@@ -1,0 +1,181 @@
+use super::*;
+use crate::color::Rgb;
+use crate::geometry::{Analytic, Disk, Geometry, Mesh, Placed, Quad, Shape, Sphere};
+use crate::id::{LightId, ShapeId};
+use crate::light::test_support::{Random, assert_chi_squared};
+use crate::light::{AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, SpotLight};
+use crate::math::{DAffine3, Transform};
+
+const CLOUD: usize = 40;
+
+/// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and lights at infinity if asked.
+fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
+    let mut random = Random(seed);
+    let mut next = move || f64::from(random.next());
+    let mut place = || DVec3::new(next(), next(), next()) * 4.0 - 2.0;
+    let mut geometry = Geometry::default();
+    let mut lights = Vec::new();
+    let mut triangles = Vec::new();
+    for i in 0..CLOUD {
+        let (p, q) = (place(), place());
+        let power = (0.5 * q.x * 4.0).exp() as f32;
+        let emission = Emission { two_sided: i % 3 == 0, ..Emission::constant(Rgb::new(power, 0.5 * power, power)) };
+        let turn = DAffine3::from_axis_angle(q.normalize(), 3.0 * p.y) * DAffine3::from_scale(DVec3::splat(0.02 + 0.2 * q.z.abs()));
+        let transform = Transform::new(DAffine3::from_translation(p) * turn).unwrap();
+        let analytic = match i % 4 {
+            0 => Analytic::Quad(Quad::new(DVec3::new(-0.5, -0.5, 0.0), DVec3::X, DVec3::Y).unwrap()),
+            1 => Analytic::Sphere(Sphere::new(0.5, -0.5, 0.5, std::f64::consts::TAU).unwrap()),
+            2 => Analytic::Disk(Disk::new(0.7, 0.2, 4.0).unwrap()),
+            _ => {
+                triangles.extend([p, p + 0.1 * q, p + 0.1 * DVec3::new(q.y, -q.x, q.z)].map(|v| v.as_vec3().to_array()));
+                continue;
+            }
+        };
+        geometry.shapes.push(Shape::Analytic(Placed::new(analytic, transform)));
+        let shape = ShapeId::new(geometry.shapes.len() - 1);
+        geometry.world.push(shape);
+        lights.extend(AreaLight::for_shape(shape, emission, &geometry, &[]).into_iter().map(Light::Area));
+    }
+    let corners = (0..triangles.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    geometry.shapes.push(Shape::Mesh(Mesh::new(triangles, corners, None, None).unwrap()));
+    let shape = ShapeId::new(geometry.shapes.len() - 1);
+    geometry.world.push(shape);
+    let mesh = AreaLight::for_shape(shape, Emission::constant(Rgb::WHITE), &geometry, &[]);
+    lights.extend(mesh.into_iter().map(Light::Area));
+    for i in 0..6 {
+        let (p, q) = (place(), place());
+        let intensity = Rgb::splat(0.01 * (i + 1) as f32);
+        lights.push(Light::Point(PointLight { position: p, intensity }));
+        lights.push(Light::Spot(Box::new(SpotLight::new(p, q, intensity, 0.2 * f64::from(i), 0.3 + 0.5 * f64::from(i)))));
+        let profile = IesProfile::new(vec![0.0, 30.0 + 25.0 * i as f32], vec![0.0, 180.0], vec![1.0, 2.0, 3.0, 0.0]).unwrap();
+        lights.push(Light::Ies(Box::new(IesLight::new(p, q, 0.4, intensity, profile.into()))));
+    }
+    lights.push(Light::Point(PointLight { position: DVec3::ZERO, intensity: Rgb::BLACK }));
+    if sky {
+        lights.push(Light::Environment(Environment::Constant(Rgb::splat(0.1))));
+    }
+    let set = LightSet::with_selection(lights, &geometry, LightSelection::Tree);
+    assert_eq!(set.selection(), LightSelection::Tree);
+    (geometry, set)
+}
+
+/// Receivers near and far, with a side and without.
+fn receivers(seed: u64, count: usize) -> Vec<Receiver> {
+    let mut random = Random(seed);
+    let receiver = |i: usize| {
+        let p = random.direction() * f64::from(random.next()) * if i.is_multiple_of(5) { 50.0 } else { 3.0 };
+        let n = if i.is_multiple_of(4) { Vec3::ZERO } else { random.direction().as_vec3().normalize() };
+        Receiver { p, n }
+    };
+    (0..count).map(receiver).collect()
+}
+
+fn pmfs(set: &LightSet, from: &Receiver) -> Vec<f64> {
+    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from))).collect()
+}
+
+#[test]
+fn probabilities_add_up_to_one() {
+    // What is missing is the chance to end in a group none of whose lights reaches the point, although the group's looser bounds do: it is
+    // counted among the choices in the next test.
+    for sky in [false, true] {
+        let (_, set) = cloud(1, sky);
+        for from in receivers(2, 400) {
+            let sum: f64 = pmfs(&set, &from).iter().sum();
+            assert!(sum < 1.0 + 1e-5, "{from:?}: {sum}");
+        }
+    }
+
+    // Where every light reaches every point, nothing is missing.
+    let mut random = Random(9);
+    let point = |_| Light::Point(PointLight { position: 3.0 * random.direction(), intensity: Rgb::splat(1.0 + random.next()) });
+    let set = LightSet::with_selection((0..100).map(point).collect(), &Geometry::default(), LightSelection::Tree);
+    for from in receivers(2, 400) {
+        let sum: f64 = pmfs(&set, &Receiver { n: Vec3::ZERO, ..from }).iter().sum();
+        assert!((sum - 1.0).abs() < 1e-5, "{from:?}: {sum}");
+    }
+}
+
+#[test]
+fn lights_are_chosen_as_often_as_their_probability_says() {
+    for sky in [false, true] {
+        let (_, set) = cloud(3, sky);
+        let mut random = Random(4);
+        for (k, from) in receivers(5, 8).into_iter().enumerate() {
+            let mut expected = pmfs(&set, &from);
+            // No light at all.
+            expected.push((1.0 - expected.iter().sum::<f64>()).max(0.0));
+            let mut counts = vec![0u32; expected.len()];
+            for _ in 0..100_000 {
+                let Some(choice) = set.choose(&from, random.pair()) else {
+                    counts[expected.len() - 1] += 1;
+                    continue;
+                };
+                assert!((f64::from(choice.pmf) / expected[choice.id.index()] - 1.0).abs() < 1e-5);
+                counts[choice.id.index()] += 1;
+            }
+            assert_chi_squared(&counts, &expected, &format!("receiver {k}"));
+        }
+    }
+}
+
+#[test]
+fn whatever_can_shine_somewhere_can_be_chosen_there() {
+    let (geometry, set) = cloud(6, true);
+    let mut random = Random(7);
+    let (mut shining, mut excluded) = (0, 0);
+    for from in receivers(8, 300) {
+        for (light, pmf) in set.lights().iter().zip(pmfs(&set, &from)) {
+            let mut arrives = false;
+            for _ in 0..16 {
+                let Some(s) = light.sample(&geometry, &[], from.p, random.pair()) else { continue };
+                arrives |= s.radiance.luminance() > 0.0 && (from.n == Vec3::ZERO || s.wi.dot(from.n) > 0.0);
+            }
+            assert!(pmf > 0.0 || !arrives, "{from:?} {light:?}");
+            shining += usize::from(arrives);
+            excluded += usize::from(pmf == 0.0);
+        }
+    }
+    // The test means something only if both happen often.
+    assert!(shining > 5_000 && excluded > 2_000, "{shining} {excluded}");
+}
+
+#[test]
+fn near_lights_are_preferred_to_strong_ones_far_away() {
+    let point = |x: f64, intensity: f32| Light::Point(PointLight { position: DVec3::X * x, intensity: Rgb::splat(intensity) });
+    let mut lights: Vec<Light> = (0..20).map(|i| point(f64::from(i), 1.0)).collect();
+    lights.push(point(100.0, 50.0));
+    let set = LightSet::new(lights, &Geometry::default());
+    assert_eq!(set.selection(), LightSelection::Tree);
+    for i in 0..20 {
+        let from = Receiver { p: DVec3::new(f64::from(i), 0.1, 0.0), n: Vec3::ZERO };
+        // 100 from the light at hand, less than 3.3 from all others together.
+        assert!(set.pmf(LightId::new(i as usize), &from) > 0.9, "{i}");
+    }
+}
+
+#[test]
+fn any_arrangement_of_lights_makes_a_tree_of_bounded_size() {
+    type Arrangement = (&'static str, fn(f64) -> DVec3);
+    let arrangements: [Arrangement; 4] = [
+        ("one point", |_| DVec3::ONE),
+        ("a line", |i| DVec3::X * i),
+        ("growing gaps", |i| DVec3::Y * (i / 100.0).exp2()),
+        ("a plane", |i| DVec3::new((i * 0.618).fract(), 0.0, (i * 0.755).fract())),
+    ];
+    for (name, place) in arrangements {
+        let n = 5_000;
+        let lights: Vec<Option<_>> =
+            (0..n).map(|i| PointLight { position: place(f64::from(i)), intensity: Rgb::splat(1.0 + (i % 7) as f32) }.bounds()).collect();
+        let tree = LightTree::new(&lights).unwrap();
+        assert!(tree.memory_bytes() < 150 * n as usize, "{name}: {} bytes", tree.memory_bytes());
+        let from = Receiver { p: DVec3::new(0.3, 0.2, 0.1), n: Vec3::ZERO };
+        let sum: f64 = (0..n as u32).map(|i| f64::from(tree.pmf(&from, i))).sum();
+        assert!((sum - 1.0).abs() < 1e-4, "{name}: {sum}");
+        for i in 0..1000 {
+            let choice = tree.choose(&from, f64::from(i) / 1000.0).unwrap();
+            assert!(choice.pmf > 0.0, "{name}");
+        }
+    }
+    assert!(LightTree::new(&[None, None]).is_none());
+}

@@ -1,0 +1,201 @@
+//! Lights of the scene file: measured, textured, inside objects, in groups; and the limit on indirect light.
+
+use std::f64::consts::PI;
+
+use serde_json::{Value, json};
+use steradian::ErrorKind;
+use steradian::id::{LightGroupId, LightId};
+
+use crate::util::folder::{Folder, good_scene, set};
+use crate::util::render::{assert_irradiance, floor_probe, merge, pixels, probe, render};
+
+/// 10 candela downwards; 8 (in the plane of horizontal angle 0) or 6 (in that of 90) at 45 degrees; nothing at 90.
+const LAMP: &str = "IESNA:LM-63-2002\n[TEST] none\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10 6 0\n";
+
+#[test]
+fn a_measured_light_shines_as_its_file_says() {
+    let folder = Folder::new();
+    let file = folder.write("lamp.ies", LAMP);
+    let lamp = |turned: f64| json!([{ "type": "ies", "file": file, "position": [0, 1, 0], "intensity": [0.5, 0.5, 0.5], "rotation_degrees": turned }]);
+    let angle = 22.5f64.to_radians();
+    let fall = 0.5 * angle.cos().powi(3);
+    // Half of the way from 0 to 45 degrees.
+    for (at, turned, candela) in [([1.0, 0.0, 0.0], 0.0, 9.0), ([0.0, 0.0, 1.0], 0.0, 8.0), ([0.0, 0.0, -1.0], 90.0, 9.0)] {
+        let mut scene = floor_probe(at.map(|x| x * angle.tan()), json!([]));
+        scene["lights"] = lamp(turned);
+        assert_irradiance(&scene, candela * fall, &format!("{at:?}"));
+    }
+}
+
+#[test]
+fn a_textured_light_shines_where_its_texture_is_bright() {
+    // Above the corner of a square of side 2 at height 1, of whose four squares two are lit.
+    let corner = |a: f64, b: f64| {
+        let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+        0.5 * (a / ra * (b / ra).atan() + b / rb * (a / rb).atan())
+    };
+    let expected = corner(1.0, 1.0) + (corner(2.0, 2.0) - 2.0 * corner(1.0, 2.0) + corner(1.0, 1.0));
+    let emission = json!({ "radiance": [1, 1, 1], "texture": "board" });
+    let quad =
+        json!({ "type": "quad", "material": "black", "origin": [0, 1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "emission": emission });
+    let mesh = json!({
+        "type": "mesh", "material": "black", "emission": emission, "positions": [[0, 1, 0], [2, 1, 0], [2, 1, 2], [0, 1, 2]],
+        "triangles": [[0, 1, 2], [0, 2, 3]], "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]]
+    });
+    for (what, shape) in [("quad", quad), ("mesh", mesh)] {
+        let mut scene = floor_probe([0.0; 3], json!([shape]));
+        scene["textures"] = json!({ "board": { "type": "checker", "color0": [1, 1, 1], "color1": [0, 0, 0] } });
+        assert_irradiance(&scene, expected, what);
+    }
+}
+
+#[test]
+fn lamps_inside_objects_light_from_every_place_they_are_put() {
+    let mut scene = floor_probe([0.0; 3], json!([]));
+    let ball = json!({ "type": "sphere", "material": "black", "radius": 0.25, "emission": { "radiance": [1, 1, 1] } });
+    scene["objects"] = json!({ "lamp": { "shapes": [ball] }, "pair": { "instances": [
+        { "object": "lamp", "transform": [{ "translate": [0, 2, 0] }] },
+        { "object": "lamp", "transform": [{ "scale": 2 }, { "translate": [0, 1.6, 1.2] }] }
+    ] } });
+    scene["instances"] = json!([{ "object": "pair" }]);
+    // pi (R / d)² cos of each.
+    assert_irradiance(&scene, PI / 64.0 + PI / 16.0 * 0.8, "two lamps");
+}
+
+#[test]
+fn groups_have_names_and_know_their_lights() {
+    let folder = Folder::new();
+    let mut scene = good_scene();
+    assert!(folder.compile(&scene).unwrap().light_groups.names().is_empty());
+    set(&mut scene, "objects.lamp.shapes[1].emission.group", json!("lamps"));
+    set(&mut scene, "lights[1].group", json!("fill"));
+    set(&mut scene, "lights[3].group", json!("lamps"));
+    let scene = folder.compile(&scene).unwrap();
+    assert_eq!(scene.light_groups.names(), ["lamps", "fill"]);
+    let groups: Vec<_> = (0..scene.lights.lights().len()).map(|i| scene.light_groups.of(LightId::new(i))).collect();
+    let (lamps, fill) = (Some(LightGroupId(0)), Some(LightGroupId(1)));
+    // A triangle, two placed lamps, point, spot, directional, environment.
+    assert_eq!(groups, [None, lamps, lamps, None, fill, None, lamps]);
+}
+
+/// A corner with a lamp and a mirror ball.
+fn corner(integrator: Value) -> Value {
+    let mut scene = probe(
+        [3.0, 2.0, 4.0],
+        [0.0, 0.6, 0.0],
+        json!({
+            "materials": { "grey": { "type": "diffuse", "albedo": 0.7 }, "metal": { "type": "conductor", "metal": "silver", "alpha": 0.1 } },
+            "shapes": [
+                { "type": "quad", "material": "grey", "origin": [-2, 0, 2], "edge_u": [4, 0, 0], "edge_v": [0, 0, -4] },
+                { "type": "quad", "material": "grey", "origin": [-2, 0, -2], "edge_u": [4, 0, 0], "edge_v": [0, 4, 0] },
+                { "type": "sphere", "material": "metal", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] },
+                { "type": "sphere", "radius": 0.2, "emission": { "radiance": [20, 18, 15] }, "transform": [{ "translate": [-1, 2, 0.5] }] }
+            ]
+        }),
+    );
+    merge(&mut scene, json!({ "camera": { "vertical_fov_degrees": 40 }, "sampler": { "spp": 16 }, "integrator": { "type": "path" } }));
+    merge(&mut scene["integrator"], integrator);
+    scene
+}
+
+#[test]
+fn clamping_takes_only_from_indirect_light_and_never_more_than_the_limit() {
+    let picture = |integrator: Value| pixels(&render(&corner(integrator))).collect::<Vec<_>>();
+    let direct = picture(json!({ "max_depth": 2 }));
+    let free = picture(json!({ "max_depth": 6 }));
+    // Direct light is left whole, however low the limit; a limit above everything takes nothing.
+    let nothing_else = picture(json!({ "max_depth": 6, "clamp": 1e-20 }));
+    let strays = nothing_else.iter().zip(&direct).filter(|(a, b)| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-12));
+    assert_eq!(strays.map(|(a, b)| format!("{a:?} {b:?}")).collect::<Vec<_>>(), [""; 0]);
+    assert_eq!(picture(json!({ "max_depth": 6, "clamp": 1e30 })), free);
+    let limited = picture(json!({ "max_depth": 6, "clamp": 0.05 }));
+    let mut changed = 0;
+    for ((d, l), f) in direct.iter().zip(&limited).zip(&free) {
+        // Eight contributions at most of up to 0.05 each.
+        assert!((0..3).all(|c| l[c] <= f[c] * 1.000_01 && l[c] >= d[c] && l[c] <= d[c] + 8.0 * 0.05), "{d:?} {l:?} {f:?}");
+        changed += usize::from(l[1] < f[1] * 0.99);
+    }
+    assert!(changed > 20, "{changed} of {}", free.len());
+}
+
+/// The error of the good scene after a change.
+#[track_caller]
+fn assert_fault(folder: &Folder, path: &str, value: &Value, kind: ErrorKind, place: &str, word: &str) {
+    let mut scene = good_scene();
+    set(&mut scene, path, value.clone());
+    let error = folder.compile(&scene).err().unwrap_or_else(|| panic!("{path} compiles with {value}"));
+    let message = error.to_string();
+    assert_eq!(error.kind(), kind, "{message}");
+    assert!(message.contains(place) && message.contains(word) && message.contains("scene.json"), "{place}, {word}: {message}");
+}
+
+#[test]
+fn wrong_lights_are_refused_with_their_place() {
+    let folder = Folder::new();
+    folder.write("good.ies", LAMP);
+    folder.write("bad.ies", LAMP.replace("10 8 0", "10 eight 0"));
+    folder.write("type_b.ies", LAMP.replace("3 2 1 2", "3 2 2 2"));
+    let ies = |file: &str| json!({ "type": "ies", "file": file, "position": [0, 2, 0] });
+    let with = |key: &str, value: Value| {
+        let mut light = ies("good.ies");
+        light[key] = value;
+        light
+    };
+    for (path, value, kind, place, word) in [
+        ("lights[0]", ies("none.ies"), ErrorKind::AssetMissing, "lights[0].file", "none.ies"),
+        ("lights[0]", ies("bad.ies"), ErrorKind::Scene, "lights[0].file", "\"eight\""),
+        ("lights[0]", ies("type_b.ies"), ErrorKind::Scene, "lights[0].file", "type C"),
+        ("lights[0]", with("look_at", json!([0, 2, 0])), ErrorKind::Scene, "lights[0].look_at", "own position"),
+        ("lights[0]", with("intensity", json!([1, -1, 1])), ErrorKind::Scene, "lights[0].intensity", "-1"),
+        ("lights[0]", with("candela", json!(1)), ErrorKind::Scene, "lights[0]", "candela"),
+        ("lights[0].group", json!("key light"), ErrorKind::Scene, "lights[0].group", "key light"),
+        ("lights[3].group", json!(""), ErrorKind::Scene, "lights[3].group", "letters"),
+        ("shapes[1].emission.group", json!("a.b"), ErrorKind::Scene, "shapes[1].emission.group", "a.b"),
+        ("shapes[1].emission.texture", json!("tile"), ErrorKind::Scene, "shapes[1].emission.texture", "did you mean \"tiles\"?"),
+        ("integrator.clamp", json!(0), ErrorKind::Scene, "integrator.clamp", "0"),
+        ("integrator.clamp", json!(-2), ErrorKind::Scene, "integrator.clamp", "-2"),
+    ] {
+        assert_fault(&folder, path, &value, kind, place, word);
+    }
+}
+
+#[test]
+fn wrong_cameras_are_refused_with_their_place() {
+    let folder = Folder::new();
+    let place = json!({ "position": [0, 1, 5], "look_at": [0, 1, 0] });
+    let camera = |rest: Value| {
+        let mut camera = place.clone();
+        merge(&mut camera, rest);
+        camera
+    };
+    for (value, place, word) in [
+        (json!({ "type": "fisheye" }), "camera", "fisheye"),
+        (json!({ "type": "orthographic" }), "camera", "`view_height`"),
+        (json!({ "type": "orthographic", "view_height": 0 }), "camera.view_height", "0"),
+        (json!({ "type": "orthographic", "view_height": 1, "vertical_fov_degrees": 30 }), "camera.vertical_fov_degrees", "orthographic"),
+        (json!({ "type": "environment", "shift": [0, 1] }), "camera.shift", "environment"),
+        (json!({ "type": "environment", "pixel_aspect": 1 }), "camera.pixel_aspect", "environment"),
+        (json!({ "type": "environment", "lens": { "radius": 1, "focus_distance": 1 } }), "camera.lens", "environment"),
+        (json!({ "view_height": 1 }), "camera.view_height", "perspective"),
+        (json!({ "shift": [11, 0] }), "camera.shift", "11"),
+        (json!({ "pixel_aspect": 0 }), "camera.pixel_aspect", "0"),
+        (json!({ "near": -1 }), "camera.near", "-1"),
+        (json!({ "shutter": [1, 0.5] }), "camera.shutter", "[1.0, 0.5]"),
+        (json!({ "shutter": [-1e308, 1e308] }), "camera.shutter", "1e308"),
+        (json!({ "motion": [{ "time": 0 }, { "time": 0 }] }), "camera.motion[1].time", "grow"),
+        (json!({ "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "scale": 2 }] }] }), "camera.motion[1].transform", "scaled"),
+        (json!({ "motion": [{ "time": 0, "transform": [{ "scale": [1, 1, -1] }] }] }), "camera.motion[0].transform", "rotation"),
+        (json!({ "motion": [{ "when": 0 }] }), "camera.motion[0]", "when"),
+        (json!({ "lens": { "radius": 1, "focus_distance": 1, "blades": { "count": 2 } } }), "camera.lens.blades.count", "2"),
+        (json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_distance": 0.05 } }), "camera.lens", "nothing is in focus"),
+        (
+            json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_distance": 0.2, "focus_distance": 1 } }),
+            "camera.lens",
+            "one too many",
+        ),
+        (json!({ "lens": { "radius": 1, "sensor_height": 0.1, "sensor_distance": 0.2, "focus_distance": 1 } }), "camera.lens", "either"),
+        (json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_height": -1 } }), "camera.lens.sensor_height", "-1"),
+    ] {
+        assert_fault(&folder, "camera", &camera(value), ErrorKind::Scene, place, word);
+    }
+}
