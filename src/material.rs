@@ -1,8 +1,10 @@
 //! Materials: textures and parameters that become a [`Bsdf`] at a point.
 
-use crate::bsdf::{Bsdf, Conductor, Dielectric, Lambert, Mirror, Plastic};
+use crate::bsdf::{
+    Bsdf, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Plastic, Principled, PrincipledParameters,
+};
 use crate::color::Rgb;
-use crate::id::TextureId;
+use crate::id::{MaterialId, TextureId};
 use crate::math::Vec2;
 use crate::texture::Texture;
 
@@ -11,7 +13,7 @@ use crate::texture::Texture;
 pub enum ColorInput {
     /// The same everywhere.
     Constant(Rgb),
-    /// Looked up by uv.
+    /// Looked up by uv, each channel clamped to `[0, 1]`.
     Texture(TextureId),
 }
 
@@ -21,38 +23,336 @@ impl ColorInput {
     pub fn at(&self, textures: &[Texture], uv: Vec2) -> Rgb {
         match self {
             Self::Constant(color) => *color,
-            Self::Texture(id) => textures[id.index()].color(uv),
+            Self::Texture(id) => textures[id.index()].color(uv).map(|v| v.clamp(0.0, 1.0)),
         }
+    }
+
+    fn is_constant(&self) -> bool {
+        matches!(self, Self::Constant(_))
     }
 }
 
-/// A material: what is constant is prepared once.
+/// A number within `[0, 1]` that is constant or comes from a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ScalarInput {
+    /// The same everywhere.
+    Constant(f32),
+    /// Looked up by uv, clamped to `[0, 1]`.
+    Texture(TextureId),
+}
+
+impl ScalarInput {
+    /// The number at `uv`.
+    #[inline]
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> f32 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Texture(id) => textures[id.index()].scalar(uv).clamp(0.0, 1.0),
+        }
+    }
+
+    /// Whether it is 0 everywhere.
+    pub fn is_zero(&self) -> bool {
+        *self == Self::Constant(0.0)
+    }
+
+    fn is_constant(&self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
+}
+
+/// A material.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Material {
-    /// The same scattering everywhere.
+    /// The same scattering everywhere, prepared once.
     Constant(Bsdf),
-    /// Diffuse with a varying albedo.
-    Diffuse {
-        /// Albedo.
-        albedo: ColorInput,
+    /// Scattering that textures change.
+    Varying(Box<Varying>),
+    /// One of two materials at each point, chosen anew at each hit: the second with the probability `amount`.
+    Mix {
+        /// Where `amount` is 0.
+        first: MaterialId,
+        /// Where `amount` is 1.
+        second: MaterialId,
+        /// How much of the second.
+        amount: ScalarInput,
     },
-    /// Plastic with a varying diffuse colour.
+    /// A material for each side.
+    TwoSided {
+        /// Where the normal points.
+        front: MaterialId,
+        /// Against the normal.
+        back: MaterialId,
+    },
+}
+
+/// GGX alpha along u and v from inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AlphaInput {
+    /// Along u and v.
+    pub axes: [ScalarInput; 2],
+    /// Whether the inputs are roughness, of which alpha is the square.
+    pub squared: bool,
+}
+
+impl AlphaInput {
+    /// Alpha at `uv`.
+    #[inline]
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> [f32; 2] {
+        self.axes.map(|input| input.at(textures, uv)).map(|value| if self.squared { value * value } else { value })
+    }
+
+    /// Whether no texture changes it.
+    pub fn is_constant(&self) -> bool {
+        self.axes.iter().all(ScalarInput::is_constant)
+    }
+}
+
+/// Parameters that may come from textures.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Varying {
+    /// Diffuse, rough or not.
+    Diffuse {
+        /// Fraction of light reflected.
+        albedo: ColorInput,
+        /// Roughness.
+        roughness: ScalarInput,
+    },
+    /// Diffuse reflection and transmission.
+    DiffuseTransmission {
+        /// Fraction of light reflected.
+        reflectance: ColorInput,
+        /// Fraction of light that crosses.
+        transmittance: ColorInput,
+    },
+    /// Ideal specular reflection.
+    Mirror {
+        /// Fraction of light reflected.
+        reflectance: ColorInput,
+    },
+    /// Metal.
+    Conductor {
+        /// Its index of refraction.
+        metal: Conductor,
+        /// Factor on the reflectance.
+        tint: ColorInput,
+        /// Roughness.
+        alpha: AlphaInput,
+        /// Whether light scattered several times counts.
+        multiscatter: bool,
+    },
+    /// Glass.
+    Dielectric {
+        /// Index of refraction of the inside over that of the outside.
+        ior: f32,
+        /// Roughness.
+        alpha: AlphaInput,
+        /// Whether light scattered several times counts.
+        multiscatter: bool,
+    },
+    /// Phong's model.
+    Phong {
+        /// The diffuse part.
+        diffuse: ColorInput,
+        /// The highlight.
+        specular: ColorInput,
+        /// Exponent.
+        exponent: f32,
+    },
+    /// Plastic.
     Plastic {
         /// Everything else.
         base: Plastic,
         /// Colour of the diffuse base.
         albedo: ColorInput,
     },
+    /// The principled model.
+    Principled(PrincipledInputs),
+}
+
+/// What [`PrincipledParameters`] are made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PrincipledInputs {
+    /// What no texture changes, or a number below would replace.
+    pub rest: PrincipledParameters,
+    /// The base's colour.
+    pub base_color: ColorInput,
+    /// How much is metal.
+    pub metallic: ScalarInput,
+    /// Roughness.
+    pub roughness: ScalarInput,
+    /// Anisotropy.
+    pub anisotropic: ScalarInput,
+    /// Reflectance ahead in units of 0.08, in place of the index of refraction in `rest`.
+    pub specular: Option<ScalarInput>,
+    /// Tint of the dielectric layer.
+    pub specular_tint: ScalarInput,
+    /// Strength of the sheen.
+    pub sheen: ScalarInput,
+    /// Tint of the sheen.
+    pub sheen_tint: ScalarInput,
+    /// Strength of the clear coat.
+    pub clearcoat: ScalarInput,
+    /// Gloss of the clear coat.
+    pub clearcoat_gloss: ScalarInput,
+    /// From the diffuse to the flat lobe.
+    pub subsurface: ScalarInput,
+    /// How much is glass.
+    pub transmission: ScalarInput,
+    /// How much the diffuse base of a thin sheet lets through.
+    pub diffuse_transmission: ScalarInput,
+}
+
+impl PrincipledInputs {
+    fn parameters(&self, textures: &[Texture], uv: Vec2) -> PrincipledParameters {
+        let at = |input: &ScalarInput| input.at(textures, uv);
+        PrincipledParameters {
+            base_color: self.base_color.at(textures, uv),
+            metallic: at(&self.metallic),
+            roughness: at(&self.roughness),
+            anisotropic: at(&self.anisotropic),
+            ior: self.specular.as_ref().map_or(self.rest.ior, |specular| PrincipledParameters::ior_of_specular(at(specular))),
+            specular_tint: at(&self.specular_tint),
+            sheen: at(&self.sheen),
+            sheen_tint: at(&self.sheen_tint),
+            clearcoat: at(&self.clearcoat),
+            clearcoat_gloss: at(&self.clearcoat_gloss),
+            subsurface: at(&self.subsurface),
+            transmission: at(&self.transmission),
+            diffuse_transmission: at(&self.diffuse_transmission),
+            ..self.rest
+        }
+    }
+
+    fn is_constant(&self) -> bool {
+        let scalars = [
+            &self.metallic,
+            &self.roughness,
+            &self.anisotropic,
+            &self.specular_tint,
+            &self.sheen,
+            &self.sheen_tint,
+            &self.clearcoat,
+            &self.clearcoat_gloss,
+            &self.subsurface,
+            &self.transmission,
+            &self.diffuse_transmission,
+        ];
+        self.base_color.is_constant() && scalars.into_iter().chain(&self.specular).all(ScalarInput::is_constant)
+    }
+}
+
+impl Varying {
+    /// The scattering at `uv`.
+    fn bsdf(&self, textures: &[Texture], uv: Vec2) -> Bsdf {
+        match self {
+            Self::Diffuse { albedo, roughness } => match (albedo.at(textures, uv), roughness.at(textures, uv)) {
+                (albedo, 0.0) => Bsdf::Lambert(Lambert { albedo }),
+                (albedo, roughness) => Bsdf::Eon(Eon { albedo, roughness }),
+            },
+            Self::DiffuseTransmission { reflectance, transmittance } => {
+                Bsdf::DiffuseTransmission(DiffuseTransmission::new(reflectance.at(textures, uv), transmittance.at(textures, uv)))
+            }
+            Self::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: reflectance.at(textures, uv) }),
+            Self::Conductor { metal, tint, alpha, multiscatter } => {
+                let metal = metal.with_surface(alpha.at(textures, uv), tint.at(textures, uv));
+                Bsdf::Conductor(if *multiscatter { metal } else { metal.single_scattering() })
+            }
+            Self::Dielectric { ior, alpha, multiscatter } => {
+                let glass = Dielectric::new(*ior, alpha.at(textures, uv));
+                Bsdf::Dielectric(if *multiscatter { glass } else { glass.single_scattering() })
+            }
+            Self::Phong { diffuse, specular, exponent } => {
+                // What exceeds 1 together is taken from the diffuse part.
+                let specular = specular.at(textures, uv);
+                let diffuse = diffuse.at(textures, uv);
+                let left = Rgb::WHITE - specular;
+                let diffuse = Rgb::new(diffuse.r.min(left.r), diffuse.g.min(left.g), diffuse.b.min(left.b));
+                Bsdf::Glossy(Glossy::phong(diffuse, specular, *exponent))
+            }
+            Self::Plastic { base, albedo } => Bsdf::Plastic(Plastic { diffuse: albedo.at(textures, uv), ..*base }),
+            Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, uv))),
+        }
+    }
+
+    fn is_constant(&self) -> bool {
+        match self {
+            Self::Diffuse { albedo, roughness } => albedo.is_constant() && roughness.is_constant(),
+            Self::DiffuseTransmission { reflectance: a, transmittance: b } | Self::Phong { diffuse: a, specular: b, .. } => {
+                a.is_constant() && b.is_constant()
+            }
+            Self::Conductor { tint, alpha, .. } => tint.is_constant() && alpha.is_constant(),
+            Self::Dielectric { alpha, .. } => alpha.is_constant(),
+            Self::Mirror { reflectance: color } | Self::Plastic { albedo: color, .. } => color.is_constant(),
+            Self::Principled(inputs) => inputs.is_constant(),
+        }
+    }
+
+    /// Whether light may cross the surface.
+    fn transmits(&self) -> bool {
+        match self {
+            Self::DiffuseTransmission { .. } | Self::Dielectric { .. } => true,
+            Self::Principled(inputs) => !inputs.transmission.is_zero() || !inputs.diffuse_transmission.is_zero(),
+            Self::Diffuse { .. } | Self::Mirror { .. } | Self::Conductor { .. } | Self::Phong { .. } | Self::Plastic { .. } => false,
+        }
+    }
+
+    /// Whether scattering may depend on the direction of the tangents.
+    fn is_anisotropic(&self) -> bool {
+        match self {
+            Self::Diffuse { .. } | Self::DiffuseTransmission { .. } | Self::Mirror { .. } | Self::Phong { .. } => false,
+            Self::Conductor { alpha, .. } | Self::Dielectric { alpha, .. } => alpha.axes[0] != alpha.axes[1],
+            Self::Plastic { base, .. } => base.is_anisotropic(),
+            Self::Principled(inputs) => !inputs.anisotropic.is_zero(),
+        }
+    }
 }
 
 impl Material {
-    /// The scattering at `uv`.
+    /// The scattering at `uv`; nothing for what consists of other materials, which [`Material::part`] resolves first.
     #[inline]
     pub fn bsdf(&self, textures: &[Texture], uv: Vec2) -> Bsdf {
         match self {
             Self::Constant(bsdf) => *bsdf,
-            Self::Diffuse { albedo } => Bsdf::Lambert(Lambert { albedo: albedo.at(textures, uv) }),
-            Self::Plastic { base, albedo } => Bsdf::Plastic(Plastic { diffuse: albedo.at(textures, uv), ..*base }),
+            Self::Varying(varying) => varying.bsdf(textures, uv),
+            Self::Mix { .. } | Self::TwoSided { .. } => Bsdf::Lambert(Lambert { albedo: Rgb::BLACK }),
+        }
+    }
+
+    /// The material that this one stands for on one side at `uv`, if it consists of others; `u` within `[0, 1)` chooses.
+    #[inline]
+    pub fn part(&self, textures: &[Texture], uv: Vec2, is_front: bool, u: impl FnOnce() -> f32) -> Option<MaterialId> {
+        match self {
+            Self::Constant(_) | Self::Varying(_) => None,
+            Self::Mix { first, second, amount } => Some(if u() < amount.at(textures, uv) { *second } else { *first }),
+            Self::TwoSided { front, back } => Some(if is_front { *front } else { *back }),
+        }
+    }
+
+    /// The materials that this one consists of.
+    pub fn parts(&self) -> Option<[MaterialId; 2]> {
+        match *self {
+            Self::Constant(_) | Self::Varying(_) => None,
+            Self::Mix { first, second, .. } => Some([first, second]),
+            Self::TwoSided { front, back } => Some([front, back]),
+        }
+    }
+
+    /// Whether light may cross the surface; of what consists of others, the parts tell.
+    pub fn transmits(&self) -> bool {
+        match self {
+            Self::Constant(bsdf) => bsdf.transmits(),
+            Self::Varying(varying) => varying.transmits(),
+            Self::Mix { .. } | Self::TwoSided { .. } => false,
+        }
+    }
+
+    /// Whether a texture has a say in it.
+    pub fn is_textured(&self) -> bool {
+        match self {
+            Self::Constant(_) | Self::TwoSided { .. } => false,
+            Self::Varying(_) => true,
+            Self::Mix { amount, .. } => !amount.is_constant(),
         }
     }
 
@@ -60,8 +360,25 @@ impl Material {
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Constant(bsdf) => bsdf.is_delta(),
-            Self::Diffuse { .. } | Self::Plastic { .. } => false,
+            Self::Varying(varying) => matches!(**varying, Varying::Mirror { .. }),
+            Self::Mix { .. } | Self::TwoSided { .. } => false,
         }
+    }
+
+    /// Whether scattering may depend on the direction of the surface's tangents; of what consists of others, the parts tell.
+    pub fn is_anisotropic(&self) -> bool {
+        match self {
+            Self::Constant(bsdf) => bsdf.is_anisotropic(),
+            Self::Varying(varying) => varying.is_anisotropic(),
+            Self::Mix { .. } | Self::TwoSided { .. } => false,
+        }
+    }
+}
+
+impl From<Varying> for Material {
+    /// What no texture changes is prepared once.
+    fn from(varying: Varying) -> Self {
+        if varying.is_constant() { Self::Constant(varying.bsdf(&[], Vec2::ZERO)) } else { Self::Varying(Box::new(varying)) }
     }
 }
 

@@ -1,10 +1,12 @@
 //! A scene ready to render: tables and ids, no paths and no names but those of light groups, which become layers.
 
+use crate::bsdf::Bsdf;
 use crate::camera::Camera;
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, SurfaceInteraction};
 use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId, TextureId};
 use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
+use crate::math::Vec3;
 use crate::relief::Relief;
 use crate::texture::Texture;
 
@@ -92,4 +94,36 @@ impl Scene {
     pub fn material(&self, shape: ShapeId) -> &Material {
         &self.materials[self.surface(shape).material.index()]
     }
+
+    /// The scattering at a point for a ray that arrives in `direction`.
+    #[inline]
+    pub fn bsdf(&self, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
+        let material = self.material(at.shape);
+        if let Material::Constant(bsdf) = material { *bsdf } else { self.resolved_bsdf(self.surface(at.shape).material, at, direction) }
+    }
+
+    fn resolved_bsdf(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
+        let is_front = direction.dot(at.n_g) < 0.0;
+        loop {
+            let material = &self.materials[id.index()];
+            match material.part(&self.textures, at.uv, is_front, || choice(at, direction, id)) {
+                Some(part) => id = part,
+                None => return material.bsdf(&self.textures, at.uv),
+            }
+        }
+    }
+}
+
+/// A number in `[0, 1)` hashed from a point, a direction and a material: the choice between the parts of a mix is the same for any number of
+/// threads, and another for every sample of a pixel.
+fn choice(at: &SurfaceInteraction, direction: Vec3, id: MaterialId) -> f32 {
+    // The finalizer of SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators").
+    let mix = |n: u64| {
+        let n = (n ^ (n >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let n = (n ^ (n >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        n ^ (n >> 31)
+    };
+    let words = at.p.to_array().map(f64::to_bits).into_iter().chain(direction.to_array().map(|x| u64::from(x.to_bits())));
+    let hash = words.fold(mix(u64::from(id.0) + 1), |hash, word| mix(hash.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ word));
+    (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }

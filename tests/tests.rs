@@ -26,6 +26,8 @@ mod light_transport;
 mod lights;
 /// Choosing among many lights.
 mod many_lights;
+/// Materials as scenes use them.
+mod materials;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
 mod motion;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
 use steradian::geometry::SurfaceInteraction;
 use steradian::integrator::World;
-use steradian::material::{ColorInput, Material};
+use steradian::material::{ColorInput, Material, Varying};
 use steradian::math::{DVec3, Ray, Vec2, vec2};
 use steradian::scene::Scene;
 use steradian::texture::Texture;
@@ -36,8 +36,9 @@ fn look(scene: &Scene, origin: DVec3, target: DVec3) -> Option<SurfaceInteractio
 
 /// The colour of the texture on the diffuse shape that a ray meets.
 fn texel(scene: &Scene, at: &SurfaceInteraction) -> steradian::color::Rgb {
-    match scene.material(at.shape) {
-        Material::Diffuse { albedo: ColorInput::Texture(id) } => scene.textures[id.index()].color(at.uv),
+    let Material::Varying(varying) = scene.material(at.shape) else { panic!("constant") };
+    match &**varying {
+        Varying::Diffuse { albedo: ColorInput::Texture(id), .. } => scene.textures[id.index()].color(at.uv),
         other => panic!("{other:?}"),
     }
 }
@@ -213,10 +214,7 @@ fn an_image_lies_on_a_sphere_about_y_with_offsets_in_longitude_and_latitude() {
     let shape = json!([{ "type": "sphere", "radius": 2.0, "material": "m", "transform": upright }]);
     let scene = folder.compile(&scene_of(shape, rest)).unwrap();
     let plain = folder.compile(&scene_of(json!([{ "type": "quad", "material": "m" }]), one_image("repeat"))).unwrap();
-    let image = match scene.material(steradian::id::ShapeId(0)) {
-        Material::Diffuse { albedo: ColorInput::Texture(_) } => &plain.textures[0],
-        other => panic!("{other:?}"),
-    };
+    let image = &plain.textures[0];
     for i in 0..200 {
         let (y, angle) = (f64::from(i) / 100.0 - 0.995, 2.4 * f64::from(i));
         let r = (1.0 - y * y).sqrt();

@@ -1,17 +1,29 @@
-//! Metals: reflection with the exact Fresnel equations of a complex index of refraction, by a plane or by GGX microfacets.
+//! Metals: reflection with the exact Fresnel equations of a complex index of refraction, by a plane or by GGX microfacets; light that meets
+//! several microfacets comes back as the lobe of [`energy`](super::energy), coloured by as many reflections (of anisotropic microfacets
+//! a little less).
 
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use super::energy::{Energy, multiple_color};
 use super::fresnel::ComplexIndex;
 use super::microfacet::{MIN_COSINE, reflect};
 use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
+use crate::sampling::warp;
 
-/// A metal on both sides. Light that meets more than one microfacet is lost (single scattering).
+/// A metal on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
     index: [ComplexIndex; 3],
     tint: Rgb,
     ggx: Ggx,
+    /// Reflectance under diffuse light without the tint.
+    average: Rgb,
+    /// Colour of light scattered several times, over `pi (1 - E_avg)`.
+    multiple: Rgb,
+    /// Mean of that colour over the mean reflectance; zero for single scattering.
+    share: f32,
 }
 
 impl Conductor {
@@ -19,7 +31,31 @@ impl Conductor {
     /// reflectance.
     pub fn new(eta: Rgb, k: Rgb, alpha: [f32; 2], tint: Rgb) -> Self {
         let index = [ComplexIndex::new(eta.r, k.r), ComplexIndex::new(eta.g, k.g), ComplexIndex::new(eta.b, k.b)];
-        Self { index, tint, ggx: Ggx::new(alpha) }
+        let average = Rgb::from(index.map(ComplexIndex::average));
+        let metal = Self { index, tint, ggx: Ggx::new(alpha), average, multiple: Rgb::BLACK, share: 0.0 };
+        metal.with_multiple_scattering()
+    }
+
+    /// Without the light that microfacets scatter several times.
+    #[must_use]
+    pub fn single_scattering(self) -> Self {
+        Self { multiple: Rgb::BLACK, share: 0.0, ..self }
+    }
+
+    fn with_multiple_scattering(self) -> Self {
+        let average = self.tint * self.average;
+        if self.ggx.is_smooth() || average.is_black() {
+            return self;
+        }
+        let lost = Energy::new(&self.ggx).mirrors_lost();
+        let color = average.map(|f| multiple_color(f, 1.0 - lost));
+        Self { multiple: color / (PI * lost), share: color.mean() / average.mean(), ..self }
+    }
+
+    /// The same metal with other roughness and tint.
+    #[must_use]
+    pub fn with_surface(self, alpha: [f32; 2], tint: Rgb) -> Self {
+        Self { tint, ggx: Ggx::new(alpha), ..self.single_scattering() }.with_multiple_scattering()
     }
 
     #[inline]
@@ -27,19 +63,42 @@ impl Conductor {
         self.tint * Rgb::from(self.index.map(|index| index.reflectance(cos)))
     }
 
-    /// `F D G2 / (4 |cos wo|)` for directions on the same side of a rough metal, zero for a smooth one.
+    /// Probability of sampling light scattered several times, for what microfacets scatter at once.
+    #[inline]
+    fn multiple_probability(&self, at_once: f32) -> f32 {
+        let multiple = self.share * (1.0 - at_once);
+        multiple / (at_once + multiple)
+    }
+
+    /// `F D G2 / (4 |cos wo|)` and light scattered several times for directions on the same side of a rough metal, zero for a smooth one.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
         if self.ggx.is_smooth() || wo.z * wi.z <= 0.0 {
             return BsdfEval::default();
         }
-        let facet = self.ggx.reflection(vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
-        BsdfEval { value: self.reflectance(facet.cos) * facet.value, pdf: facet.pdf }
+        let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
+        if self.share == 0.0 {
+            let facet = self.ggx.reflection(o, i);
+            return BsdfEval { value: self.reflectance(facet.cos) * facet.value, pdf: facet.pdf };
+        }
+        self.eval_upper(o, i, Energy::new(&self.ggx).mirrors(o))
     }
 
-    /// A reflection at a visible normal.
+    /// With multiple scattering, for what microfacets scatter at once of the light from `o`.
     #[inline]
-    pub fn sample(&self, wo: Vec3, _u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+    fn eval_upper(&self, o: Vec3, i: Vec3, at_once: f32) -> BsdfEval {
+        let facet = self.ggx.reflection(o, i);
+        let probability = self.multiple_probability(at_once);
+        let lost = (1.0 - at_once) * (1.0 - Energy::new(&self.ggx).mirrors(i));
+        BsdfEval {
+            value: self.reflectance(facet.cos) * facet.value + self.multiple * (lost * i.z),
+            pdf: (1.0 - probability) * facet.pdf + probability * FRAC_1_PI * i.z,
+        }
+    }
+
+    /// A reflection at a visible normal, or by the cosine for light scattered several times.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         if wo.z.abs() <= MIN_COSINE {
             return None;
         }
@@ -47,16 +106,31 @@ impl Conductor {
             return Some(BsdfSample::mirrored(wo, self.reflectance(wo.z.abs().min(1.0)), 1.0));
         }
         let o = vec3(wo.x, wo.y, wo.z.abs());
+        let at_once = if self.share == 0.0 { 1.0 } else { Energy::new(&self.ggx).mirrors(o) };
+        if self.share > 0.0 && u_lobe < self.multiple_probability(at_once) {
+            return self.weigh(wo, o, warp::cosine_hemisphere(u), at_once);
+        }
         let m = self.ggx.sample_visible_normal(o, u);
         let cos = o.dot(m);
         let mut wi = reflect(o, m, cos);
         if !(cos > 0.0 && wi.z > 0.0) {
             return None;
         }
+        if self.share > 0.0 {
+            return self.weigh(wo, o, wi, at_once);
+        }
         let weight = self.reflectance(cos.min(1.0)) * self.ggx.sampled_shadowing(o, wi);
         let pdf = self.ggx.reflection_pdf(o, m);
         wi.z = wi.z.copysign(wo.z);
         Some(BsdfSample { wi, weight, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+    }
+
+    /// The sample for a direction of the upper side, all lobes counted.
+    #[inline]
+    fn weigh(&self, wo: Vec3, o: Vec3, i: Vec3, at_once: f32) -> Option<BsdfSample> {
+        let BsdfEval { value, pdf } = self.eval_upper(o, i, at_once);
+        let wi = vec3(i.x, i.y, i.z.copysign(wo.z));
+        (i.z > 0.0 && pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
     }
 
     /// Whether the surface is rougher along one tangent than along the other.
@@ -70,7 +144,7 @@ impl Conductor {
         self.ggx.is_smooth()
     }
 
-    /// The reflectance of the plane: what microfacets lose is left out.
+    /// The reflectance of the plane.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         self.reflectance(wo.z.abs().min(1.0))
     }

@@ -10,13 +10,23 @@
 //! pdf   = (1 - F) (visible normals) eta² |wi·m| / |h|²
 //! ```
 //!
+//! What microfacets lose is shared out to both sides by two lobes as in [`energy`](super::energy): with `L` what is lost of diffuse light from
+//! each side and `F` the mean reflectance from the thinner one, `(1 - F) min(L, L') / L` of what is lost on the thinner side crosses, and
+//! `1 / ior²` times that with `L'` on the denser one, so that nothing is lost and what crosses is reciprocal. What anisotropic microfacets
+//! lose is not known closely enough, and stays lost.
+//!
 //! Reflection and refraction share the height-correlated G2, as in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition.
 
+use std::f32::consts::FRAC_1_PI;
+
+use super::energy::Energy;
 use super::fresnel;
 use super::microfacet::{MIN_COSINE, reflect};
 use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
+use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec3, vec3};
+use crate::sampling::warp;
 
 /// A boundary between two clear media. The outside is where the normal points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +34,32 @@ pub struct Dielectric {
     /// Index of refraction of the inside over that of the outside.
     ior: f32,
     ggx: Ggx,
+    /// What microfacets lose, for light from outside and from inside; `None` if it stays lost.
+    multiple: Option<[Multiple; 2]>,
+}
+
+/// Light from one side that is scattered several times.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Multiple {
+    /// What is lost of diffuse light from this side.
+    lost: f32,
+    /// How much of it crosses.
+    crossing: f32,
+}
+
+/// What is lost and where it goes, for light from outside and from inside.
+fn multiple_scattering(ior: f32, ggx: &Ggx) -> [Multiple; 2] {
+    let energy = Energy::new(ggx);
+    let [outside, inside] = [ior, 1.0 / ior].map(|eta| energy.glass_lost(eta));
+    let dense = ior.max(1.0 / ior);
+    // Kulla and Conty's fit of the mean reflectance.
+    let transmitted = 1.0 - (dense - 1.0) / (4.085_67 + 1.000_71 * dense);
+    let common = transmitted * outside.min(inside);
+    let [from_outside, from_inside] = if ior >= 1.0 { [1.0, dense * dense] } else { [dense * dense, 1.0] };
+    [
+        Multiple { lost: outside, crossing: common / (outside * from_outside) },
+        Multiple { lost: inside, crossing: common / (inside * from_inside) },
+    ]
 }
 
 impl Dielectric {
@@ -33,7 +69,27 @@ impl Dielectric {
         let turn = (ior - 1.0).abs().min(1.0);
         let ggx = Ggx::new(alpha);
         let is_smooth = Ggx::new(alpha.map(|a| a * turn)).is_smooth();
-        Self { ior, ggx: if is_smooth { Ggx::new([0.0; 2]) } else { ggx } }
+        if is_smooth { Self { ior, ggx: Ggx::new([0.0; 2]), multiple: None } } else { Self::rough(ior, ggx, true) }
+    }
+
+    /// A boundary of which the caller knows that it is rough.
+    #[inline]
+    pub(super) fn rough(ior: f32, ggx: Ggx, multiscatter: bool) -> Self {
+        let [ax, ay] = ggx.alpha();
+        let is_known = multiscatter && ax == ay;
+        Self { ior, ggx, multiple: is_known.then(|| multiple_scattering(ior, &ggx)) }
+    }
+
+    /// Without the light that microfacets scatter several times.
+    #[must_use]
+    pub fn single_scattering(self) -> Self {
+        Self { multiple: None, ..self }
+    }
+
+    /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over that on its side.
+    #[inline]
+    fn lost(&self, eta: f32, w: Vec3) -> f32 {
+        (1.0 - Energy::new(&self.ggx).glass(eta, w)).clamp(0.0, 1.0)
     }
 
     /// Index of refraction beyond the surface over that on the side of `wo`.
@@ -52,6 +108,32 @@ impl Dielectric {
         let eta = self.eta(wo);
         let o = vec3(wo.x, wo.y, wo.z.abs());
         let i = vec3(wi.x, wi.y, wi.z * 1f32.copysign(wo.z));
+        match &self.multiple {
+            None => self.eval_once(o, i, eta),
+            Some(multiple) => self.eval_all(multiple, wo, o, i, eta),
+        }
+    }
+
+    /// With multiple scattering; `o` on the upper side.
+    #[inline]
+    fn eval_all(&self, multiple: &[Multiple; 2], wo: Vec3, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
+        let [near, far] = if wo.z > 0.0 { [multiple[0], multiple[1]] } else { [multiple[1], multiple[0]] };
+        let once = self.eval_once(o, i, eta);
+        let lost = self.lost(eta, o);
+        let cosine_pdf = FRAC_1_PI * i.z.abs();
+        let (value, fraction) = if i.z > 0.0 {
+            let fraction = 1.0 - near.crossing;
+            (fraction * lost * self.lost(eta, i) / near.lost, fraction)
+        } else {
+            let beyond = self.lost(1.0 / eta, vec3(i.x, i.y, -i.z));
+            (near.crossing * lost * beyond / (far.lost * eta * eta), near.crossing)
+        };
+        BsdfEval { value: once.value + Rgb::splat(value * cosine_pdf), pdf: (1.0 - lost) * once.pdf + lost * fraction * cosine_pdf }
+    }
+
+    /// One encounter with a microfacet; `o` on the upper side.
+    #[inline]
+    fn eval_once(&self, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
         if i.z > 0.0 {
             let facet = self.ggx.reflection(o, i);
             let reflectance = fresnel::dielectric(facet.cos, eta).reflectance;
@@ -91,6 +173,38 @@ impl Dielectric {
         if self.ggx.is_smooth() {
             return Some(self.sample_smooth(wo, u_lobe));
         }
+        match &self.multiple {
+            None => self.sample_once(wo, u_lobe, u),
+            Some(multiple) => self.sample_all(multiple, wo, u_lobe, u),
+        }
+    }
+
+    /// With multiple scattering.
+    #[inline]
+    fn sample_all(&self, multiple: &[Multiple; 2], wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let (o, eta) = (vec3(wo.x, wo.y, wo.z.abs()), self.eta(wo));
+        let lost = self.lost(eta, o);
+        let side = 1f32.copysign(wo.z);
+        let wi = if u_lobe < lost {
+            let near = multiple[usize::from(wo.z < 0.0)];
+            let i = warp::cosine_hemisphere(u);
+            let z = if u_lobe < lost * near.crossing { -i.z } else { i.z };
+            vec3(i.x, i.y, z * side)
+        } else {
+            self.sample_once(wo, ((u_lobe - lost) / (1.0 - lost)).min(ONE_MINUS_EPSILON), u)?.wi
+        };
+        if wi.z.abs() <= MIN_COSINE {
+            return None;
+        }
+        let BsdfEval { value, pdf } = self.eval_all(multiple, wo, o, vec3(wi.x, wi.y, wi.z * side), eta);
+        let is_transmission = wi.z * wo.z < 0.0;
+        let eta = if is_transmission { eta } else { 1.0 };
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission, eta })
+    }
+
+    /// One encounter with a microfacet.
+    #[inline]
+    fn sample_once(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let eta = self.eta(wo);
         let o = vec3(wo.x, wo.y, wo.z.abs());
         let m = self.ggx.sample_visible_normal(o, u);

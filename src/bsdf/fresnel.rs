@@ -67,6 +67,13 @@ impl ComplexIndex {
         Self { real_squared: (eta - k) * (eta + k), cross_squared: (2.0 * eta * k) * (2.0 * eta * k) }
     }
 
+    /// Mean reflectance under diffuse light, `2 ∫ F(cos) cos dcos`, by the midpoint rule.
+    pub fn average(self) -> f32 {
+        const STEPS: u16 = 64;
+        let cosines = (0..STEPS).map(|step| (f32::from(step) + 0.5) / f32::from(STEPS));
+        cosines.map(|cos| 2.0 * cos * self.reflectance(cos)).sum::<f32>() / f32::from(STEPS)
+    }
+
     /// Reflectance at `cos`, within `[0, 1]`, exact for any complex index.
     #[inline]
     pub fn reflectance(&self, cos: f32) -> f32 {

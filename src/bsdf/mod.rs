@@ -5,20 +5,30 @@
 
 mod conductor;
 mod dielectric;
+mod energy;
+mod eon;
 pub mod fresnel;
+mod glossy;
 mod lambert;
 mod microfacet;
 mod mirror;
 mod plastic;
+mod principled;
 #[cfg(test)]
 mod tests;
+mod thin;
 
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
+pub use energy::bake as bake_energy_tables;
+pub use eon::Eon;
+pub use glossy::Glossy;
 pub use lambert::Lambert;
 pub use microfacet::{Ggx, SMOOTH_ALPHA};
 pub use mirror::Mirror;
 pub use plastic::Plastic;
+pub use principled::{Principled, PrincipledParameters};
+pub use thin::{DiffuseTransmission, ThinDielectric};
 
 use crate::color::Rgb;
 use crate::math::Vec3;
@@ -56,24 +66,42 @@ pub struct BsdfEval {
 pub enum Bsdf {
     /// Ideal diffuse reflection.
     Lambert(Lambert),
+    /// Rough diffuse reflection.
+    Eon(Eon),
+    /// Diffuse reflection and transmission.
+    DiffuseTransmission(DiffuseTransmission),
     /// Ideal specular reflection with a given reflectance.
     Mirror(Mirror),
     /// Metal, smooth or rough.
     Conductor(Conductor),
     /// Glass, smooth or rough.
     Dielectric(Dielectric),
+    /// A pane of glass.
+    ThinDielectric(ThinDielectric),
+    /// Diffuse beside a highlight.
+    Glossy(Glossy),
     /// A diffuse base under a smooth or rough dielectric coat.
     Plastic(Plastic),
+    /// Disney's model.
+    Principled(Principled),
 }
+
+// Made anew at every hit: no kind may make the others slower to pass around.
+const _: () = assert!(size_of::<Bsdf>() <= 96);
 
 macro_rules! each {
     ($self:expr, $bsdf:ident => $body:expr) => {
         match $self {
             Bsdf::Lambert($bsdf) => $body,
+            Bsdf::Eon($bsdf) => $body,
+            Bsdf::DiffuseTransmission($bsdf) => $body,
             Bsdf::Mirror($bsdf) => $body,
+            Bsdf::ThinDielectric($bsdf) => $body,
+            Bsdf::Glossy($bsdf) => $body,
             Bsdf::Conductor($bsdf) => $body,
             Bsdf::Dielectric($bsdf) => $body,
             Bsdf::Plastic($bsdf) => $body,
+            Bsdf::Principled($bsdf) => $body,
         }
     };
 }
@@ -98,19 +126,29 @@ impl Bsdf {
         each!(self, bsdf => bsdf.is_delta())
     }
 
-    /// Whether light may cross the surface; otherwise nothing arrives but from the side of `wo`.
-    #[inline]
-    pub fn transmits(&self) -> bool {
-        matches!(self, Self::Dielectric(_))
-    }
-
     /// Whether scattering depends on the direction of the frame's tangents.
     pub fn is_anisotropic(&self) -> bool {
         match self {
-            Self::Lambert(_) | Self::Mirror(_) => false,
+            Self::Lambert(_)
+            | Self::Eon(_)
+            | Self::DiffuseTransmission(_)
+            | Self::Mirror(_)
+            | Self::ThinDielectric(_)
+            | Self::Glossy(_) => false,
             Self::Conductor(bsdf) => bsdf.is_anisotropic(),
             Self::Dielectric(bsdf) => bsdf.is_anisotropic(),
             Self::Plastic(bsdf) => bsdf.is_anisotropic(),
+            Self::Principled(bsdf) => bsdf.is_anisotropic(),
+        }
+    }
+
+    /// Whether light may cross the surface; otherwise nothing arrives but from the side of `wo`.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        match self {
+            Self::Dielectric(_) | Self::ThinDielectric(_) | Self::DiffuseTransmission(_) => true,
+            Self::Principled(bsdf) => bsdf.transmits(),
+            Self::Lambert(_) | Self::Eon(_) | Self::Mirror(_) | Self::Conductor(_) | Self::Plastic(_) | Self::Glossy(_) => false,
         }
     }
 

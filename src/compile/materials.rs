@@ -4,15 +4,17 @@ use std::collections::HashMap;
 use std::fmt::Debug;
 
 use super::Files;
-use super::textures::TextureTable;
-use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
+use super::textures::{TextureTable, TextureUse};
+use crate::bsdf::{Bsdf, Conductor, Dielectric, Glossy, Lambert, Mirror, Plastic, ThinDielectric};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, SceneDesc};
+use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, ScalarDesc, SceneDesc};
 use crate::error::Result;
 use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
-use crate::material::{ColorInput, Material};
+use crate::material::{AlphaInput, ColorInput, Material, ScalarInput, Varying};
+use crate::math::Vec2;
 use crate::relief::Relief;
+use crate::texture::Texture;
 
 /// Real and imaginary part of the index of refraction for red, green and blue (650, 550 and 450 nm; refractiveindex.info: Johnson and Christy
 /// for noble metals, iron, chromium and titanium; Rakic for aluminium and tungsten; Querry for brass).
@@ -59,18 +61,37 @@ impl MaterialTable {
     pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
         let textures = TextureTable::new(files, desc)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
-        let mut table = Self { materials: vec![default], textures, reliefs: Vec::new(), names: HashMap::new() };
+        let mut table = Self { materials: vec![default], textures: TextureTable::default(), reliefs: Vec::new(), names: HashMap::new() };
+        let compiler = Compiler { files, textures: &textures };
         for (name, material) in &desc.materials {
-            if matches!(material, MaterialDesc::Relief { .. }) {
-                continue;
+            if !matches!(material, MaterialDesc::Relief { .. }) {
+                table.add(&compiler, desc, name, &mut Vec::new())?;
             }
-            let compiler = Compiler { files, textures: &table.textures };
-            let material = compiler.material(&format!("materials.{name}"), material)?;
-            let id = table.push(material);
-            table.names.insert(name.clone(), Look::plain(id));
         }
+        table.textures = textures;
         table.add_reliefs(files, desc)?;
         Ok(table)
+    }
+
+    /// Compiles a material and what it consists of, unless that is done. `outer` are the materials that consist of it.
+    pub(super) fn add<'a>(
+        &mut self,
+        compiler: &Compiler,
+        desc: &'a SceneDesc,
+        name: &'a str,
+        outer: &mut Vec<&'a str>,
+    ) -> Result<MaterialId> {
+        if let Some(look) = self.names.get(name) {
+            return Ok(look.material);
+        }
+        let path = format!("materials.{name}");
+        let material = match self.composite(compiler, desc, name, outer)? {
+            Some(material) => material,
+            None => compiler.material(&path, &desc.materials[name])?,
+        };
+        let id = self.push(material);
+        self.names.insert(name.to_owned(), Look::plain(id));
+        Ok(id)
     }
 
     /// Adds a material without a name.
@@ -86,7 +107,13 @@ impl MaterialTable {
 
     /// Whether a surface without uv cannot look so.
     pub fn needs_uv(&self, look: &Look) -> bool {
-        look.relief.is_some() || look.alpha.is_some() || !matches!(self.materials[look.material.index()], Material::Constant(_))
+        look.relief.is_some() || look.alpha.is_some() || self.is_textured(look.material)
+    }
+
+    /// Whether a texture has a say in a material or a part of it.
+    fn is_textured(&self, id: MaterialId) -> bool {
+        let material = &self.materials[id.index()];
+        material.is_textured() || material.parts().is_some_and(|parts| parts.into_iter().any(|part| self.is_textured(part)))
     }
 
     /// Whether a surface's normals come from a normal map.
@@ -104,8 +131,8 @@ impl MaterialTable {
     }
 }
 
-struct Compiler<'a> {
-    files: &'a Files,
+pub(super) struct Compiler<'a> {
+    pub(super) files: &'a Files,
     textures: &'a TextureTable,
 }
 
@@ -113,37 +140,67 @@ impl Compiler<'_> {
     fn material(&self, path: &str, desc: &MaterialDesc) -> Result<Material> {
         let files = self.files;
         Ok(match desc {
-            MaterialDesc::Diffuse { albedo } => match self.color(&format!("{path}.albedo"), albedo)? {
-                ColorInput::Constant(albedo) => Lambert { albedo }.into(),
-                albedo @ ColorInput::Texture(_) => Material::Diffuse { albedo },
-            },
+            MaterialDesc::Diffuse { albedo, roughness } => Varying::Diffuse {
+                albedo: self.color(&format!("{path}.albedo"), albedo)?,
+                roughness: self.scalar(&format!("{path}.roughness"), roughness)?,
+            }
+            .into(),
+            MaterialDesc::DiffuseTransmission { reflectance, transmittance } => {
+                let [reflectance, transmittance] = self.sum_to_one(path, ("reflectance", reflectance), ("transmittance", transmittance))?;
+                Varying::DiffuseTransmission { reflectance, transmittance }.into()
+            }
             MaterialDesc::Relief { .. } => return Err(files.error(path, "a material cannot consist of one with relief")),
             MaterialDesc::Mirror { reflectance } => {
-                Mirror { reflectance: self.constant(&format!("{path}.reflectance"), reflectance)? }.into()
+                Varying::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
             }
-            MaterialDesc::Conductor { metal, eta, k, roughness, alpha, tint } => {
+            MaterialDesc::Conductor { metal, eta, k, roughness, alpha, tint, multiscatter } => {
                 let (eta, k) = self.metal(path, metal.as_deref(), *eta, *k)?;
-                let tint = self.constant(&format!("{path}.tint"), tint)?;
-                Conductor::new(eta.into(), k.into(), self.alpha(path, *roughness, *alpha)?, tint).into()
+                let metal = Conductor::new(eta.into(), k.into(), [0.0; 2], Rgb::WHITE);
+                let tint = self.color(&format!("{path}.tint"), tint)?;
+                let alpha = self.alpha(path, roughness.as_ref(), alpha.as_ref())?;
+                Varying::Conductor { metal, tint, alpha, multiscatter: *multiscatter }.into()
             }
-            MaterialDesc::Dielectric { ior, roughness, alpha } => {
+            MaterialDesc::Dielectric { ior, roughness, alpha, multiscatter } => {
                 files.within(&format!("{path}.ior"), f64::from(*ior), 0.1, 10.0)?;
-                Dielectric::new(*ior, self.alpha(path, *roughness, *alpha)?).into()
+                let alpha = self.alpha(path, roughness.as_ref(), alpha.as_ref())?;
+                Varying::Dielectric { ior: *ior, alpha, multiscatter: *multiscatter }.into()
             }
+            MaterialDesc::ThinDielectric { ior } => {
+                files.within(&format!("{path}.ior"), f64::from(*ior), 0.1, 10.0)?;
+                Material::Constant(Bsdf::ThinDielectric(ThinDielectric { ior: *ior }))
+            }
+            MaterialDesc::Phong { diffuse, specular, exponent } => {
+                if !(*exponent >= 0.0 && exponent.is_finite()) {
+                    return Err(files.error(&format!("{path}.exponent"), format!("must be finite and not negative, not {exponent}")));
+                }
+                let [diffuse, specular] = self.sum_to_one(path, ("diffuse", diffuse), ("specular", specular))?;
+                Varying::Phong { diffuse, specular, exponent: *exponent }.into()
+            }
+            MaterialDesc::CookTorrance { albedo, d, s, m, f0 } => {
+                let albedo = Rgb::from(files.reflectance(&format!("{path}.albedo"), *albedo)?);
+                let f0 = Rgb::from(files.reflectance(&format!("{path}.f0"), *f0)?);
+                for (key, value) in [("d", d), ("s", s), ("m", m)] {
+                    files.within(&format!("{path}.{key}"), f64::from(*value), 0.0, 1.0)?;
+                }
+                if d + s > 1.0 + 1e-6 {
+                    return Err(files.error(path, format!("`d` and `s` must not exceed 1 together, but are {d} and {s}")));
+                }
+                Material::Constant(Bsdf::Glossy(Glossy::new(albedo * *d, f0 * *s, Rgb::splat(*s), *m)))
+            }
+            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } => return Err(files.error(path, "cannot be part of a material")),
             MaterialDesc::Plastic { albedo, ior, roughness, alpha } => {
                 if !(*ior > 1.0 && *ior <= 10.0) {
                     return Err(files.error(&format!("{path}.ior"), format!("must be above 1 and at most 10, not {ior}")));
                 }
-                let alpha = self.alpha(path, *roughness, *alpha)?;
-                match self.color(&format!("{path}.albedo"), albedo)? {
-                    ColorInput::Constant(albedo) => Plastic::new(albedo, *ior, alpha).into(),
-                    albedo @ ColorInput::Texture(_) => Material::Plastic { base: Plastic::new(Rgb::BLACK, *ior, alpha), albedo },
-                }
+                let alpha = self.constant_alpha(path, roughness.as_ref(), alpha.as_ref())?;
+                let albedo = self.color(&format!("{path}.albedo"), albedo)?;
+                Varying::Plastic { base: Plastic::new(Rgb::BLACK, *ior, alpha), albedo }.into()
             }
+            MaterialDesc::Principled(desc) => Varying::Principled(self.principled(path, desc)?).into(),
         })
     }
 
-    fn color(&self, path: &str, desc: &ColorDesc) -> Result<ColorInput> {
+    pub(super) fn color(&self, path: &str, desc: &ColorDesc) -> Result<ColorInput> {
         Ok(match desc {
             ColorDesc::Grey(v) => ColorInput::Constant(self.files.reflectance(path, [*v; 3])?.into()),
             ColorDesc::Rgb(v) => ColorInput::Constant(self.files.reflectance(path, *v)?.into()),
@@ -151,11 +208,33 @@ impl Compiler<'_> {
         })
     }
 
-    fn constant(&self, path: &str, desc: &ColorDesc) -> Result<Rgb> {
-        match self.color(path, desc)? {
-            ColorInput::Constant(color) => Ok(color),
-            ColorInput::Texture(_) => Err(self.files.error(path, "must be a colour: only `albedo` can vary with a texture")),
+    /// A number within `[0, 1]`.
+    pub(super) fn scalar(&self, path: &str, desc: &ScalarDesc) -> Result<ScalarInput> {
+        Ok(match desc {
+            ScalarDesc::Constant(value) => ScalarInput::Constant(self.files.within(path, f64::from(*value), 0.0, 1.0)? as f32),
+            ScalarDesc::Texture { texture } => {
+                let id = self.textures.find(self.files, path, texture, TextureUse::Data)?;
+                match self.textures.get(id) {
+                    Texture::Constant(color) => ScalarInput::Constant(color.luminance().clamp(0.0, 1.0)),
+                    _ => ScalarInput::Texture(id),
+                }
+            }
+        })
+    }
+
+    /// Two colours that do not exceed 1 together; of textures only the lookup can tell.
+    fn sum_to_one(&self, path: &str, a: (&str, &ColorDesc), b: (&str, &ColorDesc)) -> Result<[ColorInput; 2]> {
+        let inputs = [self.color(&format!("{path}.{}", a.0), a.1)?, self.color(&format!("{path}.{}", b.0), b.1)?];
+        if let [ColorInput::Constant(x), ColorInput::Constant(y)] = inputs
+            && (x + y).max_channel() > 1.0 + 1e-6
+        {
+            let message = format!(
+                "`{}` and `{}` must not exceed 1 together in any channel: a surface cannot scatter more than it receives",
+                a.0, b.0
+            );
+            return Err(self.files.error(path, message));
         }
+        Ok(inputs)
     }
 
     fn metal(&self, path: &str, metal: Option<&str>, eta: Option<[f32; 3]>, k: Option<[f32; 3]>) -> Result<([f32; 3], [f32; 3])> {
@@ -175,24 +254,31 @@ impl Compiler<'_> {
     }
 
     /// GGX alpha along u and v; zero for a smooth surface.
-    fn alpha(&self, path: &str, roughness: Option<RoughnessDesc>, alpha: Option<RoughnessDesc>) -> Result<[f32; 2]> {
-        let pair = |desc: RoughnessDesc| match desc {
-            RoughnessDesc::Isotropic(a) => [a; 2],
-            RoughnessDesc::Anisotropic(a) => a,
+    fn alpha(&self, path: &str, roughness: Option<&RoughnessDesc>, alpha: Option<&RoughnessDesc>) -> Result<AlphaInput> {
+        let (key, desc, squared) = match (roughness, alpha) {
+            (None, None) => return Ok(AlphaInput { axes: [ScalarInput::Constant(0.0); 2], squared: false }),
+            (Some(roughness), None) => ("roughness", roughness, true),
+            (None, Some(alpha)) => ("alpha", alpha, false),
+            (Some(_), Some(_)) => return Err(self.files.error(path, "give either `roughness` or `alpha`")),
         };
-        let checked = |key: &str, desc: RoughnessDesc| {
-            let values = pair(desc);
-            for value in values {
-                self.files.within(&format!("{path}.{key}"), f64::from(value), 0.0, 1.0)?;
-            }
-            Ok(values)
+        let path = format!("{path}.{key}");
+        let constant = |value: f32| self.files.within(&path, f64::from(value), 0.0, 1.0).map(|value| ScalarInput::Constant(value as f32));
+        let axes = match desc {
+            RoughnessDesc::Isotropic(a) => [constant(*a)?; 2],
+            RoughnessDesc::Anisotropic([u, v]) => [constant(*u)?, constant(*v)?],
+            RoughnessDesc::Texture { texture } => [self.scalar(&path, &ScalarDesc::Texture { texture: texture.clone() })?; 2],
         };
-        match (roughness, alpha) {
-            (None, None) => Ok([0.0; 2]),
-            (Some(roughness), None) => Ok(checked("roughness", roughness)?.map(|r| r * r)),
-            (None, Some(alpha)) => checked("alpha", alpha),
-            (Some(_), Some(_)) => Err(self.files.error(path, "give either `roughness` or `alpha`")),
+        Ok(AlphaInput { axes, squared })
+    }
+
+    /// The same where no texture is allowed.
+    fn constant_alpha(&self, path: &str, roughness: Option<&RoughnessDesc>, alpha: Option<&RoughnessDesc>) -> Result<[f32; 2]> {
+        let input = self.alpha(path, roughness, alpha)?;
+        if input.is_constant() {
+            return Ok(input.at(&[], Vec2::ZERO));
         }
+        let key = if roughness.is_some() { "roughness" } else { "alpha" };
+        Err(self.files.error(&format!("{path}.{key}"), "cannot come from a texture: what the coat reflects is prepared once"))
     }
 }
 
@@ -250,7 +336,6 @@ fn metal_of_color(reflectance: Rgb, alpha: [f32; 2]) -> Material {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bsdf::Bsdf;
     use crate::math::Vec3;
 
     fn bsdf(mtl: ObjMaterial) -> Bsdf {

@@ -3,6 +3,7 @@
 
 mod camera;
 mod check;
+mod composites;
 mod lights;
 mod materials;
 mod meshes;
@@ -11,6 +12,7 @@ mod nesting;
 mod normals;
 mod objects;
 mod prepared;
+mod principled;
 mod reliefs;
 mod settings;
 mod shapes;
@@ -23,7 +25,6 @@ pub use summary::Summary;
 
 use std::path::{Path, PathBuf};
 
-use crate::bsdf::Bsdf;
 use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
@@ -115,16 +116,15 @@ impl Builder {
             return Err(files.error("lights", message));
         }
         let materials = self.materials.materials;
-        let has_bsdf = |test: fn(&Bsdf) -> bool| materials.iter().any(|m| matches!(m, Material::Constant(bsdf) if test(bsdf)));
         let features = Features {
             lights: !lights.is_empty(),
             environment: sky,
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
-            textures: materials.iter().any(|m| !matches!(m, Material::Constant(_))),
+            textures: materials.iter().any(Material::is_textured),
             reliefs: self.surfaces.iter().any(|surface| surface.relief.is_some()),
             delta_materials: materials.iter().any(Material::is_delta),
-            anisotropic: has_bsdf(Bsdf::is_anisotropic),
+            anisotropic: materials.iter().any(Material::is_anisotropic),
             lens: camera.lens().is_some(),
             motion: self.geometry.is_moving() || camera.is_moving(),
         };

@@ -8,7 +8,7 @@ use crate::color::Rgb;
 use crate::error::Result;
 use crate::id::TextureId;
 use crate::import::{ObjMap, ObjMaterial};
-use crate::material::{ColorInput, Material};
+use crate::material::{ColorInput, Material, ScalarInput, Varying};
 use crate::math::Vec2;
 use crate::relief::Relief;
 use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
@@ -115,8 +115,8 @@ impl Builder {
 /// The material with a texture for its diffuse colour, where it has one.
 fn with_albedo(material: Material, albedo: ColorInput) -> Material {
     match material {
-        Material::Constant(Bsdf::Lambert(_)) => Material::Diffuse { albedo },
-        Material::Constant(Bsdf::Plastic(base)) => Material::Plastic { base, albedo },
+        Material::Constant(Bsdf::Lambert(_)) => Varying::Diffuse { albedo, roughness: ScalarInput::Constant(0.0) }.into(),
+        Material::Constant(Bsdf::Plastic(base)) => Varying::Plastic { base, albedo }.into(),
         other => other,
     }
 }

@@ -8,6 +8,7 @@ mod camera;
 mod light;
 mod material;
 mod output;
+mod principled;
 mod settings;
 mod shape;
 mod texture;
@@ -15,8 +16,9 @@ mod transform;
 
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
-pub use material::{BumpMapDesc, ColorDesc, MaterialDesc, NormalMapDesc, RoughnessDesc};
+pub use material::{BumpMapDesc, ColorDesc, MaterialDesc, NormalMapDesc, RoughnessDesc, ScalarDesc};
 pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
+pub use principled::PrincipledDesc;
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
 pub use shape::{
     ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ObjectDesc,

@@ -134,7 +134,7 @@ fn surface_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInteraction, d
         sample.position = at.p.as_vec3();
     }
     if needs.albedo {
-        let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
+        let bsdf = world.scene.bsdf(at, direction);
         let frame = crate::math::Frame::from_normal(at.n_s);
         sample.albedo = bsdf.albedo(frame.to_local(-direction));
     }

@@ -179,8 +179,11 @@ impl PathIntegrator {
     /// What a contribution brings that was scattered so many times between the light and the camera.
     #[inline]
     fn clamped(&self, contribution: Rgb, scatterings: u32) -> Rgb {
+        if self.clamp == f32::INFINITY || scatterings <= 1 {
+            return contribution;
+        }
         let largest = contribution.max_channel();
-        if scatterings > 1 && largest > self.clamp { contribution * (self.clamp / largest) } else { contribution }
+        if largest > self.clamp { contribution * (self.clamp / largest) } else { contribution }
     }
 
     /// Weight of light that was found by following `direction`, against finding it by sampling the light with density `light_pdf`.
@@ -310,7 +313,7 @@ impl<'a> Vertex<'a> {
         let cos_geometric = back.dot(at.n_g);
         let n_s = facing_normal(back, at.n_s, at.n_g);
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
-        let bsdf = world.scene.material(at.shape).bsdf(&world.scene.textures, at.uv);
+        let bsdf = world.scene.bsdf(at, ray.direction);
         // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
         let has_relief = world.scene.features.reliefs && world.scene.surface(at.shape).relief.is_some();
         let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));

@@ -16,7 +16,7 @@ const LEAF: usize = 8;
 const MAX_DEPTH: u32 = 20;
 
 /// The references that a tree may have for each item, on average.
-const BUDGET: f64 = 6.0;
+const BUDGET: f64 = 16.0;
 
 /// Seven siblings wait on each level.
 const STACK: usize = 8 * (MAX_DEPTH as usize + 1);
@@ -199,6 +199,6 @@ fn split(items: &Items<'_>, cell: &Cell) -> Option<Vec<(u32, Cell)>> {
         }
     }
     // Octants that all hold nearly everything bring nothing.
-    let pays = total as f64 <= cell.budget && (children.len() == 1 || total < 4 * cell.parts.len());
+    let pays = total as f64 <= cell.budget && (children.len() == 1 || total < 6 * cell.parts.len());
     pays.then_some(children)
 }

@@ -5,16 +5,19 @@ use crate::sampling::{PixelSeed, Sampler, SamplerKind};
 
 /// Mean weight of samples with the radiance scaling of refraction undone.
 fn scattered(bsdf: &Bsdf, wo: Vec3) -> Rgb {
-    const COUNT: u32 = 1 << 14;
+    scattered_of(1 << 14, bsdf, wo)
+}
+
+fn scattered_of(count: u32, bsdf: &Bsdf, wo: Vec3) -> Rgb {
     let sampler = Sampler::new(SamplerKind::Sobol, 9);
     let mut sum = Rgb::BLACK;
-    for i in 0..COUNT {
+    for i in 0..count {
         let u = sampler.sample_4d(PixelSeed(1), i, 0);
         if let Some(s) = bsdf.sample(wo, u[2], [u[0], u[1]]) {
             sum += s.weight * (s.eta * s.eta);
         }
     }
-    sum / COUNT as f32
+    sum / count as f32
 }
 
 fn assert_close(name: &str, value: Rgb, expected: f32, tolerance: f32) {
@@ -77,9 +80,49 @@ fn single_scattering_keeps_the_known_fraction() {
     ];
     for (alpha, row) in table {
         for (cos, expected) in cosines.into_iter().zip(row) {
-            assert_close(&format!("{alpha} {cos}"), scattered(&perfect_metal([alpha; 2]), direction(cos, 0.3)), expected, 2e-3);
+            let Bsdf::Conductor(metal) = perfect_metal([alpha; 2]) else { unreachable!() };
+            let single = Bsdf::Conductor(metal.single_scattering());
+            assert_close(&format!("{alpha} {cos}"), scattered(&single, direction(cos, 0.3)), expected, 2e-3);
         }
     }
+}
+
+#[test]
+fn a_white_rough_metal_loses_nothing() {
+    for alpha in [1e-3, 0.01, 0.05, 0.1, 0.3, 0.6, 1.0] {
+        for cos in COSINES {
+            assert_close(&format!("{alpha} {cos}"), scattered_of(1 << 12, &perfect_metal([alpha; 2]), direction(cos, 0.3)), 1.0, 0.01);
+            // Anisotropic: between the axes E is interpolated, and what comes back held down so that nothing is gained.
+            for aspect in [0.1, 0.4] {
+                let total = scattered_of(1 << 12, &perfect_metal([alpha * aspect, alpha]), direction(cos, 0.1));
+                // 0.18 of at most half of the light.
+                assert!(total.g > 0.91 && total.g <= 1.01, "{alpha} {aspect} {cos}: {total:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rough_glass_reflects_and_refracts_all_light() {
+    for ior in [1.1, 1.5, 2.4, 0.7] {
+        for alpha in [0.01, 0.1, 0.4, 1.0] {
+            let bsdf = Bsdf::Dielectric(Dielectric::new(ior, [alpha; 2]));
+            for cos in COSINES {
+                // Close to the horizon E falls too steeply for its table.
+                let tolerance = if cos > 0.02 { 0.02 } else { 0.03 };
+                assert_close(&format!("{ior} {alpha} {cos}"), scattered_of(1 << 12, &bsdf, direction(cos, 0.1)), 1.0, tolerance);
+                assert_close(&format!("{ior} {alpha} -{cos}"), scattered_of(1 << 12, &bsdf, direction(-cos, 0.1)), 1.0, tolerance);
+            }
+        }
+    }
+}
+
+#[test]
+fn several_reflections_deepen_a_metals_colour() {
+    let (Bsdf::Conductor(metal), wo) = (gold([1.0; 2]), direction(0.5, 0.0)) else { unreachable!() };
+    let (all, once) = (scattered(&Bsdf::Conductor(metal), wo), scattered(&Bsdf::Conductor(metal.single_scattering()), wo));
+    let added = all - once;
+    assert!(added.r > 0.3 && added.b / added.r < 0.8 * once.b / once.r, "{all:?} {once:?}");
 }
 
 #[test]

@@ -1,8 +1,10 @@
 //! Every BSDF against statistics and closed forms.
 
+mod diffuse;
 mod energy;
 mod limits;
 mod microfacet;
+mod principled;
 mod sampling;
 
 use super::*;

@@ -42,8 +42,14 @@ impl Emission {
     fn at(&self, textures: &[Texture], uv: impl FnOnce() -> Vec2) -> Rgb {
         match self.texture {
             None => self.radiance,
-            Some(id) => self.radiance * textures[id.index()].color(uv()),
+            Some(id) => self.textured(&textures[id.index()], uv()),
         }
+    }
+
+    /// Out of the way of emission without a texture.
+    #[cold]
+    fn textured(&self, texture: &Texture, uv: Vec2) -> Rgb {
+        self.radiance * texture.color(uv)
     }
 }
 

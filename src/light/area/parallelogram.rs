@@ -104,6 +104,7 @@ impl ParallelogramEmitter {
     }
 
     /// A point chosen by the brightness of its texel in half of the cases, by what `p` sees of the surface in the others.
+    #[cold]
     fn sample_textured(&self, texels: &Piecewise2d, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
         let mut sample = if u[0] < 0.5 {
             self.sample_by_size(p, [2.0 * u[0], u[1]])?
@@ -117,7 +118,7 @@ impl ParallelogramEmitter {
     }
 
     /// A point that does not depend on the texture.
-    #[inline]
+    #[inline(always)]
     fn sample_by_size(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
         let view = self.view(p);
         let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };

@@ -1,0 +1,159 @@
+//! How much of the light microfacets scatter at once, and what is lost to their second and later encounters.
+//!
+//! A microfacet model follows light to one microfacet; what is masked on its way out is missing, up to two thirds at alpha 1. With `E(w)`
+//! the fraction that is scattered at once for the direction `w` and `E_avg` its mean under diffuse light, the lobe
+//!
+//! ```text
+//! (1 - E(wo)) (1 - E(wi)) / (pi (1 - E_avg))
+//! ```
+//!
+//! times the colour that several reflections leave gives back exactly what is missing, and is reciprocal (Kulla and Conty, "Revisiting
+//! Physically Based Shading at Imageworks"). `E` comes from tables that `cargo run --release --example bake_energy` computes.
+//!
+//! Directions are unit, local, on the upper side.
+
+mod bake;
+pub(super) mod table;
+
+pub use bake::bake;
+
+use super::Ggx;
+use crate::math::Vec3;
+pub(super) use table::schlick_weight;
+use table::{
+    ALPHAS, ASPECTS, CLEAR_COAT, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MIRRORS, MIRRORS_AVERAGE, Place, SCHLICK, SHAPES, SHEEN,
+    smoothed,
+};
+
+/// The least loss under diffuse light that is told from none.
+const MIN_LOST: f32 = 1e-7;
+
+/// Fraction of the light that rough microfacets scatter at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Energy {
+    ggx: Ggx,
+    /// The larger alpha.
+    alpha: f32,
+    /// The smaller alpha over the larger.
+    aspect: f32,
+    at_alpha: Place,
+}
+
+/// A direction as the tables see it.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    /// Cosine with which isotropic microfacets of the larger alpha mask as much.
+    cos: f32,
+    at: Place,
+    /// How far the direction is from the plane of the larger alpha, within `[0, 1]`.
+    across: f32,
+}
+
+impl Energy {
+    #[inline]
+    pub fn new(ggx: &Ggx) -> Self {
+        let [ax, ay] = ggx.alpha();
+        let alpha = ax.max(ay);
+        Self { ggx: *ggx, alpha, aspect: ax.min(ay) / alpha, at_alpha: Place::of_alpha(alpha) }
+    }
+
+    #[inline]
+    fn see(&self, w: Vec3) -> Seen {
+        let [ax, ay] = self.ggx.alpha();
+        let cos = w.z.clamp(0.0, 1.0);
+        if ax == ay {
+            return Seen { cos, at: Place::of_cosine(cos, self.alpha), across: 0.0 };
+        }
+        // What counts is the tangent times the alpha along the direction.
+        let (x, y) = (ax * w.x, ay * w.y);
+        let (x2, y2) = (x * x, y * y);
+        let run = (x2 + y2).sqrt() / self.alpha;
+        let cos = cos / (cos * cos + run * run).sqrt();
+        let along = w.x * w.x + w.y * w.y;
+        let minor = if ax > ay { w.y } else { w.x };
+        let across = if along > 0.0 { minor * minor / along } else { 0.5 };
+        Seen { cos, at: Place::of_cosine(cos, self.alpha), across }
+    }
+
+    /// What perfect mirrors would scatter.
+    #[inline]
+    pub fn mirrors(&self, w: Vec3) -> f32 {
+        self.mirrors_seen(self.see(w))
+    }
+
+    #[inline]
+    fn mirrors_seen(&self, seen: Seen) -> f32 {
+        const AXIS: usize = ALPHAS * COSINES;
+        let lookup = |aspect: usize, axis: usize| MIRRORS.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, seen.at);
+        if self.aspect == 1.0 {
+            return lookup(ASPECTS - 1, 0);
+        }
+        let at = Place::new(self.aspect.sqrt(), ASPECTS);
+        let of = |axis: usize| {
+            let (before, after) = (lookup(at.node, axis), lookup(at.node + 1, axis));
+            before + (after - before) * at.part
+        };
+        let (along, across) = (of(0), of(1));
+        along + (across - along) * seen.across
+    }
+
+    /// What [`Energy::mirrors`] lacks of 1 under diffuse light.
+    pub fn mirrors_lost(&self) -> f32 {
+        let lost = MIRRORS_AVERAGE.bilinear_square(0, ALPHAS, Place::new(self.aspect.sqrt(), ASPECTS), self.at_alpha).max(MIN_LOST);
+        // Between its axes the table of anisotropic microfacets is wrong by up to a sixth of what is lost: rather darker than brighter.
+        lost / (1.0 - 0.18 * (1.0 - self.aspect))
+    }
+
+    /// What mirrors of reflectance `(1 - cos)^5` would scatter: Schlick's approximation is linear in this and [`Energy::mirrors`].
+    #[inline]
+    pub fn schlick(&self, w: Vec3) -> f32 {
+        let seen = self.see(w);
+        SCHLICK.bilinear_from(0, COSINES, self.at_alpha, seen.at) + schlick_weight(smoothed(seen.cos, self.alpha))
+    }
+
+    /// What dielectric microfacets reflect and refract together, for the index of refraction beyond them over that on this side, within
+    /// `[1/10, 10]`. Of isotropic microfacets.
+    #[inline]
+    pub fn glass(&self, eta: f32, w: Vec3) -> f32 {
+        const SIDE: usize = ALPHAS * IORS * COSINES;
+        let (start, ior) = if eta >= 1.0 { (0, eta) } else { (SIDE, 1.0 / eta) };
+        let seen = self.see(w);
+        GLASS.trilinear(start, [IORS, COSINES], [self.at_alpha, Place::of_ior(ior), seen.at])
+    }
+
+    /// What [`Energy::glass`] lacks of 1 under diffuse light.
+    pub fn glass_lost(&self, eta: f32) -> f32 {
+        let (start, ior) = if eta >= 1.0 { (0, eta) } else { (ALPHAS * IORS, 1.0 / eta) };
+        GLASS_AVERAGE.bilinear_square(start, IORS, self.at_alpha, Place::of_ior(ior)).max(MIN_LOST)
+    }
+}
+
+/// Colour of light that leaves after more than one reflection, over what perfect mirrors would leave for it, where `reflectance` is the mean
+/// reflectance and `average` what perfect mirrors scatter at once under diffuse light: `sum_k reflectance^k (1 - average)^(k - 2) average`
+/// from `k = 2` on.
+#[inline]
+pub fn multiple_color(reflectance: f32, average: f32) -> f32 {
+    reflectance * reflectance * average / (1.0 - reflectance * (1.0 - average)).max(f32::MIN_POSITIVE)
+}
+
+/// Albedo of the principled model's white diffuse lobe, with `flat` of it the flat lobe.
+#[inline]
+pub fn principled_diffuse(roughness: f32, flat: f32, cos: f32) -> f32 {
+    let (shape, at) = (Place::new(roughness, SHAPES), Place::of_cosine(cos, 1.0));
+    let of = |kind: usize| DIFFUSE.bilinear_from(kind * SHAPES * COSINES, COSINES, shape, at);
+    let diffuse = of(0);
+    if flat == 0.0 { diffuse } else { diffuse + (of(1) - diffuse) * flat }
+}
+
+/// Albedo of the principled model's sheen.
+#[inline]
+pub fn principled_sheen(cos: f32) -> f32 {
+    let at = Place::of_cosine(cos, 1.0);
+    SHEEN.linear(at.node, at.part)
+}
+
+/// Albedo of the principled model's clear coat.
+#[inline]
+pub fn principled_clear_coat(gloss: f32, cos: f32) -> f32 {
+    CLEAR_COAT.bilinear_from(0, COSINES, Place::new(gloss, SHAPES), Place::of_cosine(cos, 1.0))
+}

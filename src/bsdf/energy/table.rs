@@ -1,0 +1,167 @@
+//! The baked numbers: where each block lies in the file, and how it is read between its nodes.
+
+/// Nodes along alpha, at equal steps of its square root.
+pub const ALPHAS: usize = 24;
+/// Nodes along the smaller alpha over the larger, at equal steps of its square root.
+pub const ASPECTS: usize = 6;
+/// Nodes along the index of refraction, at equal steps of the fourth root of the reflectance ahead.
+pub const IORS: usize = 16;
+/// Nodes along the cosine, at equal steps of [`cosine_axis`].
+pub const COSINES: usize = 24;
+/// Nodes along the roughness of the diffuse lobes and the gloss of the clear coat of the principled model.
+pub const SHAPES: usize = 8;
+
+/// Largest index of refraction.
+pub const MAX_IOR: f32 = 10.0;
+
+static DATA: &[u8; 2 * TOTAL] = include_bytes!("tables.bin");
+
+/// Fractions of 1, in units of 1/65535, from one place of the file on.
+#[derive(Clone, Copy, Debug)]
+pub struct Block {
+    start: usize,
+    len: usize,
+    low: f32,
+    scale: f32,
+}
+
+impl Block {
+    const fn new(start: usize, len: usize, low: f32, high: f32) -> Self {
+        Self { start, len, low, scale: (high - low) / 65_535.0 }
+    }
+
+    const fn end(&self) -> usize {
+        self.start + self.len
+    }
+
+    /// Appends values in the form of the file.
+    pub fn encode(&self, values: &[f32], file: &mut Vec<u8>) {
+        assert_eq!((file.len(), values.len()), (2 * self.start, self.len));
+        for value in values {
+            let steps = ((value - self.low) / self.scale).round();
+            assert!((0.0..=65_535.0).contains(&steps), "{value} is out of the range of {self:?}");
+            file.extend((steps as u16).to_le_bytes());
+        }
+    }
+
+    /// The value at a node.
+    #[inline]
+    pub fn at(&self, node: usize) -> f32 {
+        let at = 2 * (self.start + node);
+        self.low + self.scale * f32::from(u16::from_le_bytes([DATA[at], DATA[at + 1]]))
+    }
+
+    /// Between two neighbouring nodes.
+    #[inline]
+    pub fn linear(&self, node: usize, part: f32) -> f32 {
+        let (before, after) = (self.at(node), self.at(node + 1));
+        before + (after - before) * part
+    }
+
+    /// Between nodes of two axes, the second with `columns` nodes, in the part of the block that begins at `start`.
+    #[inline]
+    pub fn bilinear_from(&self, start: usize, columns: usize, first: Place, second: Place) -> f32 {
+        let row = |node: usize| self.linear(start + node * columns + second.node, second.part);
+        let (before, after) = (row(first.node), row(first.node + 1));
+        before + (after - before) * first.part
+    }
+
+    /// Square of the value between nodes of two axes, linear in the squares.
+    #[inline]
+    pub fn bilinear_square(&self, start: usize, columns: usize, first: Place, second: Place) -> f32 {
+        let square = |node: usize| self.at(node) * self.at(node);
+        let row = |node: usize| {
+            let at = start + node * columns + second.node;
+            square(at) + (square(at + 1) - square(at)) * second.part
+        };
+        let (before, after) = (row(first.node), row(first.node + 1));
+        before + (after - before) * first.part
+    }
+
+    /// Between nodes of three axes.
+    #[inline]
+    pub fn trilinear(&self, start: usize, counts: [usize; 2], places: [Place; 3]) -> f32 {
+        let plane = |node: usize| self.bilinear_from(start + node * counts[0] * counts[1], counts[1], places[1], places[2]);
+        let (before, after) = (plane(places[0].node), plane(places[0].node + 1));
+        before + (after - before) * places[0].part
+    }
+}
+
+/// Single-scattering albedo of microfacets that reflect all: aspect, axis above which the direction is, alpha, cosine.
+pub const MIRRORS: Block = Block::new(0, ASPECTS * 2 * ALPHAS * COSINES, 0.0, 1.0);
+/// Square root of what its mean under diffuse light lacks of 1: aspect, alpha.
+pub const MIRRORS_AVERAGE: Block = Block::new(MIRRORS.end(), ASPECTS * ALPHAS, 0.0, 1.0);
+/// The same for microfacets that reflect `(1 - cos)^5`, less that of [`smoothed`] `cos`: alpha, cosine.
+pub const SCHLICK: Block = Block::new(MIRRORS_AVERAGE.end(), ALPHAS * COSINES, -1.0, 1.0);
+/// What dielectric microfacets reflect and refract together: seen from outside or inside, alpha, index, cosine.
+pub const GLASS: Block = Block::new(SCHLICK.end(), 2 * ALPHAS * IORS * COSINES, 0.0, 1.0);
+/// Square root of what its mean lacks of 1: seen from outside or inside, alpha, index.
+pub const GLASS_AVERAGE: Block = Block::new(GLASS.end(), 2 * ALPHAS * IORS, 0.0, 1.0);
+/// Albedo of the principled model's white diffuse lobe and of its flat one: which, roughness, cosine.
+pub const DIFFUSE: Block = Block::new(GLASS_AVERAGE.end(), 2 * SHAPES * COSINES, 0.0, 2.0);
+/// Albedo of its sheen: cosine.
+pub const SHEEN: Block = Block::new(DIFFUSE.end(), COSINES, 0.0, 1.0);
+/// Albedo of its clear coat: gloss, cosine.
+pub const CLEAR_COAT: Block = Block::new(SHEEN.end(), SHAPES * COSINES, 0.0, 1.0);
+const TOTAL: usize = CLEAR_COAT.end();
+
+/// A place between two nodes of an axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// The node before.
+    pub node: usize,
+    /// How far it is to the next node, within `[0, 1]`.
+    pub part: f32,
+}
+
+impl Place {
+    /// On an axis of `count` nodes, where `x` runs from 0 to 1.
+    #[inline]
+    pub fn new(x: f32, count: usize) -> Self {
+        let at = x * (count - 1) as f32;
+        let node = (at as usize).min(count - 2);
+        Self { node, part: (at - node as f32).clamp(0.0, 1.0) }
+    }
+
+    /// On the axis of alpha.
+    #[inline]
+    pub fn of_alpha(alpha: f32) -> Self {
+        Self::new(alpha.sqrt(), ALPHAS)
+    }
+
+    /// On the axis of the index of refraction, at least 1.
+    #[inline]
+    pub fn of_ior(ior: f32) -> Self {
+        const LAST: f32 = (MAX_IOR + 1.0) / (MAX_IOR - 1.0);
+        Self::new(((ior - 1.0) / (ior + 1.0) * LAST).max(0.0).sqrt(), IORS)
+    }
+
+    /// On the axis of the cosine.
+    #[inline]
+    pub fn of_cosine(cos: f32, alpha: f32) -> Self {
+        Self::new(cosine_axis(cos, alpha), COSINES)
+    }
+}
+
+/// Where a cosine lies on its axis: half of the nodes follow its square root; the others are dense where the cosine is of the order of
+/// alpha, since there masking sets in.
+#[inline]
+pub fn cosine_axis(cos: f32, alpha: f32) -> f32 {
+    0.5 * (cos * (1.0 + alpha) / (cos + alpha).max(f32::MIN_POSITIVE) + cos.sqrt())
+}
+
+/// A cosine that stays away from grazing by about alpha, where microfacets are not seen at grazing angles: what is left to tabulate after
+/// Fresnel's reflectance there is smooth.
+#[inline]
+pub fn smoothed(cos: f32, alpha: f32) -> f32 {
+    let apart = 2.25 * alpha * alpha;
+    ((cos * cos + apart) / (1.0 + apart)).sqrt().min(1.0)
+}
+
+/// `(1 - cos)^5`.
+#[inline]
+pub fn schlick_weight(cos: f32) -> f32 {
+    let rest = 1.0 - cos;
+    let squared = rest * rest;
+    squared * squared * rest
+}

@@ -1,0 +1,102 @@
+//! A diffuse part beside a GGX highlight: what Phong's and Cook and Torrance's models of older scenes come to.
+//!
+//! ```text
+//! f = diffuse / pi + F D G2 / (4 |cos wo| |cos wi|),    F = ahead + (grazing - ahead) (1 - cos)^5
+//! ```
+//!
+//! Both parts always count in full, so that diffuse and grazing reflectance together must not exceed 1 in any channel.
+
+use std::f32::consts::FRAC_1_PI;
+
+use super::energy::schlick_weight;
+use super::microfacet::{MIN_COSINE, reflect};
+use super::{BsdfEval, BsdfSample, Ggx};
+use crate::color::Rgb;
+use crate::math::{Vec3, vec3};
+use crate::sampling::warp;
+
+/// A diffuse part beside a highlight, on both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Glossy {
+    diffuse: Rgb,
+    /// Reflectance of the highlight ahead and at grazing angles.
+    ahead: Rgb,
+    grazing: Rgb,
+    ggx: Ggx,
+}
+
+/// The least alpha: the highlight is no delta.
+const MIN_ALPHA: f32 = 1e-3;
+
+impl Glossy {
+    /// With Schlick's Fresnel term from `ahead` to `grazing` and a GGX `alpha` within `[0, 1]`, of which at least 0.001 counts.
+    pub fn new(diffuse: Rgb, ahead: Rgb, grazing: Rgb, alpha: f32) -> Self {
+        Self { diffuse, ahead, grazing, ggx: Ggx::new([alpha.max(MIN_ALPHA); 2]) }
+    }
+
+    /// Phong's model with the highlight of the same width: alpha is `sqrt(2 / (exponent + 2))` (Walter et al., "Microfacet Models for
+    /// Refraction through Rough Surfaces").
+    pub fn phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Self {
+        Self::new(diffuse, specular, specular, (2.0 / (exponent + 2.0)).sqrt())
+    }
+
+    #[inline]
+    fn reflectance(&self, cos: f32) -> Rgb {
+        self.ahead + (self.grazing - self.ahead) * schlick_weight(cos.min(1.0))
+    }
+
+    /// Probability of the highlight: by what the parts reflect, about.
+    #[inline]
+    fn highlight_probability(&self, cos: f32) -> f32 {
+        let (highlight, diffuse) = (self.reflectance(cos).mean(), self.diffuse.mean());
+        if highlight + diffuse > 0.0 { highlight / (highlight + diffuse) } else { 0.0 }
+    }
+
+    /// Both parts, for directions on the same side.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        if wo.z * wi.z <= 0.0 || wo.z.abs() <= MIN_COSINE {
+            return BsdfEval::default();
+        }
+        let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
+        let facet = self.ggx.reflection(o, i);
+        let probability = self.highlight_probability(o.z);
+        let cosine_pdf = FRAC_1_PI * i.z;
+        BsdfEval {
+            value: self.diffuse * cosine_pdf + self.reflectance(facet.cos) * facet.value,
+            pdf: (1.0 - probability) * cosine_pdf + probability * facet.pdf,
+        }
+    }
+
+    /// A direction from one of the parts.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        if wo.z.abs() <= MIN_COSINE {
+            return None;
+        }
+        let o = vec3(wo.x, wo.y, wo.z.abs());
+        let i = if u_lobe < self.highlight_probability(o.z) {
+            let m = self.ggx.sample_visible_normal(o, u);
+            reflect(o, m, o.dot(m))
+        } else {
+            warp::cosine_hemisphere(u)
+        };
+        if i.z <= 0.0 {
+            return None;
+        }
+        let wi = vec3(i.x, i.y, i.z.copysign(wo.z));
+        let BsdfEval { value, pdf } = self.eval(wo, wi);
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+    }
+
+    /// Never.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        false
+    }
+
+    /// Both parts; what microfacets lose is left out.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        self.diffuse + self.reflectance(wo.z.abs())
+    }
+}

@@ -1,0 +1,459 @@
+//! The principled model: one material for most surfaces, from a dozen parameters (Burley, "Physically Based Shading at Disney"; Burley,
+//! "Extending the Disney BRDF to a BSDF with Integrated Subsurface Scattering").
+//!
+//! From the top: a clear coat; below it, shared out by `metallic` and `transmission`, a metal, a dielectric layer over a diffuse base with
+//! sheen, and rough glass. A layer that reflects `E(w)` of the light from `w` leaves
+//!
+//! ```text
+//! 1 - max(E(wo), E(wi))
+//! ```
+//!
+//! to what is below: reciprocal, and the whole never scatters more than it receives, whatever the parameters. Differences from the papers,
+//! where lobes are simply added and a white surface may reflect up to twice what it receives:
+//!
+//! - layers take from what is below them, as above; the diffuse lobe is divided by its albedo where that exceeds 1;
+//! - GGX masks with the height-correlated G2, and light scattered among microfacets several times is added back;
+//! - alpha is `roughness²` stretched by the aspect, within `[0.001, 1]`, for distribution and masking alike;
+//! - tints are the base colour over its largest channel in place of its luminance, so that no channel exceeds 1;
+//! - subsurface scattering is the flat lobe of 2012 for solids as well; glass has exact Fresnel terms, all else Schlick's;
+//! - the specular lobe that passes a thin sheet has the width of the one that it reflects.
+//!
+//! Mitsuba 3's `principled` adds its lobes as well, has exact Fresnel terms for the untinted layer, G as a product, no compensation, and no
+//! `diffuse_transmission` without `principledthin`.
+
+pub(super) mod shapes;
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use super::energy::{Energy, principled_clear_coat, principled_diffuse, principled_sheen, schlick_weight};
+use super::microfacet::{MIN_COSINE, reflect};
+use super::thin::pane_reflectance;
+use super::{BsdfEval, BsdfSample, Dielectric, Ggx};
+use crate::color::Rgb;
+use crate::math::{Vec3, vec3};
+use crate::sampling::warp;
+use shapes::ClearCoat;
+
+/// Parameters of the principled model, within `[0, 1]` where nothing else is said.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrincipledParameters {
+    /// Colour of the base, the metal and what is refracted.
+    pub base_color: Rgb,
+    /// How much of the surface is metal.
+    pub metallic: f32,
+    /// Square root of GGX's alpha; shape of the diffuse lobe.
+    pub roughness: f32,
+    /// How much the highlight is stretched along x.
+    pub anisotropic: f32,
+    /// Index of refraction over that of the outside, within `[1, 10]`; see [`PrincipledParameters::ior_of_specular`].
+    pub ior: f32,
+    /// How much the dielectric layer's reflection ahead has the base's colour.
+    pub specular_tint: f32,
+    /// Strength of the sheen.
+    pub sheen: f32,
+    /// How much the sheen has the base's colour.
+    pub sheen_tint: f32,
+    /// Strength of the clear coat.
+    pub clearcoat: f32,
+    /// Sharpness of the clear coat.
+    pub clearcoat_gloss: f32,
+    /// From the diffuse to the flat lobe.
+    pub subsurface: f32,
+    /// How much of what is not metal is glass.
+    pub transmission: f32,
+    /// How much of what the diffuse base of a thin sheet scatters goes to the other side.
+    pub diffuse_transmission: f32,
+    /// Whether the surface is a sheet with the outside on both sides.
+    pub thin: bool,
+    /// Whether light scattered by microfacets several times counts.
+    pub multiscatter: bool,
+}
+
+impl Default for PrincipledParameters {
+    fn default() -> Self {
+        Self {
+            base_color: Rgb::splat(0.5),
+            metallic: 0.0,
+            roughness: 0.5,
+            anisotropic: 0.0,
+            ior: 1.5,
+            specular_tint: 0.0,
+            sheen: 0.0,
+            sheen_tint: 0.5,
+            clearcoat: 0.0,
+            clearcoat_gloss: 1.0,
+            subsurface: 0.0,
+            transmission: 0.0,
+            diffuse_transmission: 0.0,
+            thin: false,
+            multiscatter: true,
+        }
+    }
+}
+
+impl PrincipledParameters {
+    /// The index of refraction whose reflectance ahead is `0.08 specular`.
+    pub fn ior_of_specular(specular: f32) -> f32 {
+        2.0 / (1.0 - (0.08 * specular).sqrt()) - 1.0
+    }
+}
+
+/// The least alpha: no lobe is a delta.
+const MIN_ALPHA: f32 = 1e-3;
+
+/// The least index of refraction of glass: with less, directions have no digits left to tell refracted light from light that goes on.
+const MIN_GLASS_IOR: f32 = 1.05;
+
+/// The principled model at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Principled {
+    base: Rgb,
+    /// Reflectance of the dielectric layer ahead.
+    specular: Rgb,
+    /// Colour of light scattered by microfacets more than once, over `pi (1 - E_avg)`.
+    multiple: Rgb,
+    /// Weights of metal and of glass; the rest is the diffuse base with its layer.
+    metallic: f32,
+    glass: f32,
+    ior: f32,
+    ggx: Ggx,
+    sheen: f32,
+    sheen_tint: f32,
+    clearcoat: f32,
+    gloss: f32,
+    roughness: f32,
+    flat: f32,
+    diffuse_transmission: f32,
+    thin: bool,
+    multiscatter: bool,
+}
+
+/// What the layers reflect of the light from one direction, each if it alone were there.
+struct Albedos {
+    /// Microfacets that reflect all, and those that reflect Schlick's weight.
+    mirrors: f32,
+    schlick: f32,
+    clearcoat: f32,
+    sheen: f32,
+    /// The white diffuse lobe before it is divided.
+    diffuse: f32,
+}
+
+/// Probabilities of the lobes.
+struct Choice {
+    clearcoat: f32,
+    specular: f32,
+    /// What is sampled by the cosine: diffuse base, sheen, and light scattered several times.
+    diffuse: f32,
+    diffuse_transmission: f32,
+    glass: f32,
+}
+
+impl Principled {
+    /// The model for parameters within their ranges.
+    pub fn new(p: &PrincipledParameters) -> Self {
+        let aspect = (1.0 - 0.9 * p.anisotropic).sqrt();
+        let squared = p.roughness * p.roughness;
+        let glass = (1.0 - p.metallic) * p.transmission;
+        let refracts = glass > 0.0 && !p.thin;
+        let ior = if refracts { p.ior.max(MIN_GLASS_IOR) } else { p.ior };
+        let least = if refracts { MIN_ALPHA.max(2e-4 / (ior - 1.0)) } else { MIN_ALPHA };
+        let ggx = Ggx::new([squared / aspect, squared * aspect].map(|a| a.clamp(least, 1.0)));
+
+        let ahead = (p.ior - 1.0) / (p.ior + 1.0);
+        let largest = p.base_color.max_channel();
+        let tint = if largest > 0.0 { p.base_color / largest } else { Rgb::WHITE };
+        let specular = mix(Rgb::WHITE, tint, p.specular_tint) * (ahead * ahead);
+        let dielectric = 1.0 - p.metallic - glass;
+        let mut multiple = Rgb::BLACK;
+        if p.multiscatter && p.metallic + dielectric > 0.0 {
+            let lost = Energy::new(&ggx).mirrors_lost();
+            let color = p.base_color.map(|f| schlick_multiple(f, 1.0 - lost)) * p.metallic
+                + specular.map(|f| schlick_multiple(f, 1.0 - lost)) * dielectric.max(0.0);
+            multiple = color / (PI * lost);
+        }
+        Self {
+            base: p.base_color,
+            specular,
+            multiple,
+            metallic: p.metallic,
+            glass,
+            ior,
+            ggx,
+            sheen: p.sheen,
+            sheen_tint: p.sheen_tint,
+            clearcoat: p.clearcoat,
+            gloss: p.clearcoat_gloss,
+            roughness: p.roughness,
+            flat: p.subsurface,
+            diffuse_transmission: p.diffuse_transmission,
+            thin: p.thin,
+            multiscatter: p.multiscatter,
+        }
+    }
+
+    /// Weight of the diffuse base with its layer.
+    #[inline]
+    fn dielectric(&self) -> f32 {
+        (1.0 - self.metallic - self.glass).max(0.0)
+    }
+
+    /// Reflectance of metal and layer together, at Schlick's weight 0.
+    #[inline]
+    fn reflectance_ahead(&self) -> Rgb {
+        self.base * self.metallic + self.specular * self.dielectric()
+    }
+
+    #[inline]
+    fn sheen_color(&self) -> Rgb {
+        let largest = self.base.max_channel();
+        let tint = if largest > 0.0 { self.base / largest } else { Rgb::WHITE };
+        mix(Rgb::WHITE, tint, self.sheen_tint) * self.sheen
+    }
+
+    #[inline]
+    fn glass(&self) -> Dielectric {
+        Dielectric::rough(self.ior, self.ggx, self.multiscatter)
+    }
+
+    #[inline]
+    fn albedos(&self, w: Vec3) -> Albedos {
+        let cos = w.z.clamp(0.0, 1.0);
+        let energy = Energy::new(&self.ggx);
+        let mirrors = energy.mirrors(w);
+        let dielectric = self.dielectric() > 0.0;
+        Albedos {
+            mirrors,
+            schlick: energy.schlick(w).clamp(0.0, mirrors),
+            clearcoat: if self.clearcoat > 0.0 { self.clearcoat * principled_clear_coat(self.gloss, cos) } else { 0.0 },
+            sheen: if dielectric && self.sheen > 0.0 { principled_sheen(cos) } else { 0.0 },
+            diffuse: if dielectric { principled_diffuse(self.roughness, self.flat, cos) } else { 0.0 },
+        }
+    }
+
+    /// What the dielectric layer reflects, several times scattered light included.
+    #[inline]
+    fn layer_albedo(&self, at: &Albedos) -> Rgb {
+        self.specular.map(|f| {
+            let average = f + (1.0 - f) / 21.0;
+            f * (at.mirrors - at.schlick) + at.schlick + (1.0 - at.mirrors) * average * average
+        })
+    }
+
+    /// What the layer of a black base reflects, for a direction of the upper side: the closed form for tests.
+    #[cfg(test)]
+    pub(super) fn layer_albedo_at(&self, w: Vec3) -> f32 {
+        self.layer_albedo(&self.albedos(w)).g
+    }
+
+    /// Probabilities for a direction: by what the lobes scatter, about.
+    #[inline]
+    fn choose(&self, at: &Albedos) -> Choice {
+        let below = 1.0 - at.clearcoat;
+        let ahead = self.reflectance_ahead().mean();
+        let specular = below * (ahead * (at.mirrors - at.schlick) + (self.metallic + self.dielectric()) * at.schlick);
+        let base = self.dielectric() * (1.0 - self.layer_albedo(at).mean()) * self.base.mean();
+        let around = self.dielectric() * self.sheen * at.sheen + (1.0 - at.mirrors) * self.multiple.mean().min(1.0);
+        let diffuse = below * (base * (1.0 - self.diffuse_transmission) + around);
+        let diffuse_transmission = below * base * self.diffuse_transmission;
+        let glass = below * self.glass;
+        let sum = at.clearcoat + specular + diffuse + diffuse_transmission + glass;
+        let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+        Choice {
+            clearcoat: at.clearcoat * scale,
+            specular: specular * scale,
+            diffuse: diffuse * scale,
+            diffuse_transmission: diffuse_transmission * scale,
+            glass: glass * scale,
+        }
+    }
+
+    /// All lobes.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        if wo.z.abs().min(wi.z.abs()) <= MIN_COSINE {
+            return BsdfEval::default();
+        }
+        let at_o = self.albedos(vec3(wo.x, wo.y, wo.z.abs()));
+        self.eval_from(wo, wi, &at_o, &self.choose(&at_o))
+    }
+
+    fn eval_from(&self, wo: Vec3, wi: Vec3, at_o: &Albedos, choice: &Choice) -> BsdfEval {
+        let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
+        let at_i = self.albedos(i);
+        let below = 1.0 - at_o.clearcoat.max(at_i.clearcoat);
+        let reflects = wo.z * wi.z > 0.0;
+        let mut value = Rgb::BLACK;
+        let mut coat = 0.0;
+        let mut pdf = 0.0;
+
+        // Clear coat, metal and dielectric layer.
+        if reflects {
+            if self.clearcoat > 0.0 {
+                let (unscaled, density) = ClearCoat::new(self.gloss).eval(o, i);
+                coat = self.clearcoat * unscaled;
+                pdf += choice.clearcoat * density;
+            }
+            if self.metallic + self.dielectric() > 0.0 {
+                let facet = self.ggx.reflection(o, i);
+                let weight = schlick_weight(facet.cos);
+                let ahead = self.reflectance_ahead();
+                let grazing = Rgb::splat(self.metallic + self.dielectric());
+                value += (ahead * (1.0 - weight) + grazing * weight) * facet.value;
+                value += self.multiple * ((1.0 - at_o.mirrors) * (1.0 - at_i.mirrors) * i.z);
+                pdf += choice.specular * facet.pdf;
+            }
+        }
+
+        // The base.
+        let cosine_pdf = FRAC_1_PI * i.z;
+        if self.dielectric() > 0.0 {
+            value += self.base_value(o, i, reflects, at_o, &at_i) * self.dielectric();
+        }
+        pdf += if reflects { choice.diffuse } else { choice.diffuse_transmission } * cosine_pdf;
+
+        // Glass.
+        if self.glass > 0.0 {
+            let (color, glass) = if self.thin {
+                (self.base, self.eval_sheet(o, i, reflects))
+            } else {
+                (self.base.map(f32::sqrt), self.glass().eval(wo, wi))
+            };
+            value += if reflects { glass.value } else { glass.value * color } * self.glass;
+            pdf += choice.glass * glass.pdf;
+        }
+        BsdfEval { value: value * below + Rgb::splat(coat), pdf }
+    }
+
+    /// The diffuse base below its layer.
+    #[inline]
+    fn base_value(&self, o: Vec3, i: Vec3, reflects: bool, at_o: &Albedos, at_i: &Albedos) -> Rgb {
+        let (layer_o, layer_i) = (self.layer_albedo(at_o), self.layer_albedo(at_i));
+        let left = |o: f32, i: f32| (1.0 - o.max(i)).max(0.0);
+        let below_layer = Rgb::new(left(layer_o.r, layer_i.r), left(layer_o.g, layer_i.g), left(layer_o.b, layer_i.b));
+        let below_sheen = left(self.sheen * at_o.sheen, self.sheen * at_i.sheen);
+        if !reflects {
+            return self.base * below_layer * (below_sheen * self.diffuse_transmission * FRAC_1_PI * i.z);
+        }
+        let mut shape = shapes::diffuse(o, i, self.roughness);
+        if self.flat > 0.0 {
+            shape += (shapes::flat(o, i, self.roughness) - shape) * self.flat;
+        }
+        let excess = at_o.diffuse.max(at_i.diffuse).max(1.0);
+        let mut value = self.base * (below_sheen * (1.0 - self.diffuse_transmission) * shape / excess);
+        if self.sheen > 0.0 {
+            value += self.sheen_color() * shapes::sheen(o, i);
+        }
+        value * below_layer
+    }
+
+    /// A thin sheet of glass: all reflections within it together, and what passes without a turn.
+    #[inline]
+    fn eval_sheet(&self, o: Vec3, i: Vec3, reflects: bool) -> BsdfEval {
+        let facet = self.ggx.reflection(o, i);
+        let reflectance = pane_reflectance(facet.cos, self.ior);
+        let fraction = if reflects { reflectance } else { 1.0 - reflectance };
+        BsdfEval { value: Rgb::splat(fraction * facet.value), pdf: fraction * facet.pdf }
+    }
+
+    /// A direction from one of the lobes.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        if wo.z.abs() <= MIN_COSINE {
+            return None;
+        }
+        let o = vec3(wo.x, wo.y, wo.z.abs());
+        let at_o = self.albedos(o);
+        let choice = self.choose(&at_o);
+        let wi = self.sample_direction(wo, o, &choice, u_lobe, u)?;
+        if wi.z.abs() <= MIN_COSINE {
+            return None;
+        }
+        let BsdfEval { value, pdf } = self.eval_from(wo, wi, &at_o, &choice);
+        if pdf <= 0.0 {
+            return None;
+        }
+        let is_transmission = wo.z * wi.z < 0.0;
+        let eta = match (is_transmission && !self.thin, wo.z > 0.0) {
+            (false, _) => 1.0,
+            (true, true) => self.ior,
+            (true, false) => 1.0 / self.ior,
+        };
+        Some(BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission, eta })
+    }
+
+    /// A direction with the density of the chosen lobe.
+    fn sample_direction(&self, wo: Vec3, o: Vec3, choice: &Choice, u_lobe: f32, u: [f32; 2]) -> Option<Vec3> {
+        let side = 1f32.copysign(wo.z);
+        // A reflection keeps its side, or is lost.
+        let above = |i: Vec3| (i.z > 0.0).then(|| vec3(i.x, i.y, i.z * side));
+        let mut u_lobe = u_lobe;
+        let mut is_chosen = |probability: f32| {
+            u_lobe -= probability;
+            u_lobe < 0.0
+        };
+        if is_chosen(choice.clearcoat) {
+            return above(ClearCoat::new(self.gloss).sample(o, u));
+        }
+        if is_chosen(choice.specular) {
+            let m = self.ggx.sample_visible_normal(o, u);
+            return above(reflect(o, m, o.dot(m)));
+        }
+        if is_chosen(choice.diffuse) {
+            return above(warp::cosine_hemisphere(u));
+        }
+        if is_chosen(choice.diffuse_transmission) {
+            return above(warp::cosine_hemisphere(u)).map(|i| vec3(i.x, i.y, -i.z));
+        }
+        if choice.glass <= 0.0 {
+            return None;
+        }
+        let u_glass = (u_lobe / choice.glass).min(crate::math::float::ONE_MINUS_EPSILON);
+        if !self.thin {
+            return self.glass().sample(wo, u_glass, u).map(|sample| sample.wi);
+        }
+        let m = self.ggx.sample_visible_normal(o, u);
+        let cos = o.dot(m);
+        let reflected = above(reflect(o, m, cos))?;
+        let reflects = u_glass < pane_reflectance(cos.clamp(0.0, 1.0), self.ior);
+        Some(if reflects { reflected } else { vec3(reflected.x, reflected.y, -reflected.z) })
+    }
+
+    /// Whether the highlight is stretched.
+    pub fn is_anisotropic(&self) -> bool {
+        self.ggx.alpha()[0] != self.ggx.alpha()[1]
+    }
+
+    /// Whether light can cross the surface.
+    pub fn transmits(&self) -> bool {
+        self.glass > 0.0 || self.diffuse_transmission > 0.0
+    }
+
+    /// Never.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        false
+    }
+
+    /// What all lobes scatter together, about.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        let at = self.albedos(vec3(wo.x, wo.y, wo.z.abs()));
+        let metal = self.base.map(|f| f * (at.mirrors - at.schlick) + at.schlick + (1.0 - at.mirrors) * f);
+        let layer = self.layer_albedo(&at);
+        let base = self.base * (1.0 - self.sheen * at.sheen) * at.diffuse.min(1.0) + self.sheen_color() * at.sheen;
+        let dielectric = layer + (Rgb::WHITE - layer) * base;
+        let glass = if self.thin { self.base } else { self.base.map(f32::sqrt) };
+        let below = metal * self.metallic + dielectric * self.dielectric() + glass * self.glass;
+        Rgb::splat(at.clearcoat) + below * (1.0 - at.clearcoat)
+    }
+}
+
+#[inline]
+fn mix(a: Rgb, b: Rgb, amount: f32) -> Rgb {
+    a * (1.0 - amount) + b * amount
+}
+
+/// Colour that several reflections leave where Schlick's reflectance is `f` ahead and one reflection releases `average` of diffuse light.
+fn schlick_multiple(f: f32, average: f32) -> f32 {
+    super::energy::multiple_color(f + (1.0 - f) / 21.0, average)
+}
