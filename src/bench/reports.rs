@@ -94,9 +94,8 @@ pub struct ReportsReport {
 /// If an accelerator cannot be built or a picture does not fit in memory.
 pub fn bench_reports(options: &ReportsOptions, watch: &dyn Watch) -> Result<ReportsReport> {
     let machine = Machine::here();
-    let plans: [fn(&ReportsOptions, &dyn Watch) -> Result<Comparison>; 3] = [octree, kd_tree, bvh];
     let mut comparisons = Vec::new();
-    for plan in plans {
+    for plan in [octree as Plan, kd_tree, bvh] {
         if !watch.is_stopped() {
             comparisons.push(plan(options, watch)?);
         }
@@ -104,12 +103,18 @@ pub fn bench_reports(options: &ReportsOptions, watch: &dyn Watch) -> Result<Repo
     Ok(ReportsReport { machine, size: options.size, comparisons })
 }
 
+type Plan = fn(&ReportsOptions, &dyn Watch) -> Result<Comparison>;
+
+/// Builds an accelerator over a geometry that outlives it.
 type Build = Box<dyn for<'g> Fn(&'g Geometry) -> Result<Subject<'g>>>;
+
+/// Triangles that an accelerator tests for a ray, if that is known.
+type Count<'g> = dyn Fn(&dyn Accelerator, &Ray) -> Option<f64> + 'g;
 
 /// An accelerator with a way to count its tests.
 struct Subject<'g> {
     accel: Box<dyn Accelerator + 'g>,
-    tests: Box<dyn Fn(&dyn Accelerator, &Ray) -> Option<f64> + 'g>,
+    tests: Box<Count<'g>>,
 }
 
 /// One of ours, or Embree.
