@@ -212,7 +212,7 @@ fn run(
 fn gather(query: Query, first: usize, hits: &[Option<Hit>], found: &[bool], answer: &mut Answer) {
     match query {
         Query::Closest(Some(_)) => {
-            hits.iter().enumerate().filter_map(|(i, hit)| Some((i, hit.as_ref()?))).for_each(|(i, hit)| answer.take(first + i, hit))
+            hits.iter().enumerate().filter_map(|(i, hit)| Some((i, hit.as_ref()?))).for_each(|(i, hit)| answer.take(first + i, hit));
         }
         Query::Any(Some(_)) => found.iter().enumerate().filter(|(_, found)| **found).for_each(|(i, _)| answer.add(first + i, 1)),
         Query::Closest(None) | Query::Any(None) => {}
