@@ -3,7 +3,7 @@
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::geometry::{Geometry, SurfaceInteraction};
-use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId, TextureId};
+use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId};
 use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
 use crate::math::Vec3;
@@ -17,8 +17,6 @@ pub struct Surface {
     pub material: MaterialId,
     /// Where its shading normals come from, if not from the shape alone.
     pub relief: Option<ReliefId>,
-    /// How much of it is there, by its luminance or the channel it says; all of it without one.
-    pub alpha: Option<TextureId>,
     /// The light of its first primitive if it emits; the others follow.
     pub first_light: Option<LightId>,
     /// Whether all primitives are one light: an analytic shape, or two triangles that make up a parallelogram.
@@ -70,7 +68,7 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Reliefs, by [`ReliefId`].
     pub reliefs: Vec<Relief>,
-    /// Textures, by [`TextureId`].
+    /// Textures, by [`TextureId`](crate::id::TextureId).
     pub textures: Vec<Texture>,
     /// Lights and their choice.
     pub lights: LightSet,

@@ -30,6 +30,8 @@ mod many_lights;
 mod materials;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
 mod motion;
+/// Leaves cut out by images, for what the camera sees and for shadows.
+mod opacity;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.
 mod own_accelerators;
 /// Normal maps, bump maps and smooth normals, without leaks and black rims.

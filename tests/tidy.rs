@@ -9,7 +9,7 @@ const LAYERS: &[(u32, &[&str])] = &[
     (1, &["math", "desc"]),
     (2, &["color", "sampling", "import"]),
     (3, &["geometry", "texture", "bsdf", "camera", "film"]),
-    (4, &["accel", "material", "relief", "light", "output"]),
+    (4, &["accel", "material", "opacity", "relief", "light", "output"]),
     (5, &["scene"]),
     (6, &["integrator", "compile"]),
     (7, &["render"]),

@@ -43,14 +43,14 @@ pub struct MaterialTable {
 pub struct Look {
     pub material: MaterialId,
     pub relief: Option<ReliefId>,
-    /// How much of the surface is there.
-    pub alpha: Option<TextureId>,
+    /// How much of the surface is there, if not all of it.
+    pub opacity: Option<TextureId>,
 }
 
 impl Look {
     /// A material alone.
     pub fn plain(material: MaterialId) -> Self {
-        Self { material, relief: None, alpha: None }
+        Self { material, relief: None, opacity: None }
     }
 }
 
@@ -107,7 +107,8 @@ impl MaterialTable {
 
     /// Whether a surface without uv cannot look so.
     pub fn needs_uv(&self, look: &Look) -> bool {
-        look.relief.is_some() || look.alpha.is_some() || self.is_textured(look.material)
+        let cut_out = look.opacity.is_some_and(|id| !matches!(self.textures.get(id), Texture::Constant(_)));
+        cut_out || look.relief.is_some() || self.is_textured(look.material)
     }
 
     /// Whether a texture has a say in a material or a part of it.
@@ -289,9 +290,9 @@ pub struct MtlSurface {
     pub radiance: Option<Rgb>,
 }
 
-/// The nearest material for what an MTL says: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9, or `d` below 1/2, is glass of index Ni; a
-/// specular colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic otherwise;
-/// everything else is diffuse with Kd.
+/// The nearest material for what an MTL says: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
+/// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic otherwise; everything else
+/// is diffuse with Kd.
 ///
 /// The error says which number makes no sense.
 pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
@@ -307,10 +308,13 @@ pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
     if let Some(exponent) = mtl.shininess.filter(|&n| !(n >= 0.0 && n.is_finite())) {
         return fault("Ns", &exponent, "finite and not negative");
     }
+    if let Some(opacity) = mtl.opacity.filter(|d| !(0.0..=1.0).contains(d)) {
+        return fault("d", &opacity, "within 0 and 1");
+    }
     let diffuse = mtl.diffuse.map_or(Rgb::splat(0.5), Rgb::from);
     let specular = mtl.specular.map_or(Rgb::BLACK, Rgb::from);
     let ior = mtl.ior.filter(|&n| n > 1.0 && n <= 10.0).unwrap_or(1.5);
-    let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9)) || mtl.opacity.is_some_and(|d| d < 0.5);
+    let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9));
     let material = if mtl.illumination == Some(5) {
         Mirror { reflectance: if specular.is_black() { Rgb::WHITE } else { specular } }.into()
     } else if is_glass {
@@ -376,5 +380,7 @@ mod tests {
         assert!(bad(ObjMaterial { specular: Some([f32::NAN; 3]), ..none() }).contains("Ks"));
         assert!(bad(ObjMaterial { emissive: Some([-1.0; 3]), ..none() }).contains("Ke"));
         assert!(bad(ObjMaterial { shininess: Some(f32::INFINITY), ..none() }).contains("Ns"));
+        assert!(bad(ObjMaterial { opacity: Some(1.5), ..none() }).contains("\"m\": d"));
+        assert!(bad(ObjMaterial { opacity: Some(f32::NAN), ..none() }).contains("\"m\": d"));
     }
 }

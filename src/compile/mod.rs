@@ -11,6 +11,7 @@ mod mtl;
 mod nesting;
 mod normals;
 mod objects;
+mod opacity;
 mod prepared;
 mod principled;
 mod reliefs;
@@ -28,6 +29,7 @@ use std::path::{Path, PathBuf};
 use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
+use crate::id::TextureId;
 use crate::import::AssetError;
 use crate::light::LightSet;
 use crate::material::Material;
@@ -47,8 +49,15 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
     let camera = camera::compile(&files, &desc.camera)?;
     let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
-    let mut builder =
-        Builder { files, shutter, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: LightTable::default() };
+    let mut builder = Builder {
+        files,
+        shutter,
+        materials,
+        geometry: Geometry::default(),
+        surfaces: Vec::new(),
+        opacities: Vec::new(),
+        lights: LightTable::default(),
+    };
     builder.add_world(desc)?;
     for (i, light) in desc.lights.iter().enumerate() {
         let path = format!("lights[{i}]");
@@ -99,12 +108,15 @@ struct Builder {
     geometry: Geometry,
     /// By shape.
     surfaces: Vec<Surface>,
+    /// How much of each shape is there, if not all of it, by shape.
+    opacities: Vec<Option<TextureId>>,
     lights: LightTable,
 }
 
 impl Builder {
     fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
         let files = &self.files;
+        self.geometry.cutouts = opacity::cutouts(&self.opacities, &self.materials.textures);
         let light_groups = self.lights.groups();
         let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();

@@ -40,21 +40,18 @@ impl Builder {
             // Exporters leave Kd black, or out, where a map says it all.
             plain.diffuse = Some(mtl.diffuse.filter(|color| color.iter().any(|&c| c != 0.0)).unwrap_or([1.0; 3]));
         }
-        if opacity.is_some() {
-            plain.opacity = None;
-        }
         let surface = from_mtl(&plain).map_err(|message| meshes::refusal(&self.files, path, file, message))?;
 
+        let is_glass = matches!(surface.material, Material::Constant(Bsdf::Dielectric(_)));
         let mut material = surface.material;
         if let Some(map) = &diffuse {
             let tint = plain.diffuse.map_or(Rgb::WHITE, Rgb::from);
             material = with_albedo(material, ColorInput::Texture(self.diffuse_map(path, map, tint)?));
         }
         let mut look = Look::plain(self.materials.push(material));
-        if let Some(map) = &opacity {
-            look.alpha = Some(self.opacity_map(path, map)?);
-        } else if let Some(map) = &diffuse {
-            look.alpha = self.alpha_of_colors(path, map)?;
+        // Glass lets through what it does not reflect.
+        if !is_glass {
+            look.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
         }
         let relief = match (wanted(&maps.normal), wanted(&maps.bump)) {
             (Some(map), _) => Some(self.relief_map(path, &map, true)?),
@@ -85,20 +82,29 @@ impl Builder {
         Ok(id)
     }
 
-    /// `map_d`: the channel it says, or the image's alpha, or else its luminance.
-    fn opacity_map(&mut self, path: &str, map: &ObjMap) -> Result<TextureId> {
-        let mut bitmap = self.map_texture(path, map, TextureUse::Data)?;
-        if map.channel.is_none() && bitmap.image.has_alpha() {
-            bitmap.channel = Some(Channel::A);
-        }
-        Ok(self.materials.textures.push(Texture::Bitmap(bitmap)))
-    }
-
-    /// The alpha of a `map_Kd`, if it has one that is not 1 everywhere.
-    fn alpha_of_colors(&mut self, path: &str, map: &ObjMap) -> Result<Option<TextureId>> {
-        let bitmap = Bitmap { channel: Some(Channel::A), ..self.map_texture(path, map, TextureUse::Data)? };
-        let has_holes = bitmap.image.has_alpha() && bitmap.image.least_alpha() < 1.0;
-        Ok(has_holes.then(|| self.materials.textures.push(Texture::Bitmap(bitmap))))
+    /// `d` times `map_d` (the channel it says, or the image's alpha, or else its luminance), or times the alpha of `map_Kd`.
+    fn mtl_opacity(&mut self, path: &str, d: Option<f32>, map: Option<&ObjMap>, diffuse: Option<&ObjMap>) -> Result<Option<TextureId>> {
+        let bitmap = match (map, diffuse) {
+            (Some(map), _) => {
+                let bitmap = self.map_texture(path, map, TextureUse::Data)?;
+                let channel = bitmap.channel.or(bitmap.image.has_alpha().then_some(Channel::A));
+                Some(Bitmap { channel, ..bitmap })
+            }
+            (None, Some(map)) => {
+                let bitmap = Bitmap { channel: Some(Channel::A), ..self.map_texture(path, map, TextureUse::Data)? };
+                Some(bitmap).filter(|bitmap| bitmap.image.has_alpha() && bitmap.image.least_alpha() < 1.0)
+            }
+            (None, None) => None,
+        };
+        let constant = d.filter(|&d| d < 1.0).map(|d| Texture::Constant(Rgb::splat(d)));
+        let texture = match (bitmap.map(Texture::Bitmap), constant) {
+            // Exporters leave d at 0 where a map says it all.
+            (Some(bitmap), Some(factor)) if d != Some(0.0) => Texture::Product([bitmap, factor].into()),
+            (Some(bitmap), _) => bitmap,
+            (None, Some(constant)) => constant,
+            (None, None) => return Ok(None),
+        };
+        Ok(Some(self.materials.textures.push(texture)))
     }
 
     /// A normal map, which `bump` may name too: then it is one with colours.

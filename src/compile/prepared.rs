@@ -55,12 +55,13 @@ impl Builder {
     /// Loads and checks one shape of the scene file; an OBJ file may bring several.
     pub(super) fn prepare(&mut self, path: &str, desc: &ShapeDesc) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
-        let look = self.materials.find(&self.files, path, common.material)?;
+        let mut look = self.materials.find(&self.files, path, common.material)?;
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
         let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map, self.shutter)?;
         let (map, motion) = motion.as_constant().map_or((map, Some(motion)), |rest| (rest, None));
         let emission = self.emission(path, &common)?;
+        look.opacity = self.opacity(path, &common, emission.is_some())?;
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
         }
@@ -99,16 +100,23 @@ impl Builder {
             let has_uvs = loaded.data.uvs.is_some();
             if let Some(mtl) = &loaded.material {
                 let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
-                look = from_mtl.look;
+                // What the scene says of the shape counts.
+                let given = if desc.opacity.is_some() { look.opacity } else { from_mtl.look.opacity };
+                look = Look { opacity: given, ..from_mtl.look };
                 emission =
                     emission.or(from_mtl.radiance.map(|radiance| PreparedEmission { emission: Emission::constant(radiance), group: None }));
+            }
+            if emission.is_some() && look.opacity.is_some() {
+                let message = format!("{path}: what gives off light has no holes: its opacity is not used");
+                tracing::warn!("{}: {message}", self.files.scene.display());
+                look.opacity = None;
             }
             if !has_uvs && self.materials.needs_uv(&look) {
                 return Err(meshes::refusal(
                     &self.files,
                     path,
                     desc.file.as_deref(),
-                    "the material has textures, but the mesh has no uv".into(),
+                    "the material or the opacity has textures, but the mesh has no uv".into(),
                 ));
             }
             if moves && emission.is_some() {
@@ -178,8 +186,7 @@ impl Builder {
         }
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
-        let mut surface =
-            Surface { material: look.material, relief: look.relief, alpha: look.alpha, first_light: None, single_light: false };
+        let mut surface = Surface { material: look.material, relief: look.relief, first_light: None, single_light: false };
         if let Some(PreparedEmission { emission, group }) = emission {
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
             if !lights.iter().any(|light| light.area() > 0.0) {
@@ -189,6 +196,7 @@ impl Builder {
             surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
         }
         self.surfaces.push(surface);
+        self.opacities.push(look.opacity);
         Ok(id)
     }
 }

@@ -124,6 +124,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (f.instances, "instances"),
         (f.textures, "textures"),
         (f.reliefs, "normal or bump maps"),
+        (!scene.geometry.cutouts.is_empty(), "holes"),
         (f.delta_materials, "mirror or glass"),
         (f.anisotropic, "anisotropic materials"),
         (f.lens, "lens"),

@@ -26,6 +26,10 @@ macro_rules! shapes {
                 /// How the shape moves, after `transform`. Default: not at all.
                 #[serde(default, skip_serializing_if = "Vec::is_empty")]
                 pub motion: Vec<KeyframeDesc>,
+                /// How much of the surface is there: a number from 0 to 1, or `{ "texture": "name" }`. Rays, shadow rays too, pass through the
+                /// rest. Default: 1, or what an MTL says. Not with `emission`.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub opacity: Option<OpacityDesc>,
                 /// Light that the shape gives off.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub emission: Option<EmissionDesc>,
@@ -51,6 +55,7 @@ macro_rules! shapes {
                         material: shape.material.as_deref(),
                         transform: &shape.transform,
                         motion: &shape.motion,
+                        opacity: shape.opacity.as_ref(),
                         emission: shape.emission.as_ref(),
                         reverse_normal: shape.reverse_normal,
                     },)*
@@ -71,6 +76,8 @@ pub struct ShapeCommon<'a> {
     pub transform: &'a TransformDesc,
     /// How it moves.
     pub motion: &'a [KeyframeDesc],
+    /// How much of the surface is there.
+    pub opacity: Option<&'a OpacityDesc>,
     /// Light that the shape gives off.
     pub emission: Option<&'a EmissionDesc>,
     /// Whether the front is the side against the shape's own normal.
@@ -81,11 +88,12 @@ shapes! {
     /// A triangle mesh from a file, or inline by `positions` and `triangles`.
     Mesh(MeshDesc) {
         /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ brings those of its MTL: `illum`
-        /// 5 is a mirror of colour Ks; 4, 6, 7 and 9, or `d` below 1/2, is glass of index Ni; a specular colour Ks with an exponent Ns has
+        /// 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular colour Ks with an exponent Ns has
         /// alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic with base Kd otherwise; all else is diffuse with
         /// Kd. Ke is radiance given off. `map_Kd` is a texture times Kd (times 1 if Kd is black), where the faces have uv; `norm` is a normal
         /// map, `bump` and `map_Bump` are one if their image has colours, else heights in world units times `-bm`. Of the options of maps,
-        /// `-s`, `-o`, `-clamp`, `-bm` and `-imfchan` count. Other maps are not used.
+        /// `-s`, `-o`, `-clamp`, `-bm` and `-imfchan` count. `d` (or 1 - `Tr`) is the
+        /// opacity of what is not glass, times `map_d` (its alpha, else its luminance) or the alpha of `map_Kd`. Other maps are not used.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
         /// Inline: positions of the vertices.
@@ -255,6 +263,19 @@ fn quad_edge_u() -> [f64; 3] {
 
 fn quad_edge_v() -> [f64; 3] {
     [0.0, 2.0, 0.0]
+}
+
+/// How much of a surface is there, from 0 to 1.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields, expecting = "expected an opacity: a number, or { \"texture\": name }")]
+pub enum OpacityDesc {
+    /// The same everywhere.
+    Number(f32),
+    /// A texture by name.
+    Texture {
+        /// The texture's name. An image with alpha that names no `channel` stands for its alpha, other textures for their luminance.
+        texture: String,
+    },
 }
 
 /// Light given off by a shape.
