@@ -8,7 +8,7 @@ pub use lens::{Blades, Lens, lens_equation};
 
 use std::f64::consts::{PI, TAU};
 
-use crate::math::{DAffine3, DVec3, Motion, Ray, Transform, Vec2, Vec3};
+use crate::math::{DVec3, Motion, Ray, Transform, Vec2, Vec3};
 
 /// How points of the picture become directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,15 +129,6 @@ impl Camera {
         self.world_from_camera.point(DVec3::ZERO)
     }
 
-    /// Camera to world at the [time of a ray](Ray::time).
-    #[inline]
-    fn map_at(&self, time: f32) -> DAffine3 {
-        match &self.motion {
-            None => self.world_from_camera.world_from_object,
-            Some(motion) => motion.map_at(f64::from(time)),
-        }
-    }
-
     /// The ray through `film`, in pixels from the upper left corner of a picture of `size` pixels, from the point of the lens that `lens_u`
     /// (in the unit square) chooses, at a [time](Self::time). The direction is unit.
     #[inline]
@@ -160,9 +151,11 @@ impl Camera {
             let unit = if matches!(self.projection, Projection::Environment) { 1.0 } else { -direction.z };
             origin += direction * (self.near / unit);
         }
-        let map = self.map_at(time);
-        let (origin, direction) = (map.transform_point3(origin), map.transform_vector3(direction).normalize());
-        Ray { time, ..Ray::new(origin.as_vec3(), direction.as_vec3()) }
+        let (origin, direction) = match &self.motion {
+            None => (self.world_from_camera.point(origin), self.world_from_camera.vector(direction)),
+            Some(motion) => moved(motion, time, origin, direction),
+        };
+        Ray { time, ..Ray::new(origin.as_vec3(), direction.normalize().as_vec3()) }
     }
 
     /// The point of a picture at z = -1.
@@ -200,8 +193,15 @@ impl Camera {
     }
 }
 
+/// A point and a vector of a moving camera in the world; out of the way of cameras at rest.
+#[inline(never)]
+fn moved(motion: &Motion, time: f32, point: DVec3, vector: DVec3) -> (DVec3, DVec3) {
+    let map = motion.map_at(f64::from(time));
+    (map.transform_point3(point), map.transform_vector3(vector))
+}
+
 /// The unit direction of a point of a lat-long picture. Above the upper edge the picture goes on over the pole, as filters need it.
-#[inline]
+#[inline(never)]
 fn everywhere(film: Vec2, size: [u32; 2]) -> DVec3 {
     let azimuth = TAU * (f64::from(film.x) / f64::from(size[0]) - 0.5);
     let theta = PI * f64::from(film.y) / f64::from(size[1]);

@@ -1,6 +1,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::*;
+use crate::math::DAffine3;
 
 const PLACE: DVec3 = DVec3::new(1.0, 2.0, 3.0);
 

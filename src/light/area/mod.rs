@@ -164,13 +164,7 @@ impl AreaLight {
         let (sample, error) = match &self.form {
             Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
             Form::Parallelogram(quad) if both || quad.sees_front(p) => (quad.sample(p, u)?, quad.error),
-            Form::Triangle { .. } => {
-                let triangle = self.triangle(geometry)?;
-                if !(both || triangle.sees_front(p)) {
-                    return None;
-                }
-                (triangle.sample(p, u)?, triangle.error)
-            }
+            Form::Triangle { .. } => self.sample_triangle(geometry, p, u)?,
             Form::Placed { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
                 let point = placed.sample_area(u);
@@ -182,9 +176,26 @@ impl AreaLight {
             }
             _ => return None,
         };
-        let radiance = self.emission.at(textures, || textured::uv(geometry.shape(self.shape), self.prim, sample.p, u));
+        let radiance = match self.emission.texture {
+            None => self.emission.radiance,
+            Some(_) => self.radiance_at(geometry, textures, sample.p, u),
+        };
         let target = ShadowTarget::Point(SpawnTarget { p: sample.p, n: sample.n, error });
         Some(LightSample { wi: sample.wi, radiance, pdf: sample.pdf, is_delta: false, target })
+    }
+
+    /// The radiance of a texture at a point that was chosen with `u`; out of the way of lights without.
+    #[inline(never)]
+    fn radiance_at(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Rgb {
+        self.emission.at(textures, || textured::uv(geometry.shape(self.shape), self.prim, p, u))
+    }
+
+    /// A point of a triangle and its error; out of the way of rectangles and spheres.
+    #[inline(never)]
+    fn sample_triangle(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(SurfaceSample, f32)> {
+        let triangle = self.triangle(geometry)?;
+        let seen = self.emission.two_sided || triangle.sees_front(p);
+        Some((triangle.sample(p, u).filter(|_| seen)?, triangle.error))
     }
 
     /// The triangle of a mesh.

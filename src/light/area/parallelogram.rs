@@ -200,7 +200,7 @@ impl View {
     }
 
     /// The solid angle if the parametrisation is to be used.
-    #[inline]
+    #[inline(never)]
     fn usable_solid_angle(&self) -> Option<f64> {
         // Along each axis the rectangle reaches from 0 or the nearer side to the farther side.
         let (near_x, near_y) = (self.x0.max(-self.x1).max(0.0), self.y0.max(-self.y1).max(0.0));
