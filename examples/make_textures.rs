@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 use glam::{Vec2 as V2, Vec3 as V, vec2, vec3};
-use image::{GrayImage, Luma, Rgb, RgbImage};
+use image::{GrayImage, Luma, Rgb, RgbImage, Rgba, RgbaImage};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
@@ -21,6 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     picture(256, 256, floor).save(textures.join("floor.png"))?;
     picture(256, 256, glaze).save(textures.join("glaze.png"))?;
     heights(256, 256, hammered).save(textures.join("hammered_height.png"))?;
+    cut_out(&picture(128, 128, |uv| leaf(uv).color), |uv| leaf(uv).height).save(textures.join("leaf.png"))?;
     picture(256, 64, |uv| rope(uv).color).save(textures.join("rope.png"))?;
     normals(256, 64, 0.1, |uv| rope(uv).height).save(textures.join("rope_normal.png"))?;
     fs::write(scenes.join("meshes/ring.obj"), ring(72, 20))?;
@@ -54,6 +55,15 @@ fn picture(width: u32, height: u32, color: impl Fn(V2) -> V) -> RgbImage {
 
 fn heights(width: u32, height: u32, of: impl Fn(V2) -> f32) -> GrayImage {
     GrayImage::from_fn(width, height, |x, y| Luma([(of(uv_of(x, y, width, height)).clamp(0.0, 1.0) * 255.0).round() as u8]))
+}
+
+/// A picture with an alpha from 0 to 1.
+fn cut_out(picture: &RgbImage, alpha: impl Fn(V2) -> f32) -> RgbaImage {
+    let (width, height) = picture.dimensions();
+    RgbaImage::from_fn(width, height, |x, y| {
+        let Rgb([r, g, b]) = *picture.get_pixel(x, y);
+        Rgba([r, g, b, (alpha(uv_of(x, y, width, height)).clamp(0.0, 1.0) * 255.0).round() as u8])
+    })
 }
 
 /// The normals of a field of heights that repeats; `scale` is a height of 1 over the width of the picture.
@@ -172,6 +182,19 @@ fn hammered(uv: V2) -> f32 {
         }
     }
     height
+}
+
+/// A leaf on its stalk; its height is 1 inside and falls to 0 over a few pixels outside.
+fn leaf(uv: V2) -> Relief {
+    let (x, y) = ((uv.x - 0.5).abs(), (uv.y - 0.14) / 0.82);
+    let teeth = 1.0 + 0.06 * (TAU * 9.0 * y).sin();
+    let width = if (0.0..1.0).contains(&y) { 0.34 * (PI * y.powf(0.75)).sin() * teeth } else { 0.0 };
+    let stalk = if uv.y < 0.2 { 0.016 } else { 0.0 };
+    let veins = ((y - 1.4 * x) * 9.0).rem_euclid(1.0);
+    let is_vein = x < 0.011 || veins.min(1.0 - veins) < 0.07;
+    let tone = 0.8 + 0.4 * layers(uv, [8, 8], 3);
+    let color = if is_vein { vec3(0.30, 0.40, 0.10) } else { vec3(0.10, 0.28, 0.04) } * tone;
+    Relief { color, height: ((width.max(stalk) - x) * 64.0).clamp(0.0, 1.0) }
 }
 
 /// Three twisted strands.
