@@ -36,6 +36,8 @@ ids! {
     MaterialId,
     /// A texture.
     TextureId,
+    /// A relief.
+    ReliefId,
     /// A light.
     LightId,
     /// A group of lights.

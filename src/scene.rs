@@ -3,10 +3,11 @@
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::geometry::{Geometry, SurfaceInteraction};
-use crate::id::{LightId, MaterialId, PrimId, ShapeId};
+use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId};
 use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
 use crate::math::Vec3;
+use crate::relief::Relief;
 use crate::texture::Texture;
 
 /// How a shape looks.
@@ -14,6 +15,8 @@ use crate::texture::Texture;
 pub struct Surface {
     /// Its material.
     pub material: MaterialId,
+    /// Where its shading normals come from, if not from the shape alone.
+    pub relief: Option<ReliefId>,
     /// The light of its first primitive if it emits; the others follow.
     pub first_light: Option<LightId>,
     /// Whether all primitives are one light: an analytic shape, or two triangles that make up a parallelogram.
@@ -42,6 +45,8 @@ pub struct Features {
     pub instances: bool,
     /// Some material is textured.
     pub textures: bool,
+    /// Some surface has a normal map or a bump map.
+    pub reliefs: bool,
     /// Some material has only delta lobes.
     pub delta_materials: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
@@ -61,6 +66,8 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Materials, by [`MaterialId`].
     pub materials: Vec<Material>,
+    /// Reliefs, by [`ReliefId`].
+    pub reliefs: Vec<Relief>,
     /// Textures, by [`TextureId`](crate::id::TextureId).
     pub textures: Vec<Texture>,
     /// Lights and their choice.

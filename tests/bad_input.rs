@@ -70,6 +70,17 @@ fn unknown_keys_and_types() {
 }
 
 #[test]
+fn opacities() {
+    assert_faults(&[
+        ("shapes[0].opacity", json!(1.5), "shapes[0].opacity", "from 0 to 1, not 1.5"),
+        ("shapes[0].opacity", json!(-0.25), "shapes[0].opacity", "-0.25"),
+        ("shapes[0].opacity", json!([1, 1, 1]), "shapes[0].opacity", "expected an opacity"),
+        ("shapes[0].opacity", json!({ "texture": "tilse" }), "shapes[0].opacity.texture", "did you mean \"tiles\"?"),
+        ("shapes[1].opacity", json!(0.5), "shapes[1].opacity", "gives off light"),
+    ]);
+}
+
+#[test]
 fn settings_out_of_range() {
     let faults: &[Fault] = &[
         ("film.width", json!(0), "film.width", "0"),

@@ -30,12 +30,18 @@ mod many_lights;
 mod materials;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
 mod motion;
+/// Leaves cut out by images, for what the camera sees and for shadows.
+mod opacity;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.
 mod own_accelerators;
+/// Normal maps, bump maps and smooth normals, without leaks and black rims.
+mod relief;
 /// Meshes, comments, names and transforms of scene files, read as users write them.
 mod scene_files;
 /// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
 mod self_intersection;
+/// Images on every shape, at seams and poles too.
+mod textures;
 /// Layers, file lengths, unsafe code, printing.
 mod tidy;
 /// Shared helpers.

@@ -1,18 +1,20 @@
-//! Materials and textures: names to ids, parameters to BSDFs.
+//! Materials: names to ids, parameters to BSDFs.
 
 use std::collections::HashMap;
 use std::fmt::Debug;
 
 use super::Files;
+use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Bsdf, Conductor, Dielectric, Glossy, Lambert, Mirror, Plastic, ThinDielectric};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, ScalarDesc, SceneDesc, TextureDesc};
+use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, ScalarDesc, SceneDesc};
 use crate::error::Result;
-use crate::id::{MaterialId, TextureId};
+use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
 use crate::material::{AlphaInput, ColorInput, Material, ScalarInput, Varying};
 use crate::math::Vec2;
-use crate::texture::{Checker, Texture};
+use crate::relief::Relief;
+use crate::texture::Texture;
 
 /// Real and imaginary part of the index of refraction for red, green and blue (650, 550 and 450 nm; refractiveindex.info: Johnson and Christy
 /// for noble metals, iron, chromium and titanium; Rakic for aluminium and tungsten; Querry for brass).
@@ -31,9 +33,25 @@ const METALS: &[(&str, [f32; 3], [f32; 3])] = &[
 /// All materials and textures, with their names.
 pub struct MaterialTable {
     pub materials: Vec<Material>,
-    pub textures: Vec<Texture>,
-    names: HashMap<String, MaterialId>,
-    texture_names: HashMap<String, ColorInput>,
+    pub textures: TextureTable,
+    pub reliefs: Vec<Relief>,
+    names: HashMap<String, Look>,
+}
+
+/// How a shape looks: what a material of the scene file comes to.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    pub material: MaterialId,
+    pub relief: Option<ReliefId>,
+    /// How much of the surface is there, if not all of it.
+    pub opacity: Option<TextureId>,
+}
+
+impl Look {
+    /// A material alone.
+    pub fn plain(material: MaterialId) -> Self {
+        Self { material, relief: None, opacity: None }
+    }
 }
 
 impl MaterialTable {
@@ -41,18 +59,17 @@ impl MaterialTable {
     pub const DEFAULT: MaterialId = MaterialId(0);
 
     pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
-        let mut textures = Vec::new();
-        let mut inputs = HashMap::new();
-        for (name, texture) in &desc.textures {
-            inputs.insert(name.as_str(), compile_texture(files, &format!("textures.{name}"), texture, &mut textures)?);
-        }
+        let textures = TextureTable::new(files, desc)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
-        let texture_names = inputs.iter().map(|(name, input)| ((*name).to_owned(), *input)).collect();
-        let mut table = Self { materials: vec![default], textures, names: HashMap::new(), texture_names };
-        let compiler = Compiler { files, inputs };
-        for name in desc.materials.keys() {
-            table.add(&compiler, desc, name, &mut Vec::new())?;
+        let mut table = Self { materials: vec![default], textures: TextureTable::default(), reliefs: Vec::new(), names: HashMap::new() };
+        let compiler = Compiler { files, textures: &textures };
+        for (name, material) in &desc.materials {
+            if !matches!(material, MaterialDesc::Relief { .. }) {
+                table.add(&compiler, desc, name, &mut Vec::new())?;
+            }
         }
+        table.textures = textures;
+        table.add_reliefs(files, desc)?;
         Ok(table)
     }
 
@@ -64,8 +81,8 @@ impl MaterialTable {
         name: &'a str,
         outer: &mut Vec<&'a str>,
     ) -> Result<MaterialId> {
-        if let Some(&id) = self.names.get(name) {
-            return Ok(id);
+        if let Some(look) = self.names.get(name) {
+            return Ok(look.material);
         }
         let path = format!("materials.{name}");
         let material = match self.composite(compiler, desc, name, outer)? {
@@ -73,7 +90,7 @@ impl MaterialTable {
             None => compiler.material(&path, &desc.materials[name])?,
         };
         let id = self.push(material);
-        self.names.insert(name.to_owned(), id);
+        self.names.insert(name.to_owned(), Look::plain(id));
         Ok(id)
     }
 
@@ -83,40 +100,41 @@ impl MaterialTable {
         MaterialId::new(self.materials.len() - 1)
     }
 
-    /// The texture of a name, or its colour if that is constant.
-    pub fn texture(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
-        let found = self.texture_names.get(name).copied();
-        found.ok_or_else(|| files.unknown(path, "texture", name, self.texture_names.keys().map(String::as_str)))
+    /// Gives a look a name.
+    pub(super) fn insert(&mut self, name: String, look: Look) {
+        self.names.insert(name, look);
     }
 
-    /// The id of a name, or of the default.
-    pub fn find(&self, files: &Files, path: &str, name: Option<&str>) -> Result<MaterialId> {
+    /// Whether a surface without uv cannot look so.
+    pub fn needs_uv(&self, look: &Look) -> bool {
+        let cut_out = look.opacity.is_some_and(|id| !matches!(self.textures.get(id), Texture::Constant(_)));
+        cut_out || look.relief.is_some() || self.is_textured(look.material)
+    }
+
+    /// Whether a texture has a say in a material or a part of it.
+    fn is_textured(&self, id: MaterialId) -> bool {
+        let material = &self.materials[id.index()];
+        material.is_textured() || material.parts().is_some_and(|parts| parts.into_iter().any(|part| self.is_textured(part)))
+    }
+
+    /// Whether a surface's normals come from a normal map.
+    pub fn has_normal_map(&self, look: &Look) -> bool {
+        look.relief.is_some_and(|id| matches!(self.reliefs[id.index()], Relief::NormalMap { .. }))
+    }
+
+    /// What a name stands for, or the default.
+    pub fn find(&self, files: &Files, path: &str, name: Option<&str>) -> Result<Look> {
         let Some(name) = name else {
-            return Ok(Self::DEFAULT);
+            return Ok(Look::plain(Self::DEFAULT));
         };
         let found = self.names.get(name).copied();
         found.ok_or_else(|| files.unknown(&format!("{path}.material"), "material", name, self.names.keys().map(String::as_str)))
     }
 }
 
-fn compile_texture(files: &Files, path: &str, desc: &TextureDesc, textures: &mut Vec<Texture>) -> Result<ColorInput> {
-    let color = |key: &str, value: [f32; 3]| files.reflectance(&format!("{path}.{key}"), value).map(Rgb::from);
-    Ok(match desc {
-        TextureDesc::Constant { color: value } => ColorInput::Constant(color("color", *value)?),
-        TextureDesc::Checker { color0, color1, scale } => {
-            if !scale.iter().all(|s| s.is_finite()) {
-                return Err(files.error(&format!("{path}.scale"), "is not finite"));
-            }
-            let colors = [color("color0", *color0)?, color("color1", *color1)?];
-            textures.push(Texture::Checker(Checker { colors, scale: Vec2::from(*scale) }));
-            ColorInput::Texture(TextureId::new(textures.len() - 1))
-        }
-    })
-}
-
 pub(super) struct Compiler<'a> {
     pub(super) files: &'a Files,
-    inputs: HashMap<&'a str, ColorInput>,
+    textures: &'a TextureTable,
 }
 
 impl Compiler<'_> {
@@ -132,6 +150,7 @@ impl Compiler<'_> {
                 let [reflectance, transmittance] = self.sum_to_one(path, ("reflectance", reflectance), ("transmittance", transmittance))?;
                 Varying::DiffuseTransmission { reflectance, transmittance }.into()
             }
+            MaterialDesc::Relief { .. } => return Err(files.error(path, "a material cannot consist of one with relief")),
             MaterialDesc::Mirror { reflectance } => {
                 Varying::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
             }
@@ -186,23 +205,21 @@ impl Compiler<'_> {
         Ok(match desc {
             ColorDesc::Grey(v) => ColorInput::Constant(self.files.reflectance(path, [*v; 3])?.into()),
             ColorDesc::Rgb(v) => ColorInput::Constant(self.files.reflectance(path, *v)?.into()),
-            ColorDesc::Texture { texture } => self.texture(path, texture)?,
+            ColorDesc::Texture { texture } => self.textures.reflectance(self.files, path, texture)?,
         })
-    }
-
-    fn texture(&self, path: &str, name: &str) -> Result<ColorInput> {
-        let found = self.inputs.get(name).copied();
-        found.ok_or_else(|| self.files.unknown(path, "texture", name, self.inputs.keys().copied()))
     }
 
     /// A number within `[0, 1]`.
     pub(super) fn scalar(&self, path: &str, desc: &ScalarDesc) -> Result<ScalarInput> {
         Ok(match desc {
             ScalarDesc::Constant(value) => ScalarInput::Constant(self.files.within(path, f64::from(*value), 0.0, 1.0)? as f32),
-            ScalarDesc::Texture { texture } => match self.texture(path, texture)? {
-                ColorInput::Constant(color) => ScalarInput::Constant(color.luminance().clamp(0.0, 1.0)),
-                ColorInput::Texture(id) => ScalarInput::Texture(id),
-            },
+            ScalarDesc::Texture { texture } => {
+                let id = self.textures.find(self.files, path, texture, TextureUse::Data)?;
+                match self.textures.get(id) {
+                    Texture::Constant(color) => ScalarInput::Constant(color.luminance().clamp(0.0, 1.0)),
+                    _ => ScalarInput::Texture(id),
+                }
+            }
         })
     }
 
@@ -273,9 +290,9 @@ pub struct MtlSurface {
     pub radiance: Option<Rgb>,
 }
 
-/// The nearest material for what an MTL says: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9, or `d` below 1/2, is glass of index Ni; a
-/// specular colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic otherwise;
-/// everything else is diffuse with Kd.
+/// The nearest material for what an MTL says: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
+/// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic otherwise; everything else
+/// is diffuse with Kd.
 ///
 /// The error says which number makes no sense.
 pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
@@ -291,10 +308,13 @@ pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
     if let Some(exponent) = mtl.shininess.filter(|&n| !(n >= 0.0 && n.is_finite())) {
         return fault("Ns", &exponent, "finite and not negative");
     }
+    if let Some(opacity) = mtl.opacity.filter(|d| !(0.0..=1.0).contains(d)) {
+        return fault("d", &opacity, "within 0 and 1");
+    }
     let diffuse = mtl.diffuse.map_or(Rgb::splat(0.5), Rgb::from);
     let specular = mtl.specular.map_or(Rgb::BLACK, Rgb::from);
     let ior = mtl.ior.filter(|&n| n > 1.0 && n <= 10.0).unwrap_or(1.5);
-    let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9)) || mtl.opacity.is_some_and(|d| d < 0.5);
+    let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9));
     let material = if mtl.illumination == Some(5) {
         Mirror { reflectance: if specular.is_black() { Rgb::WHITE } else { specular } }.into()
     } else if is_glass {
@@ -360,5 +380,7 @@ mod tests {
         assert!(bad(ObjMaterial { specular: Some([f32::NAN; 3]), ..none() }).contains("Ks"));
         assert!(bad(ObjMaterial { emissive: Some([-1.0; 3]), ..none() }).contains("Ke"));
         assert!(bad(ObjMaterial { shininess: Some(f32::INFINITY), ..none() }).contains("Ns"));
+        assert!(bad(ObjMaterial { opacity: Some(1.5), ..none() }).contains("\"m\": d"));
+        assert!(bad(ObjMaterial { opacity: Some(f32::NAN), ..none() }).contains("\"m\": d"));
     }
 }

@@ -1,8 +1,7 @@
 //! Meshes: buffers from files or the scene itself to placed, checked [`Mesh`]es.
 
-use std::collections::HashMap;
-
 use super::Files;
+use super::normals::{self, Smoothing};
 use crate::desc::{MeshDesc, MeshShadingDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, MeshError, MeshStep};
@@ -68,6 +67,7 @@ fn load_file(files: &Files, place: &str, file: &str, with_materials: bool) -> Re
 pub struct Placement<'a> {
     pub transform: &'a Transform,
     pub shading: MeshShadingDesc,
+    pub smoothing: Smoothing,
     pub reverse_normal: bool,
 }
 
@@ -86,6 +86,9 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, late
     let count = data.positions.len();
     if let Some((triangle, index)) = out_of_range(&data) {
         return Err(refuse(MeshError::Index { triangle, index, count }));
+    }
+    if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
+        return Err(refuse(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }));
     }
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
@@ -113,22 +116,58 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, late
         tracing::warn!("{}: {path}: {dropped} of {before} triangles have no area and were dropped", files.scene.display());
     }
 
-    let find_normals = |given: Option<Vec<[f32; 3]>>, positions: &[[f32; 3]]| match (placement.shading, given) {
-        (MeshShadingDesc::Flat, _) | (MeshShadingDesc::Auto, None) => None,
-        (_, Some(normals)) => Some(place_normals(normals, transform, placement.reverse_normal)),
-        (MeshShadingDesc::Smooth, None) => Some(smooth_normals(positions, &triangles)),
-    };
-    let normals = find_normals(data.normals, &positions);
-    let mut steps = Vec::with_capacity(later.len());
+    let mut steps = vec![MeshStep { positions, normals: data.normals }];
     for step in later {
         if step.positions.len() != count {
             return Err(refuse(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices: count }));
         }
-        let positions = place_positions(step.positions);
-        steps.push(MeshStep { normals: find_normals(step.normals, &positions), positions });
+        steps.push(MeshStep { positions: place_positions(step.positions), normals: step.normals });
     }
-    let mesh = Mesh::new(positions, triangles, normals, data.uvs).map_err(refuse)?;
-    if steps.is_empty() { Ok(mesh) } else { mesh.deforming(steps).map_err(refuse) }
+    let uvs = find_normals(&mut steps, &mut triangles, data.uvs, placement);
+    let mut steps = steps.into_iter();
+    let MeshStep { positions, normals } = steps.next().unwrap_or_default();
+    let mesh = Mesh::new(positions, triangles, normals, uvs).map_err(refuse)?;
+    let later: Vec<MeshStep> = steps.collect();
+    if later.is_empty() { Ok(mesh) } else { mesh.deforming(later).map_err(refuse) }
+}
+
+/// Gives a placed mesh the normals that its shading asks for, at each of its times; splits vertices where there are creases. Returns the uvs.
+fn find_normals(
+    steps: &mut [MeshStep],
+    triangles: &mut Vec<[u32; 3]>,
+    uvs: Option<Vec<[f32; 2]>>,
+    placement: Placement,
+) -> Option<Vec<[f32; 2]>> {
+    let given = steps.iter().all(|step| step.normals.is_some());
+    let computed = match placement.shading {
+        MeshShadingDesc::Smooth => !given,
+        MeshShadingDesc::Computed => true,
+        MeshShadingDesc::Auto | MeshShadingDesc::Flat => false,
+    };
+    let Smoothing { weight, crease_cosine } = placement.smoothing;
+    match crease_cosine.filter(|_| computed) {
+        Some(cosine) => {
+            let positions: Vec<&[[f32; 3]]> = steps.iter().map(|step| step.positions.as_slice()).collect();
+            let split = normals::split(&positions, triangles, weight, cosine);
+            for (step, normals) in steps.iter_mut().zip(split.normals) {
+                let positions = split.vertices.iter().map(|&v| step.positions[v as usize]).collect();
+                *step = MeshStep { positions, normals: Some(normals) };
+            }
+            *triangles = split.triangles;
+            uvs.map(|uvs| split.vertices.iter().map(|&v| uvs[v as usize]).collect())
+        }
+        None => {
+            for step in steps {
+                let given = step.normals.take();
+                step.normals = match placement.shading {
+                    _ if computed => Some(normals::smooth(&step.positions, triangles, weight)),
+                    MeshShadingDesc::Flat => None,
+                    _ => given.map(|normals| place_normals(normals, placement.transform, placement.reverse_normal)),
+                };
+            }
+            uvs
+        }
+    }
 }
 
 fn out_of_range(data: &MeshData) -> Option<(usize, u32)> {
@@ -151,27 +190,6 @@ fn place_normals(mut normals: Vec<[f32; 3]>, transform: &Transform, reverse: boo
         *n = if moved.length_squared() > 0.0 { moved.normalize().as_vec3().to_array() } else { *n };
     }
     normals
-}
-
-/// Normals averaged over the triangles around each position, weighted by the angle there (Thürmer and Wüthrich, "Computing Vertex Normals
-/// from Polygonal Facets"). Vertices at one position share their normal.
-fn smooth_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
-    let mut first_at = HashMap::with_capacity(positions.len());
-    // Adding zero makes -0 and 0 the same.
-    let key = |p: &[f32; 3]| p.map(|x| (x + 0.0).to_bits());
-    let shared: Vec<usize> = positions.iter().enumerate().map(|(i, p)| *first_at.entry(key(p)).or_insert(i)).collect();
-    let mut sums = vec![DVec3::ZERO; positions.len()];
-    for triangle in triangles {
-        let corners = triangle.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
-        let Some(n) = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize() else {
-            continue;
-        };
-        for k in 0..3 {
-            let (to_next, to_last) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
-            sums[shared[triangle[k] as usize]] += n * to_next.angle_between(to_last);
-        }
-    }
-    shared.iter().map(|&i| sums[i].normalize_or_zero().as_vec3().to_array()).collect()
 }
 
 /// The cube `[-1, 1]³`: two triangles a face, with uv on each.
@@ -205,14 +223,6 @@ mod tests {
         for t in &cube.triangles {
             let [a, b, c] = t.map(|i| Vec3::from(cube.positions[i as usize]));
             assert!((b - a).cross(c - a).dot(a + b + c) > 0.0);
-        }
-    }
-
-    #[test]
-    fn smooth_normals_of_a_cube_point_along_its_diagonals() {
-        let cube = cube();
-        for (p, n) in cube.positions.iter().zip(smooth_normals(&cube.positions, &cube.triangles)) {
-            assert!((Vec3::from(*p).normalize() - Vec3::from(n)).length() < 1e-6);
         }
     }
 }

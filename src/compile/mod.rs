@@ -7,13 +7,18 @@ mod composites;
 mod lights;
 mod materials;
 mod meshes;
+mod mtl;
 mod nesting;
+mod normals;
 mod objects;
+mod opacity;
 mod prepared;
 mod principled;
+mod reliefs;
 mod settings;
 mod shapes;
 mod summary;
+mod textures;
 mod transforms;
 
 pub use settings::check_settings;
@@ -24,6 +29,7 @@ use std::path::{Path, PathBuf};
 use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
+use crate::id::TextureId;
 use crate::import::AssetError;
 use crate::light::LightSet;
 use crate::material::Material;
@@ -43,8 +49,15 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
     let camera = camera::compile(&files, &desc.camera)?;
     let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
-    let mut builder =
-        Builder { files, shutter, materials, geometry: Geometry::default(), surfaces: Vec::new(), lights: LightTable::default() };
+    let mut builder = Builder {
+        files,
+        shutter,
+        materials,
+        geometry: Geometry::default(),
+        surfaces: Vec::new(),
+        opacities: Vec::new(),
+        lights: LightTable::default(),
+    };
     builder.add_world(desc)?;
     for (i, light) in desc.lights.iter().enumerate() {
         let path = format!("lights[{i}]");
@@ -95,12 +108,15 @@ struct Builder {
     geometry: Geometry,
     /// By shape.
     surfaces: Vec<Surface>,
+    /// How much of each shape is there, if not all of it, by shape.
+    opacities: Vec<Option<TextureId>>,
     lights: LightTable,
 }
 
 impl Builder {
     fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
         let files = &self.files;
+        self.geometry.cutouts = opacity::cutouts(&self.opacities, &self.materials.textures);
         let light_groups = self.lights.groups();
         let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();
@@ -118,6 +134,7 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
+            reliefs: self.surfaces.iter().any(|surface| surface.relief.is_some()),
             delta_materials: materials.iter().any(Material::is_delta),
             anisotropic: materials.iter().any(Material::is_anisotropic),
             lens: camera.lens().is_some(),
@@ -127,7 +144,8 @@ impl Builder {
             geometry: self.geometry,
             surfaces: self.surfaces,
             materials,
-            textures: self.materials.textures,
+            reliefs: self.materials.reliefs,
+            textures: self.materials.textures.textures,
             lights,
             light_groups,
             camera,

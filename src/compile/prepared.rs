@@ -1,11 +1,13 @@
 //! Shapes of the scene file: loaded and checked once, placed once or (emitters of objects) once per instance.
 
-use super::{Builder, materials, meshes, shapes};
+use super::materials::Look;
+use super::normals::Smoothing;
+use super::{Builder, meshes, shapes};
 use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
 use crate::error::Result;
 use crate::geometry::{Analytic, Placed, Shape};
-use crate::id::{LightGroupId, MaterialId, ShapeId};
+use crate::id::{LightGroupId, ShapeId};
 use crate::import::MeshData;
 use crate::light::{AreaLight, Emission, Light};
 use crate::material::ColorInput;
@@ -21,7 +23,7 @@ pub struct PreparedShape {
     /// How it moves, its own transform included.
     pub motion: Option<Motion>,
     reverse_normal: bool,
-    material: MaterialId,
+    look: Look,
     /// Light that it gives off, not black.
     pub emission: Option<PreparedEmission>,
     /// Where the scene has it.
@@ -41,6 +43,7 @@ enum Form {
     Mesh {
         data: MeshData,
         shading: MeshShadingDesc,
+        smoothing: Smoothing,
         /// Its vertices at later times.
         later: Vec<MeshData>,
         /// Where it was read, relative to the scene.
@@ -52,25 +55,32 @@ impl Builder {
     /// Loads and checks one shape of the scene file; an OBJ file may bring several.
     pub(super) fn prepare(&mut self, path: &str, desc: &ShapeDesc) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
-        let material = self.materials.find(&self.files, path, common.material)?;
+        let mut look = self.materials.find(&self.files, path, common.material)?;
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
         let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map, self.shutter)?;
         let (map, motion) = motion.as_constant().map_or((map, Some(motion)), |rest| (rest, None));
         let emission = self.emission(path, &common)?;
+        look.opacity = self.opacity(path, &common, emission.is_some())?;
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
         }
         let form = match desc {
-            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), material, emission),
-            ShapeDesc::Cube(_) => Form::Mesh { data: meshes::cube(), shading: MeshShadingDesc::Flat, later: Vec::new(), file: None },
+            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), look, emission),
+            ShapeDesc::Cube(_) => Form::Mesh {
+                data: meshes::cube(),
+                shading: MeshShadingDesc::Flat,
+                smoothing: Smoothing::default(),
+                later: Vec::new(),
+                file: None,
+            },
             _ => match shapes::compile(&self.files, path, desc)? {
                 Some(surface) => Form::Analytic(surface),
                 None => return Ok(Vec::new()),
             },
         };
         let reverse_normal = common.reverse_normal;
-        Ok(vec![PreparedShape { form, map, motion, reverse_normal, material, emission, path: path.into() }])
+        Ok(vec![PreparedShape { form, map, motion, reverse_normal, look, emission, path: path.into() }])
     }
 
     fn prepare_mesh(
@@ -79,34 +89,58 @@ impl Builder {
         desc: &MeshDesc,
         map: &DAffine3,
         motion: Option<&Motion>,
-        material: MaterialId,
+        look: Look,
         emission: Option<PreparedEmission>,
     ) -> Result<Vec<PreparedShape>> {
+        let smoothing = self.smoothing(path, desc)?;
         let mut prepared = Vec::new();
         for loaded in meshes::load(&self.files, path, desc)? {
             let moves = motion.is_some() || !loaded.later.is_empty();
-            let (mut material, mut emission) = (material, emission);
+            let (mut look, mut emission) = (look, emission);
+            let has_uvs = loaded.data.uvs.is_some();
             if let Some(mtl) = &loaded.material {
-                let from_mtl =
-                    materials::from_mtl(mtl).map_err(|message| meshes::refusal(&self.files, path, desc.file.as_deref(), message))?;
-                material = self.materials.push(from_mtl.material);
+                let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
+                // What the scene says of the shape counts.
+                let given = if desc.opacity.is_some() { look.opacity } else { from_mtl.look.opacity };
+                look = Look { opacity: given, ..from_mtl.look };
                 emission =
                     emission.or(from_mtl.radiance.map(|radiance| PreparedEmission { emission: Emission::constant(radiance), group: None }));
+            }
+            if emission.is_some() && look.opacity.is_some() {
+                let message = format!("{path}: what gives off light has no holes: its opacity is not used");
+                tracing::warn!("{}: {message}", self.files.scene.display());
+                look.opacity = None;
+            }
+            if !has_uvs && self.materials.needs_uv(&look) {
+                return Err(meshes::refusal(
+                    &self.files,
+                    path,
+                    desc.file.as_deref(),
+                    "the material or the opacity has textures, but the mesh has no uv".into(),
+                ));
             }
             if moves && emission.is_some() {
                 return Err(self.files.error(path, "a shape that gives off light cannot move"));
             }
             prepared.push(PreparedShape {
-                form: Form::Mesh { data: loaded.data, shading: desc.shading, later: loaded.later, file: desc.file.clone() },
+                form: Form::Mesh { data: loaded.data, shading: desc.shading, smoothing, later: loaded.later, file: desc.file.clone() },
                 map: *map,
                 motion: motion.cloned(),
                 reverse_normal: desc.reverse_normal,
-                material,
+                look,
                 emission,
                 path: path.into(),
             });
         }
         Ok(prepared)
+    }
+
+    fn smoothing(&self, path: &str, desc: &MeshDesc) -> Result<Smoothing> {
+        let crease = desc.crease_angle_degrees;
+        let crease = crease.map(|angle| self.files.within(&format!("{path}.crease_angle_degrees"), angle, 0.0, 180.0)).transpose()?;
+        // A rounding must not make creases where triangles are coplanar or the angle is that of all edges.
+        let crease_cosine = crease.filter(|&angle| angle < 180.0).map(|angle| angle.to_radians().cos() - 1e-6);
+        Ok(Smoothing { weight: desc.normal_weight, crease_cosine })
     }
 
     fn emission(&mut self, path: &str, common: &ShapeCommon) -> Result<Option<PreparedEmission>> {
@@ -118,7 +152,7 @@ impl Builder {
         let group = self.lights.group(&self.files, &path, desc.group.as_deref())?;
         let input = match &desc.texture {
             None => ColorInput::Constant(Rgb::WHITE),
-            Some(name) => self.materials.texture(&self.files, &format!("{path}.texture"), name)?,
+            Some(name) => self.materials.textures.radiance(&self.files, &format!("{path}.texture"), name)?,
         };
         let (radiance, texture) = match input {
             ColorInput::Constant(color) => (radiance * color, None),
@@ -130,7 +164,7 @@ impl Builder {
 
     /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
     pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3) -> Result<ShapeId> {
-        let PreparedShape { form, map, motion, reverse_normal, material, emission, path } = prepared;
+        let PreparedShape { form, map, motion, reverse_normal, look, emission, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform = Transform::new(*outer * map).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
@@ -140,9 +174,10 @@ impl Builder {
                 placed.reverse_normal = reverse_normal;
                 Shape::Analytic(placed)
             }
-            Form::Mesh { data, shading, later, file } => {
-                let placement = meshes::Placement { transform: &transform, shading, reverse_normal };
-                Shape::Mesh(meshes::place(&self.files, &path, file.as_deref(), data, later, placement)?)
+            Form::Mesh { data, shading, smoothing, later, file } => {
+                let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal };
+                let mesh = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)?;
+                Shape::Mesh(if self.materials.has_normal_map(&look) { mesh.with_tangents() } else { mesh })
             }
         };
         let bounds = shape.bounds();
@@ -151,9 +186,9 @@ impl Builder {
         }
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
-        let mut surface = Surface { material, first_light: None, single_light: false };
+        let mut surface = Surface { material: look.material, relief: look.relief, first_light: None, single_light: false };
         if let Some(PreparedEmission { emission, group }) = emission {
-            let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures);
+            let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
             if !lights.iter().any(|light| light.area() > 0.0) {
                 return Err(self.files.error(&format!("{path}.emission"), "the light has no area"));
             }
@@ -161,6 +196,7 @@ impl Builder {
             surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
         }
         self.surfaces.push(surface);
+        self.opacities.push(look.opacity);
         Ok(id)
     }
 }

@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::geometry::{Analytic, Shape};
 use crate::light::{Light, LightSelection};
 use crate::scene::Scene;
+use crate::texture::Texture;
 
 /// Counts, bounds and features of a scene.
 #[derive(Clone, Debug, Serialize)]
@@ -31,7 +32,7 @@ pub struct Summary {
     pub light_groups: Vec<String>,
     /// Materials, the default one included.
     pub materials: usize,
-    /// Textures.
+    /// Textures that vary; constant ones are colours.
     pub textures: usize,
     /// Smallest and largest coordinates, in world units; absent if there is no shape.
     pub bounds: Option<[[f32; 3]; 2]>,
@@ -83,7 +84,7 @@ impl Summary {
             },
             light_groups: scene.light_groups.names().to_vec(),
             materials: scene.materials.len(),
-            textures: scene.textures.len(),
+            textures: scene.textures.iter().filter(|texture| !matches!(texture, Texture::Constant(_))).count(),
             bounds: (!bounds.is_empty()).then(|| [bounds.min.to_array(), bounds.max.to_array()]),
             geometry_bytes: geometry.memory_bytes(),
             features: features(scene),
@@ -122,6 +123,8 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (f.analytic_shapes, "analytic shapes"),
         (f.instances, "instances"),
         (f.textures, "textures"),
+        (f.reliefs, "normal or bump maps"),
+        (!scene.geometry.cutouts.is_empty(), "holes"),
         (f.delta_materials, "mirror or glass"),
         (f.anisotropic, "anisotropic materials"),
         (f.lens, "lens"),

@@ -50,7 +50,7 @@ pub enum RoughnessDesc {
 }
 
 /// A material. All are two-sided unless composed by `two_sided`; a dielectric's inside is the side against the normal. Colours are within
-/// `[0, 1]`; those of textures are clamped to it.
+/// `[0, 1]`, those of textures too; the numbers of textures are clamped to it.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum MaterialDesc {
@@ -186,6 +186,48 @@ pub enum MaterialDesc {
         /// The material of the other side, by name.
         back: String,
     },
+    /// Another material on a surface that looks as if it had relief: give `normal_map` or `bump_map`. The shape itself stays as it is, and
+    /// needs uv: every shape has them but a mesh without `uvs`.
+    Relief {
+        /// The material, by name; not one with a relief of its own.
+        material: String,
+        /// An image of normals.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        normal_map: Option<NormalMapDesc>,
+        /// A texture of heights.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        bump_map: Option<BumpMapDesc>,
+    },
+}
+
+/// An image of normals in tangent space: red along u, green along v (upward in the image), blue along the normal, each as `2 x - 1` of a linear
+/// value. On meshes the frame is MikkTSpace's, with the mesh's normals; on other shapes it is that of u and v.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NormalMapDesc {
+    /// The texture's name. Its `color_space` must not be `srgb`.
+    pub texture: String,
+    /// Factor on the tilt, from 0 to 16. Default: 1.
+    #[serde(default = "one")]
+    pub strength: f32,
+    /// Whether green grows downward in the image, as in maps made for DirectX. Default: false.
+    #[serde(default)]
+    pub flip_y: bool,
+}
+
+/// A texture of heights along the normal.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BumpMapDesc {
+    /// The texture's name.
+    pub texture: String,
+    /// Height in world units where the texture is 1; below 0 turns bumps into dents. Default: 1.
+    #[serde(default = "one")]
+    pub height: f32,
+}
+
+fn one() -> f32 {
+    1.0
 }
 
 fn zero() -> ScalarDesc {
@@ -234,39 +276,4 @@ fn white() -> ColorDesc {
 
 fn glass_ior() -> f32 {
     1.5
-}
-
-/// A texture.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-pub enum TextureDesc {
-    /// A checkerboard in uv.
-    Checker {
-        /// Colour of the square at the origin of uv. Default: 0.4.
-        #[serde(default = "dark")]
-        color0: [f32; 3],
-        /// Colour of its neighbours. Default: 0.2.
-        #[serde(default = "darker")]
-        color1: [f32; 3],
-        /// Repetitions of a pair of squares along u and v. Default: 1, 1.
-        #[serde(default = "unit_scale")]
-        scale: [f32; 2],
-    },
-    /// The same colour everywhere.
-    Constant {
-        /// The colour.
-        color: [f32; 3],
-    },
-}
-
-fn dark() -> [f32; 3] {
-    [0.4; 3]
-}
-
-fn darker() -> [f32; 3] {
-    [0.2; 3]
-}
-
-fn unit_scale() -> [f32; 2] {
-    [1.0; 2]
 }

@@ -11,18 +11,20 @@ mod output;
 mod principled;
 mod settings;
 mod shape;
+mod texture;
 mod transform;
 
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
-pub use material::{ColorDesc, MaterialDesc, RoughnessDesc, ScalarDesc, TextureDesc};
+pub use material::{BumpMapDesc, ColorDesc, MaterialDesc, NormalMapDesc, RoughnessDesc, ScalarDesc};
 pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
 pub use principled::PrincipledDesc;
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
 pub use shape::{
-    ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, ObjectDesc, ProfileDesc, QuadDesc,
-    RevolutionDesc, ShapeCommon, ShapeDesc, SphereDesc,
+    ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ObjectDesc,
+    OpacityDesc, ProfileDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeDesc, SphereDesc,
 };
+pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};
 
 use std::collections::BTreeMap;

@@ -26,6 +26,10 @@ macro_rules! shapes {
                 /// How the shape moves, after `transform`. Default: not at all.
                 #[serde(default, skip_serializing_if = "Vec::is_empty")]
                 pub motion: Vec<KeyframeDesc>,
+                /// How much of the surface is there: a number from 0 to 1, or `{ "texture": "name" }`. Rays, shadow rays too, pass through the
+                /// rest. Default: 1, or what an MTL says. Not with `emission`.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub opacity: Option<OpacityDesc>,
                 /// Light that the shape gives off.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub emission: Option<EmissionDesc>,
@@ -51,6 +55,7 @@ macro_rules! shapes {
                         material: shape.material.as_deref(),
                         transform: &shape.transform,
                         motion: &shape.motion,
+                        opacity: shape.opacity.as_ref(),
                         emission: shape.emission.as_ref(),
                         reverse_normal: shape.reverse_normal,
                     },)*
@@ -71,6 +76,8 @@ pub struct ShapeCommon<'a> {
     pub transform: &'a TransformDesc,
     /// How it moves.
     pub motion: &'a [KeyframeDesc],
+    /// How much of the surface is there.
+    pub opacity: Option<&'a OpacityDesc>,
     /// Light that the shape gives off.
     pub emission: Option<&'a EmissionDesc>,
     /// Whether the front is the side against the shape's own normal.
@@ -81,9 +88,12 @@ shapes! {
     /// A triangle mesh from a file, or inline by `positions` and `triangles`.
     Mesh(MeshDesc) {
         /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ brings those of its MTL: `illum`
-        /// 5 is a mirror of colour Ks; 4, 6, 7 and 9, or `d` below 1/2, is glass of index Ni; a specular colour Ks with an exponent Ns has
-        /// alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic with base Kd otherwise; all else is diffuse with
-        /// Kd. Ke is radiance given off. Texture maps are not read.
+        /// 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular colour Ks with an exponent Ns has alpha =
+        /// sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic with base Kd otherwise; all else is diffuse with Kd. Ke is
+        /// radiance given off. `map_Kd` is a texture times Kd (times 1 if Kd is black), where the faces have uv; `norm` is a normal map, `bump`
+        /// and `map_Bump` are one if their image has colours, else heights in world units times `-bm`. `d` (or 1 - `Tr`) is the opacity of what
+        /// is neither glass nor a lamp, times `map_d` (its alpha, else its luminance) or the alpha of `map_Kd`. Of the options of maps, `-s`,
+        /// `-o`, `-clamp`, `-bm` and `-imfchan` count. Other maps are not used.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
         /// Inline: positions of the vertices.
@@ -108,8 +118,16 @@ shapes! {
         /// How normals are found. Default: given ones are interpolated, else the mesh is flat.
         #[serde(default)]
         shading: MeshShadingDesc,
+        /// Where normals are computed: triangles at an angle above this are not smoothed together, from 0 to 180 degrees. Default: 180, no
+        /// creases.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        crease_angle_degrees: Option<f64>,
+        /// Where normals are computed: how triangles around a vertex are weighted. Default: `angle`.
+        #[serde(default)]
+        normal_weight: NormalWeightDesc,
     }
-    /// A sphere about the origin, or the part of it between two heights and within an angle about +z.
+    /// A sphere about the origin, or the part of it between two heights and within an angle about +z. u is the angle over `phi_max`; v runs
+    /// from the bottom to the top of what is kept, by the angle from -z.
     Sphere(SphereDesc) {
         /// Radius, above 0. Default: 1.
         #[serde(default = "one")]
@@ -124,7 +142,8 @@ shapes! {
         #[serde(default = "full_turn")]
         phi_max_degrees: f64,
     }
-    /// A parallelogram; the normal is `edge_u` x `edge_v`. Default: the square `[-1, 1]²` at z = 0 with normal +z.
+    /// A parallelogram; the normal is `edge_u` x `edge_v`. Default: the square `[-1, 1]²` at z = 0 with normal +z. u and v run from 0 to 1 along
+    /// the edges, so a texture with a `scale` of the edges' lengths over that of a tile shows tiles.
     Quad(QuadDesc) {
         /// One corner.
         #[serde(default = "quad_origin")]
@@ -136,7 +155,7 @@ shapes! {
         #[serde(default = "quad_edge_v")]
         edge_v: [f64; 3],
     }
-    /// The cube `[-1, 1]³` with normals outward.
+    /// The cube `[-1, 1]³` with normals outward. Each face has u and v from 0 to 1.
     Cube(CubeDesc) {}
     /// A disk, ring or sector at z = 0 about the origin, with normal +z. u is the angle over `phi_max`; v runs from the inner to the outer
     /// radius.
@@ -209,8 +228,21 @@ pub enum MeshShadingDesc {
     Auto,
     /// Flat, even where normals are given.
     Flat,
-    /// Smooth: given normals, or angle-weighted ones.
+    /// Smooth: given normals, or computed ones where none are given.
     Smooth,
+    /// Smooth with computed normals, even where normals are given.
+    Computed,
+}
+
+/// How computed normals are averaged over the triangles around a vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NormalWeightDesc {
+    /// By the angle of the triangle at the vertex: does not depend on how faces are cut into triangles.
+    #[default]
+    Angle,
+    /// By the area of the triangle: large faces stay flatter.
+    Area,
 }
 
 fn one() -> f64 {
@@ -231,6 +263,19 @@ fn quad_edge_u() -> [f64; 3] {
 
 fn quad_edge_v() -> [f64; 3] {
     [0.0, 2.0, 0.0]
+}
+
+/// How much of a surface is there, from 0 to 1.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields, expecting = "expected an opacity: a number, or { \"texture\": name }")]
+pub enum OpacityDesc {
+    /// The same everywhere.
+    Number(f32),
+    /// A texture by name.
+    Texture {
+        /// The texture's name. An image with alpha that names no `channel` stands for its alpha, other textures for their luminance.
+        texture: String,
+    },
 }
 
 /// Light given off by a shape.

@@ -9,7 +9,7 @@ use crate::math::Ray;
 
 /// How much of a surface is there, decided hit by hit while a ray is on its way.
 ///
-/// A hit counts if a number in `[0, 1)`, hashed from the ray and the ids, lies below the coverage. So the answer is the same in any order of
+/// A hit counts if a number in `[0, 1)`, hashed from the ray, the ids and the side, lies below the coverage. So the answer is the same in any order of
 /// visits, for closest and any hits, and a ray that looks again meets the same surfaces.
 pub trait Coverage: Debug + Send + Sync {
     /// The shapes with holes; all others are never asked about.
@@ -52,10 +52,20 @@ impl Cutouts {
     pub fn counts(&self, shapes: &[Shape], key: u32, ray: &Ray, hit: &Hit) -> bool {
         match &self.0 {
             Some(coverage) if coverage.has_holes(hit.shape) => {
-                is_covered(coverage.coverage(&shapes[hit.shape.index()], ray, hit), key, hit)
+                let shape = &shapes[hit.shape.index()];
+                is_covered(coverage.coverage(shape, ray, hit), key ^ side(shape, ray, hit), hit)
             }
             _ => true,
         }
+    }
+}
+
+/// Tells the hits of a ray with one analytic shape apart, for they have the same ids: it enters and leaves from different sides. Distances
+/// would not do, for accelerators round them differently.
+fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
+    match shape {
+        Shape::Mesh(_) => 0,
+        Shape::Analytic(placed) => placed.interaction(ray, hit).is_some_and(|at| at.n_g.dot(ray.direction) > 0.0).into(),
     }
 }
 

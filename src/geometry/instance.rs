@@ -105,6 +105,6 @@ impl Instance {
     }
 }
 
-fn finite_or_zero(v: Vec3) -> Vec3 {
+pub(super) fn finite_or_zero(v: Vec3) -> Vec3 {
     if v.is_finite() { v } else { Vec3::ZERO }
 }

@@ -1,5 +1,6 @@
 //! Triangle meshes: positions, corners, and optionally normals and uv per vertex.
 
+use super::tangents::{self, CornerTangents};
 pub use super::triangle::TrianglePoints;
 use super::{Hit, SurfaceInteraction};
 use crate::id::PrimId;
@@ -48,11 +49,13 @@ pub enum MeshError {
 pub struct Mesh {
     /// One more than there are vertices: Embree reads 16 bytes of the last.
     positions: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    normals: Option<Vec<[f32; 3]>>,
-    uvs: Option<Vec<[f32; 2]>>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) normals: Option<Vec<[f32; 3]>>,
+    pub(super) uvs: Option<Vec<[f32; 2]>>,
     /// Of a mesh that deforms, its vertices at further times.
-    later: Vec<MeshStep>,
+    pub(super) later: Vec<MeshStep>,
+    /// For normal maps, those of each triangle at each time; else empty.
+    pub(super) tangents: Vec<Vec<CornerTangents>>,
 }
 
 /// The vertices of a deforming mesh at one time.
@@ -105,7 +108,7 @@ impl Mesh {
         }
         positions.push([0.0; 3]);
         positions.shrink_to_fit();
-        Ok(Self { positions, triangles, normals, uvs, later: Vec::new() })
+        Ok(Self { positions, triangles, normals, uvs, later: Vec::new(), tangents: Vec::new() })
     }
 
     /// This mesh deforming: its own vertices are those at the opening of the shutter, `later` has those at further times, evenly spaced to the
@@ -127,7 +130,7 @@ impl Mesh {
             let Self { positions, normals, .. } = Self::new(step.positions, self.triangles.clone(), normals, None)?;
             checked.push(MeshStep { positions, normals });
         }
-        Ok(Self { later: checked, ..self })
+        Ok(Self { later: checked, tangents: Vec::new(), ..self })
     }
 
     /// Whether vertices move.
@@ -250,12 +253,19 @@ impl Mesh {
         let of_step =
             |step: &MeshStep| size_of_val(step.positions.as_slice()) + step.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
         let later: usize = self.later.iter().map(of_step).sum();
-        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs + later
+        let tangents: usize = self.tangents.iter().map(|t| size_of_val(t.as_slice())).sum();
+        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs + later + tangents
     }
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
     #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        self.interaction_and_dp_dv(ray, hit).map(|(at, _)| at)
+    }
+
+    /// The interaction with the change of the point with v.
+    #[inline(always)]
+    pub(super) fn interaction_and_dp_dv(&self, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
         let points = self.triangle_points_at(hit.prim, ray.time);
 
         // The hit point in f64, on the plane of the triangle.
@@ -280,7 +290,7 @@ impl Mesh {
         }
 
         let shading = self.shading(hit, &points, n_g, ray.time);
-        Some(SurfaceInteraction {
+        let at = SurfaceInteraction {
             p,
             t: t as f32,
             error,
@@ -292,7 +302,8 @@ impl Mesh {
             prim: hit.prim,
             instance: hit.instance,
             time: ray.time,
-        })
+        };
+        Some((at, shading.dp_dv))
     }
 
     /// Interpolated attributes at a hit.
@@ -302,39 +313,58 @@ impl Mesh {
         let (u, v) = (hit.u, hit.v);
         let w = 1.0 - u - v;
 
-        let n_s = match self.corner_normals(hit.prim, time) {
-            None => n_g,
+        let (n_s, length) = match self.corner_normals(hit.prim, time) {
+            None => (n_g, 1.0),
             Some([n_a, n_b, n_c]) => {
                 let n = n_a * w + n_b * u + n_c * v;
                 let length_squared = n.length_squared();
                 // A vanishing interpolated normal (opposite corners) falls back to the flat one, as does a NaN.
                 if length_squared > 1e-12 {
-                    let n = n / length_squared.sqrt();
+                    let length = length_squared.sqrt();
+                    let n = n / length;
                     // A mesh may be wound against its normals: the shading normal follows the front.
-                    if n.dot(n_g) < 0.0 { -n } else { n }
+                    (if n.dot(n_g) < 0.0 { -n } else { n }, length)
                 } else {
-                    n_g
+                    (n_g, 1.0)
                 }
             }
         };
 
-        match &self.uvs {
-            None => ShadingAttributes { n_s, dp_du: points.b - points.a, uv: Vec2::new(u, v) },
-            Some(uvs) => {
-                let (uv_a, uv_b, uv_c) = (Vec2::from(uvs[a]), Vec2::from(uvs[b]), Vec2::from(uvs[c]));
-                let (d1, d2) = (uv_b - uv_a, uv_c - uv_a);
-                let determinant = d1.x * d2.y - d1.y * d2.x;
-                let dp_du = ((points.b - points.a) * d2.y - (points.c - points.a) * d1.y) / determinant;
-                let dp_du = if dp_du.is_finite() { dp_du } else { points.b - points.a };
-                ShadingAttributes { n_s, dp_du, uv: uv_a * w + uv_b * u + uv_c * v }
-            }
+        let (edge_b, edge_c) = (points.b - points.a, points.c - points.a);
+        let Some(uvs) = &self.uvs else {
+            return ShadingAttributes { n_s, dp_du: edge_b, dp_dv: edge_c, uv: Vec2::new(u, v) };
+        };
+        let (uv_a, uv_b, uv_c) = (Vec2::from(uvs[a]), Vec2::from(uvs[b]), Vec2::from(uvs[c]));
+        let uv = uv_a * w + uv_b * u + uv_c * v;
+        if let Some((tangent, side)) = self.tangent(hit.prim, [w, u, v], time) {
+            // MikkTSpace's frame is that of the interpolated vectors before they are normalised, up to a factor common to all three.
+            return ShadingAttributes { n_s, dp_du: tangent / length, dp_dv: n_s.cross(tangent) * side, uv };
         }
+        let (d1, d2) = (uv_b - uv_a, uv_c - uv_a);
+        let inverse = 1.0 / (d1.x * d2.y - d1.y * d2.x);
+        let (dp_du, dp_dv) = ((edge_b * d2.y - edge_c * d1.y) * inverse, (edge_c * d1.x - edge_b * d2.x) * inverse);
+        let (dp_du, dp_dv) = if dp_du.is_finite() && dp_dv.is_finite() { (dp_du, dp_dv) } else { (edge_b, edge_c) };
+        ShadingAttributes { n_s, dp_du, dp_dv, uv }
+    }
+
+    /// The interpolated tangent for normal maps and the side of the bitangent; `None` where the mesh has none.
+    #[inline]
+    fn tangent(&self, prim: PrimId, weights: [f32; 3], time: f32) -> Option<(Vec3, f32)> {
+        let first = &self.tangents.first()?[prim.index()];
+        if !self.is_deforming() {
+            return tangents::interpolate(first, weights);
+        }
+        let ([first, second], s) = self.steps_around(time);
+        let at = |step: usize| tangents::interpolate(&self.tangents[step][prim.index()], weights);
+        let ((from, side), (to, _)) = (at(first)?, at(second)?);
+        Some((from * (1.0 - s) + to * s, side))
     }
 }
 
 struct ShadingAttributes {
     n_s: Vec3,
     dp_du: Vec3,
+    dp_dv: Vec3,
     uv: Vec2,
 }
 

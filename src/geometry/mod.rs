@@ -14,6 +14,7 @@ mod revolution;
 mod sector;
 mod shape_error;
 mod sphere;
+mod tangents;
 #[cfg(test)]
 mod testing;
 mod triangle;
@@ -36,7 +37,7 @@ pub use triangle::{TriangleHit, TriangleRay, TriangleSample};
 
 use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
 use crate::math::float::step_past;
-use crate::math::{Aabb, Ray};
+use crate::math::{Aabb, Ray, Vec3};
 
 /// A triangle mesh or one analytic surface.
 ///
@@ -188,5 +189,23 @@ impl Geometry {
         } else {
             self.instance(hit.instance).interaction(self.shape(hit.shape), ray, hit)
         }
+    }
+
+    /// Change of the point with v at a hit of `ray`, as [`SurfaceInteraction::dp_du`]; apart from the interaction, for few surfaces need it.
+    #[inline(never)]
+    pub fn dp_dv(&self, ray: &Ray, hit: &Hit) -> Vec3 {
+        let local = |ray: &Ray| {
+            let found = match self.shape(hit.shape) {
+                Shape::Mesh(mesh) => mesh.interaction_and_dp_dv(ray, hit),
+                Shape::Analytic(placed) => placed.interaction_and_dp_dv(ray, hit),
+            };
+            found.map_or(Vec3::ZERO, |(_, dp_dv)| dp_dv)
+        };
+        if hit.instance == Hit::NO_INSTANCE {
+            return local(ray);
+        }
+        let instance = self.instance(hit.instance);
+        let dp_dv = local(&instance.object_ray(ray));
+        instance::finite_or_zero(instance.transform_at(ray.time).vector(dp_dv.as_dvec3()).as_vec3())
     }
 }

@@ -207,6 +207,12 @@ impl Placed {
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        self.interaction_and_dp_dv(ray, hit).map(|(at, _)| at)
+    }
+
+    /// The interaction with the change of the point with v.
+    #[inline(always)]
+    pub(super) fn interaction_and_dp_dv(&self, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
         let centered = self.centered_ray(&Ray { t_max: f32::INFINITY, ..*ray });
         let local_hit = self.hit_near(hit.t, &centered)?;
         let t = local_hit.t + centered.shift;
@@ -215,7 +221,7 @@ impl Placed {
         }
         let surface = self.shape.surface(&centered.ray, &local_hit);
         let placed = self.place(surface.p, surface.n, surface.pdf_area);
-        Some(SurfaceInteraction {
+        let at = SurfaceInteraction {
             p: placed.p,
             t: t as f32,
             error: self.error,
@@ -227,7 +233,8 @@ impl Placed {
             prim: hit.prim,
             instance: hit.instance,
             time: ray.time,
-        })
+        };
+        Some((at, self.transform.vector(surface.dp_dv).as_vec3()))
     }
 
     /// The hit nearest to the distance `t` of the original ray. It need not be the first: the surface may have holes. It need not be exact

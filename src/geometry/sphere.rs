@@ -2,8 +2,8 @@
 //!
 //! Object space: `|p| = radius`, `z_min <= z <= z_max`, `0 <= phi <= phi_max` with phi from +x towards +y. The normal points outward.
 //!
-//! `u = phi / phi_max`. `v = (theta - theta_min) / (theta_max - theta_min)` where theta is the angle from +z, so v is 0 at the top and 1 at
-//! the bottom of the part that is kept.
+//! `u = phi / phi_max`. `v = (theta_max - theta) / (theta_max - theta_min)` where theta is the angle from +z, so v is 0 at the bottom and 1 at
+//! the top of the part that is kept: a map of the world in latitude and longitude stands upright on it.
 
 use std::f64::consts::PI;
 
@@ -106,12 +106,12 @@ impl Sphere {
         let rho = (p.x * p.x + p.y * p.y).sqrt();
         let toward = direction_from_axis(p.x, p.y);
         let theta_range = self.theta_max - self.theta_min;
-        let v = (rho.atan2(p.z) - self.theta_min) / theta_range;
+        let v = (self.theta_max - rho.atan2(p.z)) / theta_range;
         LocalSurface {
             p,
             n,
             dp_du: dvec3(-p.y, p.x, 0.0) * self.sector.phi_max(),
-            dp_dv: dvec3(p.z * toward.x, p.z * toward.y, -rho) * theta_range,
+            dp_dv: dvec3(-p.z * toward.x, -p.z * toward.y, rho) * theta_range,
             uv: [self.sector.fraction(p.x, p.y), v.clamp(0.0, 1.0)],
             pdf_area: 1.0 / self.area,
         }
@@ -177,9 +177,9 @@ mod tests {
     }
 
     #[test]
-    fn v_runs_from_the_top_to_the_bottom() {
+    fn v_runs_from_the_bottom_to_the_top() {
         let sphere = Sphere::new(1.0, -0.6, 0.8, 3.0).unwrap();
-        for (z, v) in [(0.8f64, 0.0), (-0.6, 1.0)] {
+        for (z, v) in [(0.8f64, 1.0), (-0.6, 0.0)] {
             let r = ray(dvec3(0.0, 3.0, z * 0.999_999_9), -DVec3::Y);
             let hit = sphere.intersect(&r).unwrap();
             assert!((sphere.surface(&r, &hit).uv[1] - v).abs() < 1e-6);

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use std::fmt::Display;
 use std::path::Path;
 
+use super::mtl_maps::{ObjMaps, take_maps};
 use super::obj_check::{check_obj, expand_colors};
 use super::{AssetError, MeshData};
 
@@ -27,6 +28,8 @@ pub struct ObjMaterial {
     pub opacity: Option<f32>,
     /// `illum`.
     pub illumination: Option<u8>,
+    /// Images.
+    pub maps: ObjMaps,
 }
 
 /// The faces of an OBJ file that share a material.
@@ -52,13 +55,14 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
 
     let folder = path.parent().unwrap_or(Path::new(""));
     let trouble: RefCell<Option<AssetError>> = RefCell::new(None);
+    let maps: RefCell<HashMap<String, ObjMaps>> = RefCell::default();
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let loaded = tobj::load_obj_buf(&mut text.as_bytes(), &options, |mtl| {
         if !materials {
             return Ok(Default::default());
         }
         let mtl = folder.join(mtl);
-        let parsed = read_mtl(&mtl).and_then(|text| tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|e| mtl_fault(&mtl, &e)));
+        let parsed = read_mtl(&mtl, &maps).and_then(|text| tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|e| mtl_fault(&mtl, &e)));
         parsed.map_err(|e| {
             trouble.borrow_mut().get_or_insert(e);
             tobj::LoadError::ReadError
@@ -69,17 +73,19 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     }
     let (models, library) = loaded.map_err(|e| AssetError::Malformed(format!("not a valid OBJ file: {e}")))?;
     let library = if materials { library.unwrap_or_default() } else { Vec::new() };
+    let maps = maps.into_inner();
     if materials && used.names_a_library {
         let unknown = |(_, name): &&(usize, String)| !library.iter().any(|m| m.name == *name);
         if let Some((line, name)) = used.materials.iter().find(unknown) {
             return Err(AssetError::Malformed(format!("line {line}: no material named \"{name}\" in the MTL")));
         }
     }
+    let library: Vec<ObjMaterial> = library.iter().map(|m| from_mtl(m, maps.get(&m.name).cloned().unwrap_or_default())).collect();
     join_models(&models, &library)
 }
 
 /// One mesh for each material and set of attributes, in the order of their first faces.
-fn join_models(models: &[tobj::Model], library: &[tobj::Material]) -> Result<Vec<ObjMesh>, AssetError> {
+fn join_models(models: &[tobj::Model], library: &[ObjMaterial]) -> Result<Vec<ObjMesh>, AssetError> {
     let mut meshes: Vec<ObjMesh> = Vec::new();
     let mut places = HashMap::new();
     for model in models.iter().filter(|model| !model.mesh.indices.is_empty()) {
@@ -88,7 +94,7 @@ fn join_models(models: &[tobj::Model], library: &[tobj::Material]) -> Result<Vec
         let place = *places.entry((material, mesh.normals.is_some(), mesh.uvs.is_some())).or_insert(meshes.len());
         match meshes.get_mut(place) {
             Some(joined) => joined.mesh.append(mesh)?,
-            None => meshes.push(ObjMesh { mesh, material: material.map(|id| from_mtl(&library[id])) }),
+            None => meshes.push(ObjMesh { mesh, material: material.map(|id| library[id].clone()) }),
         }
     }
     if meshes.is_empty() {
@@ -101,17 +107,20 @@ fn without_lines(text: &str) -> String {
     text.lines().filter(|line| line.split_whitespace().next() != Some("l")).flat_map(|line| [line, "\n"]).collect()
 }
 
-/// The text of an MTL, fit for the parser.
-fn read_mtl(path: &Path) -> Result<String, AssetError> {
+/// The text of an MTL, fit for the parser; its texture maps are added to `maps`.
+fn read_mtl(path: &Path, maps: &RefCell<HashMap<String, ObjMaps>>) -> Result<String, AssetError> {
     let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
-    expand_colors(&String::from_utf8_lossy(&bytes)).map_err(|e| mtl_fault(path, &e))
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let (text, found) = take_maps(&String::from_utf8_lossy(&bytes), folder).map_err(|e| mtl_fault(path, &e))?;
+    maps.borrow_mut().extend(found);
+    expand_colors(&text).map_err(|e| mtl_fault(path, &e))
 }
 
 fn mtl_fault(path: &Path, fault: &dyn Display) -> AssetError {
     AssetError::Malformed(format!("{}: not a valid MTL file: {fault}", path.display()))
 }
 
-fn from_mtl(material: &tobj::Material) -> ObjMaterial {
+fn from_mtl(material: &tobj::Material, maps: ObjMaps) -> ObjMaterial {
     let transparency = material.unknown_param.get("Tr").and_then(|text| text.parse::<f32>().ok());
     ObjMaterial {
         name: material.name.clone(),
@@ -122,6 +131,7 @@ fn from_mtl(material: &tobj::Material) -> ObjMaterial {
         ior: material.optical_density,
         opacity: material.dissolve.or(transparency.map(|t| 1.0 - t)),
         illumination: material.illumination_model,
+        maps,
     }
 }
 

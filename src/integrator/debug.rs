@@ -82,10 +82,12 @@ impl Integrator for AmbientOcclusion {
         let mut shadow_rays = 0;
         for_each_first_surface(world, samples, out, counts, |sample, ray, at| {
             let u = self.sampler.sample_4d(sample.seed, sample.sample, dimensions::bsdf(0));
-            let toward_viewer = if at.n_s.dot(ray.direction) > 0.0 { -at.n_s } else { at.n_s };
-            let direction = Frame::from_normal(toward_viewer).to_world(warp::cosine_hemisphere([u[1], u[2]]));
-            shadow_rays += 1;
-            let free = !world.accel.occluded(&Ray { t_max: self.distance, ..at.spawn(direction) });
+            let side = if at.n_g.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+            let direction = Frame::from_normal(at.n_s * side).to_world(warp::cosine_hemisphere([u[1], u[2]]));
+            // Below the surface is its own inside.
+            let above = direction.dot(at.n_g) * side > 0.0;
+            shadow_rays += u64::from(above);
+            let free = above && !world.accel.occluded(&Ray { t_max: self.distance, ..at.spawn(direction) });
             PixelSample {
                 radiance: Rgb::splat(f32::from(u8::from(free))),
                 alpha: 1.0,

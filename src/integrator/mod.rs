@@ -6,6 +6,7 @@
 
 mod debug;
 mod path;
+mod shading;
 mod whitted;
 mod world;
 

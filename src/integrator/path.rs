@@ -5,9 +5,10 @@
 
 use std::cell::RefCell;
 
+use super::shading::{facing_normal, terminator_factor};
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions, surface_sample};
 use crate::accel::Coherence;
-use crate::bsdf::{Bsdf, BsdfSample};
+use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
@@ -293,25 +294,30 @@ struct ShadowRay {
 }
 
 /// A surface point with its scattering and the frame for it.
-struct Vertex<'a> {
-    at: &'a SurfaceInteraction,
-    bsdf: Bsdf,
-    frame: Frame,
-    wo: Vec3,
+pub(super) struct Vertex<'a> {
+    pub at: &'a SurfaceInteraction,
+    pub bsdf: Bsdf,
+    pub frame: Frame,
+    /// The direction back, in the frame.
+    pub wo: Vec3,
     /// Cosine between the direction back and the geometric normal.
     cos_geometric: f32,
+    /// Cosine between the shading and the geometric normal, if they differ by a normal map or a bump map.
+    cos_normals: Option<f32>,
 }
 
 impl<'a> Vertex<'a> {
     #[inline]
-    fn new(world: &World, at: &'a SurfaceInteraction, ray: &Ray) -> Self {
+    pub fn new(world: &World, at: &'a SurfaceInteraction, ray: &Ray) -> Self {
         let back = -ray.direction;
         let cos_geometric = back.dot(at.n_g);
-        // Near silhouettes an interpolated normal may face away although the surface faces us; the flat one is right there.
-        let n_s = if back.dot(at.n_s) * cos_geometric > 0.0 { at.n_s } else { at.n_g };
+        let n_s = facing_normal(back, at.n_s, at.n_g);
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
         let bsdf = world.scene.bsdf(at, ray.direction);
-        Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric }
+        // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
+        let has_relief = world.scene.features.reliefs && world.scene.surface(at.shape).relief.is_some();
+        let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
+        Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric, cos_normals }
     }
 
     /// The point and the side of it that light must reach.
@@ -321,28 +327,41 @@ impl<'a> Vertex<'a> {
         Receiver { p: self.at.p, n }
     }
 
-    /// Whether the shading frame and the geometry agree on which side a direction lies; where they do not, light would leak through.
+    /// What the surface lets through of light from a direction, beyond its BSDF: nothing where the shading frame and the geometry disagree on
+    /// its side, for it would leak through, and less where only the shading normal sees it well. 1 for most.
     #[inline]
-    fn sides_agree(&self, local: Vec3, world: Vec3) -> bool {
+    pub fn shadowing(&self, local: Vec3, world: Vec3) -> f32 {
+        let cos = world.dot(self.at.n_g);
         let reflected_in_frame = local.z * self.wo.z > 0.0;
-        let reflected_in_geometry = world.dot(self.at.n_g) * self.cos_geometric > 0.0;
-        reflected_in_frame == reflected_in_geometry
+        let reflected_in_geometry = cos * self.cos_geometric > 0.0;
+        if reflected_in_frame != reflected_in_geometry {
+            return 0.0;
+        }
+        match self.cos_normals {
+            Some(cos_normals) if reflected_in_frame => terminator_factor(cos, local.z, cos_normals),
+            _ => 1.0,
+        }
     }
 
     #[inline]
-    fn eval(&self, direction: Vec3) -> Option<crate::bsdf::BsdfEval> {
+    pub fn eval(&self, direction: Vec3) -> Option<BsdfEval> {
         let wi = self.frame.to_local(direction);
-        if !self.sides_agree(wi, direction) {
+        let shadowing = self.shadowing(wi, direction);
+        if shadowing == 0.0 {
             return None;
         }
-        let eval = self.bsdf.eval(self.wo, wi);
-        (!eval.value.is_black()).then_some(eval)
+        let BsdfEval { value, pdf } = self.bsdf.eval(self.wo, wi);
+        (!value.is_black()).then(|| BsdfEval { value: value * shadowing, pdf })
     }
 
     #[inline]
     fn sample(&self, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Vec3)> {
-        let sample = self.bsdf.sample(self.wo, u_lobe, u)?;
+        let mut sample = self.bsdf.sample(self.wo, u_lobe, u)?;
         let direction = self.frame.to_world(sample.wi);
-        self.sides_agree(sample.wi, direction).then_some((sample, direction))
+        let shadowing = self.shadowing(sample.wi, direction);
+        if !sample.is_delta {
+            sample.weight *= shadowing;
+        }
+        (shadowing > 0.0).then_some((sample, direction))
     }
 }

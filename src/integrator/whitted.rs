@@ -1,14 +1,14 @@
 //! Whitted's ray tracing: mirror reflection, refraction, hard shadows and an ambient term ("An Improved Illumination Model for Shaded
 //! Display").
 
+use super::path::Vertex;
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sample};
-use crate::bsdf::Bsdf;
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::SurfaceInteraction;
 use crate::light::{Light, ShadowTarget};
+use crate::math::Ray;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::{Frame, Ray};
 
 /// Whitted's ray tracing. Area lights shine from their middle, so shadows are hard; scattering that is neither mirror-like nor lit by a
 /// light contributes only through the ambient term.
@@ -44,22 +44,24 @@ impl Whitted {
         if depth >= self.max_depth {
             return radiance;
         }
-        let bsdf = world.scene.bsdf(at, ray.direction);
-        let frame = Frame::from_normal(at.n_s);
-        let wo = frame.to_local(-ray.direction);
-
-        if !bsdf.is_delta() {
-            radiance += self.ambient * bsdf.albedo(wo);
+        let vertex = Vertex::new(world, at, ray);
+        if !vertex.bsdf.is_delta() {
+            radiance += self.ambient * vertex.bsdf.albedo(vertex.wo);
             for light in world.scene.lights.lights() {
-                radiance += direct_light(world, at, &frame, &bsdf, wo, light, counts);
+                radiance += direct_light(world, &vertex, light, counts);
             }
         }
 
         // Both delta lobes, each without the division by its probability: u at either end of [0, 1) chooses reflection and refraction.
-        let first = bsdf.sample(wo, 0.0, [0.5; 2]).filter(|s| s.is_delta);
-        let second = bsdf.sample(wo, ONE_MINUS_EPSILON, [0.5; 2]).filter(|s| s.is_delta && Some(s.wi) != first.map(|f| f.wi));
+        let lobe = |u: f32| vertex.bsdf.sample(vertex.wo, u, [0.5; 2]).filter(|s| s.is_delta);
+        let first = lobe(0.0);
+        let second = lobe(ONE_MINUS_EPSILON).filter(|s| Some(s.wi) != first.map(|f| f.wi));
         for lobe in [first, second].into_iter().flatten() {
-            let next = at.spawn(frame.to_world(lobe.wi));
+            let direction = vertex.frame.to_world(lobe.wi);
+            if vertex.shadowing(lobe.wi, direction) == 0.0 {
+                continue;
+            }
+            let next = at.spawn(direction);
             counts.indirect += 1;
             let arriving = match world.closest(&next) {
                 Some(hit) => self.shade(world, &next, &hit, depth + 1, counts),
@@ -71,20 +73,16 @@ impl Whitted {
     }
 }
 
-/// Light that arrives from the middle of one light and is scattered towards `wo`.
-fn direct_light(
-    world: &World,
-    at: &SurfaceInteraction,
-    frame: &Frame,
-    bsdf: &Bsdf,
-    wo: crate::math::Vec3,
-    light: &Light,
-    counts: &mut RayCounts,
-) -> Rgb {
+/// Light that arrives from the middle of one light and is scattered back.
+fn direct_light(world: &World, vertex: &Vertex, light: &Light, counts: &mut RayCounts) -> Rgb {
+    let at = vertex.at;
     let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2]) else {
         return Rgb::BLACK;
     };
-    let scattered = bsdf.eval(wo, frame.to_local(sample.wi)).value * sample.radiance / sample.pdf;
+    let Some(eval) = vertex.eval(sample.wi) else {
+        return Rgb::BLACK;
+    };
+    let scattered = eval.value * sample.radiance / sample.pdf;
     if scattered.is_black() {
         return scattered;
     }

@@ -36,8 +36,24 @@ impl<'a> World<'a> {
     #[inline]
     pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
         let hit = hit?;
-        let at = self.scene.geometry.interaction(ray, &hit);
-        if at.is_some() { at } else { self.retrace(ray, hit) }
+        match self.scene.geometry.interaction(ray, &hit) {
+            Some(at) => Some(self.finished(ray, &hit, at)),
+            None => self.retrace(ray, hit),
+        }
+    }
+
+    /// With the shading normal that the surface's relief gives, if it has one.
+    #[inline(always)]
+    fn finished(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
+        if self.scene.features.reliefs { self.with_relief(ray, hit, at) } else { at }
+    }
+
+    #[inline(never)]
+    fn with_relief(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
+        let scene = self.scene;
+        let Some(id) = scene.surface(at.shape).relief else { return at };
+        let dp_dv = scene.geometry.dp_dv(ray, hit);
+        SurfaceInteraction { n_s: scene.reliefs[id.index()].normal(&scene.geometry, &scene.textures, &at, dp_dv), ..at }
     }
 
     #[cold]
@@ -47,7 +63,7 @@ impl<'a> World<'a> {
             ray.t_min = step_past(hit.t);
             hit = self.accel.intersect(&ray)?;
             if let Some(at) = self.scene.geometry.interaction(&ray, &hit) {
-                return Some(at);
+                return Some(self.finished(&ray, &hit, at));
             }
         }
         None

@@ -3,9 +3,14 @@
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
+use steradian::accel::AccelKind;
 use steradian::error::Result;
+use steradian::film::Image;
+use steradian::render::{Overrides, Settings};
 use steradian::scene::Scene;
 use steradian::{compile, import};
+
+use super::render::{Prepared, render_with};
 
 /// A temporary folder.
 pub struct Folder(tempfile::TempDir);
@@ -20,6 +25,20 @@ impl Folder {
         let path = self.0.path().join(name);
         std::fs::write(&path, content).unwrap();
         path
+    }
+
+    /// Where a file of this name lies, or would.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Compiles a scene and renders it through Embree.
+    pub fn render(&self, scene: &Value) -> Image {
+        let path = self.write("scene.json", scene.to_string());
+        let desc = import::load_scene(&path).unwrap();
+        let settings = Settings::new(&desc, &Overrides { threads: Some(2), ..Overrides::default() }).unwrap();
+        let scene = compile::compile(&desc, &path).unwrap();
+        render_with(&Prepared { scene, settings }, AccelKind::EMBREE).image
     }
 
     /// Writes `scene.json`, loads and compiles it.

@@ -1,0 +1,138 @@
+//! Materials of OBJ files with their texture maps.
+
+use super::materials::{Look, from_mtl};
+use super::textures::TextureUse;
+use super::{Builder, meshes};
+use crate::bsdf::Bsdf;
+use crate::color::Rgb;
+use crate::error::Result;
+use crate::id::TextureId;
+use crate::import::{ObjMap, ObjMaterial};
+use crate::material::{ColorInput, Material, ScalarInput, Varying};
+use crate::math::Vec2;
+use crate::relief::Relief;
+use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
+
+/// What a material of an MTL comes to.
+pub struct MtlLook {
+    pub look: Look,
+    /// Light given off, if not black.
+    pub radiance: Option<Rgb>,
+}
+
+impl Builder {
+    /// What the faces with a material of an OBJ file look like; maps need uv. `path` is the shape, `file` the OBJ.
+    pub(super) fn mtl_look(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlLook> {
+        let maps = &mtl.maps;
+        let unused: Vec<&str> = maps.unused.iter().map(String::as_str).collect();
+        if !unused.is_empty() {
+            tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.scene.display(), mtl.name, unused.join(", "));
+        }
+        let has_maps = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity].iter().any(|map| map.is_some());
+        if has_maps && !has_uvs {
+            tracing::warn!("{}: {path}: material \"{}\": faces without uv have no maps", self.files.scene.display(), mtl.name);
+        }
+        let wanted = |map: &Option<ObjMap>| map.clone().filter(|_| has_uvs);
+        let (diffuse, opacity) = (wanted(&maps.diffuse), wanted(&maps.opacity));
+
+        let mut plain = mtl.clone();
+        if diffuse.is_some() {
+            // Exporters leave Kd black, or out, where a map says it all.
+            plain.diffuse = Some(mtl.diffuse.filter(|color| color.iter().any(|&c| c != 0.0)).unwrap_or([1.0; 3]));
+        }
+        let surface = from_mtl(&plain).map_err(|message| meshes::refusal(&self.files, path, file, message))?;
+
+        let is_glass = matches!(surface.material, Material::Constant(Bsdf::Dielectric(_)));
+        let mut material = surface.material;
+        if let Some(map) = &diffuse {
+            let tint = plain.diffuse.map_or(Rgb::WHITE, Rgb::from);
+            material = with_albedo(material, ColorInput::Texture(self.diffuse_map(path, map, tint)?));
+        }
+        let mut look = Look::plain(self.materials.push(material));
+        // Glass lets through what it does not reflect.
+        if !is_glass {
+            look.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
+        }
+        let relief = match (wanted(&maps.normal), wanted(&maps.bump)) {
+            (Some(map), _) => Some(self.relief_map(path, &map, true)?),
+            (None, Some(map)) => Some(self.relief_map(path, &map, false)?),
+            (None, None) => None,
+        };
+        look.relief = relief.map(|relief| self.materials.push_relief(relief));
+        Ok(MtlLook { look, radiance: surface.radiance })
+    }
+
+    fn map_texture(&mut self, path: &str, map: &ObjMap, wanted: TextureUse) -> Result<Bitmap> {
+        let image = self.materials.textures.image(&self.files, &format!("{path}.file"), &map.file)?;
+        let decoding = if wanted == TextureUse::Color { Decoding::Srgb } else { Decoding::Linear };
+        Ok(Bitmap {
+            wrap: [if map.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2],
+            transform: UvTransform::new(Vec2::from(map.scale), 0.0, Vec2::from(map.offset)),
+            channel: map.channel.and_then(channel),
+            ..Bitmap::new(image, decoding)
+        })
+    }
+
+    fn diffuse_map(&mut self, path: &str, map: &ObjMap, tint: Rgb) -> Result<TextureId> {
+        let bitmap = Texture::Bitmap(Bitmap { channel: None, ..self.map_texture(path, map, TextureUse::Color)? });
+        let texture = if tint == Rgb::WHITE { bitmap } else { Texture::Product([bitmap, Texture::Constant(tint)].into()) };
+        let id = self.materials.textures.push(texture);
+        let fault = |message| meshes::refusal(&self.files, path, None, format!("{}: {message}", map.file.display()));
+        self.materials.textures.check_reflectance(id).map_err(fault)?;
+        Ok(id)
+    }
+
+    /// `d` times `map_d` (the channel it says, or the image's alpha, or else its luminance), or times the alpha of `map_Kd`.
+    fn mtl_opacity(&mut self, path: &str, d: Option<f32>, map: Option<&ObjMap>, diffuse: Option<&ObjMap>) -> Result<Option<TextureId>> {
+        let bitmap = match (map, diffuse) {
+            (Some(map), _) => {
+                let bitmap = self.map_texture(path, map, TextureUse::Data)?;
+                let channel = bitmap.channel.or(bitmap.image.has_alpha().then_some(Channel::A));
+                Some(Bitmap { channel, ..bitmap })
+            }
+            (None, Some(map)) => {
+                let bitmap = Bitmap { channel: Some(Channel::A), ..self.map_texture(path, map, TextureUse::Data)? };
+                Some(bitmap).filter(|bitmap| bitmap.image.has_alpha() && bitmap.image.least_alpha() < 1.0)
+            }
+            (None, None) => None,
+        };
+        let constant = d.filter(|&d| d < 1.0).map(|d| Texture::Constant(Rgb::splat(d)));
+        let texture = match (bitmap.map(Texture::Bitmap), constant) {
+            // Exporters leave d at 0 where a map says it all.
+            (Some(bitmap), Some(factor)) if d != Some(0.0) => Texture::Product([bitmap, factor].into()),
+            (Some(bitmap), _) => bitmap,
+            (None, Some(constant)) => constant,
+            (None, None) => return Ok(None),
+        };
+        Ok(Some(self.materials.textures.push(texture)))
+    }
+
+    /// A normal map, which `bump` may name too: then it is one with colours.
+    fn relief_map(&mut self, path: &str, map: &ObjMap, is_normal_map: bool) -> Result<Relief> {
+        let bitmap = self.map_texture(path, map, TextureUse::Data)?;
+        let holds_normals = is_normal_map || (map.channel.is_none() && !bitmap.image.is_grey());
+        let bitmap = if holds_normals { Bitmap { channel: None, ..bitmap } } else { bitmap };
+        let id = self.materials.textures.push(Texture::Bitmap(bitmap));
+        let textures = &self.materials.textures.textures;
+        Ok(if holds_normals { Relief::normal_map(id, 1.0, false, textures) } else { Relief::bump_map(id, map.height, textures) })
+    }
+}
+
+/// The material with a texture for its diffuse colour, where it has one.
+fn with_albedo(material: Material, albedo: ColorInput) -> Material {
+    match material {
+        Material::Constant(Bsdf::Lambert(_)) => Varying::Diffuse { albedo, roughness: ScalarInput::Constant(0.0) }.into(),
+        Material::Constant(Bsdf::Plastic(base)) => Varying::Plastic { base, albedo }.into(),
+        other => other,
+    }
+}
+
+fn channel(letter: char) -> Option<Channel> {
+    match letter {
+        'r' => Some(Channel::R),
+        'g' => Some(Channel::G),
+        'b' => Some(Channel::B),
+        'm' => Some(Channel::A),
+        _ => None,
+    }
+}

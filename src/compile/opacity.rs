@@ -1,0 +1,61 @@
+//! Opacity: from the key of shapes to what accelerators ask.
+
+use std::sync::Arc;
+
+use super::Builder;
+use super::textures::{TextureTable, TextureUse};
+use crate::color::Rgb;
+use crate::desc::{OpacityDesc, ShapeCommon};
+use crate::error::Result;
+use crate::geometry::Cutouts;
+use crate::id::TextureId;
+use crate::opacity::Opacity;
+use crate::texture::{Bitmap, Channel, Texture};
+
+impl Builder {
+    /// What a shape's own key says, if the shape has holes at all.
+    pub(super) fn opacity(&mut self, path: &str, common: &ShapeCommon, shines: bool) -> Result<Option<TextureId>> {
+        let Some(desc) = common.opacity else {
+            return Ok(None);
+        };
+        let path = format!("{path}.opacity");
+        let textures = &mut self.materials.textures;
+        let id = match desc {
+            OpacityDesc::Number(value) => {
+                let value = self.files.within(&path, f64::from(*value), 0.0, 1.0)? as f32;
+                (value < 1.0).then(|| textures.push(Texture::Constant(Rgb::splat(value))))
+            }
+            OpacityDesc::Texture { texture: name } => {
+                let place = format!("{path}.texture");
+                let named = textures.find(&self.files, &place, name, TextureUse::Data)?;
+                let alpha = match textures.get(named) {
+                    Texture::Bitmap(bitmap) if bitmap.channel.is_none() && bitmap.image.has_alpha() => {
+                        Some(Bitmap { channel: Some(Channel::A), ..bitmap.clone() })
+                    }
+                    _ => None,
+                };
+                let id = alpha.map_or(named, |bitmap| textures.push(Texture::Bitmap(bitmap)));
+                let [min, max] = textures.get(id).range();
+                if !(min >= 0.0 && max <= 1.0) {
+                    return Err(self
+                        .files
+                        .error(&place, format!("the texture \"{name}\" reaches from {min} to {max}, opacity from 0 to 1")));
+                }
+                Some(id)
+            }
+        };
+        if shines && id.is_some() {
+            return Err(self.files.error(&path, "a shape that gives off light cannot have holes"));
+        }
+        Ok(id)
+    }
+}
+
+/// The holes of shapes with these opacities.
+pub(super) fn cutouts(opacities: &[Option<TextureId>], textures: &TextureTable) -> Cutouts {
+    if opacities.iter().all(Option::is_none) {
+        return Cutouts::default();
+    }
+    let by_shape = opacities.iter().map(|id| id.map(|id| textures.get(id).clone())).collect();
+    Cutouts::new(Arc::new(Opacity::new(by_shape)))
+}

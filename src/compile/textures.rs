@@ -1,0 +1,235 @@
+//! Textures: names to ids, files to images. Each file is read once, however many textures show it.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Files;
+use crate::color::Rgb;
+use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
+use crate::error::Result;
+use crate::id::TextureId;
+use crate::import::{AssetError, read_image};
+use crate::material::ColorInput;
+use crate::math::Vec2;
+use crate::texture::{Bitmap, Channel, Checker, Decoding, Filter, Image, Texture, UvTransform, Wrap};
+
+/// What a texture is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextureUse {
+    /// A colour: whole numbers are sRGB unless the texture says otherwise.
+    Color,
+    /// Roughness, normals, heights, opacity: numbers are linear unless the texture says otherwise.
+    Data,
+}
+
+/// All textures, with their names.
+#[derive(Default)]
+pub struct TextureTable {
+    pub textures: Vec<Texture>,
+    names: BTreeMap<String, Entry>,
+    images: HashMap<PathBuf, Arc<Image>>,
+}
+
+/// A texture for each use; the same one if the use makes no difference.
+struct Entry {
+    color: TextureId,
+    data: TextureId,
+}
+
+impl TextureTable {
+    pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
+        let mut table = Self::default();
+        let mut loader = Loader { files, descs: &desc.textures, images: HashMap::new(), open: Vec::new() };
+        for name in desc.textures.keys() {
+            let place = format!("textures.{name}");
+            let color = table.push(loader.named(&place, name, TextureUse::Color)?);
+            let data = if loader.depends_on_use(name) { table.push(loader.named(&place, name, TextureUse::Data)?) } else { color };
+            table.names.insert(name.clone(), Entry { color, data });
+        }
+        table.images = loader.images;
+        Ok(table)
+    }
+
+    /// Adds a texture without a name.
+    pub fn push(&mut self, texture: Texture) -> TextureId {
+        self.textures.push(texture);
+        TextureId::new(self.textures.len() - 1)
+    }
+
+    /// The texture with this id.
+    pub fn get(&self, id: TextureId) -> &Texture {
+        &self.textures[id.index()]
+    }
+
+    /// The texture that `path` names.
+    pub fn find(&self, files: &Files, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
+        let entry = self.names.get(name).ok_or_else(|| files.unknown(path, "texture", name, self.names.keys().map(String::as_str)))?;
+        Ok(match wanted {
+            TextureUse::Color => entry.color,
+            TextureUse::Data => entry.data,
+        })
+    }
+
+    /// The texture that `path` names, for a fraction of light: no channel is below 0 or above 1.
+    pub fn reflectance(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
+        let id = self.find(files, path, name, TextureUse::Color)?;
+        self.check_reflectance(id).map_err(|message| files.error(path, format!("the texture \"{name}\" {message}")))?;
+        Ok(match self.get(id) {
+            Texture::Constant(color) => ColorInput::Constant(*color),
+            _ => ColorInput::Texture(id),
+        })
+    }
+
+    /// The texture that `path` names, for light given off: no channel is below 0.
+    pub fn radiance(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
+        let id = self.find(files, path, name, TextureUse::Color)?;
+        let [min, _] = self.get(id).range();
+        if min < 0.0 {
+            return Err(files.error(path, format!("the texture \"{name}\" goes down to {min}: light is not negative")));
+        }
+        Ok(match self.get(id) {
+            Texture::Constant(color) => ColorInput::Constant(*color),
+            _ => ColorInput::Texture(id),
+        })
+    }
+
+    /// Refuses a texture with colours that a surface cannot reflect; the error says what it does.
+    pub fn check_reflectance(&self, id: TextureId) -> Result<(), String> {
+        let [min, max] = self.get(id).range();
+        if min >= 0.0 && max <= 1.0 {
+            return Ok(());
+        }
+        Err(format!("reaches from {min} to {max}: a surface can only reflect from 0 to 1"))
+    }
+
+    /// The image in a file that is no texture of the scene's own, read unless it has been; `place` is where the scene leads to it.
+    pub fn image(&mut self, files: &Files, place: &str, asset: &Path) -> Result<Arc<Image>> {
+        load_image(&mut self.images, files, place, asset)
+    }
+}
+
+struct Loader<'a> {
+    files: &'a Files,
+    descs: &'a BTreeMap<String, TextureDesc>,
+    images: HashMap<PathBuf, Arc<Image>>,
+    /// The textures on the way to the one being made.
+    open: Vec<String>,
+}
+
+impl Loader<'_> {
+    /// Whether a texture (which has been made before, so that it is no part of itself) is another one as a colour than as data.
+    fn depends_on_use(&self, name: &str) -> bool {
+        match self.descs.get(name) {
+            Some(TextureDesc::Image { color_space, .. }) => *color_space == ColorSpaceDesc::Auto,
+            Some(TextureDesc::Product { factors }) => {
+                factors.iter().any(|factor| matches!(factor, ColorDesc::Texture { texture } if self.depends_on_use(texture)))
+            }
+            _ => false,
+        }
+    }
+
+    /// The texture that `place` names.
+    fn named(&mut self, place: &str, name: &str, wanted: TextureUse) -> Result<Texture> {
+        let descs = self.descs;
+        let desc = descs.get(name).ok_or_else(|| self.files.unknown(place, "texture", name, descs.keys().map(String::as_str)))?;
+        if let Some(first) = self.open.iter().position(|open| open == name) {
+            let cycle = format!("{} > {name}", self.open[first..].join(" > "));
+            return Err(self.files.error(place, format!("a texture cannot be a part of itself: {cycle}")));
+        }
+        self.open.push(name.to_owned());
+        let texture = self.texture(&format!("textures.{name}"), desc, wanted);
+        self.open.pop();
+        texture
+    }
+
+    fn texture(&mut self, path: &str, desc: &TextureDesc, wanted: TextureUse) -> Result<Texture> {
+        let files = self.files;
+        let color = |key: &str, value: [f32; 3]| files.reflectance(&format!("{path}.{key}"), value).map(Rgb::from);
+        Ok(match desc {
+            TextureDesc::Constant { color: value } => Texture::Constant(color("color", *value)?),
+            TextureDesc::Checker { color0, color1, scale } => {
+                let colors = [color("color0", *color0)?, color("color1", *color1)?];
+                Texture::Checker(Checker { colors, scale: files.uv(&format!("{path}.scale"), *scale)? })
+            }
+            TextureDesc::Product { factors } => {
+                if factors.is_empty() {
+                    return Err(files.error(&format!("{path}.factors"), "a product needs at least one factor"));
+                }
+                let mut product = Vec::with_capacity(factors.len());
+                for (i, factor) in factors.iter().enumerate() {
+                    let key = format!("factors[{i}]");
+                    product.push(match factor {
+                        ColorDesc::Grey(v) => Texture::Constant(color(&key, [*v; 3])?),
+                        ColorDesc::Rgb(v) => Texture::Constant(color(&key, *v)?),
+                        ColorDesc::Texture { texture } => self.named(&format!("{path}.{key}"), texture, wanted)?,
+                    });
+                }
+                Texture::Product(product.into())
+            }
+            TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert } => {
+                let scale = files.uv(&format!("{path}.scale"), *scale)?;
+                let offset = files.uv(&format!("{path}.offset"), *offset)?;
+                if !rotation_degrees.is_finite() {
+                    return Err(files.error(&format!("{path}.rotation_degrees"), "is not finite"));
+                }
+                let image = load_image(&mut self.images, files, &format!("{path}.file"), &files.asset(file))?;
+                if *color_space == ColorSpaceDesc::Srgb && image.is_float() {
+                    return Err(files.error(&format!("{path}.color_space"), "the image has floats, which are linear"));
+                }
+                Texture::Bitmap(Bitmap {
+                    decoding: match (color_space, wanted) {
+                        (ColorSpaceDesc::Srgb, _) | (ColorSpaceDesc::Auto, TextureUse::Color) => Decoding::Srgb,
+                        (ColorSpaceDesc::Linear, _) | (ColorSpaceDesc::Auto, TextureUse::Data) => Decoding::Linear,
+                    },
+                    image,
+                    filter: match filter {
+                        TextureFilterDesc::Nearest => Filter::Nearest,
+                        TextureFilterDesc::Bilinear => Filter::Bilinear,
+                    },
+                    wrap: match wrap {
+                        WrapDesc::Both(mode) => [wrap_mode(*mode); 2],
+                        WrapDesc::Each(modes) => modes.map(wrap_mode),
+                    },
+                    transform: UvTransform::new(scale, rotation_degrees.to_radians(), offset),
+                    channel: channel.map(|channel| match channel {
+                        ChannelDesc::R => Channel::R,
+                        ChannelDesc::G => Channel::G,
+                        ChannelDesc::B => Channel::B,
+                        ChannelDesc::A => Channel::A,
+                    }),
+                    invert: *invert,
+                })
+            }
+        })
+    }
+}
+
+fn wrap_mode(desc: WrapModeDesc) -> Wrap {
+    match desc {
+        WrapModeDesc::Repeat => Wrap::Repeat,
+        WrapModeDesc::Clamp => Wrap::Clamp,
+        WrapModeDesc::Mirror => Wrap::Mirror,
+    }
+}
+
+/// The image in a file, from `images` if it has been read before.
+fn load_image(images: &mut HashMap<PathBuf, Arc<Image>>, files: &Files, place: &str, asset: &Path) -> Result<Arc<Image>> {
+    let key = asset.canonicalize().unwrap_or_else(|_| asset.into());
+    if let Some(image) = images.get(&key) {
+        return Ok(Arc::clone(image));
+    }
+    let fault = |e| files.asset_error(place, asset, e);
+    let data = read_image(asset).map_err(fault)?;
+    let image = Arc::new(Image::new(data).map_err(|e| fault(AssetError::Malformed(e.to_string())))?);
+    images.insert(key, Arc::clone(&image));
+    Ok(image)
+}
+
+impl Files {
+    /// Two finite numbers along u and v.
+    fn uv(&self, path: &str, value: [f32; 2]) -> Result<Vec2> {
+        let uv = Vec2::from(value);
+        if uv.is_finite() { Ok(uv) } else { Err(self.error(path, format!("{value:?} is not finite"))) }
+    }
+}

@@ -1,0 +1,144 @@
+//! Textures as written.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ColorDesc;
+
+/// A texture. Every shape has its uv, described there; on an image the origin of uv is the bottom left corner and v grows upward.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum TextureDesc {
+    /// A checkerboard in uv.
+    Checker {
+        /// Colour of the square at the origin of uv. Default: 0.4.
+        #[serde(default = "dark")]
+        color0: [f32; 3],
+        /// Colour of its neighbours. Default: 0.2.
+        #[serde(default = "darker")]
+        color1: [f32; 3],
+        /// Repetitions of a pair of squares along u and v. Default: 1, 1.
+        #[serde(default = "unit_scale")]
+        scale: [f32; 2],
+    },
+    /// The same colour everywhere.
+    Constant {
+        /// The colour.
+        color: [f32; 3],
+    },
+    /// An image, which fills the unit square of uv.
+    Image {
+        /// A PNG, JPEG, TGA, Radiance HDR or OpenEXR file of any size with grey or red, green and blue, with or without alpha, in 8 or 16 bits
+        /// or floats; relative to the scene file. Colours are taken as they are stored, not divided by alpha.
+        file: String,
+        /// How whole numbers become colours. Default: `auto`.
+        #[serde(default)]
+        color_space: ColorSpaceDesc,
+        /// What stands between the middles of pixels. Default: `bilinear`.
+        #[serde(default)]
+        filter: TextureFilterDesc,
+        /// What lies beyond the edges: one word, or one for u and one for v. Default: `repeat`.
+        #[serde(default)]
+        wrap: WrapDesc,
+        /// The image is looked up at `offset + R (scale * uv)`, where R turns from u towards v by `rotation_degrees`. So a scale of 2 shows it
+        /// twice along each axis, and -1 mirrors it. Default: 1, 1.
+        #[serde(default = "unit_scale")]
+        scale: [f32; 2],
+        /// See `scale`. Default: 0.
+        #[serde(default)]
+        rotation_degrees: f64,
+        /// See `scale`. Default: 0, 0.
+        #[serde(default)]
+        offset: [f32; 2],
+        /// One number of each pixel in place of its colour. Default: where a colour is asked for, the colour; where a number is asked for, its
+        /// luminance.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        channel: Option<ChannelDesc>,
+        /// Whether 1 minus the value is meant. Default: false.
+        #[serde(default)]
+        invert: bool,
+    },
+    /// The product of several colours and textures, such as an image and a tint.
+    Product {
+        /// What is multiplied: colours, numbers or textures by name.
+        factors: Vec<ColorDesc>,
+    },
+}
+
+/// How the whole numbers of an image become colours. Floats (HDR, EXR) and alpha are linear in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ColorSpaceDesc {
+    /// As `srgb` where a colour is asked for; as `linear` where data is: roughness, normals, heights, opacity.
+    #[default]
+    Auto,
+    /// By the sRGB transfer curve.
+    Srgb,
+    /// In proportion.
+    Linear,
+}
+
+/// What stands between the middles of an image's pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TextureFilterDesc {
+    /// The nearest pixel.
+    Nearest,
+    /// The four nearest pixels, blended in linear colours.
+    #[default]
+    Bilinear,
+}
+
+/// What lies beyond the edges of an image: the same along u and v, or `[along u, along v]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged, expecting = "expected \"repeat\", \"clamp\" or \"mirror\", or one of them for u and one for v")]
+pub enum WrapDesc {
+    /// The same along u and v.
+    Both(WrapModeDesc),
+    /// Along u, along v.
+    Each([WrapModeDesc; 2]),
+}
+
+impl Default for WrapDesc {
+    fn default() -> Self {
+        Self::Both(WrapModeDesc::Repeat)
+    }
+}
+
+/// What lies beyond the edges of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WrapModeDesc {
+    /// The image again.
+    Repeat,
+    /// The colours of the edge.
+    Clamp,
+    /// The image's mirror image, then the image again.
+    Mirror,
+}
+
+/// One of the numbers of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ChannelDesc {
+    /// Red, or grey.
+    R,
+    /// Green, or grey.
+    G,
+    /// Blue, or grey.
+    B,
+    /// Alpha; 1 where the image has none.
+    A,
+}
+
+fn dark() -> [f32; 3] {
+    [0.4; 3]
+}
+
+fn darker() -> [f32; 3] {
+    [0.2; 3]
+}
+
+fn unit_scale() -> [f32; 2] {
+    [1.0; 2]
+}

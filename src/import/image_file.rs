@@ -1,0 +1,146 @@
+//! Images for textures: PNG, JPEG, TGA, Radiance HDR and OpenEXR, with the numbers as they stand in the file.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use half::f16;
+use image::{DynamicImage, ImageFormat, ImageReader};
+
+use super::AssetError;
+use super::jpeg_check::is_whole_jpeg;
+
+/// An image as a file has it, row by row from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageData {
+    /// Width in pixels, at least 1.
+    pub width: usize,
+    /// Height in pixels, at least 1.
+    pub height: usize,
+    /// Numbers per pixel: 1 is grey, 2 grey and alpha, 3 red, green and blue, 4 those and alpha.
+    pub channels: usize,
+    /// `width * height * channels` numbers.
+    pub samples: Samples,
+}
+
+/// The numbers of an image.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Samples {
+    /// From 0 to 255.
+    U8(Vec<u8>),
+    /// From 0 to 65,535.
+    U16(Vec<u16>),
+    /// Floats that 16 bits hold without loss.
+    F16(Vec<f16>),
+    /// Floats.
+    F32(Vec<f32>),
+}
+
+/// More pixels than any texture has; a header that claims more is damaged, or means harm.
+pub(super) const MAX_PIXELS: u64 = 1 << 28;
+
+/// Reads an image file, of the kind that its first bytes say (TGA, which has no mark: that its name says).
+///
+/// # Errors
+/// If the file is missing, malformed, cut short, of another kind, or has more than 2^28 pixels or none.
+pub fn read_image(path: &Path) -> Result<ImageData, AssetError> {
+    let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    if bytes.is_empty() {
+        return Err(AssetError::Malformed("the file is empty".into()));
+    }
+    let is_tga = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tga"));
+    match image::guess_format(&bytes) {
+        Ok(ImageFormat::OpenExr) => read_exr(&bytes),
+        Ok(ImageFormat::Jpeg) if !is_whole_jpeg(&bytes) => Err(AssetError::Malformed("the JPEG file is cut short".into())),
+        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr)) => read_with(&bytes, format),
+        _ if is_tga => read_with(&bytes, ImageFormat::Tga),
+        _ => Err(AssetError::Malformed("not a PNG, JPEG, TGA, HDR or EXR image".into())),
+    }
+}
+
+/// Refuses sizes that no image has, before memory is asked for.
+pub(super) fn check_size(width: usize, height: usize) -> Result<(), String> {
+    let pixels = (width as u64).saturating_mul(height as u64);
+    match pixels {
+        0 => Err(format!("an image of {width} x {height} pixels has nothing in it")),
+        _ if pixels > MAX_PIXELS => Err(format!("{width} x {height} pixels are too many: at most {MAX_PIXELS} in all")),
+        _ => Ok(()),
+    }
+}
+
+fn read_with(bytes: &[u8], format: ImageFormat) -> Result<ImageData, AssetError> {
+    let name = format.extensions_str().first().unwrap_or(&"").to_uppercase();
+    let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable {name} image: {e}"));
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    // The size is checked below; four floats a pixel are the most that a decoder asks for.
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(16 * MAX_PIXELS);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(|e| malformed(&e))?;
+    let (width, height) = image::ImageDecoder::dimensions(&decoder);
+    check_size(width as usize, height as usize).map_err(AssetError::Malformed)?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|e| malformed(&e))?;
+    let (channels, samples) = match image {
+        DynamicImage::ImageLuma8(i) => (1, Samples::U8(i.into_raw())),
+        DynamicImage::ImageLumaA8(i) => (2, Samples::U8(i.into_raw())),
+        DynamicImage::ImageRgb8(i) => (3, Samples::U8(i.into_raw())),
+        DynamicImage::ImageRgba8(i) => (4, Samples::U8(i.into_raw())),
+        DynamicImage::ImageLuma16(i) => (1, Samples::U16(i.into_raw())),
+        DynamicImage::ImageLumaA16(i) => (2, Samples::U16(i.into_raw())),
+        DynamicImage::ImageRgb16(i) => (3, Samples::U16(i.into_raw())),
+        DynamicImage::ImageRgba16(i) => (4, Samples::U16(i.into_raw())),
+        DynamicImage::ImageRgb32F(i) => (3, in_half_if_exact(i.into_raw())),
+        DynamicImage::ImageRgba32F(i) => (4, in_half_if_exact(i.into_raw())),
+        other => (4, Samples::U8(other.into_rgba8().into_raw())),
+    };
+    Ok(ImageData { width: width as usize, height: height as usize, channels, samples })
+}
+
+/// In 16 bits if none of the numbers changes: those of an HDR file have 8 digits.
+fn in_half_if_exact(samples: Vec<f32>) -> Samples {
+    if samples.iter().all(|&v| f16::from_f32(v).to_f32().to_bits() == v.to_bits()) {
+        Samples::F16(samples.into_iter().map(f16::from_f32).collect())
+    } else {
+        Samples::F32(samples)
+    }
+}
+
+fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
+    use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
+
+    let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR image: {e}"));
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| malformed(&e))?;
+    for header in &meta.headers {
+        check_size(header.layer_size.width(), header.layer_size.height()).map_err(AssetError::Malformed)?;
+    }
+    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let layer = reader.from_buffered(Cursor::new(bytes)).map_err(|e| malformed(&e))?.layer_data;
+
+    let all = &layer.channel_data.list;
+    let find = |name: &str| all.iter().find(|channel| channel.name.to_string().eq_ignore_ascii_case(name));
+    let mut chosen = match (find("R"), find("G"), find("B"), find("Y")) {
+        (Some(r), Some(g), Some(b), _) => vec![r, g, b],
+        (.., Some(y)) => vec![y],
+        _ if all.len() == 1 => vec![&all[0]],
+        _ => return Err(AssetError::Malformed("the EXR image has several channels, but neither R, G and B nor Y".into())),
+    };
+    chosen.extend(find("A"));
+    let (width, height, channels) = (layer.size.width(), layer.size.height(), chosen.len());
+    let samples = if chosen.iter().all(|channel| matches!(channel.sample_data, FlatSamples::F16(_))) {
+        let mut out = vec![f16::ZERO; width * height * channels];
+        for (k, channel) in chosen.iter().enumerate() {
+            let FlatSamples::F16(values) = &channel.sample_data else { continue };
+            out.iter_mut().skip(k).step_by(channels).zip(values).for_each(|(out, value)| *out = *value);
+        }
+        Samples::F16(out)
+    } else {
+        let mut out = vec![0.0; width * height * channels];
+        for (k, channel) in chosen.iter().enumerate() {
+            out.iter_mut().skip(k).step_by(channels).zip(channel.sample_data.values_as_f32()).for_each(|(out, value)| *out = value);
+        }
+        in_half_if_exact(out)
+    };
+    Ok(ImageData { width, height, channels, samples })
+}
+
+#[cfg(test)]
+mod tests;
