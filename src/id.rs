@@ -34,6 +34,8 @@ ids! {
     InstanceId,
     /// A material.
     MaterialId,
+    /// A medium.
+    MediumId,
     /// A texture.
     TextureId,
     /// A relief.

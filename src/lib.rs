@@ -17,7 +17,7 @@
 //! | 1 | `math`, `desc` |
 //! | 2 | `color`, `sampling`, `import` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film` |
-//! | 4 | `accel`, `material`, `opacity`, `relief`, `light`, `output` |
+//! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
 //! | 5 | `scene` |
 //! | 6 | `integrator`, `compile` |
 //! | 7 | `render` |
@@ -39,6 +39,7 @@ pub mod integrator;
 pub mod light;
 pub mod material;
 pub mod math;
+pub mod medium;
 pub mod opacity;
 pub mod output;
 pub mod relief;

@@ -319,6 +319,20 @@ impl Material {
         }
     }
 
+    /// The scattering at `uv` of a dielectric as a boundary with another relative index of refraction, inside over outside; `None` for all
+    /// other materials.
+    pub fn boundary(&self, textures: &[Texture], uv: Vec2, ior: f32) -> Option<Bsdf> {
+        match self {
+            Self::Varying(varying) => match **varying {
+                Varying::Dielectric { alpha, multiscatter, .. } => {
+                    Some(Varying::Dielectric { ior, alpha, multiscatter }.bsdf(textures, uv))
+                }
+                _ => None,
+            },
+            Self::Constant(_) | Self::Mix { .. } | Self::TwoSided { .. } => None,
+        }
+    }
+
     /// The material that this one stands for on one side at `uv`, if it consists of others; `u` within `[0, 1)` chooses.
     #[inline]
     pub fn part(&self, textures: &[Texture], uv: Vec2, is_front: bool, u: impl FnOnce() -> f32) -> Option<MaterialId> {
@@ -351,7 +365,7 @@ impl Material {
     pub fn is_textured(&self) -> bool {
         match self {
             Self::Constant(_) | Self::TwoSided { .. } => false,
-            Self::Varying(_) => true,
+            Self::Varying(varying) => !varying.is_constant(),
             Self::Mix { amount, .. } => !amount.is_constant(),
         }
     }

@@ -3,10 +3,11 @@
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::geometry::{Geometry, SurfaceInteraction};
-use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId};
+use crate::id::{LightId, MaterialId, MediumId, PrimId, ReliefId, ShapeId};
 use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
 use crate::math::Vec3;
+use crate::medium::Media;
 use crate::relief::Relief;
 use crate::texture::Texture;
 
@@ -17,6 +18,8 @@ pub struct Surface {
     pub material: MaterialId,
     /// Where its shading normals come from, if not from the shape alone.
     pub relief: Option<ReliefId>,
+    /// The medium within it.
+    pub medium: Option<MediumId>,
     /// The light of its first primitive if it emits; the others follow.
     pub first_light: Option<LightId>,
     /// Whether all primitives are one light: an analytic shape, or two triangles that make up a parallelogram.
@@ -49,6 +52,8 @@ pub struct Features {
     pub reliefs: bool,
     /// Some material has only delta lobes.
     pub delta_materials: bool,
+    /// Some surface has a medium within it: paths know where they are.
+    pub media: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
     pub anisotropic: bool,
     /// The camera has a lens.
@@ -68,6 +73,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Reliefs, by [`ReliefId`].
     pub reliefs: Vec<Relief>,
+    /// What surfaces have within them, by [`MediumId`].
+    pub media: Media,
     /// Textures, by [`TextureId`](crate::id::TextureId).
     pub textures: Vec<Texture>,
     /// Lights and their choice.
@@ -97,16 +104,18 @@ impl Scene {
     #[inline]
     pub fn bsdf(&self, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
         let material = self.material(at.shape);
-        if let Material::Constant(bsdf) = material { *bsdf } else { self.resolved_bsdf(self.surface(at.shape).material, at, direction) }
+        if let Material::Constant(bsdf) = material { *bsdf } else { self.met_material(at, direction).bsdf(&self.textures, at.uv) }
     }
 
-    fn resolved_bsdf(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
+    /// The material that a ray meets at a point, of those that the shape's material consists of.
+    pub fn met_material(&self, at: &SurfaceInteraction, direction: Vec3) -> &Material {
+        let mut id = self.surface(at.shape).material;
         let is_front = direction.dot(at.n_g) < 0.0;
         loop {
             let material = &self.materials[id.index()];
             match material.part(&self.textures, at.uv, is_front, || choice(at, direction, id)) {
                 Some(part) => id = part,
-                None => return material.bsdf(&self.textures, at.uv),
+                None => return material,
             }
         }
     }

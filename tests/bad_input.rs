@@ -7,10 +7,10 @@ use steradian::{ErrorKind, import};
 use crate::util::folder::{Folder, good_scene, set};
 
 /// A fault: what is set where in the good scene, and the place and words that the message must have.
-type Fault = (&'static str, Value, &'static str, &'static str);
+pub type Fault = (&'static str, Value, &'static str, &'static str);
 
 #[track_caller]
-fn assert_error(folder: &Folder, scene: &Value, kind: ErrorKind, parts: &[&str]) {
+pub fn assert_error(folder: &Folder, scene: &Value, kind: ErrorKind, parts: &[&str]) {
     let error = folder.compile(scene).err().unwrap_or_else(|| panic!("compiles, but lacks {parts:?}"));
     let message = error.to_string();
     assert_eq!(error.kind(), kind, "{message}");
@@ -21,7 +21,7 @@ fn assert_error(folder: &Folder, scene: &Value, kind: ErrorKind, parts: &[&str])
 }
 
 #[track_caller]
-fn assert_faults(faults: &[Fault]) {
+pub fn assert_faults(faults: &[Fault]) {
     let folder = Folder::new();
     for (path, value, place, word) in faults {
         let mut scene = good_scene();

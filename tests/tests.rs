@@ -18,8 +18,12 @@ mod degenerate_input;
 mod determinism;
 /// Known flaws of renderers in camera and film: each test fails on the flawed formula.
 mod flaws_of_camera;
+/// Known flaws of renderers in glass and in round shapes: each test fails on the flawed formula.
+mod flaws_of_glass;
 /// Known flaws of renderers in lights and light transport: each test fails on the flawed formula.
 mod flaws_of_light;
+/// Bottles and glasses of revolution, filled.
+mod glassware;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
 /// Measured and textured lights, lamps in objects, groups, clamping.
@@ -28,6 +32,8 @@ mod lights;
 mod many_lights;
 /// Materials as scenes use them.
 mod materials;
+/// Media that overlap, absorb and part colours.
+mod media;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
 mod motion;
 /// Leaves cut out by images, for what the camera sees and for shadows.

@@ -9,7 +9,7 @@ const LAYERS: &[(u32, &[&str])] = &[
     (1, &["math", "desc"]),
     (2, &["color", "sampling", "import"]),
     (3, &["geometry", "texture", "bsdf", "camera", "film"]),
-    (4, &["accel", "material", "opacity", "relief", "light", "output"]),
+    (4, &["accel", "material", "medium", "opacity", "relief", "light", "output"]),
     (5, &["scene"]),
     (6, &["integrator", "compile"]),
     (7, &["render"]),
@@ -20,7 +20,7 @@ const LAYERS: &[(u32, &[&str])] = &[
 const NARROW: &[(&str, &[&str])] = &[
     ("accel", &["geometry", "math", "error", "id"]),
     ("output", &["film", "color", "error", "desc", "math"]),
-    ("scene", &["bsdf", "camera", "geometry", "id", "light", "material", "relief", "texture", "math", "color"]),
+    ("scene", &["bsdf", "camera", "geometry", "id", "light", "material", "medium", "relief", "texture", "math", "color"]),
 ];
 
 const MAX_LINES: usize = 500;

@@ -65,7 +65,7 @@ impl MaterialTable {
     }
 
     /// Whether light may cross the material or a part of it.
-    fn transmits(&self, id: MaterialId) -> bool {
+    pub(super) fn transmits(&self, id: MaterialId) -> bool {
         let material = &self.materials[id.index()];
         material.transmits() || material.parts().is_some_and(|parts| parts.into_iter().any(|part| self.transmits(part)))
     }

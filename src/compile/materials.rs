@@ -13,6 +13,7 @@ use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
 use crate::material::{AlphaInput, ColorInput, Material, ScalarInput, Varying};
 use crate::math::Vec2;
+use crate::medium::{Media, Medium};
 use crate::relief::Relief;
 use crate::texture::Texture;
 
@@ -35,7 +36,11 @@ pub struct MaterialTable {
     pub materials: Vec<Material>,
     pub textures: TextureTable,
     pub reliefs: Vec<Relief>,
+    /// What is within surfaces of these materials.
+    pub media: Media,
     names: HashMap<String, Look>,
+    /// The medium of each material that has one.
+    pub(super) medium_of: HashMap<MaterialId, Medium>,
 }
 
 /// How a shape looks: what a material of the scene file comes to.
@@ -61,13 +66,21 @@ impl MaterialTable {
     pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
         let textures = TextureTable::new(files, desc)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
-        let mut table = Self { materials: vec![default], textures: TextureTable::default(), reliefs: Vec::new(), names: HashMap::new() };
+        let mut table = Self {
+            materials: vec![default],
+            textures: TextureTable::default(),
+            reliefs: Vec::new(),
+            media: Media::default(),
+            names: HashMap::new(),
+            medium_of: HashMap::new(),
+        };
         let compiler = Compiler { files, textures: &textures };
         for (name, material) in &desc.materials {
             if !matches!(material, MaterialDesc::Relief { .. }) {
                 table.add(&compiler, desc, name, &mut Vec::new())?;
             }
         }
+        table.media = Media::new(table.medium_of.values().copied());
         table.textures = textures;
         table.add_reliefs(files, desc)?;
         Ok(table)
@@ -89,7 +102,9 @@ impl MaterialTable {
             Some(material) => material,
             None => compiler.material(&path, &desc.materials[name])?,
         };
+        let medium = self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, &desc.materials[name])?);
         let id = self.push(material);
+        self.medium_of.extend(medium.map(|medium| (id, medium)));
         self.names.insert(name.to_owned(), Look::plain(id));
         Ok(id)
     }
@@ -161,10 +176,12 @@ impl Compiler<'_> {
                 let alpha = self.alpha(path, roughness.as_ref(), alpha.as_ref())?;
                 Varying::Conductor { metal, tint, alpha, multiscatter: *multiscatter }.into()
             }
-            MaterialDesc::Dielectric { ior, roughness, alpha, multiscatter } => {
-                files.within(&format!("{path}.ior"), f64::from(*ior), 0.1, 10.0)?;
-                let alpha = self.alpha(path, roughness.as_ref(), alpha.as_ref())?;
-                Varying::Dielectric { ior: *ior, alpha, multiscatter: *multiscatter }.into()
+            MaterialDesc::Dielectric(glass) => {
+                let ior = files.within(&format!("{path}.ior"), f64::from(glass.ior), 0.1, 10.0)? as f32;
+                let alpha = self.alpha(path, glass.roughness.as_ref(), glass.alpha.as_ref())?;
+                let boundary = Varying::Dielectric { ior, alpha, multiscatter: glass.multiscatter };
+                // The relative index at a medium's surface depends on what is around it.
+                if glass.is_medium() { Material::Varying(Box::new(boundary)) } else { boundary.into() }
             }
             MaterialDesc::ThinDielectric { ior } => {
                 files.within(&format!("{path}.ior"), f64::from(*ior), 0.1, 10.0)?;

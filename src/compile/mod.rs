@@ -6,6 +6,7 @@ mod check;
 mod composites;
 mod lights;
 mod materials;
+mod media;
 mod meshes;
 mod mtl;
 mod nesting;
@@ -136,6 +137,7 @@ impl Builder {
             textures: materials.iter().any(Material::is_textured),
             reliefs: self.surfaces.iter().any(|surface| surface.relief.is_some()),
             delta_materials: materials.iter().any(Material::is_delta),
+            media: self.surfaces.iter().any(|surface| surface.medium.is_some()),
             anisotropic: materials.iter().any(Material::is_anisotropic),
             lens: camera.lens().is_some(),
             motion: self.geometry.is_moving() || camera.is_moving(),
@@ -145,6 +147,7 @@ impl Builder {
             surfaces: self.surfaces,
             materials,
             reliefs: self.materials.reliefs,
+            media: self.materials.media,
             textures: self.materials.textures.textures,
             lights,
             light_groups,

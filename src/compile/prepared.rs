@@ -186,7 +186,11 @@ impl Builder {
         }
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
-        let mut surface = Surface { material: look.material, relief: look.relief, first_light: None, single_light: false };
+        let medium = self.materials.medium(look.material);
+        if medium.is_some() && emission.is_some() {
+            return Err(self.files.error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
+        }
+        let mut surface = Surface { material: look.material, relief: look.relief, medium, first_light: None, single_light: false };
         if let Some(PreparedEmission { emission, group }) = emission {
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
             if !lights.iter().any(|light| light.area() > 0.0) {

@@ -126,6 +126,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (f.reliefs, "normal or bump maps"),
         (!scene.geometry.cutouts.is_empty(), "holes"),
         (f.delta_materials, "mirror or glass"),
+        (f.media, "media"),
         (f.anisotropic, "anisotropic materials"),
         (f.lens, "lens"),
         (f.motion, "motion"),

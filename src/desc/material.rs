@@ -102,21 +102,8 @@ pub enum MaterialDesc {
         #[serde(default = "yes")]
         multiscatter: bool,
     },
-    /// Glass, water and the like. Smooth unless `roughness` or `alpha` is given.
-    Dielectric {
-        /// Index of refraction of the inside over that of the outside, at least 1/10 and at most 10. Default: 1.5.
-        #[serde(default = "glass_ior")]
-        ior: f32,
-        /// GGX roughness within `[0, 1]`; alpha is its square.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        roughness: Option<RoughnessDesc>,
-        /// GGX alpha itself, in place of `roughness`.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        alpha: Option<RoughnessDesc>,
-        /// Whether light that rough microfacets scatter several times is kept. Default: true.
-        #[serde(default = "yes")]
-        multiscatter: bool,
-    },
+    /// Glass, water and the like.
+    Dielectric(Box<DielectricDesc>),
     /// A clear thin pane: light is reflected or goes straight on, reflections within the pane included.
     ThinDielectric {
         /// Index of refraction of the pane over that of the outside, at least 1/10 and at most 10. Default: 1.5.
@@ -198,6 +185,64 @@ pub enum MaterialDesc {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         bump_map: Option<BumpMapDesc>,
     },
+}
+
+/// Glass, water and the like. Smooth unless `roughness` or `alpha` is given.
+///
+/// With none of `priority`, `absorption` and `abbe` it is a boundary alone, whose `ior` is relative to whatever lies outside.
+///
+/// With any of them it is a medium, which fills the closed surfaces that have the material (or a mix of it with opaque materials, such as a
+/// label). Surfaces of media may overlap, as that of a drink must overlap the inner side of its glass: each point belongs to the medium of
+/// the highest `priority` among those around it, at equal priorities to the one of the higher `ior`, then to the one that absorbs more. Light
+/// is reflected and refracted only where the medium changes, by the ratio of both indices; elsewhere it passes as if no surface were there,
+/// which then does not show in the layers either. Materials with the same `ior`, `priority`, `absorption` and `abbe` are one medium, rough
+/// or not. Up to eight different media overlap. A hollow is a surface with `reverse_normal`, or one of a medium of `ior` 1 and a higher
+/// priority. The camera may stand in a medium; `near` belongs to what is not seen, and absorbs nothing.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DielectricDesc {
+    /// Index of refraction of the inside over that of the outside, at least 1/10 and at most 10; that of a medium is over that of empty
+    /// space. Default: 1.5.
+    #[serde(default = "glass_ior")]
+    pub ior: f32,
+    /// GGX roughness within `[0, 1]`; alpha is its square.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<RoughnessDesc>,
+    /// GGX alpha itself, in place of `roughness`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alpha: Option<RoughnessDesc>,
+    /// Whether light that rough microfacets scatter several times is kept. Default: true.
+    #[serde(default = "yes")]
+    pub multiscatter: bool,
+    /// Which medium is there where several overlap: the one of the highest priority, a whole number. Default for a medium: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub priority: Option<i32>,
+    /// What the medium absorbs. Default: nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub absorption: Option<AbsorptionDesc>,
+    /// Dispersion: the Abbe number, from 1 to 1000 (60 for window glass, 30 for flint glass, 55 for diamond), the lower the more colours part;
+    /// `ior` is then that of yellow light (587.6 nm). `path` follows one of red, green and blue from the first such boundary on, which takes
+    /// more samples; `whitted` shows no dispersion. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub abbe: Option<f32>,
+}
+
+impl DielectricDesc {
+    /// Whether it is a medium, not a boundary alone.
+    pub fn is_medium(&self) -> bool {
+        self.priority.is_some() || self.absorption.is_some() || self.abbe.is_some()
+    }
+}
+
+/// Absorption by Beer and Lambert's law: what is left of white light is `color` to the power of the way over `distance`.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AbsorptionDesc {
+    /// What is left of red, green and blue after `distance`, each above 0 and at most 1.
+    pub color: [f32; 3],
+    /// In world units, above 0. Default: 1.
+    #[serde(default = "one")]
+    pub distance: f32,
 }
 
 /// An image of normals in tangent space: red along u, green along v (upward in the image), blue along the normal, each as `2 x - 1` of a linear

@@ -5,6 +5,7 @@
 //! data stay in the caches. `docs/wavefront.md` has the figures behind this choice.
 
 mod debug;
+mod media;
 mod path;
 mod shading;
 mod whitted;
@@ -28,6 +29,9 @@ pub mod dimensions {
 
     /// Time within the shutter interval (one), of scenes in which something moves.
     pub const TIME: u32 = u32::MAX;
+
+    /// Choice of a colour (one), where dispersion parts them.
+    pub const COLOR: u32 = u32::MAX - 1;
 
     /// Choice of a light (one, and one for its last digits) and a direction towards it (two), at the vertex with this many bounces before it.
     pub const fn light(bounce: u32) -> u32 {

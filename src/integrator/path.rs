@@ -5,6 +5,7 @@
 
 use std::cell::RefCell;
 
+use super::media::MediaState;
 use super::shading::{facing_normal, terminator_factor};
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions, surface_sample};
 use crate::accel::Coherence;
@@ -14,6 +15,7 @@ use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::light::{Light, Receiver, ShadowTarget};
 use crate::math::{DVec3, Frame, Ray, Vec3};
+use crate::medium::RelativeIor;
 use crate::sampling::{PixelSeed, Sampler, power_heuristic};
 
 /// How directions towards lights are found.
@@ -78,6 +80,8 @@ struct Scratch {
     shadow_rays: Vec<Ray>,
     occluded: Vec<bool>,
     pending: Vec<Pending>,
+    /// Beside `paths`, in scenes with media.
+    media: Vec<MediaState>,
 }
 
 thread_local! {
@@ -108,6 +112,12 @@ impl PathIntegrator {
             });
         }
 
+        let in_media = world.scene.features.media;
+        if in_media {
+            scratch.media.clear();
+            scratch.media.extend(scratch.rays.iter().map(|ray| MediaState { here: world.media_at_start(ray), channel: None }));
+        }
+
         for bounce in 0..self.max_depth {
             let count = scratch.rays.len();
             if count == 0 {
@@ -118,6 +128,9 @@ impl PathIntegrator {
             scratch.hits.clear();
             scratch.hits.resize(count, None);
             world.accel.intersect_batch(&scratch.rays, &mut scratch.hits, coherence);
+            if in_media {
+                counts.indirect += arrive_all(world, scratch);
+            }
 
             self.shade_all(world, bounce, out, scratch);
 
@@ -138,7 +151,8 @@ impl PathIntegrator {
 
     /// Shades every living path's hit; afterwards the scratch holds the paths that go on, their rays, and the shadow rays to trace.
     fn shade_all(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, .. } = scratch;
+        let in_media = world.scene.features.media;
         shadow_rays.clear();
         pending.clear();
         let mut alive = 0;
@@ -161,19 +175,47 @@ impl PathIntegrator {
                 continue;
             }
 
-            let vertex = Vertex::new(world, &at, &ray);
-            if let Some(shadow) = self.sample_light(world, &path, &vertex, bounce) {
+            let mut vertex = Vertex::new(world, &at, &ray);
+            if in_media {
+                self.meet_boundary(world, &mut path, &mut vertex, &ray, &mut media[i]);
+            }
+            if let Some(mut shadow) = self.sample_light(world, &path, &vertex, bounce) {
+                if in_media {
+                    let here = world.media_toward(&at, ray.direction, shadow.ray.direction, &media[i].here);
+                    shadow.contribution *= world.transmittance(&here, &shadow.ray);
+                }
                 shadow_rays.push(shadow.ray);
                 pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
             }
             if let Some(next) = self.scatter(world, &mut path, &vertex, bounce) {
                 paths[alive] = path;
                 rays[alive] = next;
+                if in_media {
+                    let here = world.media_toward(&at, ray.direction, next.direction, &media[i].here);
+                    media[alive] = MediaState { here, ..media[i] };
+                }
                 alive += 1;
             }
         }
         paths.truncate(alive);
         rays.truncate(alive);
+    }
+
+    /// Gives a vertex on a boundary of media its scattering. Where that parts colours, the path goes on with one of them.
+    #[inline(never)]
+    fn meet_boundary(&self, world: &World, path: &mut Path, vertex: &mut Vertex, ray: &Ray, state: &mut MediaState) {
+        let Some(boundary) = world.boundary(vertex.at, ray.direction, state) else { return };
+        if matches!(boundary.ior, RelativeIor::Dispersed(_)) {
+            let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::COLOR)[0];
+            let channel = ((3.0 * u) as u8).min(2);
+            let mut only = [0.0; 3];
+            only[usize::from(channel)] = 3.0;
+            path.throughput *= Rgb::from(only);
+            state.channel = Some(channel);
+        }
+        if let Some(bsdf) = world.boundary_bsdf(vertex.at, ray.direction, boundary.ior.of(state.channel.map(usize::from))) {
+            vertex.bsdf = bsdf;
+        }
     }
 
     /// What a contribution brings that was scattered so many times between the light and the camera.
@@ -285,6 +327,24 @@ impl PathIntegrator {
         path.from = vertex.receiver();
         Some(vertex.at.spawn(direction))
     }
+}
+
+/// Takes every path to the next surface where something happens to it; says how many rays that took.
+#[inline(never)]
+fn arrive_all(world: &World, scratch: &mut Scratch) -> u64 {
+    let Scratch { paths, rays, hits, media, .. } = scratch;
+    let mut passed = 0;
+    for (i, path) in paths.iter_mut().enumerate() {
+        let arrival = world.arrive(&mut rays[i], hits[i], &mut media[i]);
+        hits[i] = arrival.hit;
+        path.throughput *= arrival.transmittance;
+        if arrival.passed > 0 {
+            // No shadow ray would have come so far.
+            path.pdf = f32::INFINITY;
+            passed += u64::from(arrival.passed);
+        }
+    }
+    passed
 }
 
 /// A shadow ray and what it brings if it is free.

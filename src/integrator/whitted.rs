@@ -1,6 +1,7 @@
 //! Whitted's ray tracing: mirror reflection, refraction, hard shadows and an ambient term ("An Improved Illumination Model for Shaded
 //! Display").
 
+use super::media::MediaState;
 use super::path::Vertex;
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sample};
 use crate::color::Rgb;
@@ -9,6 +10,7 @@ use crate::geometry::SurfaceInteraction;
 use crate::light::{Light, ShadowTarget};
 use crate::math::Ray;
 use crate::math::float::ONE_MINUS_EPSILON;
+use crate::medium::Interior;
 
 /// Whitted's ray tracing. Area lights shine from their middle, so shadows are hard; scattering that is neither mirror-like nor lit by a
 /// light contributes only through the ambient term.
@@ -25,30 +27,69 @@ impl Integrator for Whitted {
     fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
         counts.camera += samples.len() as u64;
         for (sample, out) in samples.iter().zip(out) {
-            *out = match world.closest(&sample.ray) {
+            let in_media = world.scene.features.media;
+            let here = if in_media { world.media_at_start(&sample.ray) } else { Interior::default() };
+            let segment = Segment::trace(world, sample.ray, here, counts);
+            *out = match &segment.end {
                 Some(at) => PixelSample {
-                    radiance: self.shade(world, &sample.ray, &at, 1, counts),
+                    radiance: self.shade(world, &segment, at, 1, counts) * segment.transmittance,
                     alpha: 1.0,
-                    surface: surface_sample(world, self.needs, &at, sample.ray.direction),
+                    surface: surface_sample(world, self.needs, at, segment.ray.direction),
                 },
-                None => PixelSample { radiance: world.radiance_at_infinity(sample.ray.direction), ..PixelSample::default() },
+                None => PixelSample { radiance: segment.escaped(world), ..PixelSample::default() },
             };
         }
     }
 }
 
+/// A ray with what it meets.
+struct Segment {
+    /// From the last surface that it passed, if media lie on its way.
+    ray: Ray,
+    end: Option<SurfaceInteraction>,
+    /// The media that contain its end.
+    media: MediaState,
+    /// What is left of light on the way.
+    transmittance: Rgb,
+}
+
+impl Segment {
+    /// Traces a ray that starts within the media `here`.
+    fn trace(world: &World, mut ray: Ray, here: Interior, counts: &mut RayCounts) -> Self {
+        let mut media = MediaState { here, channel: None };
+        if !world.scene.features.media {
+            return Self { ray, end: world.closest(&ray), media, transmittance: Rgb::WHITE };
+        }
+        let hit = world.accel.intersect(&ray);
+        let arrival = world.arrive(&mut ray, hit, &mut media);
+        counts.indirect += u64::from(arrival.passed);
+        Self { ray, end: world.resolve(&ray, arrival.hit), media, transmittance: arrival.transmittance }
+    }
+
+    /// What arrives from infinity.
+    fn escaped(&self, world: &World) -> Rgb {
+        world.radiance_at_infinity(self.ray.direction) * self.transmittance
+    }
+}
+
 impl Whitted {
-    /// Radiance leaving `at` against `ray`, which is the segment number `depth` of its path.
-    fn shade(&self, world: &World, ray: &Ray, at: &SurfaceInteraction, depth: u32, counts: &mut RayCounts) -> Rgb {
+    /// Radiance leaving `at`, the end of the segment number `depth` of its path, against that.
+    fn shade(&self, world: &World, segment: &Segment, at: &SurfaceInteraction, depth: u32, counts: &mut RayCounts) -> Rgb {
+        let Segment { ray, media, .. } = segment;
         let mut radiance = world.emitted(at, -ray.direction);
         if depth >= self.max_depth {
             return radiance;
         }
-        let vertex = Vertex::new(world, at, ray);
+        let mut vertex = Vertex::new(world, at, ray);
+        if let Some(boundary) = world.boundary(at, ray.direction, media)
+            && let Some(bsdf) = world.boundary_bsdf(at, ray.direction, boundary.ior.of(None))
+        {
+            vertex.bsdf = bsdf;
+        }
         if !vertex.bsdf.is_delta() {
             radiance += self.ambient * vertex.bsdf.albedo(vertex.wo);
             for light in world.scene.lights.lights() {
-                radiance += direct_light(world, &vertex, light, counts);
+                radiance += direct_light(world, segment, &vertex, light, counts);
             }
         }
 
@@ -61,11 +102,12 @@ impl Whitted {
             if vertex.shadowing(lobe.wi, direction) == 0.0 {
                 continue;
             }
-            let next = at.spawn(direction);
             counts.indirect += 1;
-            let arriving = match world.closest(&next) {
-                Some(hit) => self.shade(world, &next, &hit, depth + 1, counts),
-                None => world.radiance_at_infinity(next.direction),
+            let here = world.media_toward(at, ray.direction, direction, &media.here);
+            let next = Segment::trace(world, at.spawn(direction), here, counts);
+            let arriving = match &next.end {
+                Some(end) => self.shade(world, &next, end, depth + 1, counts) * next.transmittance,
+                None => next.escaped(world),
             };
             radiance += arriving * lobe.weight * lobe.pdf;
         }
@@ -74,7 +116,7 @@ impl Whitted {
 }
 
 /// Light that arrives from the middle of one light and is scattered back.
-fn direct_light(world: &World, vertex: &Vertex, light: &Light, counts: &mut RayCounts) -> Rgb {
+fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, light: &Light, counts: &mut RayCounts) -> Rgb {
     let at = vertex.at;
     let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2]) else {
         return Rgb::BLACK;
@@ -91,5 +133,9 @@ fn direct_light(world: &World, vertex: &Vertex, light: &Light, counts: &mut RayC
         ShadowTarget::Point(target) => at.spawn_to(target),
         ShadowTarget::Infinity => at.spawn(sample.wi),
     };
-    if world.accel.occluded(&shadow) { Rgb::BLACK } else { scattered }
+    if world.accel.occluded(&shadow) {
+        return Rgb::BLACK;
+    }
+    let here = world.media_toward(at, segment.ray.direction, shadow.direction, &segment.media.here);
+    scattered * world.transmittance(&here, &shadow)
 }

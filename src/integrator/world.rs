@@ -18,12 +18,14 @@ pub struct World<'a> {
     /// The accelerator.
     pub accel: &'a dyn Accelerator,
     bounds: Aabb,
+    /// Around all surfaces of media.
+    pub(super) media_bounds: Aabb,
 }
 
 impl<'a> World<'a> {
     /// A scene with its accelerator.
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator) -> Self {
-        Self { scene, accel, bounds: accel.bounds() }
+        Self { scene, accel, bounds: accel.bounds(), media_bounds: super::media::bounds(scene) }
     }
 
     /// The surface that a ray meets first.

@@ -95,9 +95,16 @@ impl Search<'_> {
         let (d_z_squared, two_b_d_z) = (d_z * d_z, 2.0 * b * d_z);
         let linear = 2.0 * a * o_z - two_b_d_z;
         let constant = o_z * (two_b_d_z - a * o_z) - d_z_squared * c;
-        let coefficients: [f64; 7] = std::array::from_fn(|k| {
+        let mut coefficients: [f64; 7] = std::array::from_fn(|k| {
             d_z_squared * segment.r_squared[k] - a * segment.z_squared[k] + linear * segment.z_raised[k] + constant
         });
+        // On the axis no ray is nearer to it than the surface, though a ray through the pole is as near: a zero there, or a rounding above
+        // it, would hide the root beside it.
+        for end in [0, 6] {
+            if segment.r_squared[end] == 0.0 {
+                coefficients[end] = coefficients[end].min(-f64::MIN_POSITIVE);
+            }
+        }
         if sign_changes(&coefficients) == 0 {
             return;
         }

@@ -255,6 +255,22 @@ fn no_ray_passes_a_joint() {
 }
 
 #[test]
+fn no_ray_passes_a_pole() {
+    // Exactly through the pole, and past it by less than the root of a rounding; along the axis and not.
+    let shape = turned(CIRCLE);
+    let mut random = Random(27);
+    for i in 0..20_000 {
+        let from = if i % 5 == 0 { DVec3::ZERO } else { random.direction() * 0.5 };
+        let mut target = dvec3(0.0, if i % 2 == 0 { 1.0 } else { -1.0 }, 0.0);
+        if i % 3 == 0 {
+            target.x = random.magnitude(-16.0, -6.0);
+        }
+        let hits = all_hits(&shape, &endless(from, target - from));
+        assert!(hits.len() == 1 && (hits[0] - 1.0).abs() < 1e-5, "{from} {target} {hits:?}");
+    }
+}
+
+#[test]
 fn areas_are_those_of_pappus() {
     let cases = [
         (line([2.0, -1.0], [2.0, 3.0]), TAU * 2.0 * 4.0),

@@ -1,0 +1,146 @@
+//! Paths through media: where the medium changes, and what is absorbed on the way.
+
+use super::World;
+use crate::bsdf::Bsdf;
+use crate::color::Rgb;
+use crate::geometry::{Hit, SurfaceInteraction};
+use crate::math::{Aabb, Ray, Vec3, vec3};
+use crate::medium::{Interior, RelativeIor, Sides};
+use crate::scene::Scene;
+
+/// Surfaces on one straight way, at most; a way along a surface must not go on for ever.
+const MAX_SURFACES: u32 = 4096;
+
+/// The unit direction in which the media around the camera are counted. No axis and no diagonal, where scenes have their edges and poles.
+const PROBE: Vec3 = vec3(0.169_031, 0.961_236, 0.217_947);
+
+/// A path within media.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct MediaState {
+    /// The media that contain its end.
+    pub here: Interior,
+    /// The colour channel that it follows, once dispersion has parted them.
+    pub channel: Option<u8>,
+}
+
+impl MediaState {
+    fn channel(&self) -> Option<usize> {
+        self.channel.map(usize::from)
+    }
+}
+
+/// Where a ray meets something else than media that go on behind a surface.
+pub(super) struct Arrival {
+    /// On the ray, which by then may be another one.
+    pub hit: Option<Hit>,
+    /// What is left of light on the way.
+    pub transmittance: Rgb,
+    /// Surfaces passed.
+    pub passed: u32,
+}
+
+/// A surface between two media.
+pub(super) struct MediumBoundary {
+    /// The media on both sides.
+    pub sides: Sides,
+    /// Index of refraction of the inside over that of the outside.
+    pub ior: RelativeIor,
+}
+
+/// A box around all surfaces of media.
+pub(super) fn bounds(scene: &Scene) -> Aabb {
+    if !scene.features.media {
+        return Aabb::EMPTY;
+    }
+    let geometry = &scene.geometry;
+    let of_shapes = |ids: &[crate::id::ShapeId]| {
+        let media = ids.iter().filter(|&&id| scene.surface(id).medium.is_some());
+        media.fold(Aabb::EMPTY, |b, &id| b.union(&geometry.shape(id).bounds()))
+    };
+    geometry.instances.iter().fold(of_shapes(&geometry.world), |b, instance| {
+        let inside = of_shapes(&geometry.object(instance.object).shapes);
+        if inside.is_empty() { b } else { b.union(&instance.bounds(&inside)) }
+    })
+}
+
+/// Whether a ray that came along `from` crosses the surface by going on along `to`; as in [`Vertex::shadowing`](super::path::Vertex).
+pub(super) fn crosses(at: &SurfaceInteraction, from: Vec3, to: Vec3) -> bool {
+    let reflects = to.dot(at.n_g) * (-from).dot(at.n_g) > 0.0;
+    !reflects
+}
+
+impl World<'_> {
+    /// The medium's boundary that a ray meets at a surface; `None` where the surface or this point of it is none.
+    pub(super) fn boundary(&self, at: &SurfaceInteraction, direction: Vec3, state: &MediaState) -> Option<MediumBoundary> {
+        let medium = self.scene.surface(at.shape).medium?;
+        if !self.scene.met_material(at, direction).transmits() {
+            return None;
+        }
+        let sides = Sides::new(state.here, medium, direction.dot(at.n_g) < 0.0);
+        Some(MediumBoundary { sides, ior: self.scene.media.relative_ior(&sides, state.channel()) })
+    }
+
+    /// The scattering at a boundary of media.
+    pub(super) fn boundary_bsdf(&self, at: &SurfaceInteraction, direction: Vec3, ior: f32) -> Option<Bsdf> {
+        self.scene.met_material(at, direction).boundary(&self.scene.textures, at.uv, ior)
+    }
+
+    /// The media beyond a surface, if a path that came along `from` crosses it by going on along `to`; else those it is in.
+    pub(super) fn media_toward(&self, at: &SurfaceInteraction, from: Vec3, to: Vec3, here: &Interior) -> Interior {
+        match self.scene.surface(at.shape).medium {
+            Some(medium) if crosses(at, from, to) => {
+                let is_front = from.dot(at.n_g) < 0.0;
+                Sides::new(*here, medium, is_front).beyond(is_front)
+            }
+            _ => *here,
+        }
+    }
+
+    /// What is left of the light along a ray that meets nothing on its way, which lies within `here`.
+    pub(super) fn transmittance(&self, here: &Interior, ray: &Ray) -> Rgb {
+        self.scene.media.transmittance(here, (ray.t_max - ray.t_min) * ray.direction.length())
+    }
+
+    /// Follows `ray`, which has found `hit`, through all surfaces where light passes as if there were none.
+    pub(super) fn arrive(&self, ray: &mut Ray, mut hit: Option<Hit>, state: &mut MediaState) -> Arrival {
+        let mut transmittance = Rgb::WHITE;
+        let mut passed = 0;
+        loop {
+            let at = self.resolve(ray, hit);
+            let distance = at.as_ref().map_or(f32::INFINITY, |at| (at.t - ray.t_min) * ray.direction.length());
+            transmittance *= self.scene.media.transmittance(&state.here, distance);
+            let open = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state).filter(|boundary| boundary.ior.is_one()));
+            let (Some(at), Some(boundary), true) = (at, open, passed < MAX_SURFACES) else {
+                return Arrival { hit, transmittance, passed };
+            };
+            state.here = boundary.sides.beyond(ray.direction.dot(at.n_g) < 0.0);
+            *ray = at.spawn(ray.direction);
+            hit = self.accel.intersect(ray);
+            passed += 1;
+        }
+    }
+
+    /// The media around the start of a camera ray, by counting surfaces from there to infinity.
+    pub(super) fn media_at_start(&self, ray: &Ray) -> Interior {
+        let start = ray.at(ray.t_min);
+        if !self.media_bounds.contains(start) {
+            return Interior::default();
+        }
+        let mut probe = Ray { time: ray.time, ..Ray::new(start, PROBE) };
+        let mut crossings = Vec::new();
+        while let Some(at) = self.closest(&probe) {
+            if let Some(medium) = self.scene.surface(at.shape).medium {
+                crossings.push((medium, PROBE.dot(at.n_g) < 0.0));
+            }
+            if crossings.len() > MAX_SURFACES as usize {
+                break;
+            }
+            probe = at.spawn(PROBE);
+        }
+        // On the way back from infinity, where nothing contains anything.
+        crossings
+            .iter()
+            .rev()
+            .fold(Interior::default(), |here, &(medium, entering)| if entering { here.left(medium) } else { here.entered(medium) })
+    }
+}
