@@ -47,6 +47,10 @@ pub struct Features {
     pub textures: bool,
     /// Some surface has a normal map or a bump map.
     pub reliefs: bool,
+    /// Some surface's shading normal differs from its geometric one.
+    pub shading_normals: bool,
+    /// Something depends on uv or on tangents.
+    pub parameters: bool,
     /// Some material has only delta lobes.
     pub delta_materials: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
@@ -94,10 +98,15 @@ impl Scene {
     }
 
     /// The scattering at a point for a ray that arrives in `direction`.
+    /// What is not the same everywhere is made in `place`.
     #[inline]
-    pub fn bsdf(&self, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
+    pub fn bsdf<'a>(&'a self, at: &SurfaceInteraction, direction: Vec3, place: &'a mut Option<Bsdf>) -> &'a Bsdf {
         let material = self.material(at.shape);
-        if let Material::Constant(bsdf) = material { *bsdf } else { self.resolved_bsdf(self.surface(at.shape).material, at, direction) }
+        if let Material::Constant(bsdf) = material {
+            bsdf
+        } else {
+            place.insert(self.resolved_bsdf(self.surface(at.shape).material, at, direction))
+        }
     }
 
     fn resolved_bsdf(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {

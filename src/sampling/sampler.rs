@@ -63,7 +63,7 @@ impl Sampler {
 }
 
 /// Four scrambled coordinates as fractions of `2^32`.
-#[inline]
+#[inline(always)]
 fn sobol_4d(pixel: PixelSeed, sample: u32, set: u32) -> [u32; 4] {
     // One seed for the shuffle and four for the scrambles. The first is mixed well; one more round for each of the others will do.
     let first = mix(u64::from(pixel.0) << 32 | u64::from(set));
