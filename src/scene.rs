@@ -7,6 +7,7 @@ use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId};
 use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
 use crate::math::Vec3;
+use crate::math::random::mix;
 use crate::relief::Relief;
 use crate::texture::Texture;
 
@@ -124,13 +125,7 @@ impl Scene {
 /// A number in `[0, 1)` hashed from a point, a direction and a material: the choice between the parts of a mix is the same for any number of
 /// threads, and another for every sample of a pixel.
 fn choice(at: &SurfaceInteraction, direction: Vec3, id: MaterialId) -> f32 {
-    // The finalizer of SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators").
-    let mix = |n: u64| {
-        let n = (n ^ (n >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let n = (n ^ (n >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        n ^ (n >> 31)
-    };
     let words = at.p.to_array().map(f64::to_bits).into_iter().chain(direction.to_array().map(|x| u64::from(x.to_bits())));
-    let hash = words.fold(mix(u64::from(id.0) + 1), |hash, word| mix(hash.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ word));
+    let hash = words.fold(mix(u64::from(id.0)), |hash, word| mix(hash ^ word));
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }
