@@ -20,13 +20,9 @@ pub(super) struct MediaState {
     /// The media that contain its end.
     pub here: Interior,
     /// The colour channel that it follows, once dispersion has parted them.
-    pub channel: Option<u8>,
-}
-
-impl MediaState {
-    fn channel(&self) -> Option<usize> {
-        self.channel.map(usize::from)
-    }
+    pub channel: Option<usize>,
+    /// If it has arrived at a boundary between media: the index of refraction of the inside over that of the outside.
+    pub ior: Option<f32>,
 }
 
 /// Where a ray meets something else than media that go on behind a surface.
@@ -37,14 +33,14 @@ pub(super) struct Arrival {
     pub transmittance: Rgb,
     /// Surfaces passed.
     pub passed: u32,
+    /// At a boundary between media, the relative index of refraction.
+    pub ior: Option<RelativeIor>,
 }
 
 /// A surface between two media.
-pub(super) struct MediumBoundary {
-    /// The media on both sides.
-    pub sides: Sides,
-    /// Index of refraction of the inside over that of the outside.
-    pub ior: RelativeIor,
+struct MediumBoundary {
+    sides: Sides,
+    ior: RelativeIor,
 }
 
 /// A box around all surfaces of media.
@@ -71,17 +67,19 @@ pub(super) fn crosses(at: &SurfaceInteraction, from: Vec3, to: Vec3) -> bool {
 
 impl World<'_> {
     /// The medium's boundary that a ray meets at a surface; `None` where the surface or this point of it is none.
-    pub(super) fn boundary(&self, at: &SurfaceInteraction, direction: Vec3, state: &MediaState) -> Option<MediumBoundary> {
+    fn boundary(&self, at: &SurfaceInteraction, direction: Vec3, state: &MediaState) -> Option<MediumBoundary> {
         let medium = self.scene.surface(at.shape).medium?;
         if !self.scene.met_material(at, direction).transmits() {
             return None;
         }
         let sides = Sides::new(state.here, medium, direction.dot(at.n_g) < 0.0);
-        Some(MediumBoundary { sides, ior: self.scene.media.relative_ior(&sides, state.channel()) })
+        Some(MediumBoundary { sides, ior: self.scene.media.relative_ior(&sides, state.channel) })
     }
 
-    /// The scattering at a boundary of media.
-    pub(super) fn boundary_bsdf(&self, at: &SurfaceInteraction, direction: Vec3, ior: f32) -> Option<Bsdf> {
+    /// The scattering at a boundary between media, if a path has arrived at one.
+    #[inline(never)]
+    pub(super) fn boundary_bsdf(&self, at: &SurfaceInteraction, direction: Vec3, state: &MediaState) -> Option<Bsdf> {
+        let ior = state.ior?;
         self.scene.met_material(at, direction).boundary(&self.scene.textures, at.uv, ior)
     }
 
@@ -109,9 +107,10 @@ impl World<'_> {
             let at = self.resolve(ray, hit);
             let distance = at.as_ref().map_or(f32::INFINITY, |at| (at.t - ray.t_min) * ray.direction.length());
             transmittance *= self.scene.media.transmittance(&state.here, distance);
-            let open = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state).filter(|boundary| boundary.ior.is_one()));
-            let (Some(at), Some(boundary), true) = (at, open, passed < MAX_SURFACES) else {
-                return Arrival { hit, transmittance, passed };
+            let boundary = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state));
+            let ior = boundary.as_ref().map(|boundary| boundary.ior);
+            let (Some(at), Some(boundary), true) = (at, boundary, ior.is_some_and(|ior| ior.is_one()) && passed < MAX_SURFACES) else {
+                return Arrival { hit, transmittance, passed, ior };
             };
             state.here = boundary.sides.beyond(ray.direction.dot(at.n_g) < 0.0);
             *ray = at.spawn(ray.direction);

@@ -56,13 +56,14 @@ struct Segment {
 impl Segment {
     /// Traces a ray that starts within the media `here`.
     fn trace(world: &World, mut ray: Ray, here: Interior, counts: &mut RayCounts) -> Self {
-        let mut media = MediaState { here, channel: None };
+        let mut media = MediaState { here, ..MediaState::default() };
         if !world.scene.features.media {
             return Self { ray, end: world.closest(&ray), media, transmittance: Rgb::WHITE };
         }
         let hit = world.accel.intersect(&ray);
         let arrival = world.arrive(&mut ray, hit, &mut media);
         counts.indirect += u64::from(arrival.passed);
+        media.ior = arrival.ior.map(|ior| ior.of(None));
         Self { ray, end: world.resolve(&ray, arrival.hit), media, transmittance: arrival.transmittance }
     }
 
@@ -80,11 +81,11 @@ impl Whitted {
         if depth >= self.max_depth {
             return radiance;
         }
-        let mut vertex = Vertex::new(world, at, ray);
-        if let Some(boundary) = world.boundary(at, ray.direction, media)
-            && let Some(bsdf) = world.boundary_bsdf(at, ray.direction, boundary.ior.of(None))
-        {
-            vertex.bsdf = bsdf;
+        let mut bsdf = None;
+        let boundary = world.boundary_bsdf(at, ray.direction, media);
+        let mut vertex = Vertex::new(world, at, ray, &mut bsdf);
+        if let Some(boundary) = &boundary {
+            vertex.bsdf = boundary;
         }
         if !vertex.bsdf.is_delta() {
             radiance += self.ambient * vertex.bsdf.albedo(vertex.wo);
