@@ -97,7 +97,11 @@ impl Scene {
     #[inline]
     pub fn bsdf(&self, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
         let material = self.material(at.shape);
-        if let Material::Constant(bsdf) = material { *bsdf } else { self.resolved_bsdf(self.surface(at.shape).material, at, direction) }
+        if let Material::Constant(bsdf) = material {
+            bsdf.clone()
+        } else {
+            self.resolved_bsdf(self.surface(at.shape).material, at, direction)
+        }
     }
 
     fn resolved_bsdf(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
