@@ -1,65 +1,17 @@
 //! Materials: textures and parameters that become a [`Bsdf`] at a point.
 
+mod inputs;
+
+pub use inputs::{AlphaInput, CoatInput, ColorInput, RangedInput, ScalarInput};
+
 use crate::bsdf::{
-    Bsdf, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Plastic, Principled, PrincipledParameters,
+    Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Plastic, Principled, PrincipledParameters,
+    ThinDielectric,
 };
 use crate::color::Rgb;
-use crate::id::{MaterialId, TextureId};
+use crate::id::MaterialId;
 use crate::math::Vec2;
 use crate::texture::Texture;
-
-/// A colour that is constant or comes from a texture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ColorInput {
-    /// The same everywhere.
-    Constant(Rgb),
-    /// Looked up by uv, each channel clamped to `[0, 1]`.
-    Texture(TextureId),
-}
-
-impl ColorInput {
-    /// The colour at `uv`.
-    #[inline]
-    pub fn at(&self, textures: &[Texture], uv: Vec2) -> Rgb {
-        match self {
-            Self::Constant(color) => *color,
-            Self::Texture(id) => textures[id.index()].color(uv).map(|v| v.clamp(0.0, 1.0)),
-        }
-    }
-
-    fn is_constant(&self) -> bool {
-        matches!(self, Self::Constant(_))
-    }
-}
-
-/// A number within `[0, 1]` that is constant or comes from a texture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ScalarInput {
-    /// The same everywhere.
-    Constant(f32),
-    /// Looked up by uv, clamped to `[0, 1]`.
-    Texture(TextureId),
-}
-
-impl ScalarInput {
-    /// The number at `uv`.
-    #[inline]
-    pub fn at(&self, textures: &[Texture], uv: Vec2) -> f32 {
-        match self {
-            Self::Constant(value) => *value,
-            Self::Texture(id) => textures[id.index()].scalar(uv).clamp(0.0, 1.0),
-        }
-    }
-
-    /// Whether it is 0 everywhere.
-    pub fn is_zero(&self) -> bool {
-        *self == Self::Constant(0.0)
-    }
-
-    fn is_constant(&self) -> bool {
-        matches!(self, Self::Constant(_))
-    }
-}
 
 /// A material.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,28 +36,6 @@ pub enum Material {
         /// Against the normal.
         back: MaterialId,
     },
-}
-
-/// GGX alpha along u and v from inputs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AlphaInput {
-    /// Along u and v.
-    pub axes: [ScalarInput; 2],
-    /// Whether the inputs are roughness, of which alpha is the square.
-    pub squared: bool,
-}
-
-impl AlphaInput {
-    /// Alpha at `uv`.
-    #[inline]
-    pub fn at(&self, textures: &[Texture], uv: Vec2) -> [f32; 2] {
-        self.axes.map(|input| input.at(textures, uv)).map(|value| if self.squared { value * value } else { value })
-    }
-
-    /// Whether no texture changes it.
-    pub fn is_constant(&self) -> bool {
-        self.axes.iter().all(ScalarInput::is_constant)
-    }
 }
 
 /// Parameters that may come from textures.
@@ -157,14 +87,41 @@ pub enum Varying {
         /// The highlight.
         specular: ColorInput,
         /// Exponent.
-        exponent: f32,
+        exponent: RangedInput,
+    },
+    /// Cook and Torrance's model.
+    CookTorrance {
+        /// Colour of the diffuse part.
+        albedo: ColorInput,
+        /// Weight of the diffuse part.
+        d: ScalarInput,
+        /// Weight of the specular part.
+        s: ScalarInput,
+        /// Alpha.
+        m: ScalarInput,
+        /// Reflectance of the specular part ahead.
+        f0: ColorInput,
+    },
+    /// A pane of glass.
+    ThinDielectric {
+        /// Index of refraction over that of the outside.
+        ior: RangedInput,
     },
     /// Plastic.
     Plastic {
-        /// Everything else.
-        base: Plastic,
+        /// The coat.
+        coat: CoatInput,
         /// Colour of the diffuse base.
         albedo: ColorInput,
+    },
+    /// A clear coat over another material.
+    Coated {
+        /// The coat.
+        coat: CoatInput,
+        /// What light keeps that crosses it twice along the normal.
+        tint: ColorInput,
+        /// What is below: no material that consists of others.
+        base: Material,
     },
     /// The principled model.
     Principled(PrincipledInputs),
@@ -183,7 +140,9 @@ pub struct PrincipledInputs {
     pub roughness: ScalarInput,
     /// Anisotropy.
     pub anisotropic: ScalarInput,
-    /// Reflectance ahead in units of 0.08, in place of the index of refraction in `rest`.
+    /// Index of refraction over that of the outside.
+    pub ior: RangedInput,
+    /// Reflectance ahead in units of 0.08, in place of the index of refraction.
     pub specular: Option<ScalarInput>,
     /// Tint of the dielectric layer.
     pub specular_tint: ScalarInput,
@@ -211,7 +170,10 @@ impl PrincipledInputs {
             metallic: at(&self.metallic),
             roughness: at(&self.roughness),
             anisotropic: at(&self.anisotropic),
-            ior: self.specular.as_ref().map_or(self.rest.ior, |specular| PrincipledParameters::ior_of_specular(at(specular))),
+            ior: match &self.specular {
+                Some(specular) => PrincipledParameters::ior_of_specular(at(specular)),
+                None => self.ior.at(textures, uv),
+            },
             specular_tint: at(&self.specular_tint),
             sheen: at(&self.sheen),
             sheen_tint: at(&self.sheen_tint),
@@ -238,7 +200,7 @@ impl PrincipledInputs {
             &self.transmission,
             &self.diffuse_transmission,
         ];
-        self.base_color.is_constant() && scalars.into_iter().chain(&self.specular).all(ScalarInput::is_constant)
+        self.base_color.is_constant() && self.ior.is_constant() && scalars.into_iter().chain(&self.specular).all(ScalarInput::is_constant)
     }
 }
 
@@ -268,9 +230,20 @@ impl Varying {
                 let diffuse = diffuse.at(textures, uv);
                 let left = Rgb::WHITE - specular;
                 let diffuse = Rgb::new(diffuse.r.min(left.r), diffuse.g.min(left.g), diffuse.b.min(left.b));
-                Bsdf::Glossy(Glossy::phong(diffuse, specular, *exponent))
+                Bsdf::Glossy(Glossy::phong(diffuse, specular, exponent.at(textures, uv)))
             }
-            Self::Plastic { base, albedo } => Bsdf::Plastic(Plastic { diffuse: albedo.at(textures, uv), ..*base }),
+            Self::CookTorrance { albedo, d, s, m, f0 } => {
+                // What exceeds 1 together is taken from the diffuse part.
+                let s = s.at(textures, uv);
+                let d = d.at(textures, uv).min(1.0 - s);
+                Bsdf::Glossy(Glossy::new(albedo.at(textures, uv) * d, f0.at(textures, uv) * s, Rgb::splat(s), m.at(textures, uv)))
+            }
+            Self::ThinDielectric { ior } => Bsdf::ThinDielectric(ThinDielectric { ior: ior.at(textures, uv) }),
+            Self::Plastic { coat, albedo } => Bsdf::Plastic(Plastic { diffuse: albedo.at(textures, uv), coat: coat.at(textures, uv) }),
+            Self::Coated { coat, tint, base } => {
+                let base = base.bsdf(textures, uv);
+                Bsdf::Coated(Box::new(Coated::new(coat.at(textures, uv), tint.at(textures, uv), base)))
+            }
             Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, uv))),
         }
     }
@@ -278,12 +251,17 @@ impl Varying {
     fn is_constant(&self) -> bool {
         match self {
             Self::Diffuse { albedo, roughness } => albedo.is_constant() && roughness.is_constant(),
-            Self::DiffuseTransmission { reflectance: a, transmittance: b } | Self::Phong { diffuse: a, specular: b, .. } => {
-                a.is_constant() && b.is_constant()
+            Self::DiffuseTransmission { reflectance: a, transmittance: b } => a.is_constant() && b.is_constant(),
+            Self::Phong { diffuse, specular, exponent } => diffuse.is_constant() && specular.is_constant() && exponent.is_constant(),
+            Self::CookTorrance { albedo, d, s, m, f0 } => {
+                albedo.is_constant() && f0.is_constant() && [d, s, m].into_iter().all(ScalarInput::is_constant)
             }
+            Self::ThinDielectric { ior } => ior.is_constant(),
             Self::Conductor { tint, alpha, .. } => tint.is_constant() && alpha.is_constant(),
             Self::Dielectric { alpha, .. } => alpha.is_constant(),
-            Self::Mirror { reflectance: color } | Self::Plastic { albedo: color, .. } => color.is_constant(),
+            Self::Mirror { reflectance } => reflectance.is_constant(),
+            Self::Plastic { coat, albedo } => coat.is_constant() && albedo.is_constant(),
+            Self::Coated { coat, tint, base } => coat.is_constant() && tint.is_constant() && matches!(base, Material::Constant(_)),
             Self::Principled(inputs) => inputs.is_constant(),
         }
     }
@@ -291,18 +269,30 @@ impl Varying {
     /// Whether light may cross the surface.
     fn transmits(&self) -> bool {
         match self {
-            Self::DiffuseTransmission { .. } | Self::Dielectric { .. } => true,
+            Self::DiffuseTransmission { .. } | Self::Dielectric { .. } | Self::ThinDielectric { .. } => true,
             Self::Principled(inputs) => !inputs.transmission.is_zero() || !inputs.diffuse_transmission.is_zero(),
-            Self::Diffuse { .. } | Self::Mirror { .. } | Self::Conductor { .. } | Self::Phong { .. } | Self::Plastic { .. } => false,
+            Self::Diffuse { .. }
+            | Self::Mirror { .. }
+            | Self::Conductor { .. }
+            | Self::Phong { .. }
+            | Self::CookTorrance { .. }
+            | Self::Plastic { .. }
+            | Self::Coated { .. } => false,
         }
     }
 
     /// Whether scattering may depend on the direction of the tangents.
     fn is_anisotropic(&self) -> bool {
         match self {
-            Self::Diffuse { .. } | Self::DiffuseTransmission { .. } | Self::Mirror { .. } | Self::Phong { .. } => false,
+            Self::Diffuse { .. }
+            | Self::DiffuseTransmission { .. }
+            | Self::Mirror { .. }
+            | Self::ThinDielectric { .. }
+            | Self::Phong { .. }
+            | Self::CookTorrance { .. } => false,
             Self::Conductor { alpha, .. } | Self::Dielectric { alpha, .. } => alpha.axes[0] != alpha.axes[1],
-            Self::Plastic { base, .. } => base.is_anisotropic(),
+            Self::Plastic { coat, .. } => coat.is_anisotropic(),
+            Self::Coated { coat, base, .. } => coat.is_anisotropic() || base.is_anisotropic(),
             Self::Principled(inputs) => !inputs.anisotropic.is_zero(),
         }
     }
@@ -313,7 +303,7 @@ impl Material {
     #[inline]
     pub fn bsdf(&self, textures: &[Texture], uv: Vec2) -> Bsdf {
         match self {
-            Self::Constant(bsdf) => *bsdf,
+            Self::Constant(bsdf) => bsdf.clone(),
             Self::Varying(varying) => varying.bsdf(textures, uv),
             Self::Mix { .. } | Self::TwoSided { .. } => Bsdf::Lambert(Lambert { albedo: Rgb::BLACK }),
         }
@@ -374,7 +364,7 @@ impl Material {
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Constant(bsdf) => bsdf.is_delta(),
-            Self::Varying(varying) => matches!(**varying, Varying::Mirror { .. }),
+            Self::Varying(varying) => matches!(**varying, Varying::Mirror { .. } | Varying::ThinDielectric { .. }),
             Self::Mix { .. } | Self::TwoSided { .. } => false,
         }
     }

@@ -145,7 +145,12 @@ fn materials_out_of_range() {
         ("materials.Gold.multiscatter", json!(1), "materials.Gold.multiscatter", "boolean"),
         ("materials.Gold.roughness", json!({ "texture": "wood" }), "materials.Gold.roughness", "no texture"),
         ("materials.Gold.roughness", json!([0.1, 0.2, 0.3]), "materials.Gold.roughness", "expected a number"),
-        ("materials.paint.alpha", json!({ "texture": "tiles" }), "materials.paint.alpha", "cannot come from a texture"),
+        ("materials.paint.alpha", json!({ "texture": "tile" }), "materials.paint.alpha", "did you mean \"tiles\"?"),
+        ("materials.paint.ior", json!({ "texture": "tiles" }), "materials.paint.ior", "\"range\": [low, high]"),
+        ("materials.paint.ior", json!({ "texture": "tile", "range": [1.1, 2] }), "materials.paint.ior", "no texture"),
+        ("materials.paint.ior", json!({ "texture": "tiles", "range": [1, 2] }), "materials.paint.ior.range[0]", "above 1"),
+        ("materials.paint.ior", json!({ "texture": "tiles", "range": [1.1, 20] }), "materials.paint.ior.range[1]", "20"),
+        ("materials.glass.ior", json!({ "texture": "tiles", "range": [1.1, 2] }), "materials.glass.ior", "cannot come from a texture"),
         ("materials.tiled.roughness", json!(1.5), "materials.tiled.roughness", "1.5"),
         ("materials.Gold.tint", json!([1, 1, 1.5]), "materials.Gold.tint", "1.5"),
         ("materials.Gold.eta", json!([1, 1, 1]), "materials.Gold", "`metal`"),
@@ -175,6 +180,15 @@ fn older_and_thin_materials_out_of_range() {
         (glass, json!({ "type": "diffuse_transmission", "transmittance": -1 }), "materials.glass.transmittance", "-1"),
         (glass, json!({ "type": "diffuse_transmission", "reflectance": 2 }), "materials.glass.reflectance", "2"),
         (glass, json!({ "type": "phong", "exponent": -1 }), "materials.glass.exponent", "-1"),
+        (
+            glass,
+            json!({ "type": "phong", "exponent": { "texture": "tiles", "range": [0, -1] } }),
+            "materials.glass.exponent.range[1]",
+            "-1",
+        ),
+        (glass, json!({ "type": "thin_dielectric", "ior": { "texture": "tiles", "range": [0, 1] } }), "materials.glass.ior.range[0]", "0"),
+        (glass, json!({ "type": "cook_torrance", "m": { "texture": "tile" } }), "materials.glass.m", "no texture"),
+        (glass, json!({ "type": "cook_torrance", "f0": { "texture": "tile" } }), "materials.glass.f0", "no texture"),
         (glass, json!({ "type": "phong", "exponent": 1e39 }), "materials.glass.exponent", "inf"),
         (glass, json!({ "type": "phong", "diffuse": 0.7, "specular": 0.7 }), glass, "`specular`"),
         (glass, json!({ "type": "phong", "diffuse": 1.5 }), "materials.glass.diffuse", "1.5"),
@@ -186,94 +200,6 @@ fn older_and_thin_materials_out_of_range() {
         (glass, json!({ "type": "cook_torrance", "f0": [0, 2, 0] }), "materials.glass.f0", "2.0"),
         (glass, json!({ "type": "cook_torrance", "albedo": [0, -1, 0] }), "materials.glass.albedo", "-1.0"),
     ]);
-}
-
-#[test]
-fn materials_of_materials_that_make_no_sense() {
-    let mixed = "materials.mixed";
-    let mix = |a: &str, b: &str| json!({ "type": "mix", "materials": [a, b] });
-    let sides = |front: &str, back: &str| json!({ "type": "two_sided", "front": front, "back": back });
-    assert_faults(&[
-        (mixed, mix("gold", "glass"), "materials.mixed.materials[0]", "did you mean \"Gold\"?"),
-        (mixed, mix("Gold", "wood"), "materials.mixed.materials[1]", "no material"),
-        (mixed, mix("Gold", "mixed"), "materials.mixed.materials[1]", "consists of itself: mixed -> mixed"),
-        (mixed, json!({ "type": "mix", "materials": ["Gold"] }), "materials.mixed.materials", "1"),
-        (mixed, json!({ "type": "mix", "materials": ["Gold", "glass"], "amount": 2 }), "materials.mixed.amount", "2"),
-        (mixed, sides("glass", "Gold"), "materials.mixed.front", "opaque"),
-        (mixed, sides("Gold", "glass"), "materials.mixed.back", "opaque"),
-        (mixed, sides("Gold", "mixed"), "materials.mixed.back", "itself"),
-        (mixed, sides("Gold", "silver"), "materials.mixed.back", "no material"),
-    ]);
-    let folder = Folder::new();
-    let mut scene = good_scene();
-    set(&mut scene, "materials.a", mix("Gold", "b"));
-    set(&mut scene, "materials.b", sides("a", "Gold"));
-    assert_error(&folder, &scene, ErrorKind::Scene, &["materials.b.front: ", "a -> b -> a"]);
-    // A part of a part lets light through.
-    set(&mut scene, "materials.a", mix("Gold", "glass"));
-    assert_error(&folder, &scene, ErrorKind::Scene, &["materials.b.front: ", "opaque"]);
-    // Deep but sound, and too deep.
-    let mut scene = good_scene();
-    for i in 0..40 {
-        let part = if i == 39 { "Gold".to_owned() } else { format!("m{:02}", i + 1) };
-        set(&mut scene, &format!("materials.m{i:02}"), mix("Gold", &part));
-    }
-    assert_error(&folder, &scene, ErrorKind::Scene, &["nested more than 32 deep"]);
-    for i in 0..15 {
-        set(&mut scene, &format!("materials.m{i:02}"), mix("Gold", "glass"));
-    }
-    folder.compile(&scene).unwrap();
-}
-
-#[test]
-fn principled_materials_out_of_range() {
-    let with = |key: &str, value: Value| json!({ "type": "principled", key: value });
-    let place = "materials.glass";
-    let mut faults: Vec<(Value, String, &str)> = vec![
-        (with("base_color", json!([0.5, 2, 0.5])), format!("{place}.base_color"), "2.0"),
-        (with("base_color", json!({ "texture": "nowhere" })), format!("{place}.base_color"), "no texture"),
-        (with("ior", json!(0.75)), format!("{place}.ior"), "0.75"),
-        (with("ior", json!(11)), format!("{place}.ior"), "11"),
-        (json!({ "type": "principled", "ior": 1.5, "specular": 0.5 }), place.to_owned(), "either `specular` or `ior`"),
-        (with("diffuse_transmission", json!(0.5)), format!("{place}.diffuse_transmission"), "`thin`"),
-        (with("thin", json!(1)), format!("{place}.thin"), "boolean"),
-        (with("multiscatter", json!("no")), format!("{place}.multiscatter"), "boolean"),
-        (with("metalic", json!(1)), place.to_owned(), "did you mean `metallic`?"),
-        (with("metallic", json!([1, 2])), format!("{place}.metallic"), "expected a number"),
-    ];
-    let scalars = [
-        "metallic",
-        "roughness",
-        "anisotropic",
-        "specular",
-        "specular_tint",
-        "sheen",
-        "sheen_tint",
-        "clearcoat",
-        "clearcoat_gloss",
-        "subsurface",
-        "transmission",
-        "diffuse_transmission",
-    ];
-    for key in scalars {
-        faults.push((with(key, json!(1.25)), format!("{place}.{key}"), "1.25"));
-        faults.push((with(key, json!(-0.5)), format!("{place}.{key}"), "-0.5"));
-        faults.push((with(key, json!({ "texture": "tile" })), format!("{place}.{key}"), "did you mean \"tiles\"?"));
-    }
-    let folder = Folder::new();
-    for (value, place, word) in faults {
-        let mut scene = good_scene();
-        set(&mut scene, "materials.glass", value);
-        assert_error(&folder, &scene, ErrorKind::Scene, &[&format!("{place}: "), word]);
-    }
-    // And without a fault, with a texture for a number.
-    let mut scene = good_scene();
-    set(
-        &mut scene,
-        "materials.glass",
-        json!({ "type": "principled", "roughness": { "texture": "tiles" }, "metallic": { "texture": "grey" } }),
-    );
-    folder.compile(&scene).unwrap();
 }
 
 #[test]

@@ -4,6 +4,8 @@
 mod accel_agreement;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
+/// The same for materials of several parts or many parameters.
+mod bad_materials;
 /// Accelerators compared from the command line.
 mod bench_accel;
 /// What the cameras of the scene file see.

@@ -1,6 +1,5 @@
 //! Metals: reflection with the exact Fresnel equations of a complex index of refraction, by a plane or by GGX microfacets; light that meets
-//! several microfacets comes back as the lobe of [`energy`](super::energy), coloured by as many reflections (of anisotropic microfacets
-//! a little less).
+//! several microfacets comes back as the lobe of [`energy`](super::energy), coloured by as many reflections.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 

@@ -3,6 +3,8 @@
 //! Every value carries the cosine: `f(wo, wi) |cos wi|`. Densities are per solid angle. Materials are two-sided: `wo.z < 0` sees the
 //! back, which an opaque BSDF treats as its front and a dielectric as its inside.
 
+mod coat;
+mod coated;
 mod conductor;
 mod dielectric;
 mod energy;
@@ -18,6 +20,8 @@ mod principled;
 mod tests;
 mod thin;
 
+pub use coat::Coat;
+pub use coated::Coated;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use energy::bake as bake_energy_tables;
@@ -62,7 +66,7 @@ pub struct BsdfEval {
 }
 
 /// Scattering at one point: all parameters are numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Bsdf {
     /// Ideal diffuse reflection.
     Lambert(Lambert),
@@ -84,6 +88,8 @@ pub enum Bsdf {
     Plastic(Plastic),
     /// Disney's model.
     Principled(Principled),
+    /// A clear coat over another opaque one.
+    Coated(Box<Coated>),
 }
 
 // Made anew at every hit: no kind may make the others slower to pass around.
@@ -102,6 +108,7 @@ macro_rules! each {
             Bsdf::Dielectric($bsdf) => $body,
             Bsdf::Plastic($bsdf) => $body,
             Bsdf::Principled($bsdf) => $body,
+            Bsdf::Coated($bsdf) => $body,
         }
     };
 }
@@ -150,6 +157,7 @@ impl Bsdf {
             Self::Dielectric(bsdf) => bsdf.is_anisotropic(),
             Self::Plastic(bsdf) => bsdf.is_anisotropic(),
             Self::Principled(bsdf) => bsdf.is_anisotropic(),
+            Self::Coated(bsdf) => bsdf.is_anisotropic(),
         }
     }
 
@@ -159,7 +167,13 @@ impl Bsdf {
         match self {
             Self::Dielectric(_) | Self::ThinDielectric(_) | Self::DiffuseTransmission(_) => true,
             Self::Principled(bsdf) => bsdf.transmits(),
-            Self::Lambert(_) | Self::Eon(_) | Self::Mirror(_) | Self::Conductor(_) | Self::Plastic(_) | Self::Glossy(_) => false,
+            Self::Lambert(_)
+            | Self::Eon(_)
+            | Self::Mirror(_)
+            | Self::Conductor(_)
+            | Self::Plastic(_)
+            | Self::Glossy(_)
+            | Self::Coated(_) => false,
         }
     }
 

@@ -1,10 +1,18 @@
 //! Materials that consist of others.
 
+use std::collections::HashMap;
+
 use super::materials::{Compiler, MaterialTable};
 use crate::desc::{MaterialDesc, SceneDesc};
 use crate::error::Result;
 use crate::id::MaterialId;
-use crate::material::Material;
+use crate::material::{CoatInput, ColorInput, Material, Varying};
+
+/// A coat and its colour.
+struct Coating {
+    coat: CoatInput,
+    tint: ColorInput,
+}
 
 /// Materials within materials, at most.
 const MAX_DEPTH: usize = 32;
@@ -38,6 +46,21 @@ impl MaterialTable {
                 };
                 Material::TwoSided { front: side("front", front)?, back: side("back", back)? }
             }
+            MaterialDesc::Coated { base, ior, roughness, alpha, tint } => {
+                outer.push(name);
+                let place = format!("{path}.base");
+                let base_id = self.part(compiler, desc, &place, base, outer)?;
+                if self.transmits(base_id) {
+                    return Err(compiler
+                        .files
+                        .error(&place, format!("\"{base}\" lets light through: what is below a coat must be opaque")));
+                }
+                let coating = Coating {
+                    coat: CoatInput::new(compiler.ior(&path, ior, 1.0)?, compiler.alpha(&path, roughness.as_ref(), alpha.as_ref())?),
+                    tint: compiler.color(&format!("{path}.tint"), tint)?,
+                };
+                self.coated(base_id, &coating, &mut HashMap::new())
+            }
             _ => return Ok(None),
         };
         outer.pop();
@@ -62,6 +85,31 @@ impl MaterialTable {
             return Err(compiler.files.unknown(path, "material", part, desc.materials.keys().map(String::as_str)));
         }
         self.add(compiler, desc, part, outer)
+    }
+
+    /// A material below a coat: one that consists of others becomes one that consists of coated others, each coated once.
+    fn coated(&mut self, id: MaterialId, coating: &Coating, done: &mut HashMap<MaterialId, MaterialId>) -> Material {
+        match self.materials[id.index()].clone() {
+            Material::Mix { first, second, amount } => {
+                let [first, second] = [first, second].map(|part| self.coated_part(part, coating, done));
+                Material::Mix { first, second, amount }
+            }
+            Material::TwoSided { front, back } => {
+                let [front, back] = [front, back].map(|part| self.coated_part(part, coating, done));
+                Material::TwoSided { front, back }
+            }
+            base => Varying::Coated { coat: coating.coat.clone(), tint: coating.tint, base }.into(),
+        }
+    }
+
+    fn coated_part(&mut self, id: MaterialId, coating: &Coating, done: &mut HashMap<MaterialId, MaterialId>) -> MaterialId {
+        if let Some(coated) = done.get(&id) {
+            return *coated;
+        }
+        let material = self.coated(id, coating, done);
+        let coated = self.push(material);
+        done.insert(id, coated);
+        coated
     }
 
     /// Whether light may cross the material or a part of it.

@@ -5,14 +5,13 @@ use std::fmt::Debug;
 
 use super::Files;
 use super::textures::{TextureTable, TextureUse};
-use crate::bsdf::{Bsdf, Conductor, Dielectric, Glossy, Lambert, Mirror, Plastic, ThinDielectric};
+use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, MaterialDesc, RoughnessDesc, ScalarDesc, SceneDesc};
+use crate::desc::{ColorDesc, MaterialDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc};
 use crate::error::Result;
 use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
-use crate::material::{AlphaInput, ColorInput, Material, ScalarInput, Varying};
-use crate::math::Vec2;
+use crate::material::{AlphaInput, CoatInput, ColorInput, Material, RangedInput, ScalarInput, Varying};
 use crate::medium::{Media, Medium};
 use crate::relief::Relief;
 use crate::texture::Texture;
@@ -177,42 +176,43 @@ impl Compiler<'_> {
                 Varying::Conductor { metal, tint, alpha, multiscatter: *multiscatter }.into()
             }
             MaterialDesc::Dielectric(glass) => {
-                let ior = files.within(&format!("{path}.ior"), f64::from(glass.ior), 0.1, 10.0)? as f32;
+                let ior = self.glass_ior(path, &glass.ior)?;
                 let alpha = self.alpha(path, glass.roughness.as_ref(), glass.alpha.as_ref())?;
                 let boundary = Varying::Dielectric { ior, alpha, multiscatter: glass.multiscatter };
                 // The relative index at a medium's surface depends on what is around it.
                 if glass.is_medium() { Material::Varying(Box::new(boundary)) } else { boundary.into() }
             }
-            MaterialDesc::ThinDielectric { ior } => {
-                files.within(&format!("{path}.ior"), f64::from(*ior), 0.1, 10.0)?;
-                Material::Constant(Bsdf::ThinDielectric(ThinDielectric { ior: *ior }))
-            }
+            MaterialDesc::ThinDielectric { ior } => Varying::ThinDielectric { ior: self.ior(path, ior, 0.1)? }.into(),
             MaterialDesc::Phong { diffuse, specular, exponent } => {
-                if !(*exponent >= 0.0 && exponent.is_finite()) {
-                    return Err(files.error(&format!("{path}.exponent"), format!("must be finite and not negative, not {exponent}")));
-                }
+                let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
+                    let is_sound = exponent >= 0.0 && exponent.is_finite();
+                    if is_sound { Ok(()) } else { Err(files.error(path, format!("must be finite and not negative, not {exponent}"))) }
+                })?;
                 let [diffuse, specular] = self.sum_to_one(path, ("diffuse", diffuse), ("specular", specular))?;
-                Varying::Phong { diffuse, specular, exponent: *exponent }.into()
+                Varying::Phong { diffuse, specular, exponent }.into()
             }
             MaterialDesc::CookTorrance { albedo, d, s, m, f0 } => {
-                let albedo = Rgb::from(files.reflectance(&format!("{path}.albedo"), *albedo)?);
-                let f0 = Rgb::from(files.reflectance(&format!("{path}.f0"), *f0)?);
-                for (key, value) in [("d", d), ("s", s), ("m", m)] {
-                    files.within(&format!("{path}.{key}"), f64::from(*value), 0.0, 1.0)?;
-                }
-                if d + s > 1.0 + 1e-6 {
+                let albedo = self.color(&format!("{path}.albedo"), albedo)?;
+                let f0 = self.color(&format!("{path}.f0"), f0)?;
+                let scalar = |key: &str, desc: &ScalarDesc| self.scalar(&format!("{path}.{key}"), desc);
+                let (d, s, m) = (scalar("d", d)?, scalar("s", s)?, scalar("m", m)?);
+                if let (ScalarInput::Constant(d), ScalarInput::Constant(s)) = (d, s)
+                    && d + s > 1.0 + 1e-6
+                {
                     return Err(files.error(path, format!("`d` and `s` must not exceed 1 together, but are {d} and {s}")));
                 }
-                Material::Constant(Bsdf::Glossy(Glossy::new(albedo * *d, f0 * *s, Rgb::splat(*s), *m)))
+                Varying::CookTorrance { albedo, d, s, m, f0 }.into()
             }
-            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } => return Err(files.error(path, "cannot be part of a material")),
+            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } => {
+                return Err(files.error(path, "cannot be part of a material"));
+            }
             MaterialDesc::Plastic { albedo, ior, roughness, alpha } => {
-                if !(*ior > 1.0 && *ior <= 10.0) {
-                    return Err(files.error(&format!("{path}.ior"), format!("must be above 1 and at most 10, not {ior}")));
-                }
-                let alpha = self.constant_alpha(path, roughness.as_ref(), alpha.as_ref())?;
-                let albedo = self.color(&format!("{path}.albedo"), albedo)?;
-                Varying::Plastic { base: Plastic::new(Rgb::BLACK, *ior, alpha), albedo }.into()
+                let ior = self.ranged(&format!("{path}.ior"), ior, |path, ior| {
+                    let is_sound = ior > 1.0 && ior <= 10.0;
+                    if is_sound { Ok(()) } else { Err(files.error(path, format!("must be above 1 and at most 10, not {ior}"))) }
+                })?;
+                let coat = CoatInput::new(ior, self.alpha(path, roughness.as_ref(), alpha.as_ref())?);
+                Varying::Plastic { coat, albedo: self.color(&format!("{path}.albedo"), albedo)? }.into()
             }
             MaterialDesc::Principled(desc) => Varying::Principled(self.principled(path, desc)?).into(),
         })
@@ -272,7 +272,7 @@ impl Compiler<'_> {
     }
 
     /// GGX alpha along u and v; zero for a smooth surface.
-    fn alpha(&self, path: &str, roughness: Option<&RoughnessDesc>, alpha: Option<&RoughnessDesc>) -> Result<AlphaInput> {
+    pub(super) fn alpha(&self, path: &str, roughness: Option<&RoughnessDesc>, alpha: Option<&RoughnessDesc>) -> Result<AlphaInput> {
         let (key, desc, squared) = match (roughness, alpha) {
             (None, None) => return Ok(AlphaInput { axes: [ScalarInput::Constant(0.0); 2], squared: false }),
             (Some(roughness), None) => ("roughness", roughness, true),
@@ -289,14 +289,39 @@ impl Compiler<'_> {
         Ok(AlphaInput { axes, squared })
     }
 
-    /// The same where no texture is allowed.
-    fn constant_alpha(&self, path: &str, roughness: Option<&RoughnessDesc>, alpha: Option<&RoughnessDesc>) -> Result<[f32; 2]> {
-        let input = self.alpha(path, roughness, alpha)?;
-        if input.is_constant() {
-            return Ok(input.at(&[], Vec2::ZERO));
+    /// The parameter `ior`, from `least` to 10.
+    pub(super) fn ior(&self, path: &str, desc: &RangedDesc, least: f64) -> Result<RangedInput> {
+        self.ranged(&format!("{path}.ior"), desc, |path, ior| self.files.within(path, f64::from(ior), least, 10.0).map(|_| ()))
+    }
+
+    /// The index of refraction of what is inside of a dielectric.
+    pub(super) fn glass_ior(&self, path: &str, desc: &RangedDesc) -> Result<f32> {
+        match self.ior(path, desc, 0.1)? {
+            RangedInput::Constant(ior) => Ok(ior),
+            RangedInput::Texture { .. } => {
+                Err(self.files.error(&format!("{path}.ior"), "cannot come from a texture: what is inside has one index of refraction"))
+            }
         }
-        let key = if roughness.is_some() { "roughness" } else { "alpha" };
-        Err(self.files.error(&format!("{path}.{key}"), "cannot come from a texture: what the coat reflects is prepared once"))
+    }
+
+    /// A number, or both ends of a texture's range, that pass `check`.
+    fn ranged(&self, path: &str, desc: &RangedDesc, check: impl Fn(&str, f32) -> Result<()>) -> Result<RangedInput> {
+        Ok(match desc {
+            RangedDesc::Constant(value) => {
+                check(path, *value)?;
+                RangedInput::Constant(*value)
+            }
+            RangedDesc::Texture { texture, range } => {
+                for (i, end) in range.iter().enumerate() {
+                    check(&format!("{path}.range[{i}]"), *end)?;
+                }
+                let range = *range;
+                match self.scalar(path, &ScalarDesc::Texture { texture: texture.clone() })? {
+                    ScalarInput::Texture(id) => RangedInput::Texture { id, range },
+                    ScalarInput::Constant(value) => RangedInput::Constant(range[0] + (range[1] - range[0]) * value),
+                }
+            }
+        })
     }
 }
 
@@ -357,6 +382,7 @@ fn metal_of_color(reflectance: Rgb, alpha: [f32; 2]) -> Material {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bsdf::Bsdf;
     use crate::math::Vec3;
 
     fn bsdf(mtl: ObjMaterial) -> Bsdf {

@@ -16,12 +16,13 @@ impl Compiler<'_> {
         if !glass.is_medium() {
             return Ok(None);
         }
+        let ior = self.glass_ior(path, &glass.ior)?;
         let ior = match glass.abbe {
-            None => [glass.ior; 3],
+            None => [ior; 3],
             Some(abbe) => {
                 let path = format!("{path}.abbe");
                 self.files.within(&path, f64::from(abbe), 1.0, 1000.0)?;
-                let iors = dispersed(glass.ior, abbe);
+                let iors = dispersed(ior, abbe);
                 if iors.iter().any(|n| !(0.1..=10.0).contains(n)) {
                     return Err(self.files.error(&path, format!("gives indices of refraction from {} to {}", iors[0], iors[2])));
                 }

@@ -8,7 +8,7 @@ use crate::color::Rgb;
 use crate::error::Result;
 use crate::id::TextureId;
 use crate::import::{ObjMap, ObjMaterial};
-use crate::material::{ColorInput, Material, ScalarInput, Varying};
+use crate::material::{CoatInput, ColorInput, Material, ScalarInput, Varying};
 use crate::math::Vec2;
 use crate::relief::Relief;
 use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
@@ -122,7 +122,7 @@ impl Builder {
 fn with_albedo(material: Material, albedo: ColorInput) -> Material {
     match material {
         Material::Constant(Bsdf::Lambert(_)) => Varying::Diffuse { albedo, roughness: ScalarInput::Constant(0.0) }.into(),
-        Material::Constant(Bsdf::Plastic(base)) => Varying::Plastic { base, albedo }.into(),
+        Material::Constant(Bsdf::Plastic(plastic)) => Varying::Plastic { coat: CoatInput::Constant(plastic.coat), albedo }.into(),
         other => other,
     }
 }

@@ -33,6 +33,22 @@ pub enum ScalarDesc {
     },
 }
 
+/// A number, or `{ "texture": "name", "range": [low, high] }`: the number is `low` where the luminance of the texture's colour, clamped to
+/// `[0, 1]`, is 0, and `high` where it is 1.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields, expecting = "expected a number, or { \"texture\": name, \"range\": [low, high] }")]
+pub enum RangedDesc {
+    /// The same everywhere.
+    Constant(f32),
+    /// A texture by name.
+    Texture {
+        /// The texture's name.
+        texture: String,
+        /// The number where the texture is 0, and where it is 1; each within the limits of the parameter.
+        range: [f32; 2],
+    },
+}
+
 /// GGX roughness: a number, `[along u, along v]` for an anisotropic surface, or `{ "texture": "name" }`, of which the luminance counts, clamped to
 /// `[0, 1]`. The distribution's alpha is its square.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -83,7 +99,7 @@ pub enum MaterialDesc {
         /// A metal by name: `gold`, `silver`, `copper`, `aluminium`, `iron`, `chromium`, `titanium`, `tungsten`, `brass`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         metal: Option<String>,
-        /// Real part of the index of refraction for red, green, blue.
+        /// Real part of the index of refraction for red, green, blue; no texture, which `tint` can be.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         eta: Option<[f32; 3]>,
         /// Imaginary part (extinction) for red, green, blue.
@@ -106,9 +122,9 @@ pub enum MaterialDesc {
     Dielectric(Box<DielectricDesc>),
     /// A clear thin pane: light is reflected or goes straight on, reflections within the pane included.
     ThinDielectric {
-        /// Index of refraction of the pane over that of the outside, at least 1/10 and at most 10. Default: 1.5.
+        /// Index of refraction of the pane over that of the outside, from 1/10 to 10. Default: 1.5.
         #[serde(default = "glass_ior")]
-        ior: f32,
+        ior: RangedDesc,
     },
     /// A diffuse base under a clear dielectric coat. Smooth unless `roughness` or `alpha` is given.
     Plastic {
@@ -117,13 +133,33 @@ pub enum MaterialDesc {
         albedo: ColorDesc,
         /// Index of refraction of the coat over that of the outside, above 1 and at most 10. Default: 1.5.
         #[serde(default = "glass_ior")]
-        ior: f32,
-        /// GGX roughness of the coat within `[0, 1]`, not a texture; alpha is its square.
+        ior: RangedDesc,
+        /// GGX roughness of the coat within `[0, 1]`; alpha is its square.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         roughness: Option<RoughnessDesc>,
         /// GGX alpha itself, in place of `roughness`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         alpha: Option<RoughnessDesc>,
+    },
+    /// A clear dielectric coat over any opaque material: lacquer over metal or wood, a car's paint. It reflects as `plastic` does and is `plastic`
+    /// over a diffuse base; over any other the base keeps `1 - max` of what the coat reflects of the light in and out, so that nothing is
+    /// gained. Smooth unless `roughness` or `alpha` is given.
+    Coated {
+        /// The material below, by name: opaque, and without relief.
+        base: String,
+        /// Index of refraction of the coat over that of the outside, from 1, which leaves the base alone, to 10. Default: 1.5.
+        #[serde(default = "glass_ior")]
+        ior: RangedDesc,
+        /// GGX roughness of the coat within `[0, 1]`; alpha is its square.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        roughness: Option<RoughnessDesc>,
+        /// GGX alpha itself, in place of `roughness`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        alpha: Option<RoughnessDesc>,
+        /// What light keeps, in each channel, that crosses the coat twice along the normal; at an angle the way is longer and less is kept.
+        /// Default: 1.
+        #[serde(default = "white")]
+        tint: ColorDesc,
     },
     /// Disney's principled model, for most surfaces.
     Principled(Box<PrincipledDesc>),
@@ -137,26 +173,26 @@ pub enum MaterialDesc {
         specular: ColorDesc,
         /// Exponent of the highlight, at least 0. Default: 32.
         #[serde(default = "phong_exponent")]
-        exponent: f32,
+        exponent: RangedDesc,
     },
     /// Cook and Torrance's model, by its parameters: `d albedo / pi + s D F G / (4 |cos wo| |cos wi|)` with the GGX distribution of alpha `m`,
     /// Smith's `G` and Schlick's `F`.
     CookTorrance {
         /// Colour of the diffuse part. Default: 0.5.
-        #[serde(default = "half_color")]
-        albedo: [f32; 3],
+        #[serde(default = "half")]
+        albedo: ColorDesc,
         /// Weight of the diffuse part within `[0, 1]`. Default: 0.5.
-        #[serde(default = "half_number")]
-        d: f32,
-        /// Weight of the specular part within `[0, 1]`; with `d` at most 1. Default: 0.5.
-        #[serde(default = "half_number")]
-        s: f32,
+        #[serde(default = "half_scalar")]
+        d: ScalarDesc,
+        /// Weight of the specular part within `[0, 1]`; with `d` at most 1, where textures exceed it `d` is less. Default: 0.5.
+        #[serde(default = "half_scalar")]
+        s: ScalarDesc,
         /// Width of the distribution of slopes within `[0, 1]`; at least 0.001 counts. Default: 0.3.
         #[serde(default = "slope")]
-        m: f32,
-        /// Reflectance of the specular part ahead, for red, green, blue. Default: 0.04.
+        m: ScalarDesc,
+        /// Reflectance of the specular part ahead. Default: 0.04.
         #[serde(default = "plastic_reflectance")]
-        f0: [f32; 3],
+        f0: ColorDesc,
     },
     /// Two materials mixed: each hit meets one of them.
     Mix {
@@ -201,10 +237,10 @@ pub enum MaterialDesc {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DielectricDesc {
-    /// Index of refraction of the inside over that of the outside, at least 1/10 and at most 10; that of a medium is over that of empty
-    /// space. Default: 1.5.
+    /// Index of refraction of the inside over that of the outside, from 1/10 to 10; that of a medium is over that of empty space. No texture,
+    /// for what is inside has one index. Default: 1.5.
     #[serde(default = "glass_ior")]
-    pub ior: f32,
+    pub ior: RangedDesc,
     /// GGX roughness within `[0, 1]`; alpha is its square.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub roughness: Option<RoughnessDesc>,
@@ -283,28 +319,20 @@ fn half_scalar() -> ScalarDesc {
     ScalarDesc::Constant(0.5)
 }
 
-fn half_number() -> f32 {
-    0.5
-}
-
-fn half_color() -> [f32; 3] {
-    [0.5; 3]
-}
-
 fn black() -> ColorDesc {
     ColorDesc::Grey(0.0)
 }
 
-fn phong_exponent() -> f32 {
-    32.0
+fn phong_exponent() -> RangedDesc {
+    RangedDesc::Constant(32.0)
 }
 
-fn slope() -> f32 {
-    0.3
+fn slope() -> ScalarDesc {
+    ScalarDesc::Constant(0.3)
 }
 
-fn plastic_reflectance() -> [f32; 3] {
-    [0.04; 3]
+fn plastic_reflectance() -> ColorDesc {
+    ColorDesc::Grey(0.04)
 }
 
 fn yes() -> bool {
@@ -319,6 +347,6 @@ fn white() -> ColorDesc {
     ColorDesc::Grey(1.0)
 }
 
-fn glass_ior() -> f32 {
-    1.5
+fn glass_ior() -> RangedDesc {
+    RangedDesc::Constant(1.5)
 }

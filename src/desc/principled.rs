@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ColorDesc, ScalarDesc};
+use super::{ColorDesc, RangedDesc, ScalarDesc};
 
 /// Disney's principled model ("Physically Based Shading at Disney" and its extension to transmission): a clear coat over a blend of metal, a
 /// diffuse base below a dielectric layer, and glass. Every number is within `[0, 1]` unless it says otherwise and may come from a texture. It
@@ -26,9 +26,9 @@ pub struct PrincipledDesc {
     /// Reflectance of the dielectric layer ahead, in units of 0.08. Default: 0.5, unless `ior` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub specular: Option<ScalarDesc>,
-    /// Index of refraction within `[1, 10]`, in place of `specular`. Glass that is not `thin` takes at least 1.05.
+    /// Index of refraction, from 1 to 10, in place of `specular`. Glass that is not `thin` takes at least 1.05, and no texture for either.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ior: Option<f32>,
+    pub ior: Option<RangedDesc>,
     /// How much of the base's colour the dielectric layer reflects ahead. Default: 0.
     #[serde(default = "zero")]
     pub specular_tint: ScalarDesc,

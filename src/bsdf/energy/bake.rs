@@ -1,69 +1,133 @@
 //! Computes the tables.
 
+use super::super::coat::integrate_albedo;
 use super::super::fresnel;
 use super::super::microfacet::reflect;
 use super::super::principled::shapes::{self, ClearCoat};
 use super::super::{Ggx, SMOOTH_ALPHA};
 use super::table::{
-    ALPHAS, ASPECTS, CLEAR_COAT, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MAX_IOR, MIRRORS, MIRRORS_AVERAGE, Place, SCHLICK, SHAPES,
-    SHEEN, cosine_axis, schlick_weight, smoothed,
+    ALPHAS, ASPECTS, Block, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MAX_IOR, MIRRORS,
+    MIRRORS_AVERAGE, Place, SCHLICK, SHAPES, SHEEN, across, cosine_axis, schlick_weight, smoothed,
 };
 use crate::math::{Vec3, sin_cos_turns, vec3};
 use crate::sampling::warp;
 
+/// Where the entries of a block come from.
+#[derive(Clone, Copy)]
+enum Source {
+    /// Each from its number.
+    Number(fn(usize) -> f32),
+    /// Each from its number and the entries of the block before.
+    BlockBefore(fn(usize, &[f32]) -> f32),
+}
+
+/// The blocks in the order of the file.
+const SOURCES: [(Block, Source); 10] = [
+    (MIRRORS, Source::Number(mirrors)),
+    (MIRRORS_AVERAGE, Source::BlockBefore(mirrors_average)),
+    (SCHLICK, Source::Number(schlick)),
+    (GLASS, Source::Number(glass)),
+    (GLASS_AVERAGE, Source::BlockBefore(glass_average)),
+    (DIFFUSE, Source::Number(diffuse)),
+    (SHEEN, Source::Number(sheen)),
+    (CLEAR_COAT, Source::Number(clear_coat)),
+    (COAT, Source::Number(coat)),
+    (COAT_AVERAGE, Source::BlockBefore(coat_average)),
+];
+
 /// Computes the content of `tables.bin`: quadrature over visible normals at every node.
 pub fn bake() -> Vec<u8> {
-    let mut file = Vec::new();
-    let alphas: Vec<f32> = (0..ALPHAS).map(node_alpha).collect();
-    let ior: Vec<f32> = (0..IORS).map(node_ior).collect();
-    let rows = |f: &dyn Fn(f32, f32) -> f32| table(alphas.iter().flat_map(|&a| row(a).map(move |cos| (a, cos))), f);
-
-    // Mirrors, by aspect and axis.
-    let mut mirrors = Vec::new();
-    for aspect in 0..ASPECTS {
-        for axis in [0, 1] {
-            mirrors.extend(rows(&|alpha, cos| {
-                let minor = minor_alpha(alpha, aspect);
-                let (scale, turns) = if axis == 0 { (1.0, 0.0) } else { (alpha / minor, 0.25) };
-                // The direction that these microfacets mask as round ones mask `cos`.
-                let tangent = (1.0 - cos * cos).sqrt() / cos * scale;
-                mean_of_facets([alpha, minor], direction((1.0 + tangent * tangent).sqrt().recip(), turns), |facet| facet.shadowing)
-            }));
-        }
+    let (mut file, mut before) = (Vec::new(), Vec::new());
+    for (block, source) in SOURCES {
+        let values: Vec<f32> = (0..block.len()).map(|entry| value(source, entry, &before)).collect();
+        block.encode(&values, &mut file);
+        before = values;
     }
-    let averages = (0..ASPECTS).flat_map(|aspect| alphas.iter().enumerate().map(move |(i, &alpha)| (aspect, i, alpha)));
-    let averages: Vec<f32> = averages.map(|(aspect, i, alpha)| mirrors_average(&mirrors, aspect, i, alpha)).collect();
-    MIRRORS.encode(&mirrors, &mut file);
-    MIRRORS_AVERAGE.encode(&roots_of_rest(&averages), &mut file);
-
-    // Schlick's weight.
-    let weight = |alpha, cos| schlick_weight(smoothed(cos, alpha));
-    let values =
-        rows(&|alpha, cos| mean_of_facets([alpha; 2], direction(cos, 0.0), |f| f.shadowing * schlick_weight(f.cos)) - weight(alpha, cos));
-    SCHLICK.encode(&values, &mut file);
-
-    // Dielectrics.
-    let nodes: Vec<(f32, f32)> = alphas.iter().flat_map(|&a| ior.iter().map(move |&n| (a, n))).collect();
-    let sides = nodes.iter().map(|&(a, n)| (a, n)).chain(nodes.iter().map(|&(a, n)| (a, 1.0 / n)));
-    let glass: Vec<f32> = sides.clone().flat_map(|(alpha, eta)| row(alpha).map(move |cos| glass_albedo(alpha, eta, cos))).collect();
-    let averages = sides.zip(glass.chunks(COSINES)).map(|((alpha, _), row)| average(alpha, row));
-    GLASS.encode(&glass, &mut file);
-    GLASS_AVERAGE.encode(&roots_of_rest(&averages.collect::<Vec<_>>()), &mut file);
-
-    // The principled model's lobes.
-    let shape = |i: usize| i as f32 / (SHAPES - 1) as f32;
-    let even = || row(1.0);
-    let by_shape = |f: fn(f32, f32) -> f32| table((0..SHAPES).flat_map(|i| even().map(move |cos| (shape(i), cos))), &f);
-    let diffuse = by_shape(|roughness, cos| mean_of_cosines(cos, |o, i| shapes::diffuse(o, i, roughness)));
-    let flat = by_shape(|roughness, cos| mean_of_cosines(cos, |o, i| shapes::flat(o, i, roughness)));
-    DIFFUSE.encode(&[diffuse, flat].concat(), &mut file);
-    SHEEN.encode(&even().map(|cos| mean_of_cosines(cos, shapes::sheen)).collect::<Vec<_>>(), &mut file);
-    CLEAR_COAT.encode(&by_shape(clear_coat_albedo), &mut file);
     file
 }
 
-fn table(nodes: impl Iterator<Item = (f32, f32)>, f: &dyn Fn(f32, f32) -> f32) -> Vec<f32> {
-    nodes.map(|(a, b)| f(a, b)).collect()
+fn value(source: Source, entry: usize, before: &[f32]) -> f32 {
+    match source {
+        Source::Number(f) => f(entry),
+        Source::BlockBefore(f) => f(entry, before),
+    }
+}
+
+/// The place of an entry along each of the axes, the last of which changes fastest.
+fn places<const N: usize>(mut entry: usize, counts: [usize; N]) -> [usize; N] {
+    let mut places = [0; N];
+    for (place, count) in places.iter_mut().zip(counts).rev() {
+        *place = entry % count;
+        entry /= count;
+    }
+    places
+}
+
+fn mirrors(entry: usize) -> f32 {
+    let [aspect, axis, alpha, cos] = places(entry, [ASPECTS, 2, ALPHAS, COSINES]);
+    let alpha = node_alpha(alpha);
+    let (minor, cos) = (minor_alpha(alpha, aspect), node_cosine(alpha, cos));
+    let (scale, turns) = if axis == 0 { (1.0, 0.0) } else { (alpha / minor, 0.25) };
+    // The direction that these microfacets mask as round ones mask `cos`.
+    let tangent = (1.0 - cos * cos).sqrt() / cos * scale;
+    mean_of_facets([alpha, minor], direction((1.0 + tangent * tangent).sqrt().recip(), turns), |facet| facet.shadowing)
+}
+
+fn mirrors_average(entry: usize, mirrors: &[f32]) -> f32 {
+    let [aspect, alpha] = places(entry, [ASPECTS, ALPHAS]);
+    root_of_rest(average_of_mirrors(mirrors, aspect, alpha, node_alpha(alpha)))
+}
+
+/// Of Schlick's weight.
+fn schlick(entry: usize) -> f32 {
+    let [alpha, cos] = places(entry, [ALPHAS, COSINES]);
+    let alpha = node_alpha(alpha);
+    let cos = node_cosine(alpha, cos);
+    mean_of_facets([alpha; 2], direction(cos, 0.0), |f| f.shadowing * schlick_weight(f.cos)) - schlick_weight(smoothed(cos, alpha))
+}
+
+fn glass(entry: usize) -> f32 {
+    let [side, alpha, ior, cos] = places(entry, [2, ALPHAS, IORS, COSINES]);
+    let (alpha, ior) = (node_alpha(alpha), node_ior(ior));
+    glass_albedo(alpha, if side == 0 { ior } else { 1.0 / ior }, node_cosine(alpha, cos))
+}
+
+fn glass_average(entry: usize, glass: &[f32]) -> f32 {
+    let [_, alpha, _] = places(entry, [2, ALPHAS, IORS]);
+    root_of_rest(average(node_alpha(alpha), &glass[entry * COSINES..][..COSINES]))
+}
+
+/// The principled model's diffuse lobe, then its flat one.
+fn diffuse(entry: usize) -> f32 {
+    let [flat, shape, cos] = places(entry, [2, SHAPES, COSINES]);
+    let (roughness, cos) = (node_shape(shape), node_cosine(1.0, cos));
+    let lobe = if flat == 1 { shapes::flat } else { shapes::diffuse };
+    mean_of_cosines(cos, |o, i| lobe(o, i, roughness))
+}
+
+fn sheen(entry: usize) -> f32 {
+    mean_of_cosines(node_cosine(1.0, entry), shapes::sheen)
+}
+
+fn clear_coat(entry: usize) -> f32 {
+    let [shape, cos] = places(entry, [SHAPES, COSINES]);
+    clear_coat_albedo(node_shape(shape), node_cosine(1.0, cos))
+}
+
+fn coat(entry: usize) -> f32 {
+    let [alpha, ior, node] = places(entry, [ALPHAS, IORS, COAT_NODES]);
+    let root = node as f32 / (COAT_NODES - 1) as f32;
+    integrate_albedo(node_ior(ior), Ggx::new([node_alpha(alpha); 2]), root * root, 0)
+}
+
+/// Of the table as it is read, linear in the square root of the cosine.
+fn coat_average(entry: usize, coat: &[f32]) -> f32 {
+    let row = &coat[entry * COAT_NODES..][..COAT_NODES];
+    let mean = cosines().map(|(cos, weight)| {
+        let at = Place::new(cos.sqrt(), COAT_NODES);
+        weight * f64::from(row[at.node] + (row[at.node + 1] - row[at.node]) * at.part)
+    });
+    mean.sum::<f64>() as f32
 }
 
 /// Alpha at a node; the first stands for the limit, where only the ratio of cosine and alpha counts.
@@ -84,17 +148,19 @@ fn node_ior(node: usize) -> f32 {
     (1.0 + x) / (1.0 - x)
 }
 
-/// The cosines at the nodes of a row; the first is not quite zero.
-fn row(alpha: f32) -> impl Iterator<Item = f32> {
-    (0..COSINES).map(move |node| {
-        let axis = node as f32 / (COSINES - 1) as f32;
-        let (mut low, mut high) = (0.0f64, 1.0f64);
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            *(if cosine_axis(middle as f32, alpha) < axis { &mut low } else { &mut high }) = middle;
-        }
-        if node == COSINES - 1 { 1.0 } else { (high as f32).max(1e-6) }
-    })
+fn node_shape(node: usize) -> f32 {
+    node as f32 / (SHAPES - 1) as f32
+}
+
+/// The cosine at a node; the first is not quite zero.
+fn node_cosine(alpha: f32, node: usize) -> f32 {
+    let axis = node as f32 / (COSINES - 1) as f32;
+    let (mut low, mut high) = (0.0f64, 1.0f64);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        *(if cosine_axis(middle as f32, alpha) < axis { &mut low } else { &mut high }) = middle;
+    }
+    if node == COSINES - 1 { 1.0 } else { (high as f32).max(1e-6) }
 }
 
 fn direction(cos: f32, turns: f32) -> Vec3 {
@@ -165,9 +231,9 @@ fn clear_coat_albedo(gloss: f32, cos: f32) -> f32 {
     }))
 }
 
-/// Square roots of what averages lack of 1: they keep their digits where nearly nothing is lost.
-fn roots_of_rest(averages: &[f32]) -> Vec<f32> {
-    averages.iter().map(|average| (1.0 - average).max(0.0).sqrt()).collect()
+/// Square root of what an average lacks of 1: it keeps its digits where nearly nothing is lost.
+fn root_of_rest(average: f32) -> f32 {
+    (1.0 - average).max(0.0).sqrt()
 }
 
 /// Steps of the quadrature over cosines.
@@ -190,7 +256,7 @@ fn average(alpha: f32, row: &[f32]) -> f32 {
 }
 
 /// Mean over all directions of the table of mirrors at one node of aspect and alpha, as it is read.
-fn mirrors_average(mirrors: &[f32], aspect: usize, node: usize, alpha: f32) -> f32 {
+fn average_of_mirrors(mirrors: &[f32], aspect: usize, node: usize, alpha: f32) -> f32 {
     const AZIMUTHS: usize = 32;
     let minor = minor_alpha(alpha, aspect);
     let rows = [0, 1].map(|axis| &mirrors[((2 * aspect + axis) * ALPHAS + node) * COSINES..]);
@@ -200,9 +266,32 @@ fn mirrors_average(mirrors: &[f32], aspect: usize, node: usize, alpha: f32) -> f
             let (y, x) = sin_cos_turns(0.25 * (azimuth as f32 + 0.5) / AZIMUTHS as f32);
             let run_squared = (1.0 - cos * cos) * (x * x + y * y * (minor / alpha).powi(2));
             let masked_as = cos / (cos * cos + run_squared).sqrt();
-            let [along, across] = rows.map(|row| between(row, alpha, masked_as));
-            lost += weight * f64::from(1.0 - (along + (across - along) * y * y));
+            let [along, beyond] = rows.map(|row| between(row, alpha, masked_as));
+            lost += weight * f64::from(1.0 - (along + (beyond - along) * across(x * x, y * y, minor / alpha)));
         }
     }
     1.0 - (lost / AZIMUTHS as f64) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tables_are_what_the_code_computes() {
+        // Some entries of every block, spread over it by a prime, baked anew: equal to two steps of their 16 bits, which leaves room for
+        // another machine's logarithm. A block of averages is computed from the committed block before it; most hold roots of small
+        // numbers, which must be as close themselves.
+        let mut before = Vec::new();
+        for (number, (block, source)) in SOURCES.into_iter().enumerate() {
+            let committed: Vec<f32> = (0..block.len()).map(|entry| block.at(entry)).collect();
+            for i in 0..24 {
+                let entry = (i * 7919 + 311 * number) % block.len();
+                let (fresh, old) = (value(source, entry, &before), committed[entry]);
+                let scale = if matches!(source, Source::BlockBefore(_)) { (fresh + old).min(1.0) } else { 1.0 };
+                assert!((fresh - old).abs() * scale <= 2.0 * block.step(), "block {number}, entry {entry}: {fresh} {old}");
+            }
+            before = committed;
+        }
+    }
 }

@@ -21,8 +21,8 @@ use super::Ggx;
 use crate::math::Vec3;
 pub(super) use table::schlick_weight;
 use table::{
-    ALPHAS, ASPECTS, CLEAR_COAT, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MIRRORS, MIRRORS_AVERAGE, Place, SCHLICK, SHAPES, SHEEN,
-    smoothed,
+    ALPHAS, ASPECTS, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MIRRORS, MIRRORS_AVERAGE,
+    Place, SCHLICK, SHAPES, SHEEN, across, smoothed,
 };
 
 /// The least loss under diffuse light that is told from none.
@@ -45,7 +45,7 @@ struct Seen {
     /// Cosine with which isotropic microfacets of the larger alpha mask as much.
     cos: f32,
     at: Place,
-    /// How far the direction is from the plane of the larger alpha, within `[0, 1]`.
+    /// See [`across`].
     across: f32,
 }
 
@@ -69,10 +69,8 @@ impl Energy {
         let (x2, y2) = (x * x, y * y);
         let run = (x2 + y2).sqrt() / self.alpha;
         let cos = cos / (cos * cos + run * run).sqrt();
-        let along = w.x * w.x + w.y * w.y;
-        let minor = if ax > ay { w.y } else { w.x };
-        let across = if along > 0.0 { minor * minor / along } else { 0.5 };
-        Seen { cos, at: Place::of_cosine(cos, self.alpha), across }
+        let (major, minor) = if ax > ay { (w.x, w.y) } else { (w.y, w.x) };
+        Seen { cos, at: Place::of_cosine(cos, self.alpha), across: across(major * major, minor * minor, self.aspect) }
     }
 
     /// What perfect mirrors would scatter.
@@ -99,9 +97,7 @@ impl Energy {
 
     /// What [`Energy::mirrors`] lacks of 1 under diffuse light.
     pub fn mirrors_lost(&self) -> f32 {
-        let lost = MIRRORS_AVERAGE.bilinear_square(0, ALPHAS, Place::new(self.aspect.sqrt(), ASPECTS), self.at_alpha).max(MIN_LOST);
-        // Between its axes the table of anisotropic microfacets is wrong by up to a sixth of what is lost: rather darker than brighter.
-        lost / (1.0 - 0.18 * (1.0 - self.aspect))
+        MIRRORS_AVERAGE.bilinear_square(0, ALPHAS, Place::new(self.aspect.sqrt(), ASPECTS), self.at_alpha).max(MIN_LOST)
     }
 
     /// What mirrors of reflectance `(1 - cos)^5` would scatter: Schlick's approximation is linear in this and [`Energy::mirrors`].
@@ -156,4 +152,16 @@ pub fn principled_sheen(cos: f32) -> f32 {
 #[inline]
 pub fn principled_clear_coat(gloss: f32, cos: f32) -> f32 {
     CLEAR_COAT.bilinear_from(0, COSINES, Place::new(gloss, SHAPES), Place::of_cosine(cos, 1.0))
+}
+
+/// Albedo of a clear coat of isotropic microfacets, for an index of refraction over that of the outside within `[1, 10]`.
+#[inline]
+pub fn coat_albedo(ior: f32, alpha: f32, cos: f32) -> f32 {
+    let at = [Place::of_alpha(alpha), Place::of_ior(ior), Place::new(cos.sqrt(), COAT_NODES)];
+    COAT.trilinear(0, [IORS, COAT_NODES], at)
+}
+
+/// Its mean under diffuse light.
+pub fn coat_average(ior: f32, alpha: f32) -> f32 {
+    COAT_AVERAGE.bilinear_from(0, IORS, Place::of_alpha(alpha), Place::of_ior(ior))
 }

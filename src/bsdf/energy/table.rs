@@ -3,13 +3,16 @@
 /// Nodes along alpha, at equal steps of its square root.
 pub const ALPHAS: usize = 24;
 /// Nodes along the smaller alpha over the larger, at equal steps of its square root.
-pub const ASPECTS: usize = 6;
+pub const ASPECTS: usize = 11;
 /// Nodes along the index of refraction, at equal steps of the fourth root of the reflectance ahead.
 pub const IORS: usize = 16;
 /// Nodes along the cosine, at equal steps of [`cosine_axis`].
-pub const COSINES: usize = 24;
+pub const COSINES: usize = 32;
 /// Nodes along the roughness of the diffuse lobes and the gloss of the clear coat of the principled model.
 pub const SHAPES: usize = 8;
+
+/// Nodes along the cosine for a coat, at equal steps of its square root.
+pub const COAT_NODES: usize = 32;
 
 /// Largest index of refraction.
 pub const MAX_IOR: f32 = 10.0;
@@ -32,6 +35,17 @@ impl Block {
 
     const fn end(&self) -> usize {
         self.start + self.len
+    }
+
+    /// Entries.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Difference between neighbouring values that it can hold.
+    #[cfg(test)]
+    pub fn step(&self) -> f32 {
+        self.scale
     }
 
     /// Appends values in the form of the file.
@@ -103,7 +117,11 @@ pub const DIFFUSE: Block = Block::new(GLASS_AVERAGE.end(), 2 * SHAPES * COSINES,
 pub const SHEEN: Block = Block::new(DIFFUSE.end(), COSINES, 0.0, 1.0);
 /// Albedo of its clear coat: gloss, cosine.
 pub const CLEAR_COAT: Block = Block::new(SHEEN.end(), SHAPES * COSINES, 0.0, 1.0);
-const TOTAL: usize = CLEAR_COAT.end();
+/// Albedo of a dielectric coat seen from outside: alpha, index, cosine.
+pub const COAT: Block = Block::new(CLEAR_COAT.end(), ALPHAS * IORS * COAT_NODES, 0.0, 1.0);
+/// Its mean under diffuse light: alpha, index.
+pub const COAT_AVERAGE: Block = Block::new(COAT.end(), ALPHAS * IORS, 0.0, 1.0);
+const TOTAL: usize = COAT_AVERAGE.end();
 
 /// A place between two nodes of an axis.
 #[derive(Clone, Copy, Debug)]
@@ -148,6 +166,15 @@ impl Place {
 #[inline]
 pub fn cosine_axis(cos: f32, alpha: f32) -> f32 {
     0.5 * (cos * (1.0 + alpha) / (cos + alpha).max(f32::MIN_POSITIVE) + cos.sqrt())
+}
+
+/// How far a direction is from the plane of the larger alpha to that of the smaller, within `[0, 1]`: for the squared cosine and sine of its
+/// azimuth from that plane, and the smaller alpha over the larger. At equal masking the albedo changes close to the second plane, the closer
+/// the smaller the aspect; the power is fitted so that it is linear in this to half a hundredth.
+#[inline]
+pub fn across(cos_squared: f32, sin_squared: f32, aspect: f32) -> f32 {
+    let shrunk = sin_squared * aspect.powf((1.9 - 2.5 * aspect).max(0.0));
+    if cos_squared + shrunk > 0.0 { shrunk / (cos_squared + shrunk) } else { 0.5 }
 }
 
 /// A cosine that stays away from grazing by about alpha, where microfacets are not seen at grazing angles: what is left to tabulate after

@@ -2,16 +2,16 @@
 //! "Extending the Disney BRDF to a BSDF with Integrated Subsurface Scattering").
 //!
 //! From the top: a clear coat; below it, shared out by `metallic` and `transmission`, a metal, a dielectric layer over a diffuse base with
-//! sheen, and rough glass. A layer that reflects `E(w)` of the light from `w` leaves
+//! sheen, and rough glass. As in the papers the lobes are added, but so a white surface might reflect up to twice what it receives. A layer
+//! that reflects `E(w)` of the light from `w` over what would scatter `A(w)` of it alone therefore leaves
 //!
 //! ```text
-//! 1 - max(E(wo), E(wi))
+//! min(1, (1 - max(E(wo), E(wi))) / max(A(wo), A(wi)))
 //! ```
 //!
-//! to what is below: reciprocal, and the whole never scatters more than it receives, whatever the parameters. Differences from the papers,
-//! where lobes are simply added and a white surface may reflect up to twice what it receives:
+//! of what is below, in each channel: 1 wherever the sum is sound, reciprocal, and the whole never scatters more than it receives, whatever
+//! the parameters. Other differences from the papers:
 //!
-//! - layers take from what is below them, as above; the diffuse lobe is divided by its albedo where that exceeds 1;
 //! - GGX masks with the height-correlated G2, and light scattered among microfacets several times is added back;
 //! - alpha is `roughness²` stretched by the aspect, within `[0.001, 1]`, for distribution and masking alike;
 //! - tints are the base colour over its largest channel in place of its luminance, so that no channel exceeds 1;
@@ -135,7 +135,7 @@ struct Albedos {
     schlick: f32,
     clearcoat: f32,
     sheen: f32,
-    /// The white diffuse lobe before it is divided.
+    /// The white diffuse lobe.
     diffuse: f32,
 }
 
@@ -234,10 +234,23 @@ impl Principled {
     /// What the dielectric layer reflects, several times scattered light included.
     #[inline]
     fn layer_albedo(&self, at: &Albedos) -> Rgb {
-        self.specular.map(|f| {
-            let average = f + (1.0 - f) / 21.0;
-            f * (at.mirrors - at.schlick) + at.schlick + (1.0 - at.mirrors) * average * average
-        })
+        self.specular.map(|f| facets_albedo(f, at))
+    }
+
+    /// What diffuse base and sheen would scatter without a layer.
+    #[inline]
+    fn base_albedo(&self, at: &Albedos) -> Rgb {
+        let diffuse = at.diffuse + (1.0 - at.diffuse) * self.diffuse_transmission;
+        let base = self.base * diffuse;
+        if self.sheen > 0.0 { base + self.sheen_color() * at.sheen } else { base }
+    }
+
+    /// What would be scattered without a clear coat, at most.
+    #[inline]
+    fn uncoated_albedo(&self, at: &Albedos) -> Rgb {
+        let layer = self.layer_albedo(at);
+        let base = rgb_min(self.base_albedo(at), Rgb::WHITE - layer);
+        self.base.map(|f| facets_albedo(f, at)) * self.metallic + (layer + base) * self.dielectric() + Rgb::splat(self.glass)
     }
 
     /// What the layer of a black base reflects, for a direction of the upper side: the closed form for tests.
@@ -252,8 +265,9 @@ impl Principled {
         let below = 1.0 - at.clearcoat;
         let ahead = self.reflectance_ahead().mean();
         let specular = below * (ahead * (at.mirrors - at.schlick) + (self.metallic + self.dielectric()) * at.schlick);
-        let base = self.dielectric() * (1.0 - self.layer_albedo(at).mean()) * self.base.mean();
-        let around = self.dielectric() * self.sheen * at.sheen + (1.0 - at.mirrors) * self.multiple.mean().min(1.0);
+        let left = (1.0 - self.layer_albedo(at).mean()).min(1.0);
+        let base = self.dielectric() * left.min(self.base.mean());
+        let around = self.dielectric() * left * self.sheen * at.sheen + (1.0 - at.mirrors) * self.multiple.mean().min(1.0);
         let diffuse = below * (base * (1.0 - self.diffuse_transmission) + around);
         let diffuse_transmission = below * base * self.diffuse_transmission;
         let glass = below * self.glass;
@@ -281,7 +295,6 @@ impl Principled {
     fn eval_from(&self, wo: Vec3, wi: Vec3, at_o: &Albedos, choice: &Choice) -> BsdfEval {
         let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
         let at_i = self.albedos(i);
-        let below = 1.0 - at_o.clearcoat.max(at_i.clearcoat);
         let reflects = wo.z * wi.z > 0.0;
         let mut value = Rgb::BLACK;
         let mut coat = 0.0;
@@ -322,25 +335,27 @@ impl Principled {
             value += if reflects { glass.value } else { glass.value * color } * self.glass;
             pdf += choice.glass * glass.pdf;
         }
-        BsdfEval { value: value * below + Rgb::splat(coat), pdf }
+        if self.clearcoat > 0.0 {
+            let clear = |at: &Albedos| Rgb::splat(at.clearcoat);
+            let below = left_below([clear(at_o), clear(&at_i)], [self.uncoated_albedo(at_o), self.uncoated_albedo(&at_i)]);
+            value = value * below + Rgb::splat(coat);
+        }
+        BsdfEval { value, pdf }
     }
 
     /// The diffuse base below its layer.
     #[inline]
     fn base_value(&self, o: Vec3, i: Vec3, reflects: bool, at_o: &Albedos, at_i: &Albedos) -> Rgb {
-        let (layer_o, layer_i) = (self.layer_albedo(at_o), self.layer_albedo(at_i));
-        let left = |o: f32, i: f32| (1.0 - o.max(i)).max(0.0);
-        let below_layer = Rgb::new(left(layer_o.r, layer_i.r), left(layer_o.g, layer_i.g), left(layer_o.b, layer_i.b));
-        let below_sheen = left(self.sheen * at_o.sheen, self.sheen * at_i.sheen);
+        let layer = [self.layer_albedo(at_o), self.layer_albedo(at_i)];
+        let below_layer = left_below(layer, [self.base_albedo(at_o), self.base_albedo(at_i)]);
         if !reflects {
-            return self.base * below_layer * (below_sheen * self.diffuse_transmission * FRAC_1_PI * i.z);
+            return self.base * below_layer * (self.diffuse_transmission * FRAC_1_PI * i.z);
         }
         let mut shape = shapes::diffuse(o, i, self.roughness);
         if self.flat > 0.0 {
             shape += (shapes::flat(o, i, self.roughness) - shape) * self.flat;
         }
-        let excess = at_o.diffuse.max(at_i.diffuse).max(1.0);
-        let mut value = self.base * (below_sheen * (1.0 - self.diffuse_transmission) * shape / excess);
+        let mut value = self.base * ((1.0 - self.diffuse_transmission) * shape);
         if self.sheen > 0.0 {
             value += self.sheen_color() * shapes::sheen(o, i);
         }
@@ -438,14 +453,33 @@ impl Principled {
     /// What all lobes scatter together, about.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         let at = self.albedos(vec3(wo.x, wo.y, wo.z.abs()));
-        let metal = self.base.map(|f| f * (at.mirrors - at.schlick) + at.schlick + (1.0 - at.mirrors) * f);
-        let layer = self.layer_albedo(&at);
-        let base = self.base * (1.0 - self.sheen * at.sheen) * at.diffuse.min(1.0) + self.sheen_color() * at.sheen;
-        let dielectric = layer + (Rgb::WHITE - layer) * base;
         let glass = if self.thin { self.base } else { self.base.map(f32::sqrt) };
-        let below = metal * self.metallic + dielectric * self.dielectric() + glass * self.glass;
-        Rgb::splat(at.clearcoat) + below * (1.0 - at.clearcoat)
+        let below = self.uncoated_albedo(&at) - (Rgb::WHITE - glass) * self.glass;
+        rgb_min(below + Rgb::splat(at.clearcoat), Rgb::WHITE)
     }
+}
+
+/// What microfacets with Schlick's reflectance `f` ahead scatter, at most.
+#[inline]
+fn facets_albedo(f: f32, at: &Albedos) -> f32 {
+    let average = f + (1.0 - f) / 21.0;
+    f * (at.mirrors - at.schlick) + at.schlick + (1.0 - at.mirrors) * average * average
+}
+
+/// The share of what is below a layer that is left for a pair of directions: the layer's albedos for both, and those of what is below.
+#[inline]
+fn left_below(layer: [Rgb; 2], below: [Rgb; 2]) -> Rgb {
+    let left = |layer: [f32; 2], below: [f32; 2]| {
+        let (rest, wanted) = ((1.0 - layer[0].max(layer[1])).max(0.0), below[0].max(below[1]));
+        if wanted > rest { rest / wanted } else { 1.0 }
+    };
+    let channel = |of: fn(Rgb) -> f32| left(layer.map(of), below.map(of));
+    Rgb::new(channel(|c| c.r), channel(|c| c.g), channel(|c| c.b))
+}
+
+#[inline]
+fn rgb_min(a: Rgb, b: Rgb) -> Rgb {
+    Rgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b))
 }
 
 #[inline]

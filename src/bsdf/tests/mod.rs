@@ -1,5 +1,6 @@
 //! Every BSDF against statistics and closed forms.
 
+mod coated;
 mod diffuse;
 mod energy;
 mod limits;

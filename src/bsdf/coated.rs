@@ -1,0 +1,155 @@
+//! A clear dielectric coat over any opaque base.
+//!
+//! With `E(w)` the fraction of the light from `w` that the coat reflects and `E_avg` its mean under diffuse light,
+//!
+//! ```text
+//! f = coat + tint^((1 / cos_t(wo) + 1 / cos_t(wi)) / 2) g(wo, wi) base
+//! g = (1 - E(wo)) (1 - E(wi)) / (1 - E_avg)     over a diffuse base, as for plastic (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled
+//!                                              Specular-Matte BRDF Model with Importance Sampling")
+//! g = 1 - max(E(wo), E(wi))                    over any other
+//! ```
+//!
+//! with `cos_t` the cosine of the refracted direction in the coat. Both are reciprocal and scatter no more than they receive; the first
+//! loses nothing over a diffuse base, the second nothing over a mirror, and up to `E_avg - E(wo)` over a base that spreads light widely. The
+//! base sees directions as they are outside: what the coat bends on the way in it bends back on the way out.
+
+use super::fresnel;
+use super::microfacet::MIN_COSINE;
+use super::{Bsdf, BsdfEval, BsdfSample, Coat, Eon};
+use crate::color::Rgb;
+use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::{Vec3, vec3};
+
+/// A clear coat over a base, on both sides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coated {
+    coat: Coat,
+    /// What light keeps that crosses the coat twice along the normal; `None` for all.
+    tint: Option<Rgb>,
+    /// For a diffuse base the factor on `(1 - E(wo)) (1 - E(wi))`.
+    diffuse: Option<f32>,
+    base: Bsdf,
+}
+
+/// The least share of the light below the coat that sampling assumes the base to reflect.
+const MIN_BASE: f32 = 0.05;
+
+impl Coated {
+    /// A coat over an opaque base; `tint` within `[0, 1]` is what light keeps that crosses the coat twice along the normal.
+    pub fn new(coat: Coat, tint: Rgb, base: Bsdf) -> Self {
+        let inverse = coat.inverse_transmittance();
+        let diffuse = match base {
+            Bsdf::Lambert(_) => Some(inverse),
+            // A little more than a mean share of it goes where the coat lets it out.
+            Bsdf::Eon(Eon { roughness, .. }) => Some(inverse - 0.1 * roughness * (inverse - 1.0)),
+            _ => None,
+        };
+        Self { coat, tint: (tint != Rgb::WHITE).then_some(tint), diffuse, base }
+    }
+
+    /// What is left of the light from `i` to `o`, both on the upper side, on its way through the coat to the base and back.
+    #[inline]
+    fn left(&self, o: Vec3, i: Vec3, coat_o: f32) -> Rgb {
+        let coat_i = self.coat.albedo(i);
+        let left = match self.diffuse {
+            Some(factor) => (1.0 - coat_o) * (1.0 - coat_i) * factor,
+            None => 1.0 - coat_o.max(coat_i),
+        };
+        match self.tint {
+            None => Rgb::splat(left),
+            Some(tint) => {
+                let length = 0.5 * (self.path_length(o) + self.path_length(i));
+                tint.map(|t| left * t.powf(length))
+            }
+        }
+    }
+
+    /// Length of the way through a coat of thickness 1; infinite at grazing angles for an index of 1.
+    #[inline]
+    fn path_length(&self, w: Vec3) -> f32 {
+        1.0 / fresnel::dielectric(w.z.min(1.0), self.coat.ior()).cos_t
+    }
+
+    /// Probability of choosing the coat: by what the two reflect, about.
+    #[inline]
+    fn coat_probability(&self, wo: Vec3, coat_albedo: f32) -> f32 {
+        let base = (1.0 - coat_albedo) * self.base.albedo(wo).mean().clamp(MIN_BASE, 1.0);
+        coat_albedo / (coat_albedo + base)
+    }
+
+    /// Base and rough coat for directions on the same side.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        if wo.z * wi.z <= 0.0 || wo.z.abs() <= MIN_COSINE {
+            return BsdfEval::default();
+        }
+        let coat_o = self.coat.albedo(upper(wo));
+        self.eval_from(wo, wi, coat_o, self.coat_probability(wo, coat_o))
+    }
+
+    #[inline]
+    fn eval_from(&self, wo: Vec3, wi: Vec3, coat_o: f32, probability: f32) -> BsdfEval {
+        let (o, i) = (upper(wo), upper(wi));
+        let base = self.base.eval(wo, wi);
+        let (value, pdf) = (base.value * self.left(o, i, coat_o), (1.0 - probability) * base.pdf);
+        if self.coat.is_smooth() {
+            return BsdfEval { value, pdf };
+        }
+        let (reflected, density) = self.coat.eval(o, i);
+        BsdfEval { value: value + Rgb::splat(reflected), pdf: pdf + probability * density }
+    }
+
+    /// A direction from the coat or the base.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        if wo.z.abs() <= MIN_COSINE {
+            return None;
+        }
+        let o = upper(wo);
+        let coat_o = self.coat.albedo(o);
+        let probability = self.coat_probability(wo, coat_o);
+        let wi = if u_lobe < probability {
+            if self.coat.is_smooth() {
+                return Some(Coat::mirrored(wo, coat_o, probability));
+            }
+            let i = self.coat.sample(o, u);
+            vec3(i.x, i.y, i.z * 1f32.copysign(wo.z))
+        } else {
+            let u_base = ((u_lobe - probability) / (1.0 - probability)).min(ONE_MINUS_EPSILON);
+            let sample = self.base.sample(wo, u_base, u)?;
+            if sample.is_delta {
+                let weight = sample.weight * self.left(o, upper(sample.wi), coat_o) / (1.0 - probability);
+                return Some(BsdfSample { weight, pdf: (1.0 - probability) * sample.pdf, ..sample });
+            }
+            sample.wi
+        };
+        if wi.z * wo.z <= 0.0 {
+            return None;
+        }
+        let BsdfEval { value, pdf } = self.eval_from(wo, wi, coat_o, probability);
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+    }
+
+    /// Whether coat or base are rougher along one tangent than along the other.
+    pub fn is_anisotropic(&self) -> bool {
+        self.coat.is_anisotropic() || self.base.is_anisotropic()
+    }
+
+    /// Whether both are smooth.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        self.coat.is_smooth() && self.base.is_delta()
+    }
+
+    /// What coat and base reflect together, about.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        let coat = self.coat.albedo(upper(wo));
+        let tint = self.tint.map_or(Rgb::WHITE, |tint| tint.map(|t| t.powf(self.path_length(upper(wo)))));
+        Rgb::splat(coat) + tint * self.base.albedo(wo) * (1.0 - coat)
+    }
+}
+
+#[inline]
+fn upper(w: Vec3) -> Vec3 {
+    vec3(w.x, w.y, w.z.abs())
+}

@@ -1,0 +1,155 @@
+//! Parameters of materials that are constant or come from textures.
+
+use crate::bsdf::Coat;
+use crate::color::Rgb;
+use crate::id::TextureId;
+use crate::math::Vec2;
+use crate::texture::Texture;
+
+/// A colour that is constant or comes from a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ColorInput {
+    /// The same everywhere.
+    Constant(Rgb),
+    /// Looked up by uv, each channel clamped to `[0, 1]`.
+    Texture(TextureId),
+}
+
+impl ColorInput {
+    /// The colour at `uv`.
+    #[inline]
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> Rgb {
+        match self {
+            Self::Constant(color) => *color,
+            Self::Texture(id) => textures[id.index()].color(uv).map(|v| v.clamp(0.0, 1.0)),
+        }
+    }
+
+    pub(super) fn is_constant(&self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
+}
+
+/// A number within `[0, 1]` that is constant or comes from a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ScalarInput {
+    /// The same everywhere.
+    Constant(f32),
+    /// Looked up by uv, clamped to `[0, 1]`.
+    Texture(TextureId),
+}
+
+impl ScalarInput {
+    /// The number at `uv`.
+    #[inline]
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> f32 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Texture(id) => textures[id.index()].scalar(uv).clamp(0.0, 1.0),
+        }
+    }
+
+    /// Whether it is 0 everywhere.
+    pub fn is_zero(&self) -> bool {
+        *self == Self::Constant(0.0)
+    }
+
+    pub(super) fn is_constant(&self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
+}
+
+/// A number that is constant or comes from a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RangedInput {
+    /// The same everywhere.
+    Constant(f32),
+    /// Looked up by uv, clamped to `[0, 1]`.
+    Texture {
+        /// The texture.
+        id: TextureId,
+        /// The number where the texture is 0, and where it is 1.
+        range: [f32; 2],
+    },
+}
+
+impl RangedInput {
+    /// The number at `uv`.
+    #[inline]
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> f32 {
+        match *self {
+            Self::Constant(value) => value,
+            Self::Texture { id, range: [low, high] } => low + (high - low) * ScalarInput::Texture(id).at(textures, uv),
+        }
+    }
+
+    pub(super) fn is_constant(&self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
+}
+
+/// GGX alpha along u and v from inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AlphaInput {
+    /// Along u and v.
+    pub axes: [ScalarInput; 2],
+    /// Whether the inputs are roughness, of which alpha is the square.
+    pub squared: bool,
+}
+
+impl AlphaInput {
+    /// Alpha at `uv`.
+    #[inline]
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> [f32; 2] {
+        self.axes.map(|input| input.at(textures, uv)).map(|value| if self.squared { value * value } else { value })
+    }
+
+    /// Whether no texture changes it.
+    pub fn is_constant(&self) -> bool {
+        self.axes.iter().all(ScalarInput::is_constant)
+    }
+}
+
+/// A clear coat that is prepared once, or has parameters from textures.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CoatInput {
+    /// The same everywhere.
+    Constant(Coat),
+    /// From textures.
+    Varying {
+        /// Index of refraction over that of the outside.
+        ior: RangedInput,
+        /// Roughness.
+        alpha: AlphaInput,
+    },
+}
+
+impl CoatInput {
+    /// A coat with these inputs.
+    pub fn new(ior: RangedInput, alpha: AlphaInput) -> Self {
+        match ior {
+            RangedInput::Constant(ior) if alpha.is_constant() => Self::Constant(Coat::new(ior, alpha.at(&[], Vec2::ZERO))),
+            ior => Self::Varying { ior, alpha },
+        }
+    }
+
+    /// The coat at `uv`.
+    #[inline]
+    pub(super) fn at(&self, textures: &[Texture], uv: Vec2) -> Coat {
+        match self {
+            Self::Constant(coat) => *coat,
+            Self::Varying { ior, alpha } => Coat::looked_up(ior.at(textures, uv), alpha.at(textures, uv)),
+        }
+    }
+
+    pub(super) fn is_constant(&self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
+
+    pub(super) fn is_anisotropic(&self) -> bool {
+        match self {
+            Self::Constant(coat) => coat.is_anisotropic(),
+            Self::Varying { alpha, .. } => alpha.axes[0] != alpha.axes[1],
+        }
+    }
+}
