@@ -15,7 +15,7 @@ use crate::texture::Texture;
 pub struct Surface {
     /// Its material.
     pub material: MaterialId,
-    /// Where its shading normals come from, if not from the shape alone.
+    /// Where its shading normals come from, if not from the shape alone or from a part of its material.
     pub relief: Option<ReliefId>,
     /// The light of its first primitive if it emits; the others follow.
     pub first_light: Option<LightId>,
@@ -68,6 +68,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Reliefs, by [`ReliefId`].
     pub reliefs: Vec<Relief>,
+    /// Reliefs of materials that are parts of others, by [`MaterialId`]; empty if there are none.
+    pub part_reliefs: Vec<Option<ReliefId>>,
     /// Textures, by [`TextureId`](crate::id::TextureId).
     pub textures: Vec<Texture>,
     /// Lights and their choice.
@@ -100,14 +102,31 @@ impl Scene {
         if let Material::Constant(bsdf) = material { *bsdf } else { self.resolved_bsdf(self.surface(at.shape).material, at, direction) }
     }
 
-    fn resolved_bsdf(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
+    fn resolved_bsdf(&self, id: MaterialId, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
+        self.descend(id, at, direction, |_| ()).bsdf(&self.textures, at.uv)
+    }
+
+    /// The relief at a point for a ray that arrives in `direction`.
+    pub fn relief(&self, at: &SurfaceInteraction, direction: Vec3) -> Option<ReliefId> {
+        let surface = self.surface(at.shape);
+        if surface.relief.is_some() || self.part_reliefs.is_empty() {
+            return surface.relief;
+        }
+        let mut found = None;
+        self.descend(surface.material, at, direction, |id| found = self.part_reliefs[id.index()].or(found));
+        found
+    }
+
+    /// The part of a material that a ray meets, which consists of no others; `visit` learns of the parts on the way to it.
+    fn descend(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3, mut visit: impl FnMut(MaterialId)) -> &Material {
         let is_front = direction.dot(at.n_g) < 0.0;
         loop {
             let material = &self.materials[id.index()];
             match material.part(&self.textures, at.uv, is_front, || choice(at, direction, id)) {
                 Some(part) => id = part,
-                None => return material.bsdf(&self.textures, at.uv),
+                None => return material,
             }
+            visit(id);
         }
     }
 }

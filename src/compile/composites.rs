@@ -38,6 +38,15 @@ impl MaterialTable {
                 };
                 Material::TwoSided { front: side("front", front)?, back: side("back", back)? }
             }
+            MaterialDesc::Relief { material, .. } => {
+                outer.push(name);
+                let place = format!("{path}.material");
+                let base = self.part(compiler, desc, &place, material, outer)?;
+                if self.any_part(base, &|id| self.relief_of(id).is_some()) {
+                    return Err(compiler.files.error(&place, format!("\"{material}\" has a relief of its own")));
+                }
+                self.materials[base.index()].clone()
+            }
             _ => return Ok(None),
         };
         outer.pop();
@@ -66,7 +75,11 @@ impl MaterialTable {
 
     /// Whether light may cross the material or a part of it.
     fn transmits(&self, id: MaterialId) -> bool {
-        let material = &self.materials[id.index()];
-        material.transmits() || material.parts().is_some_and(|parts| parts.into_iter().any(|part| self.transmits(part)))
+        self.any_part(id, &|id| self.materials[id.index()].transmits())
+    }
+
+    /// Whether something is true of a material or of a part of it.
+    pub(super) fn any_part(&self, id: MaterialId, is: &impl Fn(MaterialId) -> bool) -> bool {
+        is(id) || self.materials[id.index()].parts().is_some_and(|parts| parts.into_iter().any(|part| self.any_part(part, is)))
     }
 }

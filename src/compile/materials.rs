@@ -35,6 +35,8 @@ pub struct MaterialTable {
     pub materials: Vec<Material>,
     pub textures: TextureTable,
     pub reliefs: Vec<Relief>,
+    /// Reliefs of materials of the scene file that have one.
+    pub(super) by_material: HashMap<MaterialId, ReliefId>,
     names: HashMap<String, Look>,
 }
 
@@ -61,15 +63,18 @@ impl MaterialTable {
     pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
         let textures = TextureTable::new(files, desc)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
-        let mut table = Self { materials: vec![default], textures: TextureTable::default(), reliefs: Vec::new(), names: HashMap::new() };
+        let mut table = Self {
+            materials: vec![default],
+            textures: TextureTable::default(),
+            reliefs: Vec::new(),
+            by_material: HashMap::new(),
+            names: HashMap::new(),
+        };
         let compiler = Compiler { files, textures: &textures };
-        for (name, material) in &desc.materials {
-            if !matches!(material, MaterialDesc::Relief { .. }) {
-                table.add(&compiler, desc, name, &mut Vec::new())?;
-            }
+        for name in desc.materials.keys() {
+            table.add(&compiler, desc, name, &mut Vec::new())?;
         }
         table.textures = textures;
-        table.add_reliefs(files, desc)?;
         Ok(table)
     }
 
@@ -90,7 +95,9 @@ impl MaterialTable {
             None => compiler.material(&path, &desc.materials[name])?,
         };
         let id = self.push(material);
-        self.names.insert(name.to_owned(), Look::plain(id));
+        let relief = compiler.relief(desc, &path, &desc.materials[name])?.map(|relief| self.push_relief(relief));
+        self.by_material.extend(relief.map(|relief| (id, relief)));
+        self.names.insert(name.to_owned(), Look { relief, ..Look::plain(id) });
         Ok(id)
     }
 
@@ -100,26 +107,17 @@ impl MaterialTable {
         MaterialId::new(self.materials.len() - 1)
     }
 
-    /// Gives a look a name.
-    pub(super) fn insert(&mut self, name: String, look: Look) {
-        self.names.insert(name, look);
-    }
-
     /// Whether a surface without uv cannot look so.
     pub fn needs_uv(&self, look: &Look) -> bool {
         let cut_out = look.opacity.is_some_and(|id| !matches!(self.textures.get(id), Texture::Constant(_)));
-        cut_out || look.relief.is_some() || self.is_textured(look.material)
-    }
-
-    /// Whether a texture has a say in a material or a part of it.
-    fn is_textured(&self, id: MaterialId) -> bool {
-        let material = &self.materials[id.index()];
-        material.is_textured() || material.parts().is_some_and(|parts| parts.into_iter().any(|part| self.is_textured(part)))
+        let needs = |id: MaterialId| self.materials[id.index()].is_textured() || self.relief_of(id).is_some();
+        cut_out || look.relief.is_some() || self.any_part(look.material, &needs)
     }
 
     /// Whether a surface's normals come from a normal map.
     pub fn has_normal_map(&self, look: &Look) -> bool {
-        look.relief.is_some_and(|id| matches!(self.reliefs[id.index()], Relief::NormalMap { .. }))
+        let is_map = |relief: Option<ReliefId>| relief.is_some_and(|id| matches!(self.reliefs[id.index()], Relief::NormalMap { .. }));
+        is_map(look.relief) || self.any_part(look.material, &|id| is_map(self.relief_of(id)))
     }
 
     /// What a name stands for, or the default.
@@ -134,7 +132,7 @@ impl MaterialTable {
 
 pub(super) struct Compiler<'a> {
     pub(super) files: &'a Files,
-    textures: &'a TextureTable,
+    pub(super) textures: &'a TextureTable,
 }
 
 impl Compiler<'_> {
@@ -150,7 +148,6 @@ impl Compiler<'_> {
                 let [reflectance, transmittance] = self.sum_to_one(path, ("reflectance", reflectance), ("transmittance", transmittance))?;
                 Varying::DiffuseTransmission { reflectance, transmittance }.into()
             }
-            MaterialDesc::Relief { .. } => return Err(files.error(path, "a material cannot consist of one with relief")),
             MaterialDesc::Mirror { reflectance } => {
                 Varying::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
             }
@@ -188,7 +185,9 @@ impl Compiler<'_> {
                 }
                 Material::Constant(Bsdf::Glossy(Glossy::new(albedo * *d, f0 * *s, Rgb::splat(*s), *m)))
             }
-            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } => return Err(files.error(path, "cannot be part of a material")),
+            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Relief { .. } => {
+                return Err(files.error(path, "cannot be part of a material"));
+            }
             MaterialDesc::Plastic { albedo, ior, roughness, alpha } => {
                 if !(*ior > 1.0 && *ior <= 10.0) {
                     return Err(files.error(&format!("{path}.ior"), format!("must be above 1 and at most 10, not {ior}")));

@@ -127,6 +127,7 @@ impl Builder {
             let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
             return Err(files.error("lights", message));
         }
+        let part_reliefs = self.materials.part_reliefs();
         let materials = self.materials.materials;
         let features = Features {
             lights: !lights.is_empty(),
@@ -134,7 +135,7 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
-            reliefs: self.surfaces.iter().any(|surface| surface.relief.is_some()),
+            reliefs: !part_reliefs.is_empty() || self.surfaces.iter().any(|surface| surface.relief.is_some()),
             delta_materials: materials.iter().any(Material::is_delta),
             anisotropic: materials.iter().any(Material::is_anisotropic),
             lens: camera.lens().is_some(),
@@ -145,6 +146,7 @@ impl Builder {
             surfaces: self.surfaces,
             materials,
             reliefs: self.materials.reliefs,
+            part_reliefs,
             textures: self.materials.textures.textures,
             lights,
             light_groups,
