@@ -12,7 +12,7 @@ use steradian::output;
 use steradian::scene::Scene;
 
 use crate::util::folder::Folder;
-use crate::util::geometry::Rng;
+use steradian::math::random::Rng;
 
 /// A scene of shapes with material `m` and a camera that sees the square from -1 to 1.
 fn scene_of(shapes: Value, material: Value) -> Value {
@@ -42,7 +42,7 @@ fn meet(scene: &Scene, ray: &Ray) -> Option<(SurfaceInteraction, Vec3)> {
 fn bsdf_at(scene: &Scene, x: f32, y: f32) -> Bsdf {
     let ray = Ray::new(vec3(x, y, 5.0), -Vec3::Z);
     let (at, _) = meet(scene, &ray).expect("the ray meets a shape");
-    scene.bsdf(&at, ray.direction)
+    *scene.bsdf(&at, ray.direction, &mut None)
 }
 
 /// Codes of the base colour taken for light; or the curve applied to roughness too.
