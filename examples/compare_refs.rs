@@ -1,10 +1,13 @@
 //! Compares renders of `scenes/` and `benches/scenes/` with independent reference images of the same scenes, block by block.
 //!
-//! `cargo run --release --example compare_refs -- [REFS] [--spp N] [SCENE...]`: `REFS` (default `../shared/refs`) holds, for each scene
-//! (default: cornell, glass, analytic), `SCENE.exr` and its two independent halves `SCENE.half0.exr` and `SCENE.half1.exr`. Two renders of
-//! N samples with different seeds give our variance, the halves give the reference's: over blocks of 16 x 16 pixels,
-//! z = (ours - reference) / sqrt(both variances). Prints one line per scene and writes the signed difference, in units of its standard
-//! deviation, to `target/compare_refs/SCENE.png` (grey: none; a structure there is a bug).
+//! `cargo run --release --example compare_refs -- [REFS] [--spp N] [SCENE...]`: `REFS` (default `../shared/refs`) holds `SCENE.exr` for each
+//! scene (default: cornell, glass, analytic) and, of some, two independent halves `SCENE.half0.exr` and `SCENE.half1.exr`. Two renders of N
+//! samples with different seeds give our variance, the halves give the reference's; without halves the differences between the two pictures,
+//! from pixel to pixel of a block, give both together. Over blocks of 16 x 16 pixels, z = (ours - reference) / sqrt(variances).
+//!
+//! Prints one line per scene: means, relMSE, relMSE without the worst thousandth of the pixels, blocks with |z| < 3, ratio of the medians over
+//! blocks of their medians (for references with fireflies). Writes the signed difference, in units of its standard deviation, to
+//! `target/compare_refs/SCENE.png` (grey: none; a structure there is a bug).
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -16,6 +19,10 @@ use steradian::{Error, Result, compile, import, output};
 
 const BLOCK: u32 = 16;
 
+/// What conventions may change where there is no noise at all: the rows of an environment reach from pole to pole either with their edges, as
+/// ours, or with their centres.
+const CONVENTIONS: f64 = 5e-4;
+
 struct Arguments {
     references: PathBuf,
     spp: u32,
@@ -26,7 +33,7 @@ fn main() -> Result<()> {
     let arguments = parse_arguments()?;
     let out = Path::new("target/compare_refs");
     std::fs::create_dir_all(out).map_err(|e| Error::Output { file: out.into(), message: e.to_string() })?;
-    println!("scene      spp    mean ratio r g b (± its standard error)          relMSE    blocks with |z| < 3    largest |z|");
+    println!("scene      spp    mean ratio r g b (± its standard error)    relMSE  trimmed    |z| < 3  largest |z|  medians");
     let mut failed = false;
     for scene in &arguments.scenes {
         failed |= !compare_scene(scene, &arguments, out)?;
@@ -57,31 +64,41 @@ fn parse_arguments() -> Result<Arguments> {
 fn compare_scene(name: &str, arguments: &Arguments, out: &Path) -> Result<bool> {
     let file = |suffix: &str| arguments.references.join(format!("{name}{suffix}.exr"));
     let reference = output::read_exr(&file(""))?;
-    let halves = [output::read_exr(&file(".half0"))?, output::read_exr(&file(".half1"))?];
+    let has_halves = file(".half0").exists();
+    let halves = if has_halves { Some([output::read_exr(&file(".half0"))?, output::read_exr(&file(".half1"))?]) } else { None };
     let ours = [render_scene(name, arguments.spp, 1)?, render_scene(name, arguments.spp, 2)?];
 
     let [width, height] = reference.size;
     let (columns, rows) = (width / BLOCK, height / BLOCK);
     let mut z_image = vec![0u8; (columns * rows * 3) as usize];
     let (mut inside, mut largest) = (0u32, 0f64);
+    let mut medians = Vec::with_capacity((columns * rows * 3) as usize);
     let mut total = [Sums::default(); 3];
     for by in 0..rows {
         for bx in 0..columns {
             for c in 0..3 {
-                let sums = block_sums(&reference, &halves, &ours, [bx * BLOCK, by * BLOCK], c);
+                let sums = block_sums(&reference, halves.as_ref(), &ours, [bx * BLOCK, by * BLOCK], c);
                 let z = sums.z();
                 inside += u32::from(z.abs() < 3.0);
                 largest = largest.max(z.abs());
                 z_image[((by * columns + bx) * 3) as usize + c] = (128.0 + 25.0 * z).clamp(0.0, 255.0) as u8;
                 total[c].add(&sums);
+                medians.push(sums.medians);
             }
         }
     }
     let mean = mean_image(&ours);
-    let relmse = relative_mse(&reference, &mean);
+    let [relmse, trimmed] = relative_mse(&reference, &mean);
     let fraction = f64::from(inside) / f64::from(columns * rows * 3);
     let ratios: Vec<String> = total.iter().map(|t| format!("{:.5} ± {:.5}", t.ratio(), t.ratio_error())).collect();
-    println!("{name:<10} {:<6} {}  {relmse:.5}  {:6.2} %  {largest:.2}", 2 * arguments.spp, ratios.join("  "), 100.0 * fraction);
+    let (our_median, their_median) = (median(medians.iter().map(|m| m[0])), median(medians.iter().map(|m| m[1])));
+    println!(
+        "{name:<10} {:<6} {}  {relmse:.5}  {trimmed:.5}  {:6.2} %  {largest:.2}  {:.4}",
+        2 * arguments.spp,
+        ratios.join("  "),
+        100.0 * fraction,
+        our_median / their_median
+    );
 
     let picture = out.join(format!("{name}.png"));
     let big = image::imageops::resize(
@@ -111,20 +128,21 @@ fn render_scene(name: &str, spp: u32, seed: u64) -> Result<Image> {
 struct Sums {
     ours: f64,
     reference: f64,
-    our_variance: f64,
-    reference_variance: f64,
+    /// Of the difference between the two.
+    variance: f64,
+    /// Of our pixels and of the reference's.
+    medians: [f64; 2],
 }
 
 impl Sums {
     fn add(&mut self, other: &Self) {
         self.ours += other.ours;
         self.reference += other.reference;
-        self.our_variance += other.our_variance;
-        self.reference_variance += other.reference_variance;
+        self.variance += other.variance;
     }
 
     fn z(&self) -> f64 {
-        let deviation = (self.our_variance + self.reference_variance).sqrt();
+        let deviation = self.variance.sqrt().hypot(CONVENTIONS * self.reference);
         if deviation > 0.0 { (self.ours - self.reference) / deviation } else { 0.0 }
     }
 
@@ -133,26 +151,39 @@ impl Sums {
     }
 
     fn ratio_error(&self) -> f64 {
-        (self.our_variance + self.reference_variance).sqrt() / self.reference
+        self.variance.sqrt() / self.reference
     }
 }
 
 /// Sums over one block. Pixels are independent, so the variance of the sum is the sum of the pixels' variances, each from the difference of
-/// two independent halves: (a - b)² / 4 estimates the variance of (a + b) / 2.
-fn block_sums(reference: &Image, halves: &[Image; 2], ours: &[Image; 2], origin: [u32; 2], channel: usize) -> Sums {
+/// two independent halves: (a - b)² / 4 estimates the variance of (a + b) / 2. Without halves of the reference it is the variance of the
+/// differences between ours and the reference over the pixels of the block.
+fn block_sums(reference: &Image, halves: Option<&[Image; 2]>, ours: &[Image; 2], origin: [u32; 2], channel: usize) -> Sums {
     let mut sums = Sums::default();
-    for y in origin[1]..origin[1] + BLOCK {
-        for x in origin[0]..origin[0] + BLOCK {
-            let at = |image: &Image| f64::from(color(image, x, y)[channel]);
-            let (a, b) = (at(&ours[0]), at(&ours[1]));
-            sums.ours += 0.5 * (a + b);
-            sums.our_variance += 0.25 * (a - b) * (a - b);
-            let (a, b) = (at(&halves[0]), at(&halves[1]));
-            sums.reference += at(reference);
-            sums.reference_variance += 0.25 * (a - b) * (a - b);
-        }
+    let at = |image: &Image, [x, y]: [u32; 2]| f64::from(color(image, x, y)[channel]);
+    let half_difference = |images: &[Image; 2], pixel| (0.5 * (at(&images[0], pixel) - at(&images[1], pixel))).powi(2);
+    let pixels: Vec<[u32; 2]> = (0..BLOCK * BLOCK).map(|i| [origin[0] + i % BLOCK, origin[1] + i / BLOCK]).collect();
+    let values: Vec<[f64; 2]> =
+        pixels.iter().map(|&pixel| [0.5 * (at(&ours[0], pixel) + at(&ours[1], pixel)), at(reference, pixel)]).collect();
+    for [our, their] in &values {
+        sums.ours += our;
+        sums.reference += their;
     }
+    sums.variance = if let Some(halves) = halves {
+        pixels.iter().map(|&pixel| half_difference(ours, pixel) + half_difference(halves, pixel)).sum()
+    } else {
+        let count = values.len() as f64;
+        let mean = (sums.ours - sums.reference) / count;
+        values.iter().map(|[our, their]| (our - their - mean).powi(2)).sum::<f64>() * count / (count - 1.0)
+    };
+    sums.medians = [0, 1].map(|which| median(values.iter().map(|pair| pair[which])));
     sums
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Black where the picture has no colour.
@@ -166,17 +197,15 @@ fn mean_image(images: &[Image; 2]) -> Vec<[f64; 3]> {
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
 }
 
-/// Mean over pixels and channels of (test - reference)² / (reference² + 0.01).
-fn relative_mse(reference: &Image, test: &[[f64; 3]]) -> f64 {
-    let [width, height] = reference.size;
-    let mut sum = 0.0;
-    for y in 0..height {
-        for x in 0..width {
-            for (r, t) in color(reference, x, y).iter().zip(test[(y * width + x) as usize]) {
-                let r = f64::from(*r);
-                sum += (t - r) * (t - r) / (r * r + 0.01);
-            }
-        }
-    }
-    sum / f64::from(width * height * 3)
+/// Mean over pixels and channels of (test - reference)² / (reference² + 0.01), of all pixels and without the worst thousandth.
+fn relative_mse(reference: &Image, test: &[[f64; 3]]) -> [f64; 2] {
+    let [width, _] = reference.size;
+    let error = |(i, pixel): (usize, &[f64; 3])| {
+        let their = color(reference, i as u32 % width, i as u32 / width).map(f64::from);
+        their.iter().zip(pixel).map(|(r, t)| (t - r) * (t - r) / (r * r + 0.01)).sum::<f64>() / 3.0
+    };
+    let mut errors: Vec<f64> = test.iter().enumerate().map(error).collect();
+    errors.sort_unstable_by(f64::total_cmp);
+    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+    [mean(&errors), mean(&errors[..errors.len() - errors.len() / 1000])]
 }

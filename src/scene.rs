@@ -17,7 +17,7 @@ use crate::texture::Texture;
 pub struct Surface {
     /// Its material.
     pub material: MaterialId,
-    /// Where its shading normals come from, if not from the shape alone.
+    /// Where its shading normals come from, if not from the shape alone or from a part of its material.
     pub relief: Option<ReliefId>,
     /// The medium within it.
     pub medium: Option<MediumId>,
@@ -80,6 +80,8 @@ pub struct Scene {
     pub reliefs: Vec<Relief>,
     /// What surfaces have within them, by [`MediumId`].
     pub media: Media,
+    /// Reliefs of materials that are parts of others, by [`MaterialId`]; empty if there are none.
+    pub part_reliefs: Vec<Option<ReliefId>>,
     /// Textures, by [`TextureId`](crate::id::TextureId).
     pub textures: Vec<Texture>,
     /// Lights and their choice.
@@ -119,7 +121,22 @@ impl Scene {
 
     /// The material that a ray meets at a point, of those that the shape's material consists of.
     pub fn met_material(&self, at: &SurfaceInteraction, direction: Vec3) -> &Material {
-        let mut id = self.surface(at.shape).material;
+        self.descend(self.surface(at.shape).material, at, direction, |_| ())
+    }
+
+    /// The relief at a point for a ray that arrives in `direction`.
+    pub fn relief(&self, at: &SurfaceInteraction, direction: Vec3) -> Option<ReliefId> {
+        let surface = self.surface(at.shape);
+        if surface.relief.is_some() || self.part_reliefs.is_empty() {
+            return surface.relief;
+        }
+        let mut found = None;
+        self.descend(surface.material, at, direction, |id| found = self.part_reliefs[id.index()].or(found));
+        found
+    }
+
+    /// The part of a material that a ray meets, which consists of no others; `visit` learns of the parts on the way to it.
+    fn descend(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3, mut visit: impl FnMut(MaterialId)) -> &Material {
         let is_front = direction.dot(at.n_g) < 0.0;
         loop {
             let material = &self.materials[id.index()];
@@ -127,6 +144,7 @@ impl Scene {
                 Some(part) => id = part,
                 None => return material,
             }
+            visit(id);
         }
     }
 }

@@ -76,7 +76,6 @@ fn opacities() {
         ("shapes[0].opacity", json!(-0.25), "shapes[0].opacity", "-0.25"),
         ("shapes[0].opacity", json!([1, 1, 1]), "shapes[0].opacity", "expected an opacity"),
         ("shapes[0].opacity", json!({ "texture": "tilse" }), "shapes[0].opacity.texture", "did you mean \"tiles\"?"),
-        ("shapes[1].opacity", json!(0.5), "shapes[1].opacity", "gives off light"),
     ]);
 }
 

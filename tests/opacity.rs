@@ -10,7 +10,7 @@ use steradian::math::{Ray, Vec3, vec3};
 use steradian::scene::Scene;
 
 use crate::util::folder::Folder;
-use crate::util::render::Estimate;
+use crate::util::render::{Estimate, assert_irradiance, floor_probe, merge};
 
 /// A red leaf on the right half of a card with nothing on its left half.
 fn save_leaf(folder: &Folder) {
@@ -124,8 +124,7 @@ fn an_mtl_cuts_leaves_out() {
         ("d 1", None, whole),
         // Glass is seen.
         ("illum 4\nNi 1.5\nd 0", None, whole),
-        // Lamps are whole.
-        ("Ke 1 1 1\nmap_d mask.png", None, whole),
+        ("Ke 1 1 1\nmap_d mask.png", None, leaf),
         // The scene counts.
         ("map_d mask.png", Some(json!(1)), whole),
         ("Kd 1 1 1", Some(json!({ "texture": "mask" })), leaf),
@@ -148,4 +147,30 @@ fn an_image_of_floats_beyond_1_is_no_opacity() {
     scene["textures"]["bright"] = json!({ "type": "image", "file": "bright.exr" });
     let message = folder.compile(&scene).unwrap_err().to_string();
     assert!(message.contains("shapes[1].opacity.texture: ") && message.contains("from 2 to 2"), "{message}");
+}
+
+/// A square light with its left half cut out, half of a veil, and a sphere whose inside shines through its outside, by every strategy: points
+/// chosen on the light must count as often as rays meet it.
+#[test]
+fn light_comes_from_what_is_there_of_a_shape_with_holes() {
+    // Textures with u below 1/2 cut out; a point below the middle of a square sees a quarter of it in the fraction f of all directions.
+    let textures = json!({ "half": { "type": "checker", "color0": [0, 0, 0], "color1": [1, 1, 1], "scale": [1, 0] } });
+    let f = FRAC_1_SQRT_2 * FRAC_1_SQRT_2.atan() / PI;
+    let half = json!({ "texture": "half" });
+    let quad = json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": half });
+    let veil = json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": 0.5 });
+    let mesh = json!({
+        "type": "mesh", "positions": [[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], "triangles": [[0, 1, 2], [0, 2, 3]],
+        "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]], "opacity": half
+    });
+    let sphere = json!({ "type": "sphere", "radius": 0.5, "opacity": 0.5, "transform": [{ "translate": [0, 1, 0] }] });
+    for (shape, two_sided, expected) in
+        [(quad, false, 2.0 * f), (veil, false, 2.0 * f), (mesh, false, 2.0 * f), (sphere, true, 0.75 * 0.25)]
+    {
+        let mut light = shape.clone();
+        merge(&mut light, json!({ "material": "black", "emission": { "radiance": [1, 1, 1], "two_sided": two_sided } }));
+        let mut scene = floor_probe([0.0; 3], json!([light]));
+        scene["textures"] = textures.clone();
+        assert_irradiance(&scene, f64::from(PI * expected), &shape.to_string());
+    }
 }

@@ -1,12 +1,16 @@
 //! What scene files say reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
 
+use image::ImageBuffer;
 use serde_json::{Value, json};
+use steradian::accel::{self, AccelKind};
+use steradian::bsdf::Bsdf;
 use steradian::compile::Summary;
 use steradian::geometry::{Mesh, Shape};
 use steradian::id::{PrimId, ShapeId};
 use steradian::import;
+use steradian::integrator::World;
 use steradian::light::Light;
-use steradian::math::{DVec3, Vec3};
+use steradian::math::{DVec3, Ray, Vec2, Vec3};
 use steradian::scene::Scene;
 
 use crate::util::folder::{Folder, good_scene, set};
@@ -212,6 +216,46 @@ fn an_obj_brings_its_materials_and_lights_unless_one_is_given() {
     let given = folder.compile(&scene).unwrap();
     assert_eq!(given.geometry.shapes.len(), 1);
     assert!(given.surfaces[0].first_light.is_none());
+}
+
+#[test]
+fn maps_of_an_mtl_colour_mirrors_metals_and_lamps() {
+    let folder = Folder::new();
+    ImageBuffer::from_fn(2, 1, |x, _| image::Rgb([255 * x as u8; 3])).save(folder.path("map.png")).unwrap();
+    let square = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n";
+    folder.write("m.obj", format!("mtllib m.mtl\n{square}"));
+    let compile = |mtl: &str| {
+        folder.write("m.mtl", format!("newmtl m\n{mtl}\n"));
+        folder.compile(&lit(json!({ "type": "mesh", "file": "m.obj" }))).unwrap()
+    };
+    // The map is black at u = 1/4 and white at u = 3/4.
+    let [dark, bright] = [Vec2::new(0.25, 0.5), Vec2::new(0.75, 0.5)];
+    let w = Vec3::new(0.3, 0.2, 0.9).normalize();
+    for (mtl, expected) in [
+        ("illum 5\nKs 0.5 0.5 0.5\nmap_Ks map.png", 0.5),
+        ("illum 5\nmap_Ks map.png", 1.0),
+        ("Kd 0 0 0\nKs 0.5 0.5 0.5\nNs 50\nmap_Ks map.png", 0.5),
+    ] {
+        let scene = compile(mtl);
+        let material = scene.material(ShapeId(0));
+        let [black, white] = [dark, bright].map(|uv| match material.bsdf(&scene.textures, uv) {
+            Bsdf::Mirror(mirror) => mirror.reflectance.g,
+            Bsdf::Conductor(metal) => metal.albedo(Vec3::Z).g,
+            other => panic!("{mtl}: {other:?}"),
+        });
+        assert!(black == 0.0 && (white - expected).abs() < 1e-4, "{mtl}: {black} {white}");
+        assert!(material.bsdf(&scene.textures, dark).eval(w, w).value.is_black());
+    }
+    for (mtl, expected) in [("Ke 2 3 4\nmap_Ke map.png", 3.0), ("map_Ke map.png", 1.0)] {
+        let scene = compile(mtl);
+        let accel = accel::build(AccelKind::EMBREE, &scene.geometry, 1).unwrap();
+        let world = World::new(&scene, &*accel);
+        let emitted = |x: f32| {
+            let at = world.closest(&Ray::new(Vec3::new(x, 0.1, 2.0), -Vec3::Z)).unwrap();
+            world.emitted(&at, Vec3::Z).g
+        };
+        assert!(emitted(-0.5) == 0.0 && (emitted(0.5) - expected).abs() < 1e-5, "{mtl}");
+    }
 }
 
 #[test]

@@ -24,6 +24,8 @@ mod flaws_of_camera;
 mod flaws_of_glass;
 /// Known flaws of renderers in lights and light transport: each test fails on the flawed formula.
 mod flaws_of_light;
+/// Known flaws of renderers in textures and surfaces, beyond those of [`textures`] and [`relief`]: each test fails on the flawed formula.
+mod flaws_of_textures;
 /// Bottles and glasses of revolution, filled.
 mod glassware;
 /// Integrators against closed forms, strategies against each other.

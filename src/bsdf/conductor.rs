@@ -132,6 +132,11 @@ impl Conductor {
         (i.z > 0.0 && pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
     }
 
+    /// GGX alpha along both tangents.
+    pub fn alpha(&self) -> [f32; 2] {
+        self.ggx.alpha()
+    }
+
     /// Whether the surface is rougher along one tangent than along the other.
     pub fn is_anisotropic(&self) -> bool {
         self.ggx.alpha()[0] != self.ggx.alpha()[1]

@@ -55,11 +55,19 @@ impl MaterialTable {
                         .files
                         .error(&place, format!("\"{base}\" lets light through: what is below a coat must be opaque")));
                 }
+                self.check_no_relief(compiler, &place, base, base_id)?;
                 let coating = Coating {
                     coat: CoatInput::new(compiler.ior(&path, ior, 1.0)?, compiler.alpha(&path, roughness.as_ref(), alpha.as_ref())?),
                     tint: compiler.color(&format!("{path}.tint"), tint)?,
                 };
                 self.coated(base_id, &coating, &mut HashMap::new())
+            }
+            MaterialDesc::Relief { material, .. } => {
+                outer.push(name);
+                let place = format!("{path}.material");
+                let base = self.part(compiler, desc, &place, material, outer)?;
+                self.check_no_relief(compiler, &place, material, base)?;
+                self.materials[base.index()].clone()
             }
             _ => return Ok(None),
         };
@@ -114,7 +122,19 @@ impl MaterialTable {
 
     /// Whether light may cross the material or a part of it.
     pub(super) fn transmits(&self, id: MaterialId) -> bool {
-        let material = &self.materials[id.index()];
-        material.transmits() || material.parts().is_some_and(|parts| parts.into_iter().any(|part| self.transmits(part)))
+        self.any_part(id, &|id| self.materials[id.index()].transmits())
+    }
+
+    /// That neither a material nor a part of it has a relief.
+    fn check_no_relief(&self, compiler: &Compiler, place: &str, name: &str, id: MaterialId) -> Result<()> {
+        if self.any_part(id, &|id| self.relief_of(id).is_some()) {
+            return Err(compiler.files.error(place, format!("\"{name}\" has a relief of its own")));
+        }
+        Ok(())
+    }
+
+    /// Whether something is true of a material or of a part of it.
+    pub(super) fn any_part(&self, id: MaterialId, is: &impl Fn(MaterialId) -> bool) -> bool {
+        is(id) || self.materials[id.index()].parts().is_some_and(|parts| parts.into_iter().any(|part| self.any_part(part, is)))
     }
 }

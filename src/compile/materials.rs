@@ -37,6 +37,8 @@ pub struct MaterialTable {
     pub reliefs: Vec<Relief>,
     /// What is within surfaces of these materials.
     pub media: Media,
+    /// Reliefs of materials of the scene file that have one.
+    pub(super) by_material: HashMap<MaterialId, ReliefId>,
     names: HashMap<String, Look>,
     /// The medium of each material that has one.
     pub(super) medium_of: HashMap<MaterialId, Medium>,
@@ -70,18 +72,16 @@ impl MaterialTable {
             textures: TextureTable::default(),
             reliefs: Vec::new(),
             media: Media::default(),
+            by_material: HashMap::new(),
             names: HashMap::new(),
             medium_of: HashMap::new(),
         };
         let compiler = Compiler { files, textures: &textures };
-        for (name, material) in &desc.materials {
-            if !matches!(material, MaterialDesc::Relief { .. }) {
-                table.add(&compiler, desc, name, &mut Vec::new())?;
-            }
+        for name in desc.materials.keys() {
+            table.add(&compiler, desc, name, &mut Vec::new())?;
         }
         table.media = Media::new(table.medium_of.values().copied());
         table.textures = textures;
-        table.add_reliefs(files, desc)?;
         Ok(table)
     }
 
@@ -101,10 +101,15 @@ impl MaterialTable {
             Some(material) => material,
             None => compiler.material(&path, &desc.materials[name])?,
         };
-        let medium = self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, &desc.materials[name])?);
+        let medium = match &desc.materials[name] {
+            MaterialDesc::Relief { material, .. } => self.names.get(material).and_then(|look| self.medium_of.get(&look.material)).copied(),
+            plain => self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, plain)?),
+        };
         let id = self.push(material);
         self.medium_of.extend(medium.map(|medium| (id, medium)));
-        self.names.insert(name.to_owned(), Look::plain(id));
+        let relief = compiler.relief(desc, &path, &desc.materials[name])?.map(|relief| self.push_relief(relief));
+        self.by_material.extend(relief.map(|relief| (id, relief)));
+        self.names.insert(name.to_owned(), Look { relief, ..Look::plain(id) });
         Ok(id)
     }
 
@@ -114,26 +119,17 @@ impl MaterialTable {
         MaterialId::new(self.materials.len() - 1)
     }
 
-    /// Gives a look a name.
-    pub(super) fn insert(&mut self, name: String, look: Look) {
-        self.names.insert(name, look);
-    }
-
     /// Whether a surface without uv cannot look so.
     pub fn needs_uv(&self, look: &Look) -> bool {
         let cut_out = look.opacity.is_some_and(|id| !matches!(self.textures.get(id), Texture::Constant(_)));
-        cut_out || look.relief.is_some() || self.is_textured(look.material)
-    }
-
-    /// Whether a texture has a say in a material or a part of it.
-    fn is_textured(&self, id: MaterialId) -> bool {
-        let material = &self.materials[id.index()];
-        material.is_textured() || material.parts().is_some_and(|parts| parts.into_iter().any(|part| self.is_textured(part)))
+        let needs = |id: MaterialId| self.materials[id.index()].is_textured() || self.relief_of(id).is_some();
+        cut_out || look.relief.is_some() || self.any_part(look.material, &needs)
     }
 
     /// Whether a surface's normals come from a normal map.
     pub fn has_normal_map(&self, look: &Look) -> bool {
-        look.relief.is_some_and(|id| matches!(self.reliefs[id.index()], Relief::NormalMap { .. }))
+        let is_map = |relief: Option<ReliefId>| relief.is_some_and(|id| matches!(self.reliefs[id.index()], Relief::NormalMap { .. }));
+        is_map(look.relief) || self.any_part(look.material, &|id| is_map(self.relief_of(id)))
     }
 
     /// What a name stands for, or the default.
@@ -148,7 +144,7 @@ impl MaterialTable {
 
 pub(super) struct Compiler<'a> {
     pub(super) files: &'a Files,
-    textures: &'a TextureTable,
+    pub(super) textures: &'a TextureTable,
 }
 
 impl Compiler<'_> {
@@ -164,7 +160,6 @@ impl Compiler<'_> {
                 let [reflectance, transmittance] = self.sum_to_one(path, ("reflectance", reflectance), ("transmittance", transmittance))?;
                 Varying::DiffuseTransmission { reflectance, transmittance }.into()
             }
-            MaterialDesc::Relief { .. } => return Err(files.error(path, "a material cannot consist of one with relief")),
             MaterialDesc::Mirror { reflectance } => {
                 Varying::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
             }
@@ -203,7 +198,7 @@ impl Compiler<'_> {
                 }
                 Varying::CookTorrance { albedo, d, s, m, f0 }.into()
             }
-            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } => {
+            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } | MaterialDesc::Relief { .. } => {
                 return Err(files.error(path, "cannot be part of a material"));
             }
             MaterialDesc::Plastic { albedo, ior, roughness, alpha } => {

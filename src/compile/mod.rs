@@ -128,8 +128,9 @@ impl Builder {
             let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
             return Err(files.error("lights", message));
         }
+        let part_reliefs = self.materials.part_reliefs();
         let materials = self.materials.materials;
-        let reliefs = self.surfaces.iter().any(|surface| surface.relief.is_some());
+        let reliefs = !part_reliefs.is_empty() || self.surfaces.iter().any(|surface| surface.relief.is_some());
         let anisotropic = materials.iter().any(Material::is_anisotropic);
         let smooth = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.has_normals());
         let features = Features {
@@ -153,6 +154,7 @@ impl Builder {
             materials,
             reliefs: self.materials.reliefs,
             media: self.materials.media,
+            part_reliefs,
             textures: self.materials.textures.textures,
             lights,
             light_groups,

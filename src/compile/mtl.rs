@@ -8,7 +8,8 @@ use crate::color::Rgb;
 use crate::error::Result;
 use crate::id::TextureId;
 use crate::import::{ObjMap, ObjMaterial};
-use crate::material::{CoatInput, ColorInput, Material, ScalarInput, Varying};
+use crate::light::Emission;
+use crate::material::{AlphaInput, CoatInput, ColorInput, Material, ScalarInput, Varying};
 use crate::math::Vec2;
 use crate::relief::Relief;
 use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
@@ -17,28 +18,28 @@ use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
 pub struct MtlLook {
     pub look: Look,
     /// Light given off, if not black.
-    pub radiance: Option<Rgb>,
+    pub emission: Option<Emission>,
 }
 
 impl Builder {
     /// What the faces with a material of an OBJ file look like; maps need uv. `path` is the shape, `file` the OBJ.
     pub(super) fn mtl_look(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlLook> {
         let maps = &mtl.maps;
-        let unused: Vec<&str> = maps.unused.iter().map(String::as_str).collect();
-        if !unused.is_empty() {
-            tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.scene.display(), mtl.name, unused.join(", "));
-        }
-        let has_maps = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity].iter().any(|map| map.is_some());
+        let every = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity, &maps.specular, &maps.emission];
+        let has_maps = every.iter().any(|map| map.is_some());
         if has_maps && !has_uvs {
             tracing::warn!("{}: {path}: material \"{}\": faces without uv have no maps", self.files.scene.display(), mtl.name);
         }
         let wanted = |map: &Option<ObjMap>| map.clone().filter(|_| has_uvs);
         let (diffuse, opacity) = (wanted(&maps.diffuse), wanted(&maps.opacity));
+        let (specular, emission) = (wanted(&maps.specular), wanted(&maps.emission));
 
         let mut plain = mtl.clone();
-        if diffuse.is_some() {
-            // Exporters leave Kd black, or out, where a map says it all.
-            plain.diffuse = Some(mtl.diffuse.filter(|color| color.iter().any(|&c| c != 0.0)).unwrap_or([1.0; 3]));
+        // Exporters leave a colour black, or out, where a map says it all.
+        for (color, map) in [(&mut plain.diffuse, &diffuse), (&mut plain.specular, &specular), (&mut plain.emissive, &emission)] {
+            if map.is_some() {
+                *color = Some(color.filter(|color| color.iter().any(|&c| c != 0.0)).unwrap_or([1.0; 3]));
+            }
         }
         let surface = from_mtl(&plain).map_err(|message| meshes::refusal(&self.files, path, file, message))?;
 
@@ -46,7 +47,17 @@ impl Builder {
         let mut material = surface.material;
         if let Some(map) = &diffuse {
             let tint = plain.diffuse.map_or(Rgb::WHITE, Rgb::from);
-            material = with_albedo(material, ColorInput::Texture(self.diffuse_map(path, map, tint)?));
+            material = with_albedo(material, ColorInput::Texture(self.reflectance_map(path, map, tint)?));
+        }
+        let mut unused: Vec<&str> = maps.unused.iter().map(String::as_str).collect();
+        if let Some(map) = &specular {
+            match specular_tint(&material) {
+                Some(tint) => material = with_specular(material, ColorInput::Texture(self.reflectance_map(path, map, tint)?)),
+                None => unused.push("map_Ks"),
+            }
+        }
+        if !unused.is_empty() {
+            tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.scene.display(), mtl.name, unused.join(", "));
         }
         let mut look = Look::plain(self.materials.push(material));
         // Glass lets through what it does not reflect.
@@ -59,7 +70,9 @@ impl Builder {
             (None, None) => None,
         };
         look.relief = relief.map(|relief| self.materials.push_relief(relief));
-        Ok(MtlLook { look, radiance: surface.radiance })
+        let texture = emission.map(|map| self.emission_map(path, &map)).transpose()?;
+        let emission = surface.radiance.map(|radiance| Emission { texture, ..Emission::constant(radiance) });
+        Ok(MtlLook { look, emission })
     }
 
     fn map_texture(&mut self, path: &str, map: &ObjMap, wanted: TextureUse) -> Result<Bitmap> {
@@ -73,7 +86,17 @@ impl Builder {
         })
     }
 
-    fn diffuse_map(&mut self, path: &str, map: &ObjMap, tint: Rgb) -> Result<TextureId> {
+    fn emission_map(&mut self, path: &str, map: &ObjMap) -> Result<TextureId> {
+        let bitmap = Bitmap { channel: None, ..self.map_texture(path, map, TextureUse::Color)? };
+        let [min, _] = bitmap.range();
+        if min < 0.0 {
+            let message = format!("{}: goes down to {min}: light is not negative", map.file.display());
+            return Err(meshes::refusal(&self.files, path, None, message));
+        }
+        Ok(self.materials.textures.push(Texture::Bitmap(bitmap)))
+    }
+
+    fn reflectance_map(&mut self, path: &str, map: &ObjMap, tint: Rgb) -> Result<TextureId> {
         let bitmap = Texture::Bitmap(Bitmap { channel: None, ..self.map_texture(path, map, TextureUse::Color)? });
         let texture = if tint == Rgb::WHITE { bitmap } else { Texture::Product([bitmap, Texture::Constant(tint)].into()) };
         let id = self.materials.textures.push(texture);
@@ -115,6 +138,27 @@ impl Builder {
         let id = self.materials.textures.push(Texture::Bitmap(bitmap));
         let textures = &self.materials.textures.textures;
         Ok(if holds_normals { Relief::normal_map(id, 1.0, false, textures) } else { Relief::bump_map(id, map.height, textures) })
+    }
+}
+
+/// The colour that a map multiplies where a material's reflection has one: of mirrors, and of metals, which have the colour themselves.
+fn specular_tint(material: &Material) -> Option<Rgb> {
+    match material {
+        Material::Constant(Bsdf::Mirror(mirror)) => Some(mirror.reflectance),
+        Material::Constant(Bsdf::Conductor(_)) => Some(Rgb::WHITE),
+        _ => None,
+    }
+}
+
+/// The material with a texture for the colour of its reflection, where it has one.
+fn with_specular(material: Material, color: ColorInput) -> Material {
+    match material {
+        Material::Constant(Bsdf::Mirror(_)) => Varying::Mirror { reflectance: color }.into(),
+        Material::Constant(Bsdf::Conductor(metal)) => {
+            let alpha = AlphaInput { axes: metal.alpha().map(ScalarInput::Constant), squared: false };
+            Varying::Conductor { metal, tint: color, alpha, multiscatter: true }.into()
+        }
+        other => other,
     }
 }
 

@@ -14,13 +14,13 @@ use crate::texture::{Bitmap, Channel, Texture};
 
 impl Builder {
     /// What a shape's own key says, if the shape has holes at all.
-    pub(super) fn opacity(&mut self, path: &str, common: &ShapeCommon, shines: bool) -> Result<Option<TextureId>> {
+    pub(super) fn opacity(&mut self, path: &str, common: &ShapeCommon) -> Result<Option<TextureId>> {
         let Some(desc) = common.opacity else {
             return Ok(None);
         };
         let path = format!("{path}.opacity");
         let textures = &mut self.materials.textures;
-        let id = match desc {
+        Ok(match desc {
             OpacityDesc::Number(value) => {
                 let value = self.files.within(&path, f64::from(*value), 0.0, 1.0)? as f32;
                 (value < 1.0).then(|| textures.push(Texture::Constant(Rgb::splat(value))))
@@ -43,11 +43,7 @@ impl Builder {
                 }
                 Some(id)
             }
-        };
-        if shines && id.is_some() {
-            return Err(self.files.error(&path, "a shape that gives off light cannot have holes"));
-        }
-        Ok(id)
+        })
     }
 }
 

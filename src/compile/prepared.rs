@@ -61,7 +61,7 @@ impl Builder {
         let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map, self.shutter)?;
         let (map, motion) = motion.as_constant().map_or((map, Some(motion)), |rest| (rest, None));
         let emission = self.emission(path, &common)?;
-        look.opacity = self.opacity(path, &common, emission.is_some())?;
+        look.opacity = self.opacity(path, &common)?;
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
         }
@@ -103,13 +103,7 @@ impl Builder {
                 // What the scene says of the shape counts.
                 let given = if desc.opacity.is_some() { look.opacity } else { from_mtl.look.opacity };
                 look = Look { opacity: given, ..from_mtl.look };
-                emission =
-                    emission.or(from_mtl.radiance.map(|radiance| PreparedEmission { emission: Emission::constant(radiance), group: None }));
-            }
-            if emission.is_some() && look.opacity.is_some() {
-                let message = format!("{path}: what gives off light has no holes: its opacity is not used");
-                tracing::warn!("{}: {message}", self.files.scene.display());
-                look.opacity = None;
+                emission = emission.or(from_mtl.emission.map(|emission| PreparedEmission { emission, group: None }));
             }
             if !has_uvs && self.materials.needs_uv(&look) {
                 return Err(meshes::refusal(
@@ -158,7 +152,7 @@ impl Builder {
             ColorInput::Constant(color) => (radiance * color, None),
             ColorInput::Texture(id) => (radiance, Some(id)),
         };
-        let emission = Emission { radiance, two_sided: desc.two_sided, texture };
+        let emission = Emission { radiance, two_sided: desc.two_sided, texture, opacity: None };
         Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
@@ -192,6 +186,7 @@ impl Builder {
         }
         let mut surface = Surface { material: look.material, relief: look.relief, medium, first_light: None, single_light: false };
         if let Some(PreparedEmission { emission, group }) = emission {
+            let emission = Emission { opacity: look.opacity, ..emission };
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
             if !lights.iter().any(|light| light.area() > 0.0) {
                 return Err(self.files.error(&format!("{path}.emission"), "the light has no area"));

@@ -1,57 +1,60 @@
 //! Materials with relief: normal maps and bump maps.
 
-use super::Files;
-use super::materials::{Look, MaterialTable};
+use super::materials::{Compiler, MaterialTable};
 use super::textures::TextureUse;
 use crate::desc::{BumpMapDesc, ColorSpaceDesc, MaterialDesc, NormalMapDesc, SceneDesc, TextureDesc};
 use crate::error::Result;
-use crate::id::ReliefId;
+use crate::id::{MaterialId, ReliefId};
+use crate::material::Material;
 use crate::relief::Relief;
 
 impl MaterialTable {
-    /// Adds the materials with relief, once all others are there.
-    pub(super) fn add_reliefs(&mut self, files: &Files, desc: &SceneDesc) -> Result<()> {
-        let mut looks = Vec::new();
-        for (name, material) in &desc.materials {
-            let MaterialDesc::Relief { material, normal_map, bump_map } = material else { continue };
-            let path = format!("materials.{name}");
-            if matches!(desc.materials.get(material), Some(MaterialDesc::Relief { .. })) {
-                return Err(files.error(&format!("{path}.material"), format!("\"{material}\" has a relief of its own")));
-            }
-            let base = self.find(files, &path, Some(material))?;
-            let relief = match (normal_map, bump_map) {
-                (Some(map), None) => self.normal_map(files, desc, &format!("{path}.normal_map"), map)?,
-                (None, Some(map)) => self.bump_map(files, &format!("{path}.bump_map"), map)?,
-                _ => return Err(files.error(&path, "a relief needs either `normal_map` or `bump_map`")),
-            };
-            looks.push((name.clone(), Look { relief: Some(self.push_relief(relief)), ..base }));
-        }
-        for (name, look) in looks {
-            self.insert(name, look);
-        }
-        Ok(())
-    }
-
     /// Adds a relief.
     pub(super) fn push_relief(&mut self, relief: Relief) -> ReliefId {
         self.reliefs.push(relief);
         ReliefId::new(self.reliefs.len() - 1)
     }
 
-    fn normal_map(&self, files: &Files, desc: &SceneDesc, path: &str, map: &NormalMapDesc) -> Result<Relief> {
-        let place = format!("{path}.texture");
-        let texture = self.textures.find(files, &place, &map.texture, TextureUse::Data)?;
-        if let Some(TextureDesc::Image { color_space: ColorSpaceDesc::Srgb, .. }) = desc.textures.get(&map.texture) {
-            return Err(files.error(&place, format!("the `color_space` of \"{}\" is `srgb`, but normals are data", map.texture)));
+    /// The relief of a material by itself.
+    pub(super) fn relief_of(&self, id: MaterialId) -> Option<ReliefId> {
+        self.by_material.get(&id).copied()
+    }
+
+    /// Reliefs by material if some material consists of one with relief; none otherwise.
+    pub(super) fn part_reliefs(&self) -> Vec<Option<ReliefId>> {
+        let mut parts = self.materials.iter().filter_map(Material::parts).flatten();
+        if !parts.any(|part| self.relief_of(part).is_some()) {
+            return Vec::new();
         }
-        files.within(&format!("{path}.strength"), f64::from(map.strength), 0.0, 16.0)?;
+        (0..self.materials.len()).map(|i| self.relief_of(MaterialId::new(i))).collect()
+    }
+}
+
+impl Compiler<'_> {
+    /// The relief that a material says, if it is one with relief.
+    pub(super) fn relief(&self, desc: &SceneDesc, path: &str, material: &MaterialDesc) -> Result<Option<Relief>> {
+        let MaterialDesc::Relief { normal_map, bump_map, .. } = material else { return Ok(None) };
+        Ok(Some(match (normal_map, bump_map) {
+            (Some(map), None) => self.normal_map(desc, &format!("{path}.normal_map"), map)?,
+            (None, Some(map)) => self.bump_map(&format!("{path}.bump_map"), map)?,
+            _ => return Err(self.files.error(path, "a relief needs either `normal_map` or `bump_map`")),
+        }))
+    }
+
+    fn normal_map(&self, desc: &SceneDesc, path: &str, map: &NormalMapDesc) -> Result<Relief> {
+        let place = format!("{path}.texture");
+        let texture = self.textures.find(self.files, &place, &map.texture, TextureUse::Data)?;
+        if let Some(TextureDesc::Image { color_space: ColorSpaceDesc::Srgb, .. }) = desc.textures.get(&map.texture) {
+            return Err(self.files.error(&place, format!("the `color_space` of \"{}\" is `srgb`, but normals are data", map.texture)));
+        }
+        self.files.within(&format!("{path}.strength"), f64::from(map.strength), 0.0, 16.0)?;
         Ok(Relief::normal_map(texture, map.strength, map.flip_y, &self.textures.textures))
     }
 
-    fn bump_map(&self, files: &Files, path: &str, map: &BumpMapDesc) -> Result<Relief> {
-        let texture = self.textures.find(files, &format!("{path}.texture"), &map.texture, TextureUse::Data)?;
+    fn bump_map(&self, path: &str, map: &BumpMapDesc) -> Result<Relief> {
+        let texture = self.textures.find(self.files, &format!("{path}.texture"), &map.texture, TextureUse::Data)?;
         if !map.height.is_finite() {
-            return Err(files.error(&format!("{path}.height"), "is not finite"));
+            return Err(self.files.error(&format!("{path}.height"), "is not finite"));
         }
         Ok(Relief::bump_map(texture, map.height, &self.textures.textures))
     }

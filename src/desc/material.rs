@@ -210,9 +210,9 @@ pub enum MaterialDesc {
         back: String,
     },
     /// Another material on a surface that looks as if it had relief: give `normal_map` or `bump_map`. The shape itself stays as it is, and
-    /// needs uv: every shape has them but a mesh without `uvs`.
+    /// needs uv: every shape has them but a mesh without `uvs`. It may be a part of other materials.
     Relief {
-        /// The material, by name; not one with a relief of its own.
+        /// The material, by name; neither it nor a part of it has a relief of its own.
         material: String,
         /// An image of normals.
         #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -90,10 +90,11 @@ shapes! {
         /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ brings those of its MTL: `illum`
         /// 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular colour Ks with an exponent Ns has alpha =
         /// sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic with base Kd otherwise; all else is diffuse with Kd. Ke is
-        /// radiance given off. `map_Kd` is a texture times Kd (times 1 if Kd is black), where the faces have uv; `norm` is a normal map, `bump`
+        /// radiance given off. `map_Kd` is a texture times Kd (times 1 if Kd is black), where the faces have uv, and so are `map_Ke` times Ke
+        /// and, on mirrors and metals, `map_Ks` times Ks; `norm` is a normal map, `bump`
         /// and `map_Bump` are one if their image has colours, else heights in world units times `-bm`. `d` (or 1 - `Tr`) is the opacity of what
-        /// is neither glass nor a lamp, times `map_d` (its alpha, else its luminance) or the alpha of `map_Kd`. Of the options of maps, `-s`,
-        /// `-o`, `-clamp`, `-bm` and `-imfchan` count. Other maps are not used.
+        /// is not glass, times `map_d` (its alpha, else its luminance) or the alpha of `map_Kd`. Of the options of maps, `-s`, `-o`, `-clamp`,
+        /// `-bm` and `-imfchan` count. Other maps are not used.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
         /// Inline: positions of the vertices.

@@ -32,6 +32,10 @@ pub struct ObjMaps {
     pub normal: Option<ObjMap>,
     /// `map_d`, opacity.
     pub opacity: Option<ObjMap>,
+    /// `map_Ks`, factor on the specular colour.
+    pub specular: Option<ObjMap>,
+    /// `map_Ke`, factor on the light given off.
+    pub emission: Option<ObjMap>,
     /// Other maps, by their keys.
     pub unused: Vec<String>,
 }
@@ -62,6 +66,8 @@ pub fn take_maps(text: &str, folder: &Path) -> Result<(String, HashMap<String, O
             "bump" | "map_bump" => &mut maps.bump,
             "norm" => &mut maps.normal,
             "map_d" => &mut maps.opacity,
+            "map_ks" => &mut maps.specular,
+            "map_ke" => &mut maps.emission,
             _ => {
                 maps.unused.push(key.to_owned());
                 continue;
@@ -134,7 +140,7 @@ mod tests {
         assert_eq!(bump.bump.unwrap().height, 0.25);
         assert_eq!(maps("norm n.png").normal.unwrap().file, Path::new("textures/n.png"));
         assert_eq!(maps("map_d on on").opacity.unwrap().file, Path::new("textures/on on"));
-        assert_eq!(maps("map_Ks s.png\nmap_Ns n.png").unused, ["map_Ks", "map_Ns"]);
+        assert_eq!(maps("map_Ka a.png\nmap_Ns n.png").unused, ["map_Ka", "map_Ns"]);
     }
 
     #[test]

@@ -370,7 +370,7 @@ impl<'a> Vertex<'a> {
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
         let bsdf = world.scene.bsdf(at, ray.direction, bsdf);
         // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
-        let has_relief = world.scene.features.reliefs && world.scene.surface(at.shape).relief.is_some();
+        let has_relief = world.scene.features.reliefs && world.scene.relief(at, ray.direction).is_some();
         let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
         Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric, cos_normals }
     }

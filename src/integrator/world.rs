@@ -58,7 +58,7 @@ impl<'a> World<'a> {
     #[inline(never)]
     fn with_relief(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
         let scene = self.scene;
-        let Some(id) = scene.surface(at.shape).relief else { return at };
+        let Some(id) = scene.relief(&at, ray.direction) else { return at };
         let dp_dv = scene.geometry.dp_dv(ray, hit);
         SurfaceInteraction { n_s: scene.reliefs[id.index()].normal(&scene.geometry, &scene.textures, &at, dp_dv), ..at }
     }

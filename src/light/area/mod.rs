@@ -29,12 +29,14 @@ pub struct Emission {
     pub two_sided: bool,
     /// A texture over the surface's uv that multiplies the radiance.
     pub texture: Option<TextureId>,
+    /// How much of the surface is there, by its uv, if not all of it.
+    pub opacity: Option<TextureId>,
 }
 
 impl Emission {
     /// The same radiance from every point of the front.
     pub const fn constant(radiance: Rgb) -> Self {
-        Self { radiance, two_sided: false, texture: None }
+        Self { radiance, two_sided: false, texture: None, opacity: None }
     }
 
     /// Radiance at a point of the surface.
@@ -51,12 +53,24 @@ impl Emission {
     fn textured(&self, texture: &Texture, uv: Vec2) -> Rgb {
         self.radiance * texture.color(uv)
     }
+
+    /// Whether all points of the surface give off the same light.
+    #[inline]
+    fn is_even(&self) -> bool {
+        self.texture.is_none() && self.opacity.is_none()
+    }
+
+    /// What a point chosen on the surface brings: rays meet it as often as its opacity says, so this is the mean over rays.
+    fn expected(&self, textures: &[Texture], uv: Vec2) -> Rgb {
+        let coverage = self.opacity.map_or(1.0, |id| textures[id.index()].scalar(uv));
+        self.at(textures, || uv) * coverage
+    }
 }
 
 /// An emissive analytic shape, one triangle of an emissive mesh, or a mesh of two triangles that make up a parallelogram.
 ///
 /// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by area. Quads with a
-/// texture are sampled by its brightness in half of the cases.
+/// texture or with holes are sampled by their brightness in half of the cases.
 #[derive(Clone, Debug)]
 pub struct AreaLight {
     /// The shape.
@@ -132,27 +146,29 @@ impl AreaLight {
     pub fn new(shape: ShapeId, prim: PrimId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Self {
         let mut form = match geometry.shape(shape) {
             Shape::Mesh(mesh) => Form::Triangle { area: TriangleEmitter::new(&mesh.triangle_points(prim)).area() },
+            // Through the holes of a sphere its far side is seen, which only sampling by area finds.
+            Shape::Analytic(placed) if emission.opacity.is_some() => Form::by_area(placed),
             Shape::Analytic(placed) => Form::analytic(placed),
         };
         let mut luminance = emission.radiance.luminance();
-        if let Some(id) = emission.texture {
-            let texture = &textures[id.index()];
-            luminance *= textured::mean_luminance(geometry.shape(shape), prim, texture);
+        if !emission.is_even() {
+            let brightness = |uv| emission.expected(textures, uv).luminance();
+            luminance = textured::mean(geometry.shape(shape), prim, brightness).max(textured::LEAST_MEAN * luminance);
             if let Form::Parallelogram(quad) = &mut form {
-                quad.texels = textured::density(texture).map(Box::new);
+                quad.texels = textured::density(brightness).map(Box::new);
             }
         }
         Self { shape, prim, emission, luminance, form }
     }
 
     /// The lights of a shape that stands in the world: one for each triangle of a mesh in their order, or a single one for an analytic
-    /// shape and for a mesh of two triangles that make up a parallelogram (without a texture).
+    /// shape and for a mesh of two triangles that make up a parallelogram (without a texture or holes).
     ///
     /// The `single_light` of the scene's surface is to be set if there is only one.
     pub fn for_shape(shape: ShapeId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Vec<Self> {
         let first = PrimId(0);
         if let Shape::Mesh(mesh) = geometry.shape(shape) {
-            if let Some(form) = Form::two_triangles(mesh).filter(|_| emission.texture.is_none()) {
+            if let Some(form) = Form::two_triangles(mesh).filter(|_| emission.is_even()) {
                 return vec![Self { shape, prim: first, emission, luminance: emission.radiance.luminance(), form }];
             }
             return (0..mesh.triangles().len()).map(|i| Self::new(shape, PrimId::new(i), emission, geometry, textures)).collect();
@@ -169,21 +185,21 @@ impl AreaLight {
     /// Light that arrives at `p` from a chosen point of the surface; `None` where `p` sees the dark side.
     #[inline]
     pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
-        if self.emission.texture.is_some() {
+        if !self.emission.is_even() {
             return self.sample_textured(geometry, textures, p, u);
         }
         let (sample, error) = self.sample_surface(geometry, p, u)?;
         Some(LightSample::at(&sample, error, self.emission.radiance))
     }
 
-    /// [`sample`](Self::sample) for emission from a texture.
+    /// [`sample`](Self::sample) for emission with a texture or holes.
     #[inline(never)]
     fn sample_textured(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
         let (sample, error) = match &self.form {
             Form::Parallelogram(quad) if self.emission.two_sided || quad.sees_front(p) => (quad.sample_textured(p, u)?, quad.error),
             _ => self.sample_surface(geometry, p, u)?,
         };
-        let radiance = self.emission.at(textures, || textured::uv(geometry.shape(self.shape), self.prim, sample.p, u));
+        let radiance = self.emission.expected(textures, textured::uv(geometry.shape(self.shape), self.prim, sample.p, u));
         Some(LightSample::at(&sample, error, radiance))
     }
 
@@ -286,14 +302,17 @@ impl Form {
                 radius: sphere.radius() * scale,
                 inward: placed.reverse_normal,
             })),
-            (Analytic::Quad(quad), _) => {
-                let map = &placed.transform;
-                let front = placed.sample_area([0.5; 2]).n.as_dvec3();
-                ParallelogramEmitter::new(map.point(quad.origin()), map.vector(quad.edge_u()), map.vector(quad.edge_v()), front, 0.0)
-                    .map_or(Self::Placed { area: 0.0 }, |quad| Self::Parallelogram(Box::new(quad)))
-            }
-            _ => Self::Placed { area: placed_area(placed) },
+            _ => Self::by_area(placed),
         }
+    }
+
+    /// What does not depend on a part of the surface being hidden by another.
+    fn by_area(placed: &Placed) -> Self {
+        let Analytic::Quad(quad) = &placed.shape else { return Self::Placed { area: placed_area(placed) } };
+        let map = &placed.transform;
+        let front = placed.sample_area([0.5; 2]).n.as_dvec3();
+        ParallelogramEmitter::new(map.point(quad.origin()), map.vector(quad.edge_u()), map.vector(quad.edge_v()), front, 0.0)
+            .map_or(Self::Placed { area: 0.0 }, |quad| Self::Parallelogram(Box::new(quad)))
     }
 
     /// Two triangles that share an edge, look to the same side and make up a parallelogram.

@@ -1,10 +1,9 @@
-//! Textures on surfaces that emit.
+//! Textures and holes of surfaces that emit.
 
 use crate::geometry::Shape;
 use crate::id::PrimId;
 use crate::math::{DVec3, Vec2};
 use crate::sampling::{Piecewise2d, warp};
-use crate::texture::Texture;
 
 /// Cells of a density along each side, and lookups along each side of a cell.
 const CELLS: usize = 64;
@@ -14,7 +13,7 @@ const LOOKUPS: usize = 3;
 const TRIANGLE_LOOKUPS: usize = 4;
 
 /// What a texture counts at least: lookups may all meet black and miss a bright spot, and a light that counts nothing is never chosen.
-const LEAST_MEAN: f32 = 1e-3;
+pub(super) const LEAST_MEAN: f32 = 1e-3;
 
 /// Surface parameters at the point `p` of a shape that its sampling found with `u`.
 pub(super) fn uv(shape: &Shape, prim: PrimId, p: DVec3, u: [f32; 2]) -> Vec2 {
@@ -27,8 +26,8 @@ pub(super) fn uv(shape: &Shape, prim: PrimId, p: DVec3, u: [f32; 2]) -> Vec2 {
     }
 }
 
-/// Mean luminance of a texture over a primitive, about, and above 0.
-pub(super) fn mean_luminance(shape: &Shape, prim: PrimId, texture: &Texture) -> f32 {
+/// Mean of a function of uv over a primitive, about.
+pub(super) fn mean(shape: &Shape, prim: PrimId, function: impl Fn(Vec2) -> f32) -> f32 {
     let side = if matches!(shape, Shape::Mesh(_)) { TRIANGLE_LOOKUPS } else { CELLS };
     let middle = |i: usize| (i as f32 + 0.5) / side as f32;
     let at = |i: usize| {
@@ -37,20 +36,19 @@ pub(super) fn mean_luminance(shape: &Shape, prim: PrimId, texture: &Texture) -> 
             Shape::Mesh(_) => DVec3::ZERO,
             Shape::Analytic(placed) => placed.sample_area(u).p,
         };
-        texture.color(uv(shape, prim, p, u)).luminance()
+        function(uv(shape, prim, p, u))
     };
-    let mean = (0..side * side).map(at).sum::<f32>() / (side * side) as f32;
-    mean.max(LEAST_MEAN)
+    (0..side * side).map(at).sum::<f32>() / (side * side) as f32
 }
 
-/// The density over the unit square that follows a texture's brightness; `None` if it is black.
-pub(super) fn density(texture: &Texture) -> Option<Piecewise2d> {
+/// The density over the unit square that follows a brightness; `None` if it is black.
+pub(super) fn density(brightness: impl Fn(Vec2) -> f32) -> Option<Piecewise2d> {
     let n = CELLS * LOOKUPS;
     let middle = |i: usize| (i as f32 + 0.5) / n as f32;
     let mut weights = vec![0.0; CELLS * CELLS];
     for y in 0..n {
         for x in 0..n {
-            weights[y / LOOKUPS * CELLS + x / LOOKUPS] += texture.color(Vec2::new(middle(x), middle(y))).luminance();
+            weights[y / LOOKUPS * CELLS + x / LOOKUPS] += brightness(Vec2::new(middle(x), middle(y)));
         }
     }
     Piecewise2d::new(CELLS, CELLS, &weights)
