@@ -161,3 +161,23 @@ fn tolerances_live_in_one_place() {
     }
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }
+
+#[test]
+fn every_known_flaw_has_its_tests() {
+    let text = std::fs::read_to_string("docs/flaws.md").unwrap();
+    let files = sources(&["src", "tests"]);
+    let is_test = |name: &str| {
+        files
+            .iter()
+            .any(|file| file.text.contains(&format!("#[test]\n    fn {name}()")) || file.text.contains(&format!("#[test]\nfn {name}()")))
+    };
+    let rows: Vec<&str> =
+        text.lines().filter(|line| line.starts_with("| A") || line.starts_with("| B") || line.starts_with("| C")).collect();
+    assert!(rows.len() >= 40, "{}", rows.len());
+    let mut faults = Vec::new();
+    for row in rows {
+        let names: Vec<&str> = row.rsplit('|').nth(1).unwrap().split(',').map(|name| name.trim().trim_matches('`')).collect();
+        faults.extend(names.into_iter().filter(|name| !is_test(name)).map(|name| format!("{name}: {row}")));
+    }
+    assert!(faults.is_empty(), "no such test:\n{}", faults.join("\n"));
+}

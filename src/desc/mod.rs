@@ -16,7 +16,9 @@ mod transform;
 
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
-pub use material::{AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc, ScalarDesc};
+pub use material::{
+    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc, ScalarDesc,
+};
 pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
 pub use principled::PrincipledDesc;
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
