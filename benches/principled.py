@@ -45,7 +45,7 @@ def pairs():
 def ours(materials, wo, wi):
     request = {"materials": materials, "pairs": np.stack([wo, wi], 1).tolist()}
     command = os.environ.get("EVAL", "cargo run -q --release --locked --example eval_materials").split()
-    out = subprocess.run(command, input=json.dumps(request), capture_output=True, text=True, check=True).stdout
+    out = subprocess.run(command, input=json.dumps(request), stdout=subprocess.PIPE, text=True, check=True).stdout
     return np.array(json.loads(out))[..., :3]
 
 
@@ -75,9 +75,34 @@ def masking(parameters, wo, wi):
     return (2 * zo / (zo + lo)) * (2 * zi / (zi + li)) / (2 * zo * zi / (lo * zi + li * zo))
 
 
+def fresnel(parameters, wo, wi):
+    """The exact reflectance of a dielectric over Schlick's approximation."""
+    ahead = 0.08 * parameters["specular"]
+    ior = 2 / (1 - np.sqrt(ahead)) - 1
+    c = np.sqrt(np.clip(0.5 * (1 + (wo * wi).sum(axis=1)), 0, 1))
+    t = np.sqrt(1 - (1 - c * c) / ior**2)
+    exact = 0.5 * (((ior * c - t) / (ior * c + t)) ** 2 + ((c - ior * t) / (c + ior * t)) ** 2)
+    return exact / (ahead + (1 - ahead) * (1 - c) ** 5)
+
+
+def masking_and_fresnel(parameters, wo, wi):
+    return masking(parameters, wo, wi) * fresnel(parameters, wo, wi)
+
+
+def cosines(_, wo, wi):
+    """The denominator of a microfacet model, which Mitsuba's clear coat is without."""
+    return np.abs(4 * wo[:, 2] * wi[:, 2])
+
+
+def luminance(_, wo, wi):
+    """Mitsuba divides a tint by the luminance of the colour, we by its largest channel."""
+    return np.full(len(wo), max(COLOR) / np.dot([0.212671, 0.715160, 0.072169], COLOR))
+
+
 def line(name, a, b):
     scale = np.maximum(np.abs(a), np.abs(b))
-    difference = (np.abs(a - b) / np.maximum(scale, 1e-9))[scale > 1e-6]
+    # Differences of values carry the rounding of what was subtracted.
+    difference = (np.abs(a - b) / np.maximum(scale, 1e-9))[scale > 1e-3 * scale.max(axis=0)]
     print(f"{name:44} {a.sum() / b.sum():8.4f} {difference.max():12.1e} {np.median(difference):10.1e}")
 
 
@@ -85,40 +110,48 @@ def main():
     os.chdir(os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
     wo, wi = pairs()
     black = {"base_color": [0, 0, 0]}
+    # Name, parameters, parameters of what is subtracted from both, what ours is multiplied by.
     lobes = [
-        ("diffuse", {"specular": 0}, False),
-        ("diffuse, rough", {"specular": 0, "roughness": 1}, False),
-        ("flat", {"specular": 0, "subsurface": 1}, False),
-        ("sheen", {"specular": 0, "sheen": 1, **black}, False),
-        ("sheen over diffuse", {"specular": 0, "sheen": 1}, False),
-        ("sheen, tinted", {"specular": 0, "sheen": 1, "sheen_tint": 1}, False),
-        ("metal", {"metallic": 1}, False),
-        ("metal, with Mitsuba's G", {"metallic": 1}, True),
-        ("metal, anisotropic, with Mitsuba's G", {"metallic": 1, "anisotropic": 0.8}, True),
-        ("metal, rough, with Mitsuba's G", {"metallic": 1, "roughness": 1}, True),
-        ("layer alone, with Mitsuba's G", black, True),
-        ("layer alone, specular 1, with Mitsuba's G", {"specular": 1, **black}, True),
-        ("layer, tinted", {"specular_tint": 1}, False),
-        ("layer over diffuse", {}, False),
-        ("clear coat alone", {"specular": 0, "clearcoat": 1, **black}, False),
-        ("clear coat, satin, over diffuse", {"specular": 0, "clearcoat": 1, "clearcoat_gloss": 0}, False),
-        ("glass", {"transmission": 1}, False),
-        ("glass, with Mitsuba's G", {"transmission": 1}, True),
+        ("diffuse", {}, black, None),
+        ("diffuse, roughness 1", {"roughness": 1}, {"roughness": 1, **black}, None),
+        ("flat", {"subsurface": 1}, {"subsurface": 1, **black}, None),
+        ("sheen", {"sheen": 1, **black}, black, None),
+        ("sheen, tinted", {"sheen": 1, "sheen_tint": 1}, {}, None),
+        ("sheen, tinted, with their luminance", {"sheen": 1, "sheen_tint": 1}, {}, luminance),
+        ("clear coat", {"clearcoat": 1, **black}, black, None),
+        ("clear coat, without 4 cos cos", {"clearcoat": 1, **black}, black, cosines),
+        ("clear coat, gloss 0, without 4 cos cos", {"clearcoat": 1, "clearcoat_gloss": 0, **black}, black, cosines),
+        ("metal", {"metallic": 1}, None, None),
+        ("metal, with their G", {"metallic": 1}, None, masking),
+        ("metal, anisotropic, with their G", {"metallic": 1, "anisotropic": 0.8}, None, masking),
+        ("metal, roughness 1, with their G", {"metallic": 1, "roughness": 1}, None, masking),
+        ("glass", {"transmission": 1}, None, None),
+        ("glass, with their G", {"transmission": 1}, None, masking),
+        ("layer", black, None, None),
+        ("layer, with their G and F", black, None, masking_and_fresnel),
+        ("layer, specular 1, with their G and F", {"specular": 1, **black}, None, masking_and_fresnel),
+        ("all of it, by default", {}, None, None),
     ]
     names = ["metallic", "roughness", "anisotropic", "specular", "sheen", "clearcoat", "subsurface", "transmission"]
     corners = [dict(zip(names, bits)) for bits in itertools.product([0, 1], repeat=len(names))]
     for corner in corners:
-        corner["roughness"] = 0.3 + 0.7 * corner["roughness"]
-    sets = [{**BASE, **changes} for _, changes, _ in lobes] + [{**BASE, **corner} for corner in corners]
+        # Mitsuba's alpha is not limited to 1.
+        corner["roughness"] = 0.3 + 0.4 * corner["roughness"]
+        corner["anisotropic"] *= 0.8
+        corner["specular"] = 0.5 + 0.5 * corner["specular"]
+    sets = [{**BASE, **changes} for lobe in lobes for changes in (lobe[1], lobe[2] or {})] + [{**BASE, **corner} for corner in corners]
     materials = [
         {"type": "principled", "multiscatter": False, "base_color": p.get("base_color", COLOR), **{k: p[k] for k in KEYS}} for p in sets
     ]
     values = ours(materials, wo, wi)
     print(f"{'':44} {'ratio':>8} {'largest':>12} {'median':>10}")
-    for (name, _, scaled), p, value in zip(lobes, sets, values):
-        line(name, value * masking(p, wo, wi)[:, None] if scaled else value, theirs(p, wo, wi))
+    for i, (name, _, subtracted, factor) in enumerate(lobes):
+        p, ours_value, theirs_value = sets[2 * i], values[2 * i], theirs(sets[2 * i], wo, wi)
+        if subtracted is not None:
+            ours_value, theirs_value = ours_value - values[2 * i + 1], theirs_value - theirs(sets[2 * i + 1], wo, wi)
+        line(name, ours_value * factor(p, wo, wi)[:, None] if factor else ours_value, theirs_value)
     ratios = []
-    for p, value in zip(sets[len(lobes):], values[len(lobes):]):
+    for p, value in zip(sets[2 * len(lobes):], values[2 * len(lobes):]):
         ratios.append((value.sum() / theirs(p, wo, wi).sum(), {k: p[k] for k in names if p[k] != BASE[k]}))
     ratios.sort(key=lambda r: r[0])
     print(f"\n{len(ratios)} corners: ratio of sums from {ratios[0][0]:.3f} {ratios[0][1]}\n    to {ratios[-1][0]:.3f} {ratios[-1][1]}")

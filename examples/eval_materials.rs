@@ -30,6 +30,7 @@ fn evaluate(material: &Value, pairs: &[[[f32; 3]; 2]]) -> Result<Vec<[f32; 4]>> 
     let scene = json!({
         "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] },
         "materials": { "m": material },
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
         "shapes": [{ "type": "sphere", "material": "m" }]
     });
     let scene = compile::compile(&import::parse_scene(&scene.to_string(), path)?, path)?;

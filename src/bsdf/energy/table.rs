@@ -170,10 +170,10 @@ pub fn cosine_axis(cos: f32, alpha: f32) -> f32 {
 
 /// How far a direction is from the plane of the larger alpha to that of the smaller, within `[0, 1]`: for the squared cosine and sine of its
 /// azimuth from that plane, and the smaller alpha over the larger. At equal masking the albedo changes close to the second plane, the closer
-/// the smaller the aspect; the power is fitted so that it is linear in this to half a hundredth.
+/// the smaller the aspect; the power is fitted so that it is linear in this to a hundredth, and hardly ever less.
 #[inline]
 pub fn across(cos_squared: f32, sin_squared: f32, aspect: f32) -> f32 {
-    let shrunk = sin_squared * aspect.powf((1.9 - 2.5 * aspect).max(0.0));
+    let shrunk = sin_squared * aspect.powf(1.95 - 1.6 * aspect);
     if cos_squared + shrunk > 0.0 { shrunk / (cos_squared + shrunk) } else { 0.5 }
 }
 

@@ -115,7 +115,7 @@ fn essential(bits: u32) -> u32 {
 #[test]
 fn no_corner_scatters_more_than_it_receives() {
     // Corners that differ in what has no effect scatter alike, bit for bit. For each of the others the albedo comes from two shifted Sobol
-    // sequences over all random numbers of a sample. Nothing is random: the points are fixed, and the two differ by less than 0.004.
+    // sequences over all random numbers of a sample. Nothing is random: the points are fixed.
     let mut corners = Vec::new();
     for bits in 0..2048 {
         if essential(bits) == bits {
@@ -129,24 +129,24 @@ fn no_corner_scatters_more_than_it_receives() {
         }
     }
     assert_eq!(corners.len(), 252);
-    let (mut worst, mut largest_difference) = (0f32, 0f32);
+    let mut worst = 0f32;
     for bits in corners {
         let bsdf = Bsdf::Principled(Principled::new(&corner(bits)));
         // Only glass has another inside.
         let inside = (bits >> 9 & 1 == 1).then_some(-0.5);
         for cos in [1.0, 0.7, 0.3, 0.1, 0.02].into_iter().chain(inside) {
-            let [a, b] = [1, 2].map(|seed| scattered_by(4096, seed, &bsdf, direction(cos, 0.07)).max_channel());
-            let albedo = 0.5 * (a + b);
-            if albedo > 1.005 {
-                println!("{bits:b} at {cos}: {a} {b}");
+            let by = |count: u32| [1, 2].map(|seed| scattered_by(count, seed, &bsdf, direction(cos, 0.07)).max_channel());
+            let [mut a, mut b] = by(4096);
+            // Where the two leave it open, the narrow lobe of a coat at grazing angles for the most part, many more points tell.
+            if 0.5 * (a + b) + (a - b).abs() > 1.005 {
+                [a, b] = by(1 << 17);
+                assert!((a - b).abs() < 0.004, "{bits:b} at {cos}: {a} {b}");
             }
+            let albedo = 0.5 * (a + b);
+            assert!(albedo <= 1.005, "{bits:b} at {cos}: {a} {b}");
             worst = worst.max(albedo);
-            largest_difference = largest_difference.max((a - b).abs());
         }
     }
-    println!("corners {worst} {largest_difference}");
-    assert!(worst <= 1.005, "{worst}");
-    assert!(largest_difference < 0.004, "{largest_difference}");
     assert!(worst > 0.99, "the bound is far from what is reached: {worst}");
 }
 
