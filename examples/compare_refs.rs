@@ -19,9 +19,9 @@ use steradian::{Error, Result, compile, import, output};
 
 const BLOCK: u32 = 16;
 
-/// What conventions may change where there is no noise at all: the rows of an environment reach from pole to pole either with their edges, as
-/// ours, or with their centres.
-const CONVENTIONS: f64 = 5e-4;
+/// What conventions may change where there is no noise: the rows of an environment reach from pole to pole either with their edges, as ours, or
+/// with their centres. Then each of 1,024 rows, and a sun on them, is larger by 1/1023.
+const CONVENTIONS: f64 = 1e-3;
 
 struct Arguments {
     references: PathBuf,

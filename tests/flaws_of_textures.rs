@@ -35,7 +35,7 @@ fn square() -> Value {
 fn meet(scene: &Scene, ray: &Ray) -> Option<(SurfaceInteraction, Vec3)> {
     let accel = accel::build(AccelKind::EMBREE, &scene.geometry, 1).unwrap();
     let hit = accel.intersect(ray)?;
-    Some((World::new(scene, &*accel).resolve(ray, Some(hit))?, scene.geometry.dp_dv(ray, &hit)))
+    Some((World::new(scene, &*accel).in_full().resolve(ray, Some(hit))?, scene.geometry.dp_dv(ray, &hit)))
 }
 
 /// The scattering where a ray along -z meets the scene.

@@ -256,6 +256,16 @@ fn maps_of_an_mtl_colour_mirrors_metals_and_lamps() {
         };
         assert!(emitted(-0.5) == 0.0 && (emitted(0.5) - expected).abs() < 1e-5, "{mtl}");
     }
+
+    let dark = folder.path("dark.exr");
+    exr::prelude::write_rgb_file(dark, 1, 1, |_, _| (-1f32, 0f32, 0f32)).unwrap();
+    for (mtl, fault) in
+        [("map_Ke dark.exr", "light is not negative"), ("illum 5\nmap_Ks dark.exr", "from -1 to 0"), ("map_Ke gone.png", "gone.png")]
+    {
+        folder.write("m.mtl", format!("newmtl m\n{mtl}\n"));
+        let message = folder.compile(&lit(json!({ "type": "mesh", "file": "m.obj" }))).unwrap_err().to_string();
+        assert!(message.contains("shapes[0]") && message.contains(fault), "{mtl}: {message}");
+    }
 }
 
 #[test]
