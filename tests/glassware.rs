@@ -113,7 +113,7 @@ fn every_line_enters_a_closed_profile_as_often_as_it_leaves() {
         for i in 0..30_000 {
             let (origin, direction) = line(&mut rng, &shape, i % 6);
             let hits = all_hits(&shape, origin, direction);
-            assert!(hits.len() % 2 == 0, "{name}: {} hits of {origin} {direction}: {hits:?}", hits.len());
+            assert!(hits.len().is_multiple_of(2), "{name}: {} hits of {origin} {direction}: {hits:?}", hits.len());
             most = most.max(hits.len());
         }
         // Through a foot and two walls, through two walls, through what they hold.
