@@ -113,11 +113,16 @@ fn every_line_enters_a_closed_profile_as_often_as_it_leaves() {
         for i in 0..30_000 {
             let (origin, direction) = line(&mut rng, &shape, i % 6);
             let hits = all_hits(&shape, origin, direction);
-            assert!(hits.len() % 2 == 0, "{name}: {} hits of {origin} {direction}: {hits:?}", hits.len());
+            assert!(hits.len().is_multiple_of(2), "{name}: {} hits of {origin} {direction}: {hits:?}", hits.len());
             most = most.max(hits.len());
         }
-        // Through two walls on both sides, at least where there are two.
-        assert!(most >= if ["wine", "oil", "water"].contains(&name.as_str()) { 4 } else { 6 }, "{name}: {most}");
+        // Through a foot and two walls, through two walls, through what they hold.
+        let least = match name.as_str() {
+            "wine glass" => 6,
+            "bottle" | "tumbler" => 4,
+            _ => 2,
+        };
+        assert!(most >= least, "{name}: {most}");
     }
 }
 

@@ -68,8 +68,8 @@ fn a_slab_of_absorbing_glass_gives_the_closed_form() {
     let mut scene = through(3.0, glass.clone(), json!([block("m", [0.0, 0.7])]));
     scene["sampler"]["spp"] = json!(1024);
     let image = render(&scene);
-    for c in 0..3 {
-        Estimate::of(&image, c).assert_is(expected[c], &format!("channel {c}"));
+    for (c, expected) in expected.into_iter().enumerate() {
+        Estimate::of(&image, c).assert_is(expected, &format!("channel {c}"));
     }
     // Whitted's integrator follows both lobes: no noise.
     scene["integrator"] = json!({ "type": "whitted", "max_depth": 14 });
@@ -367,8 +367,8 @@ fn a_label_on_a_bottle_is_opaque_and_the_rest_of_the_surface_is_not() {
     let mut scene = through(6.0, materials, json!([block("m", [0.0, 2.0])]));
     scene["sampler"]["spp"] = json!(256);
     let image = render(&scene);
-    for c in 0..3 {
-        Estimate::of(&image, c).assert_is(0.25 * left(RED, 2.0)[c], &format!("channel {c}"));
+    for (c, left) in left(RED, 2.0).into_iter().enumerate() {
+        Estimate::of(&image, c).assert_is(0.25 * left, &format!("channel {c}"));
     }
 }
 

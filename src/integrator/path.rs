@@ -130,7 +130,11 @@ impl PathIntegrator {
                 counts.indirect += self.arrive_all(world, scratch);
             }
 
-            self.shade_all(world, bounce, out, scratch);
+            if in_media {
+                self.shade_all::<true>(world, bounce, out, scratch);
+            } else {
+                self.shade_all::<false>(world, bounce, out, scratch);
+            }
 
             let shadows = scratch.shadow_rays.len();
             counts.shadow += shadows as u64;
@@ -177,9 +181,9 @@ impl PathIntegrator {
     /// Shades every living path's hit; afterwards the scratch holds the paths that go on, their rays, and the shadow rays to trace.
     ///
     /// Large results stay where they were returned and are read through references: a copy would have to wait for them.
-    fn shade_all(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
+    /// `MEDIA` is whether the scene has media.
+    fn shade_all<const MEDIA: bool>(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
         let Scratch { paths, rays, hits, shadow_rays, pending, media, .. } = scratch;
-        let in_media = world.scene.features.media;
         shadow_rays.clear();
         pending.clear();
         let mut alive = 0;
@@ -203,13 +207,13 @@ impl PathIntegrator {
             }
 
             let mut bsdf = None;
-            let boundary = if in_media { world.boundary_bsdf(at, ray.direction, &media[i]) } else { None };
+            let boundary = if MEDIA { world.boundary_bsdf(at, ray.direction, &media[i]) } else { None };
             let mut vertex = Vertex::new(world, at, ray, &mut bsdf);
             if let Some(boundary) = &boundary {
                 vertex.bsdf = boundary;
             }
             if let Some(mut shadow) = self.sample_light(world, path, &vertex, bounce) {
-                if in_media {
+                if MEDIA {
                     let here = world.media_toward(at, ray.direction, shadow.ray.direction, &media[i].here);
                     shadow.contribution *= world.transmittance(&here, &shadow.ray);
                 }
@@ -217,7 +221,7 @@ impl PathIntegrator {
                 pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
             }
             if let Some((path, next)) = self.scatter(world, path, &vertex, bounce) {
-                if in_media {
+                if MEDIA {
                     let here = world.media_toward(at, ray.direction, next.direction, &media[i].here);
                     media[alive] = MediaState { here, ..media[i] };
                 }
