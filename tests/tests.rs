@@ -20,6 +20,8 @@ mod determinism;
 mod flaws_of_camera;
 /// Known flaws of renderers in lights and light transport: each test fails on the flawed formula.
 mod flaws_of_light;
+/// The scenes that come with the program.
+mod gallery;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
 /// Measured and textured lights, lamps in objects, groups, clamping.
