@@ -9,12 +9,11 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use common::models::tessellated_sphere;
-use common::rays::Random;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use steradian::accel::{self, AccelKind, Accelerator};
 use steradian::geometry::{Analytic, Disk, Frustum, Geometry, Hit, Placed, Profile, Quad, Revolution, Shape, Sphere};
 use steradian::id::{PrimId, ShapeId};
-use steradian::math::{DVec3, Ray, Transform, Vec3};
+use steradian::math::{DVec3, Ray, Rng, Transform, Vec3};
 
 const RAYS: usize = 16_384;
 
@@ -40,9 +39,9 @@ fn world(shape: Analytic) -> Geometry {
 /// From a sphere of radius 3 to points of the bounds.
 fn rays(geometry: &Geometry) -> Vec<Ray> {
     let bounds = geometry.bounds();
-    let mut random = Random(3);
+    let mut random = Rng::new(3);
     let ray = |_| {
-        let from = 3.0 * random.direction();
+        let from = 3.0 * random.direction().as_vec3();
         let at = [random.unit(), random.unit(), random.unit()].map(|u| u as f32);
         let to = bounds.min + bounds.size() * Vec3::from(at);
         Ray::new(from, (to - from).normalize())

@@ -7,6 +7,7 @@ use crate::id::{LightId, MaterialId, PrimId, ReliefId, ShapeId};
 use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
 use crate::math::Vec3;
+use crate::math::random::mix;
 use crate::relief::Relief;
 use crate::texture::Texture;
 
@@ -47,6 +48,10 @@ pub struct Features {
     pub textures: bool,
     /// Some surface has a normal map or a bump map.
     pub reliefs: bool,
+    /// Some surface's shading normal differs from its geometric one.
+    pub shading_normals: bool,
+    /// Something depends on uv or on tangents.
+    pub parameters: bool,
     /// Some material has only delta lobes.
     pub delta_materials: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
@@ -94,10 +99,15 @@ impl Scene {
     }
 
     /// The scattering at a point for a ray that arrives in `direction`.
+    /// What is not the same everywhere is made in `place`.
     #[inline]
-    pub fn bsdf(&self, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
+    pub fn bsdf<'a>(&'a self, at: &SurfaceInteraction, direction: Vec3, place: &'a mut Option<Bsdf>) -> &'a Bsdf {
         let material = self.material(at.shape);
-        if let Material::Constant(bsdf) = material { *bsdf } else { self.resolved_bsdf(self.surface(at.shape).material, at, direction) }
+        if let Material::Constant(bsdf) = material {
+            bsdf
+        } else {
+            place.insert(self.resolved_bsdf(self.surface(at.shape).material, at, direction))
+        }
     }
 
     fn resolved_bsdf(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3) -> Bsdf {
@@ -115,13 +125,7 @@ impl Scene {
 /// A number in `[0, 1)` hashed from a point, a direction and a material: the choice between the parts of a mix is the same for any number of
 /// threads, and another for every sample of a pixel.
 fn choice(at: &SurfaceInteraction, direction: Vec3, id: MaterialId) -> f32 {
-    // The finalizer of SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators").
-    let mix = |n: u64| {
-        let n = (n ^ (n >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let n = (n ^ (n >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        n ^ (n >> 31)
-    };
     let words = at.p.to_array().map(f64::to_bits).into_iter().chain(direction.to_array().map(|x| u64::from(x.to_bits())));
-    let hash = words.fold(mix(u64::from(id.0) + 1), |hash, word| mix(hash.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ word));
+    let hash = words.fold(mix(u64::from(id.0)), |hash, word| mix(hash ^ word));
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }

@@ -1,10 +1,8 @@
 //! Rays as a path tracer sends them: from a camera, one diffuse bounce on, and from there to a light.
 
-use std::f32::consts::TAU;
-
 use steradian::accel::{Accelerator, Coherence};
 use steradian::geometry::SpawnTarget;
-use steradian::math::{Ray, Vec3};
+use steradian::math::{Ray, Rng, Vec3};
 
 use super::models::Model;
 
@@ -25,11 +23,11 @@ pub fn ray_sets(model: &Model, accel: &dyn Accelerator, resolution: usize) -> Ve
     let camera = camera_rays(model, resolution);
     let (mut bounce, mut shadow) = (Vec::new(), Vec::new());
     let (center, size) = (model.frame.center().as_dvec3(), f64::from(model.frame.size().max_element()));
-    let mut random = Random(7);
+    let mut random = Rng::new(7);
     for ray in &camera {
         let Some(si) = accel.intersect(ray).and_then(|hit| model.geometry.interaction(ray, &hit)) else { continue };
         let n = if si.n_g.dot(ray.direction) < 0.0 { si.n_g } else { -si.n_g };
-        bounce.push(si.spawn(random.cosine_around(n)));
+        bounce.push(si.spawn(random.cosine_around(n.as_dvec3()).as_vec3()));
         // A light of a tenth of the model's size, above and beside it.
         let on_light = center + size * steradian::math::DVec3::new(0.8 + 0.1 * random.unit(), 1.5, 0.5 + 0.1 * random.unit());
         shadow.push(si.spawn_to(&SpawnTarget { p: on_light, n: Vec3::ZERO, error: 0.0 }));
@@ -56,36 +54,4 @@ fn camera_rays(model: &Model, resolution: usize) -> Vec<Ray> {
         Ray::new(eye, (forward + 0.7 * (right * at(x) - up * at(y))).normalize())
     };
     (0..blocks * blocks * 16).map(pixel).collect()
-}
-
-/// SplitMix64 (Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators").
-pub struct Random(pub u64);
-
-impl Random {
-    /// 64 random bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in `[0, 1)`.
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Uniform on the unit sphere.
-    pub fn direction(&mut self) -> Vec3 {
-        let z = 2.0 * self.unit() as f32 - 1.0;
-        let (sin, cos) = (TAU * self.unit() as f32).sin_cos();
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        Vec3::new(r * cos, r * sin, z)
-    }
-
-    /// On the hemisphere around `n`, by cosine.
-    pub fn cosine_around(&mut self, n: Vec3) -> Vec3 {
-        let d = n + self.direction();
-        if d.length_squared() > 1e-8 { d.normalize() } else { n }
-    }
 }

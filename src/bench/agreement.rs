@@ -90,13 +90,7 @@ pub fn compare(geometry: &Geometry, expected: &[Answer], accel: &dyn Accelerator
         })
         .collect();
     chunks.into_iter().fold(Agreement::default(), |mut sum, part| {
-        sum.rays += part.rays;
-        sum.identical += part.identical;
-        sum.within_bound += part.within_bound;
-        sum.ties += part.ties;
-        sum.different += part.different;
-        sum.first.extend(part.first);
-        sum.first.truncate(KEPT);
+        sum.add(part);
         sum
     })
 }

@@ -110,6 +110,12 @@ impl Bsdf {
     /// Value and density for `wi`; zero for delta lobes.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        // By far the most common and cheapest: not worth a call.
+        if let Self::Lambert(bsdf) = self { bsdf.eval(wo, wi) } else { self.eval_any(wo, wi) }
+    }
+
+    #[inline(never)]
+    fn eval_any(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
         each!(self, bsdf => bsdf.eval(wo, wi))
     }
 
@@ -117,6 +123,11 @@ impl Bsdf {
     /// carries nothing.
     #[inline]
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        if let Self::Lambert(bsdf) = self { bsdf.sample(wo, u_lobe, u) } else { Some(self.sample_any(wo, u_lobe, u)?) }
+    }
+
+    #[inline(never)]
+    fn sample_any(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         each!(self, bsdf => bsdf.sample(wo, u_lobe, u))
     }
 

@@ -128,15 +128,20 @@ impl Builder {
             return Err(files.error("lights", message));
         }
         let materials = self.materials.materials;
+        let reliefs = self.surfaces.iter().any(|surface| surface.relief.is_some());
+        let anisotropic = materials.iter().any(Material::is_anisotropic);
+        let smooth = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.has_normals());
         let features = Features {
             lights: !lights.is_empty(),
             environment: sky,
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
-            reliefs: self.surfaces.iter().any(|surface| surface.relief.is_some()),
+            reliefs,
+            shading_normals: reliefs || self.geometry.shapes.iter().any(smooth),
+            parameters: anisotropic || !self.materials.textures.textures.is_empty(),
             delta_materials: materials.iter().any(Material::is_delta),
-            anisotropic: materials.iter().any(Material::is_anisotropic),
+            anisotropic,
             lens: camera.lens().is_some(),
             motion: self.geometry.is_moving() || camera.is_moving(),
         };

@@ -3,20 +3,7 @@ use super::*;
 use crate::color::Rgb;
 use crate::desc::FilterDesc;
 use crate::film::{Filter, SurfaceSample};
-use crate::math::Vec3;
-
-/// A small generator (splitmix64), enough for tests.
-struct Rng(u64);
-
-impl Rng {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
+use crate::math::{Rng, Vec3};
 
 fn gray(v: f32) -> PixelSample {
     PixelSample { radiance: Rgb::splat(v), alpha: 1.0, surface: SurfaceSample::default() }
@@ -41,7 +28,7 @@ fn a_constant_stays_constant() {
         FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0 },
         FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 1.0 },
     ];
-    let mut rng = Rng(1);
+    let mut rng = Rng::new(1);
     for (desc, tile_size) in filters.iter().flat_map(|f| [1, 7, 64].map(|size| (f, size))) {
         let filter = Filter::new(desc);
         for crop in [Crop::full([20, 13]), Crop { x: 3, y: 5, width: 11, height: 7 }] {
@@ -49,7 +36,7 @@ fn a_constant_stays_constant() {
             for tile in film.tiles_mut() {
                 for pixel in 0..tile.area.area() as usize {
                     for sample in 0..(1 + pixel as u32 % 5) {
-                        let weight = filter.sample([rng.next() as f32, rng.next() as f32]).weight;
+                        let weight = filter.sample([rng.unit() as f32, rng.unit() as f32]).weight;
                         assert!(tile.add(pixel, sample, &gray(1.0), weight));
                     }
                 }
@@ -114,11 +101,11 @@ fn samples_that_are_not_finite_are_dropped_and_counted() {
 #[test]
 fn a_million_samples_sum_exactly_enough() {
     let mut film = one_pixel(LayerSet::COLOR);
-    let mut rng = Rng(2);
+    let mut rng = Rng::new(2);
     let (mut exact, mut compensation) = (0.0f64, 0.0f64);
     let n = 1_000_000;
     for i in 0..n {
-        let v = (rng.next() * 1e3f64.powf(rng.next())) as f32;
+        let v = (rng.unit() * 1e3f64.powf(rng.unit())) as f32;
         film.tiles_mut()[0].add(0, i, &gray(v), 1.0);
         let y = f64::from(v) - compensation;
         let t = exact + y;
@@ -140,13 +127,13 @@ fn rare_bright_samples_keep_their_share() {
     assert_eq!(color(&film)[0], 1.0);
 
     // Pareto with exponent 1.8 has mean 1.8 / 0.8 and no variance: medians of means keep the test sharp.
-    let mut rng = Rng(3);
+    let mut rng = Rng::new(3);
     let mut means: Vec<f64> = (0..201)
         .map(|_| {
             let mut film = one_pixel(LayerSet::COLOR);
             let mut direct = 0.0;
             for i in 0..2000 {
-                let v = (1.0 - rng.next()).powf(-1.0 / 1.8) as f32;
+                let v = (1.0 - rng.unit()).powf(-1.0 / 1.8) as f32;
                 direct += f64::from(v);
                 film.tiles_mut()[0].add(0, i, &gray(v), 1.0);
             }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Hit, Shape, SurfaceInteraction};
+use super::{Detail, Hit, Shape, SurfaceInteraction};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{Aabb, Bounds, Motion, Ray, Transform, Vec3};
@@ -71,12 +71,10 @@ impl Instance {
     }
 
     /// The interaction of a hit of the world-space `ray` with a shape of the object.
-    pub fn interaction(&self, shape: &Shape, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+    #[inline(never)]
+    pub(super) fn interaction(&self, shape: &Shape, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         let local_ray = self.object_ray(ray);
-        let local = match shape {
-            Shape::Mesh(mesh) => mesh.interaction(&local_ray, hit),
-            Shape::Analytic(placed) => placed.interaction(&local_ray, hit),
-        }?;
+        let local = shape.interaction(detail, &local_ray, hit)?;
         let t = &*self.transform_at(ray.time);
         let n_local = local.n_g.as_dvec3();
         let n_world = t.normal(n_local);

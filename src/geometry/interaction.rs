@@ -35,6 +35,15 @@ pub struct SurfaceInteraction {
     pub time: f32,
 }
 
+/// How much of an interaction is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// All but what follows a mesh's parametrisation: there `uv` and `dp_du` may be zero.
+    Place,
+    /// Everything.
+    Full,
+}
+
 /// The far end of a shadow ray: a sampled point on a light.
 #[derive(Clone, Copy, Debug)]
 pub struct SpawnTarget {
@@ -65,7 +74,7 @@ impl SurfaceInteraction {
     }
 
     /// A ray from here to just before `target`: `t` runs from 0 to the largest number below 1.
-    #[inline]
+    #[inline(always)]
     pub fn spawn_to(&self, target: &SpawnTarget) -> Ray {
         let toward = (target.p - self.p).as_vec3();
         let origin = offset_origin(self.p, self.n_g, self.error, toward.dot(self.n_g));

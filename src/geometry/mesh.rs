@@ -2,7 +2,7 @@
 
 use super::tangents::{self, CornerTangents};
 pub use super::triangle::TrianglePoints;
-use super::{Hit, SurfaceInteraction};
+use super::{Detail, Hit, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
 use crate::math::{Aabb, Bounds, Ray, Vec2, Vec3};
@@ -259,13 +259,13 @@ impl Mesh {
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
     #[inline]
-    pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
-        self.interaction_and_dp_dv(ray, hit).map(|(at, _)| at)
+    pub fn interaction(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        self.interaction_and_dp_dv(detail, ray, hit).map(|(at, _)| at)
     }
 
     /// The interaction with the change of the point with v.
     #[inline(always)]
-    pub(super) fn interaction_and_dp_dv(&self, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
+    pub(super) fn interaction_and_dp_dv(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
         let points = self.triangle_points_at(hit.prim, ray.time);
 
         // The hit point in f64, on the plane of the triangle.
@@ -289,62 +289,62 @@ impl Mesh {
             error += 4.0 * UNIT_ROUNDOFF as f32 * n_g.abs().dot(size);
         }
 
-        let shading = self.shading(hit, &points, n_g, ray.time);
+        let (n_s, length) = self.shading_normal(hit, n_g, ray.time);
+        let parameters = if detail == Detail::Full { self.parameters(hit, &points, n_s, length, ray.time) } else { Parameters::default() };
         let at = SurfaceInteraction {
             p,
             t: t as f32,
             error,
             n_g,
-            n_s: shading.n_s,
-            dp_du: shading.dp_du,
-            uv: shading.uv,
+            n_s,
+            dp_du: parameters.dp_du,
+            uv: parameters.uv,
             shape: hit.shape,
             prim: hit.prim,
             instance: hit.instance,
             time: ray.time,
         };
-        Some((at, shading.dp_dv))
+        Some((at, parameters.dp_dv))
     }
 
-    /// Interpolated attributes at a hit.
-    #[inline]
-    fn shading(&self, hit: &Hit, points: &TrianglePoints, n_g: Vec3, time: f32) -> ShadingAttributes {
+    /// The unit shading normal at a hit, and the length of the interpolated vector that it comes from.
+    #[inline(always)]
+    fn shading_normal(&self, hit: &Hit, n_g: Vec3, time: f32) -> (Vec3, f32) {
+        let Some([n_a, n_b, n_c]) = self.corner_normals(hit.prim, time) else { return (n_g, 1.0) };
+        let n = n_a * (1.0 - hit.u - hit.v) + n_b * hit.u + n_c * hit.v;
+        let length_squared = n.length_squared();
+        // A vanishing interpolated normal (opposite corners) falls back to the flat one, as does a NaN.
+        if !(length_squared > 1e-12) {
+            return (n_g, 1.0);
+        }
+        let length = length_squared.sqrt();
+        let n = n / length;
+        // A mesh may be wound against its normals: the shading normal follows the front.
+        (if n.dot(n_g) < 0.0 { -n } else { n }, length)
+    }
+
+    /// The parametrisation at a hit with the shading normal of this [length](Self::shading_normal).
+    #[inline(never)]
+    fn parameters(&self, hit: &Hit, points: &TrianglePoints, n_s: Vec3, length: f32, time: f32) -> Parameters {
         let [a, b, c] = self.triangles[hit.prim.index()].map(|i| i as usize);
         let (u, v) = (hit.u, hit.v);
         let w = 1.0 - u - v;
 
-        let (n_s, length) = match self.corner_normals(hit.prim, time) {
-            None => (n_g, 1.0),
-            Some([n_a, n_b, n_c]) => {
-                let n = n_a * w + n_b * u + n_c * v;
-                let length_squared = n.length_squared();
-                // A vanishing interpolated normal (opposite corners) falls back to the flat one, as does a NaN.
-                if length_squared > 1e-12 {
-                    let length = length_squared.sqrt();
-                    let n = n / length;
-                    // A mesh may be wound against its normals: the shading normal follows the front.
-                    (if n.dot(n_g) < 0.0 { -n } else { n }, length)
-                } else {
-                    (n_g, 1.0)
-                }
-            }
-        };
-
         let (edge_b, edge_c) = (points.b - points.a, points.c - points.a);
         let Some(uvs) = &self.uvs else {
-            return ShadingAttributes { n_s, dp_du: edge_b, dp_dv: edge_c, uv: Vec2::new(u, v) };
+            return Parameters { dp_du: edge_b, dp_dv: edge_c, uv: Vec2::new(u, v) };
         };
         let (uv_a, uv_b, uv_c) = (Vec2::from(uvs[a]), Vec2::from(uvs[b]), Vec2::from(uvs[c]));
         let uv = uv_a * w + uv_b * u + uv_c * v;
         if let Some((tangent, side)) = self.tangent(hit.prim, [w, u, v], time) {
             // MikkTSpace's frame is that of the interpolated vectors before they are normalised, up to a factor common to all three.
-            return ShadingAttributes { n_s, dp_du: tangent / length, dp_dv: n_s.cross(tangent) * side, uv };
+            return Parameters { dp_du: tangent / length, dp_dv: n_s.cross(tangent) * side, uv };
         }
         let (d1, d2) = (uv_b - uv_a, uv_c - uv_a);
         let inverse = 1.0 / (d1.x * d2.y - d1.y * d2.x);
         let (dp_du, dp_dv) = ((edge_b * d2.y - edge_c * d1.y) * inverse, (edge_c * d1.x - edge_b * d2.x) * inverse);
         let (dp_du, dp_dv) = if dp_du.is_finite() && dp_dv.is_finite() { (dp_du, dp_dv) } else { (edge_b, edge_c) };
-        ShadingAttributes { n_s, dp_du, dp_dv, uv }
+        Parameters { dp_du, dp_dv, uv }
     }
 
     /// The interpolated tangent for normal maps and the side of the bitangent; `None` where the mesh has none.
@@ -361,8 +361,8 @@ impl Mesh {
     }
 }
 
-struct ShadingAttributes {
-    n_s: Vec3,
+#[derive(Default)]
+struct Parameters {
     dp_du: Vec3,
     dp_dv: Vec3,
     uv: Vec2,
@@ -394,9 +394,9 @@ mod tests {
     fn a_hit_behind_the_origin_is_false() {
         let hit = Hit { t: 0.0, u: 0.2, v: 0.2, shape: ShapeId(0), prim: PrimId(0), instance: Hit::NO_INSTANCE };
         let away = Ray::new(Vec3::new(0.2, 0.2, 1e-7), Vec3::Z);
-        assert!(triangle().interaction(&away, &hit).is_none());
+        assert!(triangle().interaction(Detail::Full, &away, &hit).is_none());
         let toward = Ray::new(Vec3::new(0.2, 0.2, 1e-7), -Vec3::Z);
-        let si = triangle().interaction(&toward, &hit).unwrap();
+        let si = triangle().interaction(Detail::Full, &toward, &hit).unwrap();
         assert_eq!(si.n_g, Vec3::Z);
         assert_eq!(si.p.z, 0.0);
     }

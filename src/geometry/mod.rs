@@ -24,7 +24,7 @@ pub use disk::Disk;
 pub use frustum::Frustum;
 pub use hit::Hit;
 pub use instance::{Instance, Object};
-pub use interaction::{SpawnTarget, SurfaceInteraction};
+pub use interaction::{Detail, SpawnTarget, SurfaceInteraction};
 pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
 pub use placed::{Analytic, LocalHit, LocalSurface, Placed, PlacedPoint, ShapeSample};
 pub use profile::Profile;
@@ -73,6 +73,15 @@ impl Shape {
         match self {
             Self::Mesh(mesh) => mesh.bounds(),
             Self::Analytic(placed) => placed.bounds().padded(),
+        }
+    }
+
+    /// The interaction for a hit of `ray`, in the space the shape is placed in; see [`Geometry::interaction`].
+    #[inline]
+    fn interaction(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        match self {
+            Self::Mesh(mesh) => mesh.interaction(detail, ray, hit),
+            Self::Analytic(placed) => placed.interaction(ray, hit),
         }
     }
 
@@ -179,15 +188,17 @@ impl Geometry {
     ///
     /// `None` if the exact distance is not positive: the hit is a rounding artefact of the accelerator, and the caller looks again from
     /// [`step_past`] of `hit.t`.
-    #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        self.interaction_with(Detail::Full, ray, hit)
+    }
+
+    /// [`interaction`](Self::interaction), or only the part of it that is asked for.
+    #[inline]
+    pub fn interaction_with(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         if hit.instance == Hit::NO_INSTANCE {
-            match self.shape(hit.shape) {
-                Shape::Mesh(mesh) => mesh.interaction(ray, hit),
-                Shape::Analytic(placed) => placed.interaction(ray, hit),
-            }
+            self.shape(hit.shape).interaction(detail, ray, hit)
         } else {
-            self.instance(hit.instance).interaction(self.shape(hit.shape), ray, hit)
+            self.instance(hit.instance).interaction(self.shape(hit.shape), detail, ray, hit)
         }
     }
 
@@ -196,7 +207,7 @@ impl Geometry {
     pub fn dp_dv(&self, ray: &Ray, hit: &Hit) -> Vec3 {
         let local = |ray: &Ray| {
             let found = match self.shape(hit.shape) {
-                Shape::Mesh(mesh) => mesh.interaction_and_dp_dv(ray, hit),
+                Shape::Mesh(mesh) => mesh.interaction_and_dp_dv(Detail::Full, ray, hit),
                 Shape::Analytic(placed) => placed.interaction_and_dp_dv(ray, hit),
             };
             found.map_or(Vec3::ZERO, |(_, dp_dv)| dp_dv)

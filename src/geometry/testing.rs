@@ -1,49 +1,8 @@
-//! For tests only: random numbers, and arithmetic of about 106 bits.
+//! For tests only: endless rays, and arithmetic of about 106 bits.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::math::{DVec3, RayF64, dvec3};
-
-/// A small generator of random numbers (splitmix64).
-pub(crate) struct Random(pub u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut x = self.0;
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    }
-
-    /// Uniform in `[0, 1)`.
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Uniform in `[lo, hi)`.
-    pub fn within(&mut self, lo: f64, hi: f64) -> f64 {
-        lo + (hi - lo) * self.unit()
-    }
-
-    /// `10^x` with `x` uniform in `[lo, hi)`.
-    pub fn magnitude(&mut self, lo: f64, hi: f64) -> f64 {
-        10f64.powf(self.within(lo, hi))
-    }
-
-    /// Uniform on the unit sphere.
-    pub fn direction(&mut self) -> DVec3 {
-        let z = self.within(-1.0, 1.0);
-        let (sin, cos) = self.within(0.0, std::f64::consts::TAU).sin_cos();
-        let rho = (1.0 - z * z).sqrt();
-        dvec3(rho * cos, rho * sin, z)
-    }
-
-    /// Uniform in the cube `[-size, size]³`.
-    pub fn point(&mut self, size: f64) -> DVec3 {
-        dvec3(self.within(-size, size), self.within(-size, size), self.within(-size, size))
-    }
-}
 
 /// A ray without an end.
 pub(crate) fn endless(origin: DVec3, direction: DVec3) -> RayF64 {

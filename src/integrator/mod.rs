@@ -134,9 +134,8 @@ fn surface_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInteraction, d
         sample.position = at.p.as_vec3();
     }
     if needs.albedo {
-        let bsdf = world.scene.bsdf(at, direction);
         let frame = crate::math::Frame::from_normal(at.n_s);
-        sample.albedo = bsdf.albedo(frame.to_local(-direction));
+        sample.albedo = world.scene.bsdf(at, direction, &mut None).albedo(frame.to_local(-direction));
     }
     sample
 }

@@ -94,19 +94,17 @@ impl PathIntegrator {
     fn render(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts, scratch: &mut Scratch) {
         scratch.paths.clear();
         scratch.rays.clear();
-        for (slot, sample) in samples.iter().enumerate() {
-            out[slot] = PixelSample::default();
-            scratch.rays.push(sample.ray);
-            scratch.paths.push(Path {
-                throughput: Rgb::WHITE,
-                pdf: f32::INFINITY,
-                eta_squared: 1.0,
-                slot: slot as u32,
-                seed: sample.seed,
-                sample: sample.sample,
-                from: Receiver { p: DVec3::ZERO, n: Vec3::ZERO },
-            });
-        }
+        scratch.rays.extend(samples.iter().map(|sample| sample.ray));
+        scratch.paths.extend((0..).zip(samples).map(|(slot, sample)| Path {
+            throughput: Rgb::WHITE,
+            pdf: f32::INFINITY,
+            eta_squared: 1.0,
+            slot,
+            seed: sample.seed,
+            sample: sample.sample,
+            from: Receiver { p: DVec3::ZERO, n: Vec3::ZERO },
+        }));
+        out[..samples.len()].fill(PixelSample::default());
 
         for bounce in 0..self.max_depth {
             let count = scratch.rays.len();
@@ -137,38 +135,41 @@ impl PathIntegrator {
     }
 
     /// Shades every living path's hit; afterwards the scratch holds the paths that go on, their rays, and the shadow rays to trace.
+    ///
+    /// Large results stay where they were returned and are read through references: a copy would have to wait for them.
     fn shade_all(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
         let Scratch { paths, rays, hits, shadow_rays, pending, .. } = scratch;
         shadow_rays.clear();
         pending.clear();
         let mut alive = 0;
         for i in 0..paths.len() {
-            let mut path = paths[i];
-            let ray = rays[i];
+            let (path, ray) = (&paths[i], &rays[i]);
             let sample = &mut out[path.slot as usize];
-            let Some(at) = world.resolve(&ray, hits[i]) else {
-                sample.radiance += self.clamped(path.throughput * self.escaped(world, &path, ray.direction), bounce);
+            let found = world.resolve(ray, hits[i]);
+            let Some(at) = &found else {
+                sample.radiance += self.clamped(path.throughput * self.escaped(world, path, ray.direction), bounce);
                 continue;
             };
             if bounce == 0 {
                 sample.alpha = 1.0;
                 if self.needs != SurfaceNeeds::default() {
-                    sample.surface = surface_sample(world, self.needs, &at, ray.direction);
+                    sample.surface = surface_sample(world, self.needs, at, ray.direction);
                 }
             }
-            sample.radiance += self.clamped(path.throughput * self.emitted(world, &path, &ray, &at), bounce);
+            sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
             if bounce + 1 >= self.max_depth {
                 continue;
             }
 
-            let vertex = Vertex::new(world, &at, &ray);
-            if let Some(shadow) = self.sample_light(world, &path, &vertex, bounce) {
+            let mut bsdf = None;
+            let vertex = Vertex::new(world, at, ray, &mut bsdf);
+            if let Some(shadow) = self.sample_light(world, path, &vertex, bounce) {
                 shadow_rays.push(shadow.ray);
                 pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
             }
-            if let Some(next) = self.scatter(world, &mut path, &vertex, bounce) {
+            if let Some((path, ray)) = self.scatter(world, path, &vertex, bounce) {
                 paths[alive] = path;
-                rays[alive] = next;
+                rays[alive] = ray;
                 alive += 1;
             }
         }
@@ -229,7 +230,7 @@ impl PathIntegrator {
     }
 
     /// A shadow ray towards a light, with what it brings if it is free.
-    #[inline]
+    #[inline(always)]
     fn sample_light(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32) -> Option<ShadowRay> {
         if vertex.bsdf.is_delta() || world.scene.lights.is_empty() {
             return None;
@@ -237,7 +238,8 @@ impl PathIntegrator {
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::light(bounce));
         let choice = world.scene.lights.choose(&vertex.receiver(), [u[0], u[3]])?;
         let light = world.scene.lights.get(choice.id);
-        let sample = light.sample(&world.scene.geometry, &world.scene.textures, vertex.at.p, [u[1], u[2]])?;
+        let sample = light.sample(&world.scene.geometry, &world.scene.textures, vertex.at.p, [u[1], u[2]]);
+        let sample = sample.as_ref()?;
         if self.strategy == Strategy::Bsdf && !sample.is_delta {
             return None;
         }
@@ -258,32 +260,31 @@ impl PathIntegrator {
         Some(ShadowRay { ray, contribution })
     }
 
-    /// The next ray of a path, unless the path ends here.
-    #[inline]
-    fn scatter(&self, world: &World, path: &mut Path, vertex: &Vertex, bounce: u32) -> Option<Ray> {
+    /// The path after its next scattering with its next ray, unless it ends here.
+    #[inline(always)]
+    fn scatter(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32) -> Option<(Path, Ray)> {
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::bsdf(bounce));
         let (sample, direction) = vertex.sample(u[0], [u[1], u[2]])?;
-        path.throughput *= sample.weight;
-        path.eta_squared *= sample.eta * sample.eta;
+        let mut throughput = path.throughput * sample.weight;
+        let eta_squared = path.eta_squared * (sample.eta * sample.eta);
 
         // Russian roulette: the survivors carry the weight of the dead. The chance is not capped, so a path that lost nothing goes on.
         if bounce + 1 >= self.rr_depth {
-            let survival = path.throughput.max_channel() * path.eta_squared;
+            let survival = throughput.max_channel() * eta_squared;
             if survival < 1.0 {
                 if u[3] >= survival {
                     return None;
                 }
-                path.throughput *= 1.0 / survival;
+                throughput *= 1.0 / survival;
             }
         }
-        if path.throughput.is_black() {
+        if throughput.is_black() {
             return None;
         }
 
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
-        path.pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        path.from = vertex.receiver();
-        Some(vertex.at.spawn(direction))
+        let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
+        Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, vertex.at.spawn(direction)))
     }
 }
 
@@ -296,7 +297,7 @@ struct ShadowRay {
 /// A surface point with its scattering and the frame for it.
 pub(super) struct Vertex<'a> {
     pub at: &'a SurfaceInteraction,
-    pub bsdf: Bsdf,
+    pub bsdf: &'a Bsdf,
     pub frame: Frame,
     /// The direction back, in the frame.
     pub wo: Vec3,
@@ -307,13 +308,14 @@ pub(super) struct Vertex<'a> {
 }
 
 impl<'a> Vertex<'a> {
-    #[inline]
-    pub fn new(world: &World, at: &'a SurfaceInteraction, ray: &Ray) -> Self {
+    /// The vertex at `at`, where `ray` arrives; `bsdf` is the place for scattering that is not the same everywhere.
+    #[inline(always)]
+    pub fn new(world: &'a World, at: &'a SurfaceInteraction, ray: &Ray, bsdf: &'a mut Option<Bsdf>) -> Self {
         let back = -ray.direction;
         let cos_geometric = back.dot(at.n_g);
-        let n_s = facing_normal(back, at.n_s, at.n_g);
+        let n_s = if world.scene.features.shading_normals { facing_normal(back, at.n_s, at.n_g) } else { at.n_g };
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
-        let bsdf = world.scene.bsdf(at, ray.direction);
+        let bsdf = world.scene.bsdf(at, ray.direction, bsdf);
         // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
         let has_relief = world.scene.features.reliefs && world.scene.surface(at.shape).relief.is_some();
         let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
@@ -343,7 +345,7 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn eval(&self, direction: Vec3) -> Option<BsdfEval> {
         let wi = self.frame.to_local(direction);
         let shadowing = self.shadowing(wi, direction);

@@ -44,7 +44,8 @@ impl Whitted {
         if depth >= self.max_depth {
             return radiance;
         }
-        let vertex = Vertex::new(world, at, ray);
+        let mut bsdf = None;
+        let vertex = Vertex::new(world, at, ray, &mut bsdf);
         if !vertex.bsdf.is_delta() {
             radiance += self.ambient * vertex.bsdf.albedo(vertex.wo);
             for light in world.scene.lights.lights() {

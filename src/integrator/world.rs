@@ -2,7 +2,7 @@
 
 use crate::accel::Accelerator;
 use crate::color::Rgb;
-use crate::geometry::{Hit, SurfaceInteraction};
+use crate::geometry::{Detail, Hit, SurfaceInteraction};
 use crate::light::Light;
 use crate::math::float::step_past;
 use crate::math::{Aabb, Ray, Vec3};
@@ -18,12 +18,19 @@ pub struct World<'a> {
     /// The accelerator.
     pub accel: &'a dyn Accelerator,
     bounds: Aabb,
+    detail: Detail,
 }
 
 impl<'a> World<'a> {
     /// A scene with its accelerator.
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator) -> Self {
-        Self { scene, accel, bounds: accel.bounds() }
+        let detail = if scene.features.parameters { Detail::Full } else { Detail::Place };
+        Self { scene, accel, bounds: accel.bounds(), detail }
+    }
+
+    /// With the parametrisation of every surface, whether or not the scene needs it.
+    pub fn in_full(self) -> Self {
+        Self { detail: Detail::Full, ..self }
     }
 
     /// The surface that a ray meets first.
@@ -36,18 +43,16 @@ impl<'a> World<'a> {
     #[inline]
     pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
         let hit = hit?;
-        match self.scene.geometry.interaction(ray, &hit) {
-            Some(at) => Some(self.finished(ray, &hit, at)),
-            None => self.retrace(ray, hit),
+        let mut at = self.scene.geometry.interaction_with(self.detail, ray, &hit);
+        if at.is_none() {
+            at = self.retrace(ray, hit);
+        } else if self.scene.features.reliefs {
+            at = at.map(|at| self.with_relief(ray, &hit, at));
         }
+        at
     }
 
     /// With the shading normal that the surface's relief gives, if it has one.
-    #[inline(always)]
-    fn finished(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
-        if self.scene.features.reliefs { self.with_relief(ray, hit, at) } else { at }
-    }
-
     #[inline(never)]
     fn with_relief(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
         let scene = self.scene;
@@ -62,8 +67,8 @@ impl<'a> World<'a> {
         for _ in 0..MAX_RETRACES {
             ray.t_min = step_past(hit.t);
             hit = self.accel.intersect(&ray)?;
-            if let Some(at) = self.scene.geometry.interaction(&ray, &hit) {
-                return Some(self.finished(&ray, &hit, at));
+            if let Some(at) = self.scene.geometry.interaction_with(self.detail, &ray, &hit) {
+                return Some(self.with_relief(&ray, &hit, at));
             }
         }
         None

@@ -105,23 +105,23 @@ pub fn to_positive(intensity: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::test_support::Random;
+    use crate::math::Rng;
 
     /// A random unit direction within an angle of an axis.
-    fn within(random: &mut Random, axis: Vec3, angle: f32) -> Vec3 {
+    fn within(random: &mut Rng, axis: Vec3, angle: f32) -> Vec3 {
         let across = random.direction().as_vec3().cross(axis).normalize();
-        let (sin, cos) = (angle * random.next()).sin_cos();
+        let (sin, cos) = (angle * random.unit_f32()).sin_cos();
         (axis * cos + across * sin).normalize()
     }
 
     #[test]
     fn the_union_of_cones_holds_both() {
-        let mut random = Random(1);
+        let mut random = Rng::new(1);
         for _ in 0..2000 {
             let mut cone = || EmissionCone {
                 axis: random.direction().as_vec3().normalize(),
-                spread: 2.0 * random.next() * random.next(),
-                reach: FRAC_PI_2 * random.next(),
+                spread: 2.0 * random.unit_f32() * random.unit_f32(),
+                reach: FRAC_PI_2 * random.unit_f32(),
             };
             let (a, b) = (cone(), cone());
             let union = a.union(&b);

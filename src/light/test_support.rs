@@ -1,35 +1,6 @@
-//! Random numbers and the chi-squared test, for tests of sampling.
+//! The chi-squared test, for tests of sampling.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-use crate::math::DVec3;
-
-/// A small generator (SplitMix64).
-pub struct Random(pub u64);
-
-impl Random {
-    /// Uniform in `[0, 1)`.
-    pub fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u32 << 24) as f32
-    }
-
-    /// Uniform in the unit square.
-    pub fn pair(&mut self) -> [f32; 2] {
-        [self.next(), self.next()]
-    }
-
-    /// Uniform on the unit sphere.
-    pub fn direction(&mut self) -> DVec3 {
-        let z = 1.0 - 2.0 * f64::from(self.next());
-        let (sin, cos) = (std::f64::consts::TAU * f64::from(self.next())).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    }
-}
 
 /// Asserts that counts follow probabilities, at a false-alarm rate of 1e-6. Cells of fewer than 5 expected counts are pooled.
 pub fn assert_chi_squared(counts: &[u32], probabilities: &[f64], what: &str) {

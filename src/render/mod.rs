@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::accel::Accelerator;
+use crate::desc::IntegratorDesc;
 use crate::error::{Error, Result};
 use crate::film::{DroppedSample, Film, FilmTile, Filter, Image, LayerKind, PixelSample};
 use crate::integrator::{self, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
@@ -78,8 +79,9 @@ impl<'a> Job<'a> {
             geometry: wanted(LayerKind::Z) || wanted(LayerKind::N) || wanted(LayerKind::P),
             albedo: wanted(LayerKind::Albedo),
         };
+        let world = World::new(scene, accel);
         Self {
-            world: World::new(scene, accel),
+            world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
             integrator: integrator::build(&settings.integrator, sampler, needs),
             sampler,
             filter: Filter::new(&settings.filter),
@@ -90,7 +92,8 @@ impl<'a> Job<'a> {
     /// Renders one sample of every pixel of the tile with this origin; `out` is in [slot order](pixel_of_slot).
     fn render_batch(&self, origin: [u32; 2], sample: u32, batch: &mut Batch, counts: &mut RayCounts) {
         batch.samples.clear();
-        for slot in 0..TILE_SIZE * TILE_SIZE {
+        let weights = &mut batch.weights;
+        batch.samples.extend((0..TILE_SIZE * TILE_SIZE).map(|slot| {
             let [dx, dy] = pixel_of_slot(slot);
             let (x, y) = (origin[0] + dx, origin[1] + dy);
             let seed = self.sampler.pixel(x, y);
@@ -101,9 +104,9 @@ impl<'a> Job<'a> {
             let moves = self.world.scene.features.motion;
             let time = if moves { camera.time(self.sampler.sample_4d(seed, sample, dimensions::TIME)[0]) } else { 0.0 };
             let ray = camera.ray(film, self.size, [u[2], u[3]], time);
-            batch.samples.push(CameraSample { ray: self.world.approach(ray), seed, sample });
-            batch.weights[slot as usize] = filter.weight;
-        }
+            weights[slot as usize] = filter.weight;
+            CameraSample { ray: self.world.approach(ray), seed, sample }
+        }));
         self.integrator.render_batch(&self.world, &batch.samples, &mut batch.out, counts);
     }
 

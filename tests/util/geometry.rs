@@ -1,4 +1,4 @@
-//! Random numbers, meshes and the closest-hit loop that tests share.
+//! Meshes and the closest-hit loop that tests share.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,71 +8,8 @@ use steradian::geometry::{
 };
 use steradian::id::{ObjectId, ShapeId};
 use steradian::math::float::step_past;
+pub use steradian::math::Rng;
 use steradian::math::{DMat3, DVec3, Ray, Transform, Vec3};
-
-/// SplitMix64 (Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators").
-pub struct Rng(u64);
-
-impl Rng {
-    /// A generator with its own sequence.
-    pub fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// 64 random bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in `[0, 1)`.
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Uniform in `[low, high)`.
-    pub fn range(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// Uniform in `0..n`.
-    pub fn below(&mut self, n: usize) -> usize {
-        ((self.unit() * n as f64) as usize).min(n - 1)
-    }
-
-    /// Uniform in the cube `[-1, 1)³`.
-    pub fn cube(&mut self) -> DVec3 {
-        DVec3::new(self.range(-1.0, 1.0), self.range(-1.0, 1.0), self.range(-1.0, 1.0))
-    }
-
-    /// Uniform on the unit sphere.
-    pub fn direction(&mut self) -> DVec3 {
-        let z = self.range(-1.0, 1.0);
-        let (sin, cos) = self.range(0.0, TAU).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    }
-
-    /// Uniform on the hemisphere around `n`.
-    pub fn direction_around(&mut self, n: DVec3) -> DVec3 {
-        let d = self.direction();
-        if d.dot(n) < 0.0 { -d } else { d }
-    }
-
-    /// A random rotation.
-    pub fn rotation(&mut self) -> DMat3 {
-        DMat3::from_axis_angle(self.direction(), self.range(0.0, TAU))
-    }
-
-    /// Barycentric weights, uniform on a triangle.
-    pub fn barycentric(&mut self) -> [f64; 3] {
-        let r = self.unit().sqrt();
-        let v = self.unit() * r;
-        [1.0 - r, r - v, v]
-    }
-}
 
 /// A mesh from positions in `f64`.
 pub fn mesh(positions: &[DVec3], triangles: Vec<[u32; 3]>) -> Mesh {

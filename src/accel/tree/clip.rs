@@ -145,7 +145,8 @@ fn triangle_overlaps(triangle: &TrianglePoints, cell: &Aabb) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::tree::testing::{Rng, items_of, mesh_geometry};
+    use crate::accel::tree::testing::{items_of, mesh_geometry};
+    use crate::math::Rng;
 
     /// Triangles of many sizes, some degenerate, with boxes that they touch or nearly touch.
     fn cases(count: usize, mut visit: impl FnMut(&TrianglePoints, &Aabb)) {

@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::*;
 use crate::geometry::Frustum;
-use crate::geometry::testing::{Double, Random, endless};
+use crate::geometry::testing::{Double, endless};
+use crate::math::Rng;
 
 const VASE: &[[f64; 2]] = &[[0.0, -1.0], [0.9, -1.0], [1.2, -0.3], [0.5, 0.2], [0.2, 0.4], [0.3, 0.9], [0.6, 1.0]];
 const LOOPING: &[[f64; 2]] = &[[0.2, -0.8], [2.5, 1.2], [0.1, 1.4], [1.2, -0.7], [1.6, -1.2], [0.3, 0.4], [0.5, 1.0]];
@@ -94,13 +95,13 @@ fn dense_hits(points: &[[f64; 2]], ray: &RayF64) -> Vec<f64> {
 }
 
 /// Rays of all the kinds that have troubled solvers.
-fn test_rays(random: &mut Random, shape: &Revolution, count: usize) -> Vec<RayF64> {
+fn test_rays(random: &mut Rng, shape: &Revolution, count: usize) -> Vec<RayF64> {
     let kinds = 6;
     (0..count)
         .map(|i| {
             let target = shape.sample([random.unit(), random.unit()]);
             let mut direction = random.direction();
-            let mut through = target.p + random.point(0.2);
+            let mut through = target.p + (random.cube() * 0.2);
             match i % kinds {
                 // Tangent, inside or outside by a little.
                 1 => {
@@ -114,7 +115,7 @@ fn test_rays(random: &mut Random, shape: &Revolution, count: usize) -> Vec<RayF6
                 // Nearly parallel to the axis.
                 4 => direction = (DVec3::Y + direction * random.magnitude(-9.0, -1.0)).normalize(),
                 // Through the axis.
-                5 => direction = (dvec3(0.0, random.within(-1.0, 1.0), 0.0) - through).normalize(),
+                5 => direction = (dvec3(0.0, random.range(-1.0, 1.0), 0.0) - through).normalize(),
                 _ => {}
             }
             endless(through - 4.0 * direction, direction)
@@ -124,7 +125,7 @@ fn test_rays(random: &mut Random, shape: &Revolution, count: usize) -> Vec<RayF6
 
 #[test]
 fn all_roots_are_found() {
-    let mut random = Random(21);
+    let mut random = Rng::new(21);
     let (mut rays, mut unequal, mut lost, mut worst) = (0, 0, 0, 0f64);
     for points in [VASE, LOOPING, CIRCLE] {
         let shape = turned(points);
@@ -164,7 +165,7 @@ fn level_rays_inside_and_outside_hit_on_both_sides() {
 
 #[test]
 fn the_nearest_of_many_hits_is_the_first() {
-    let mut random = Random(22);
+    let mut random = Rng::new(22);
     let shape = turned(LOOPING);
     let mut most = 0;
     for ray in test_rays(&mut random, &shape, 6_000) {
@@ -185,7 +186,7 @@ fn the_nearest_of_many_hits_is_the_first() {
 
 #[test]
 fn a_line_is_a_frustum() {
-    let mut random = Random(23);
+    let mut random = Rng::new(23);
     for (bottom, top, height) in [(1.0, 1.0, 2.0), (1.0, 0.0, 1.5), (0.25, 1.0, 0.5)] {
         for phi_max in [TAU, 2.0, 4.5] {
             let profile = Profile::bezier(&line([bottom, 0.0], [top, height])).unwrap();
@@ -219,10 +220,10 @@ fn a_line_is_a_frustum() {
 #[test]
 fn two_segments_are_nearly_a_sphere() {
     let shape = turned(CIRCLE);
-    let mut random = Random(24);
+    let mut random = Rng::new(24);
     for _ in 0..20_000 {
         let direction = random.direction();
-        let offset = random.direction().cross(direction).normalize() * random.within(0.0, 0.95);
+        let offset = random.direction().cross(direction).normalize() * random.range(0.0, 0.95);
         let ray = endless(offset - 3.0 * direction, direction);
         let hit = shape.intersect(&ray).unwrap();
         let s = shape.surface(&ray, &hit);
@@ -233,11 +234,11 @@ fn two_segments_are_nearly_a_sphere() {
 
 #[test]
 fn no_ray_passes_a_joint() {
-    let mut random = Random(25);
+    let mut random = Rng::new(25);
     let shape = turned(CIRCLE);
     let mut lost = 0;
     for i in 0..100_000 {
-        let (sin, cos) = random.within(0.0, TAU).sin_cos();
+        let (sin, cos) = random.range(0.0, TAU).sin_cos();
         let from = random.direction() * 0.5;
         let mut target = dvec3(cos, 0.0, sin);
         if i % 2 == 0 {
@@ -279,7 +280,7 @@ fn samples_weighted_by_their_density_are_uniform() {
     for points in [VASE, LOOPING, CIRCLE] {
         let shape = Revolution::new(&Profile::bezier(points).unwrap(), 2.0).unwrap();
         // Expected counts: the density along the profile, integrated by midpoints.
-        let mut random = Random(26);
+        let mut random = Rng::new(26);
         let (mut area, mut counts) = ([0f64; BINS], [0f64; BINS]);
         for _ in 0..COUNT {
             let u = [random.unit(), random.unit()];

@@ -1,6 +1,6 @@
 use std::f32::consts::TAU;
 
-use crate::geometry::{Geometry, Hit, Instance, Mesh, MeshStep, Shape, SurfaceInteraction};
+use crate::geometry::{Detail, Geometry, Hit, Instance, Mesh, MeshStep, Shape, SurfaceInteraction};
 use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
 use crate::math::{DAffine3, DVec3, Ray, Transform, Vec3};
 
@@ -20,7 +20,7 @@ fn hit(prim: usize) -> Hit {
 fn look_at(mesh: &Mesh, prim: usize, time: f32) -> (SurfaceInteraction, Vec3) {
     let points = mesh.triangle_points_at(PrimId::new(prim), time);
     let (p, n) = ((points.a * 2.0 + points.b + points.c) * 0.25, points.cross().normalize().as_vec3());
-    mesh.interaction_and_dp_dv(&Ray { time, ..Ray::new(p + n, -n) }, &hit(prim)).unwrap()
+    mesh.interaction_and_dp_dv(Detail::Full, &Ray { time, ..Ray::new(p + n, -n) }, &hit(prim)).unwrap()
 }
 
 #[test]

@@ -3,9 +3,8 @@ use std::f64::consts::{FRAC_PI_3, PI, TAU};
 use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance};
 use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
-use crate::light::test_support::Random;
 use crate::math::float::step_past;
-use crate::math::{DAffine3, DMat3, Transform};
+use crate::math::{DAffine3, DMat3, Rng, Transform};
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
 const TWO_SIDED: Emission = Emission { two_sided: true, ..WHITE };
@@ -103,7 +102,7 @@ fn partial_emitters_are_sampled_within_their_clips() {
         let geometry = place(shape, skew([1.0, 1.7, 0.6]));
         let Shape::Analytic(placed) = &geometry.shapes[0] else { panic!("just placed") };
         let light = light(&geometry, TWO_SIDED);
-        let mut random = Random(13);
+        let mut random = Rng::new(13);
         let p = DVec3::new(3.0, -2.0, 4.0);
         for _ in 0..5000 {
             let Some(s) = light.sample(&geometry, &[], p, random.pair()) else { continue };
@@ -132,13 +131,13 @@ fn densities_integrate_to_one() {
             let geometry = place(shape.clone(), skew(scale));
             let light = light(&geometry, TWO_SIDED);
             let p = DVec3::new(1.4, 1.9, 0.6).as_vec3().as_dvec3();
-            let mut random = Random(17);
+            let mut random = Rng::new(17);
             let n = 1000;
             let mut sum = 0.0;
             for i in 0..n * n {
                 // A direction for each cell of a grid on the sphere, and all hits along it: hidden points are sampled too.
-                let z = 1.0 - 2.0 * f64::from((i % n) as f32 + random.next()) / f64::from(n);
-                let (sin, cos) = (TAU * f64::from((i / n) as f32 + random.next()) / f64::from(n)).sin_cos();
+                let z = 1.0 - 2.0 * f64::from((i % n) as f32 + random.unit_f32()) / f64::from(n);
+                let (sin, cos) = (TAU * f64::from((i / n) as f32 + random.unit_f32()) / f64::from(n)).sin_cos();
                 let r = (1.0 - z * z).sqrt();
                 let mut ray = Ray::new(p.as_vec3(), DVec3::new(r * cos, r * sin, z).as_vec3());
                 while let Some(hit) = geometry.shape(ShapeId(0)).intersect_prim(&ray, ShapeId(0), PrimId(0)) {

@@ -118,6 +118,15 @@ impl SurfaceSample {
     }
 }
 
+impl LightSample {
+    /// Light from a point of a surface with this error of its position.
+    #[inline(always)]
+    fn at(sample: &SurfaceSample, error: f32, radiance: Rgb) -> Self {
+        let target = ShadowTarget::Point(SpawnTarget { p: sample.p, n: sample.n, error });
+        Self { wi: sample.wi, radiance, pdf: sample.pdf, is_delta: false, target }
+    }
+}
+
 impl AreaLight {
     /// The light of one primitive of a shape that stands in the world (not within an object).
     pub fn new(shape: ShapeId, prim: PrimId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Self {
@@ -160,8 +169,29 @@ impl AreaLight {
     /// Light that arrives at `p` from a chosen point of the surface; `None` where `p` sees the dark side.
     #[inline]
     pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
-        let both = self.emission.two_sided;
+        if self.emission.texture.is_some() {
+            return self.sample_textured(geometry, textures, p, u);
+        }
+        let (sample, error) = self.sample_surface(geometry, p, u)?;
+        Some(LightSample::at(&sample, error, self.emission.radiance))
+    }
+
+    /// [`sample`](Self::sample) for emission from a texture.
+    #[inline(never)]
+    fn sample_textured(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
         let (sample, error) = match &self.form {
+            Form::Parallelogram(quad) if self.emission.two_sided || quad.sees_front(p) => (quad.sample_textured(p, u)?, quad.error),
+            _ => self.sample_surface(geometry, p, u)?,
+        };
+        let radiance = self.emission.at(textures, || textured::uv(geometry.shape(self.shape), self.prim, sample.p, u));
+        Some(LightSample::at(&sample, error, radiance))
+    }
+
+    /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where `p` sees the dark side.
+    #[inline(always)]
+    fn sample_surface(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(SurfaceSample, f32)> {
+        let both = self.emission.two_sided;
+        Some(match &self.form {
             Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
             Form::Parallelogram(quad) if both || quad.sees_front(p) => (quad.sample(p, u)?, quad.error),
             Form::Triangle { .. } => self.sample_triangle(geometry, p, u)?,
@@ -175,19 +205,7 @@ impl AreaLight {
                 (sample, 0.0)
             }
             _ => return None,
-        };
-        let radiance = match self.emission.texture {
-            None => self.emission.radiance,
-            Some(_) => self.radiance_at(geometry, textures, sample.p, u),
-        };
-        let target = ShadowTarget::Point(SpawnTarget { p: sample.p, n: sample.n, error });
-        Some(LightSample { wi: sample.wi, radiance, pdf: sample.pdf, is_delta: false, target })
-    }
-
-    /// The radiance of a texture at a point that was chosen with `u`; out of the way of lights without.
-    #[inline(never)]
-    fn radiance_at(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Rgb {
-        self.emission.at(textures, || textured::uv(geometry.shape(self.shape), self.prim, p, u))
+        })
     }
 
     /// A point of a triangle and its error; out of the way of rectangles and spheres.

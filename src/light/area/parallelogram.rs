@@ -94,20 +94,11 @@ impl ParallelogramEmitter {
         View { x0, x1, y0, y1, height, corners: [squared(x0, y0), squared(x1, y0), squared(x1, y1), squared(x0, y1)] }
     }
 
-    /// A point as seen from `p`; `None` in the plane.
-    #[inline]
-    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
-        match &self.texels {
-            None => self.sample_by_size(p, u),
-            Some(texels) => self.sample_textured(texels, p, u),
-        }
-    }
-
     /// A point chosen by the brightness of its texel in half of the cases, by what `p` sees of the surface in the others.
-    #[cold]
-    fn sample_textured(&self, texels: &Piecewise2d, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+    pub fn sample_textured(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+        let Some(texels) = &self.texels else { return self.sample(p, u) };
         let mut sample = if u[0] < 0.5 {
-            self.sample_by_size(p, [2.0 * u[0], u[1]])?
+            self.sample(p, [2.0 * u[0], u[1]])?
         } else {
             let [x, y] = texels.sample([2.0 * u[0] - 1.0, u[1]]).uv;
             let q = self.point(f64::from(x) * self.length_u, f64::from(y) * self.length_v);
@@ -117,9 +108,9 @@ impl ParallelogramEmitter {
         (sample.pdf > 0.0).then_some(sample)
     }
 
-    /// A point that does not depend on the texture.
+    /// A point as seen from `p`, whatever the texture; `None` in the plane.
     #[inline(always)]
-    fn sample_by_size(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
         let view = self.view(p);
         let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };
         let Some(solid_angle) = by_solid_angle else {

@@ -2,7 +2,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::*;
 use crate::geometry::Hit;
-use crate::light::test_support::{Random, assert_chi_squared};
+use crate::light::test_support::assert_chi_squared;
+use crate::math::Rng;
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
 
@@ -33,7 +34,7 @@ pub(super) fn irradiance(lights: &[AreaLight], geometry: &Geometry, p: DVec3, n:
 
 /// Asserts that shadow targets lie on the light and that its hits have the density of the samples.
 pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p: DVec3, tolerance: f32) {
-    let mut random = Random(7);
+    let mut random = Rng::new(7);
     let (mut hits, n) = (0, 2000);
     let p = p.as_vec3().as_dvec3();
     for _ in 0..n {
@@ -63,7 +64,7 @@ pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p:
 
 /// Asserts that what flows through a sphere around a light is its power.
 pub(super) fn assert_power_flows_out(geometry: &Geometry, light: &AreaLight, center: DVec3, radius: f64, tolerance: f64) {
-    let mut random = Random(11);
+    let mut random = Rng::new(11);
     let n = 100_000;
     let mut sum = 0.0;
     for _ in 0..n {
@@ -103,7 +104,7 @@ fn directions_to_a_sphere_are_uniform_and_meet_it_at_the_sample() {
         let axis = (sphere.center - p).normalize();
         let (x, y) = axis.any_orthonormal_pair();
         let one_minus_cos_max = 2.0 * (0.5 * (1.0 / d).asin()).sin().powi(2);
-        let (mut counts, mut random) = (vec![0u32; 16 * 16], Random(1));
+        let (mut counts, mut random) = (vec![0u32; 16 * 16], Rng::new(1));
         for _ in 0..100_000 {
             let s = sphere.sample(p, random.pair()).unwrap();
             assert!(((s.p - sphere.center).length() / 0.7 - 1.0).abs() < 1e-13);
@@ -193,7 +194,7 @@ fn spherical_rectangles_are_sampled_uniformly() {
         assert!((cells.iter().sum::<f64>() / whole - 1.0).abs() < 1e-5, "{p}");
         let probabilities: Vec<f64> = cells.iter().map(|c| c / whole).collect();
 
-        let (mut counts, mut random) = (vec![0u32; n * n], Random(3));
+        let (mut counts, mut random) = (vec![0u32; n * n], Rng::new(3));
         if !quad.is_sampled_by_solid_angle(p) {
             assert!(p.length() > 8.0);
             let sum: f64 = (0..100_000).map(|_| 1.0 / f64::from(quad.sample(p, random.pair()).unwrap().pdf)).sum();
@@ -286,9 +287,9 @@ fn triangles_without_area_give_no_light() {
 fn a_shadow_ray_reaches_the_light_it_was_made_for() {
     let geometry = ceiling();
     for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry, &[]) {
-        let mut random = Random(5);
+        let mut random = Rng::new(5);
         for _ in 0..20_000 {
-            let distance = 10f64.powf(f64::from(random.next()) * 7.0 - 3.0);
+            let distance = 10f64.powf(f64::from(random.unit_f32()) * 7.0 - 3.0);
             let p = DVec3::new(0.1, 0.2, 1.0 - distance);
             let Some(s) = light.sample(&geometry, &[], p, random.pair()) else { continue };
             let ShadowTarget::Point(target) = s.target else { panic!("an area light is not at infinity") };
@@ -319,7 +320,7 @@ fn a_point_almost_in_a_rectangle_sees_it_evenly() {
     for (x, y, from, to) in [(0.3, 0.4, -PI, PI), (-1.0, 0.4, -0.5 * PI, 0.5 * PI), (-1.0, -0.5, 0.0, 0.5 * PI), (1.5, 1.5, -PI, 0.0)] {
         for height in [1e-12, 1e-8, 1e-5] {
             let p = DVec3::new(x, y, height);
-            let (mut counts, mut random) = (vec![0u32; 256], Random(3));
+            let (mut counts, mut random) = (vec![0u32; 256], Rng::new(3));
             for _ in 0..30_000 {
                 let s = quad.sample(p, random.pair()).unwrap();
                 assert!((f64::from(s.pdf) * (to - from) - 1.0).abs() < 1e-4);

@@ -1,8 +1,8 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::*;
-use crate::light::test_support::{Random, assert_chi_squared};
-use crate::math::DVec3;
+use crate::light::test_support::assert_chi_squared;
+use crate::math::{DVec3, Rng};
 
 fn map(width: usize, height: usize, texel: impl Fn(usize, usize) -> f32) -> EnvironmentMap {
     turned(width, height, DMat3::IDENTITY, texel)
@@ -83,7 +83,7 @@ fn directions_follow_the_density() {
         let total: f64 = probabilities.iter().sum();
         assert!((total - 1.0).abs() < 0.02, "{name}: {total}");
 
-        let (mut counts, mut random) = (vec![0u32; rows * columns], Random(21));
+        let (mut counts, mut random) = (vec![0u32; rows * columns], Rng::new(21));
         for _ in 0..20_000 {
             let s = map.sample(random.pair()).unwrap();
             let phi = (f64::from(s.wi.y).atan2(f64::from(s.wi.x)) / TAU + 1.0).fract();
@@ -112,7 +112,7 @@ fn a_sun_is_found_as_often_as_the_density_says() {
     }
     assert!((probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-5);
 
-    let (mut counts, mut random) = (vec![0u32; probabilities.len()], Random(21));
+    let (mut counts, mut random) = (vec![0u32; probabilities.len()], Rng::new(21));
     let mut bright = 0;
     for _ in 0..100_000 {
         let s = map.sample(random.pair()).unwrap();
@@ -130,7 +130,7 @@ fn a_sun_is_found_as_often_as_the_density_says() {
 fn samples_state_the_radiance_and_density_of_their_direction() {
     let rotation = DMat3::from_rotation_y(2.0) * DMat3::from_rotation_x(0.4);
     let environment = environment(turned(33, 15, rotation, |x, y| ((x * 5 + y * 3) % 11) as f32));
-    let mut random = Random(4);
+    let mut random = Rng::new(4);
     let mut different = 0;
     for _ in 0..50_000 {
         let s = environment.sample(random.pair()).unwrap();
@@ -176,7 +176,7 @@ fn wherever_there_is_light_the_density_is_positive() {
                 0.0
             }
         });
-        let mut random = Random(9);
+        let mut random = Rng::new(9);
         for _ in 0..20_000 {
             let d = random.direction().as_vec3();
             let at = map.locate(d);
@@ -205,7 +205,7 @@ fn power_is_the_light_from_all_sides() {
 #[test]
 fn a_constant_environment_is_sampled_uniformly() {
     let environment = Environment::Constant(Rgb::WHITE);
-    let (mut counts, mut random) = (vec![0u32; 100], Random(2));
+    let (mut counts, mut random) = (vec![0u32; 100], Rng::new(2));
     for _ in 0..100_000 {
         let s = environment.sample(random.pair()).unwrap();
         assert!((s.pdf - environment.pdf(s.wi)).abs() < 1e-9 && (s.wi.length() - 1.0).abs() < 1e-6);

@@ -2,16 +2,16 @@ use super::*;
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Mesh, Placed, Quad, Shape, Sphere};
 use crate::id::{LightId, ShapeId};
-use crate::light::test_support::{Random, assert_chi_squared};
+use crate::light::test_support::assert_chi_squared;
 use crate::light::{AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, SpotLight};
-use crate::math::{DAffine3, Transform};
+use crate::math::{DAffine3, Rng, Transform};
 
 const CLOUD: usize = 40;
 
 /// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and lights at infinity if asked.
 fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
-    let mut random = Random(seed);
-    let mut next = move || f64::from(random.next());
+    let mut random = Rng::new(seed);
+    let mut next = move || f64::from(random.unit_f32());
     let mut place = || DVec3::new(next(), next(), next()) * 4.0 - 2.0;
     let mut geometry = Geometry::default();
     let mut lights = Vec::new();
@@ -61,9 +61,9 @@ fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
 
 /// Receivers near and far, with a side and without.
 fn receivers(seed: u64, count: usize) -> Vec<Receiver> {
-    let mut random = Random(seed);
+    let mut random = Rng::new(seed);
     let receiver = |i: usize| {
-        let p = random.direction() * f64::from(random.next()) * if i.is_multiple_of(5) { 50.0 } else { 3.0 };
+        let p = random.direction() * f64::from(random.unit_f32()) * if i.is_multiple_of(5) { 50.0 } else { 3.0 };
         let n = if i.is_multiple_of(4) { Vec3::ZERO } else { random.direction().as_vec3().normalize() };
         Receiver { p, n }
     };
@@ -87,8 +87,8 @@ fn probabilities_add_up_to_one() {
     }
 
     // Where every light reaches every point, nothing is missing.
-    let mut random = Random(9);
-    let point = |_| Light::Point(PointLight { position: 3.0 * random.direction(), intensity: Rgb::splat(1.0 + random.next()) });
+    let mut random = Rng::new(9);
+    let point = |_| Light::Point(PointLight { position: 3.0 * random.direction(), intensity: Rgb::splat(1.0 + random.unit_f32()) });
     let set = LightSet::with_selection((0..100).map(point).collect(), &Geometry::default(), LightSelection::Tree);
     for from in receivers(2, 400) {
         let sum: f64 = pmfs(&set, &Receiver { n: Vec3::ZERO, ..from }).iter().sum();
@@ -100,7 +100,7 @@ fn probabilities_add_up_to_one() {
 fn lights_are_chosen_as_often_as_their_probability_says() {
     for sky in [false, true] {
         let (_, set) = cloud(3, sky);
-        let mut random = Random(4);
+        let mut random = Rng::new(4);
         for (k, from) in receivers(5, 8).into_iter().enumerate() {
             let mut expected = pmfs(&set, &from);
             // No light at all.
@@ -122,7 +122,7 @@ fn lights_are_chosen_as_often_as_their_probability_says() {
 #[test]
 fn whatever_can_shine_somewhere_can_be_chosen_there() {
     let (geometry, set) = cloud(6, true);
-    let mut random = Random(7);
+    let mut random = Rng::new(7);
     let (mut shining, mut excluded) = (0, 0);
     for from in receivers(8, 300) {
         for (light, pmf) in set.lights().iter().zip(pmfs(&set, &from)) {

@@ -31,11 +31,11 @@ fn hit_from_above(shape: &Analytic, p: DVec3, n: DVec3) -> Option<LocalSurface> 
 
 #[test]
 fn derivatives_are_those_of_the_parameters() {
-    let mut random = Random(11);
+    let mut random = Rng::new(11);
     for shape in shapes() {
         let mut tried = 0;
         for _ in 0..400 {
-            let sample = shape.sample([random.within(0.02, 0.98), random.within(0.05, 0.95)]);
+            let sample = shape.sample([random.range(0.02, 0.98), random.range(0.05, 0.95)]);
             let Some(s) = hit_from_above(&shape, sample.p, sample.n) else { continue };
             for (step, expected) in [(s.dp_du, [1.0, 0.0]), (s.dp_dv, [0.0, 1.0])] {
                 assert!(step.dot(s.n).abs() < 1e-9 * step.length(), "{shape:?} {s:?}");
@@ -54,10 +54,10 @@ fn derivatives_are_those_of_the_parameters() {
 
 #[test]
 fn samples_are_hit_where_they_are_with_the_same_density() {
-    let mut random = Random(12);
+    let mut random = Rng::new(12);
     for shape in shapes() {
         for _ in 0..2_000 {
-            let sample = shape.sample([random.within(0.001, 0.999), random.within(0.001, 0.999)]);
+            let sample = shape.sample([random.range(0.001, 0.999), random.range(0.001, 0.999)]);
             let s = hit_from_above(&shape, sample.p, sample.n).unwrap_or_else(|| panic!("{shape:?} {sample:?}"));
             assert!((s.p - sample.p).length() < 1e-12 && (s.n - sample.n).length() < 1e-8, "{shape:?} {s:?} {sample:?}");
             assert!((s.pdf_area - sample.pdf_area).abs() < 1e-7 * sample.pdf_area, "{shape:?} {s:?} {sample:?}");
@@ -107,7 +107,7 @@ fn normal_at(shape: &Analytic, p: DVec3) -> Option<DVec3> {
 fn samples_are_uniform_by_area() {
     const SIDE: usize = 12;
     const COUNT: usize = 40_000;
-    let mut random = Random(13);
+    let mut random = Rng::new(13);
     for shape in shapes() {
         if matches!(shape, Analytic::Revolution(_)) {
             continue;
@@ -180,7 +180,7 @@ fn transforms() -> Vec<Transform> {
 
 #[test]
 fn bounds_hold_the_samples_and_are_tight() {
-    let mut random = Random(14);
+    let mut random = Rng::new(14);
     for shape in shapes() {
         for transform in transforms().iter().chain([&Transform::IDENTITY]) {
             let placed = Placed::new(shape.clone(), *transform);
@@ -205,14 +205,14 @@ fn bounds_hold_the_samples_and_are_tight() {
 
 #[test]
 fn placed_normals_stay_perpendicular_and_outside() {
-    let mut random = Random(15);
+    let mut random = Rng::new(15);
     for shape in shapes() {
         for transform in transforms() {
             let mut placed = Placed::new(shape.clone(), transform);
             for reverse_normal in [false, true] {
                 placed.reverse_normal = reverse_normal;
                 for _ in 0..50 {
-                    let s = shape.sample([random.within(0.01, 0.99), random.within(0.01, 0.99)]);
+                    let s = shape.sample([random.range(0.01, 0.99), random.range(0.01, 0.99)]);
                     let Some(local) = hit_from_above(&shape, s.p, s.n) else { continue };
                     let point = placed.place(s.p, s.n, s.pdf_area);
                     let n = point.n.as_dvec3();
@@ -279,12 +279,12 @@ fn hits_whose_distance_was_rounded_otherwise_are_found_again() {
 
 #[test]
 fn rays_that_leave_a_convex_surface_do_not_hit_it_again() {
-    let mut random = Random(16);
+    let mut random = Rng::new(16);
     let mut spawned = 0;
     for shape in shapes().iter().filter(|shape| !matches!(shape, Analytic::Revolution(_))) {
         for _ in 0..300 {
-            let turn = DMat3::from_axis_angle(random.direction(), random.within(0.0, TAU));
-            let stretch = dvec3(random.within(0.5, 2.0), random.within(0.5, 2.0), 1.0) * random.magnitude(-4.0, 4.0);
+            let turn = DMat3::from_axis_angle(random.direction(), random.range(0.0, TAU));
+            let stretch = dvec3(random.range(0.5, 2.0), random.range(0.5, 2.0), 1.0) * random.magnitude(-4.0, 4.0);
             let offset = random.direction() * random.magnitude(-4.0, 6.0);
             let transform = Transform::new(DAffine3 { matrix3: turn * DMat3::from_diagonal(stretch), translation: offset }).unwrap();
             let placed = Placed::new(shape.clone(), transform);
