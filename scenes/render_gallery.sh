@@ -22,6 +22,7 @@ glass           glass           208x208  4096
 smallpt         smallpt         240x180  2048
 analytic        analytic        288x162  512
 shapes          shapes          288x144  1024
+glassware       glassware       256x160  1024
 phi_max         phi_max         234x208  512
 phi_max_normals phi_max         234x208  64    --integrator normal
 nee             nee             208x156  8s

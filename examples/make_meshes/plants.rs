@@ -3,27 +3,26 @@
 use std::f32::consts::TAU;
 
 use glam::{Vec3 as V, vec3};
+use steradian::math::Rng;
 
 use super::Mesh;
 
-/// Reproducible random numbers (SplitMix64).
-pub struct Rng(u64);
+/// Random numbers in single precision, as meshes have it.
+pub trait Single {
+    /// Uniform in `[low, high)`.
+    fn between(&mut self, low: f32, high: f32) -> f32;
 
-impl Rng {
-    pub fn new(seed: u64) -> Self {
-        Self(seed)
+    /// Uniform on the unit sphere.
+    fn outward(&mut self) -> V;
+}
+
+impl Single for Rng {
+    fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.unit_f32()
     }
 
-    /// A number within `[low, high)`.
-    pub fn range(&mut self, low: f32, high: f32) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let x = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        low + (high - low) * ((x ^ (x >> 31)) >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    fn direction(&mut self) -> V {
-        let (y, angle) = (self.range(-1.0, 1.0), self.range(0.0, TAU));
+    fn outward(&mut self) -> V {
+        let (y, angle) = (self.between(-1.0, 1.0), self.between(0.0, TAU));
         let r = (1.0 - y * y).sqrt();
         vec3(r * angle.cos(), y, r * angle.sin())
     }
@@ -61,7 +60,7 @@ fn grow(tree: &mut Tree, rng: &mut Rng, branch: &Branch) {
     let mut spine = vec![branch.start];
     let mut direction = branch.direction;
     for _ in 0..steps {
-        direction = (direction + 0.16 * rng.direction() + vec3(0.0, 0.02, 0.0)).normalize();
+        direction = (direction + 0.16 * rng.outward() + vec3(0.0, 0.02, 0.0)).normalize();
         spine.push(*spine.last().unwrap() + direction * (branch.length / steps as f32));
     }
     tube(&mut tree.wood, &spine, branch.radius, 0.72 * branch.radius, (9 - branch.order).max(4));
@@ -69,7 +68,7 @@ fn grow(tree: &mut Tree, rng: &mut Rng, branch: &Branch) {
     if branch.order + 2 > LAST_ORDER {
         let count = if branch.order == LAST_ORDER { 15 } else { 5 };
         for _ in 0..count {
-            let at = rng.range(0.2, steps as f32);
+            let at = rng.between(0.2, steps as f32);
             let i = (at as usize).min(steps - 1);
             let point = spine[i].lerp(spine[i + 1], at - i as f32);
             leaf(&mut tree.leaves, rng, point, direction);
@@ -79,20 +78,20 @@ fn grow(tree: &mut Tree, rng: &mut Rng, branch: &Branch) {
         return;
     }
     let count = if branch.order == 0 { 4 } else { 3 };
-    let turn = rng.range(0.0, TAU);
+    let turn = rng.between(0.0, TAU);
     let side = direction.any_orthonormal_vector();
     let other = direction.cross(side);
     for k in 0..count {
-        let around = turn + TAU * (k as f32 + rng.range(-0.25, 0.25)) / count as f32;
-        let spread = if k == 0 && branch.order > 0 { rng.range(0.05, 0.25) } else { rng.range(0.55, 0.95) };
+        let around = turn + TAU * (k as f32 + rng.between(-0.25, 0.25)) / count as f32;
+        let spread = if k == 0 && branch.order > 0 { rng.between(0.05, 0.25) } else { rng.between(0.55, 0.95) };
         let outward = side * around.cos() + other * around.sin();
         // Twigs droop a little, boughs rise.
         let lift = if branch.order < 2 { 0.18 } else { -0.06 };
         let child = Branch {
             start: *spine.last().unwrap(),
             direction: (direction * spread.cos() + outward * spread.sin() + vec3(0.0, lift, 0.0)).normalize(),
-            length: branch.length * rng.range(0.62, 0.82),
-            radius: branch.radius * rng.range(0.52, 0.66),
+            length: branch.length * rng.between(0.62, 0.82),
+            radius: branch.radius * rng.between(0.52, 0.66),
             order: branch.order + 1,
         };
         grow(tree, rng, &child);
@@ -120,8 +119,8 @@ fn tube(mesh: &mut Mesh, spine: &[V], first_radius: f32, last_radius: f32, sides
 }
 
 fn leaf(mesh: &mut Mesh, rng: &mut Rng, stalk: V, twig: V) {
-    let along = (0.5 * twig + 0.8 * rng.direction() + vec3(0.0, -0.1, 0.0)).normalize();
-    let side = along.cross((rng.direction() + vec3(0.0, 1.2, 0.0)).normalize()).normalize() * rng.range(0.085, 0.14);
+    let along = (0.5 * twig + 0.8 * rng.outward() + vec3(0.0, -0.1, 0.0)).normalize();
+    let side = along.cross((rng.outward() + vec3(0.0, 1.2, 0.0)).normalize()).normalize() * rng.between(0.085, 0.14);
     let length = along * (2.0 * side.length());
     card(mesh, [stalk - side, stalk + side, stalk + side + length, stalk - side + length]);
 }
@@ -138,13 +137,13 @@ pub fn crown() -> Mesh {
     let mut mesh = Mesh::default();
     let mut rng = Rng::new(5);
     for _ in 0..9 {
-        let puff = vec3(rng.range(-0.26, 0.26), rng.range(0.4, 0.82), rng.range(-0.26, 0.26));
-        let radius = rng.range(0.14, 0.24);
+        let puff = vec3(rng.between(-0.26, 0.26), rng.between(0.4, 0.82), rng.between(-0.26, 0.26));
+        let radius = rng.between(0.14, 0.24);
         for _ in 0..75 {
-            let outward = rng.direction();
-            let point = puff + outward * radius * rng.range(0.75, 1.05) * vec3(1.1, 0.85, 1.1);
-            let side = outward.cross(rng.direction()).normalize() * rng.range(0.02, 0.045);
-            let up = (outward + 0.6 * rng.direction()).normalize().cross(side);
+            let outward = rng.outward();
+            let point = puff + outward * radius * rng.between(0.75, 1.05) * vec3(1.1, 0.85, 1.1);
+            let side = outward.cross(rng.outward()).normalize() * rng.between(0.02, 0.045);
+            let up = (outward + 0.6 * rng.outward()).normalize().cross(side);
             facet(&mut mesh, [point - side, point + up, point + side, point - up]);
         }
     }
@@ -162,11 +161,11 @@ pub fn conifer() -> Mesh {
         let reach = 0.24 * (1.0 - t).powf(0.8) + 0.015;
         let branches = 5 + (7.0 * (1.0 - t)) as i32;
         for b in 0..branches {
-            let angle = TAU * (b as f32 + rng.range(-0.35, 0.35)) / branches as f32 + w as f32;
+            let angle = TAU * (b as f32 + rng.between(-0.35, 0.35)) / branches as f32 + w as f32;
             let outward = vec3(angle.cos(), 0.0, angle.sin());
             let side = vec3(-angle.sin(), 0.0, angle.cos());
-            let root = vec3(0.0, 0.14 + 0.84 * t + rng.range(-0.01, 0.01), 0.0);
-            let length = reach * rng.range(0.75, 1.1);
+            let root = vec3(0.0, 0.14 + 0.84 * t + rng.between(-0.01, 0.01), 0.0);
+            let length = reach * rng.between(0.75, 1.1);
             let tip = root + outward * length - V::Y * (0.28 * length);
             // Three blades: the middle one and one to each side.
             for (turn, share) in [(0.0, 1.0), (0.5, 0.72), (-0.5, 0.72)] {

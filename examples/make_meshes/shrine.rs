@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use glam::{Vec3 as V, vec3};
+use steradian::math::Rng;
 
-use super::plants::Rng;
+use super::plants::Single;
 use super::{Mesh, terrain};
 
 /// What the hills of `terrain.ply` are scaled by, and how far their floor lies below the water, which is at y = 0.
@@ -69,8 +70,8 @@ fn forest() -> Vec<String> {
     let mut lines = Vec::new();
     let mut places: Vec<V> = Vec::new();
     for _ in 0..60_000 {
-        let depth = rng.range(62.0, 250.0);
-        let (x, z) = (rng.range(-0.42, 0.42) * (depth + 8.0), 42.0 - depth);
+        let depth = rng.between(62.0, 250.0);
+        let (x, z) = (rng.between(-0.42, 0.42) * (depth + 8.0), 42.0 - depth);
         let y = ground(x, z);
         let spacing = 2.1 + 0.012 * depth;
         let place = vec3(x, y, z);
@@ -78,15 +79,15 @@ fn forest() -> Vec<String> {
             continue;
         }
         places.push(place);
-        let patch = (0.09 * x + 1.0).sin() * (0.11 * z).cos() + rng.range(-0.5, 0.5);
+        let patch = (0.09 * x + 1.0).sin() * (0.11 * z).cos() + rng.between(-0.5, 0.5);
         let (kind, height) = match patch {
-            p if p > 0.75 && y < 14.0 => ("far cherry", rng.range(3.6, 5.2)),
-            p if p > 0.1 => ("far broadleaf", rng.range(4.5, 6.5)),
-            p if p > -0.15 => ("far maple", rng.range(4.0, 5.5)),
-            _ => ("far conifer", rng.range(6.0, 9.5)),
+            p if p > 0.75 && y < 14.0 => ("far cherry", rng.between(3.6, 5.2)),
+            p if p > 0.1 => ("far broadleaf", rng.between(4.5, 6.5)),
+            p if p > -0.15 => ("far maple", rng.between(4.0, 5.5)),
+            _ => ("far conifer", rng.between(6.0, 9.5)),
         };
         let mut line = String::new();
-        let turn = rng.range(0.0, 360.0).floor();
+        let turn = rng.between(0.0, 360.0).floor();
         let _ = write!(line, "    {{ \"object\": \"{kind}\", \"transform\": [{{ \"scale\": {height:.2} }}, ");
         let _ = write!(line, "{{ \"rotate\": {{ \"axis\": [0, 1, 0], \"degrees\": {turn} }} }}, ");
         let _ = write!(line, "{{ \"translate\": [{x:.2}, {:.2}, {z:.2}] }}] }}", y - 0.1);

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::math::{DVec3, RayF64, dvec3};
+use crate::math::{DVec3, RayF64};
 
 /// A ray without an end.
 pub(crate) fn endless(origin: DVec3, direction: DVec3) -> RayF64 {

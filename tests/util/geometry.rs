@@ -7,8 +7,8 @@ use steradian::geometry::{
     Analytic, Disk, Frustum, Geometry, Hit, Instance, Mesh, Object, Placed, Profile, Quad, Revolution, Shape, Sphere, SurfaceInteraction,
 };
 use steradian::id::{ObjectId, ShapeId};
-use steradian::math::float::step_past;
 pub use steradian::math::Rng;
+use steradian::math::float::step_past;
 use steradian::math::{DMat3, DVec3, Ray, Transform, Vec3};
 
 /// A mesh from positions in `f64`.
