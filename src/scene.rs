@@ -111,7 +111,7 @@ impl Scene {
 
     /// The scattering at a point for a ray that arrives in `direction` and stands for `footprint`.
     /// What is not the same everywhere is made in `place`.
-    #[inline]
+    #[inline(always)]
     pub fn bsdf<'a>(
         &'a self,
         at: &SurfaceInteraction,

@@ -285,7 +285,7 @@ impl PathIntegrator {
     }
 
     /// Light that the surface itself gives off against `ray`.
-    #[inline]
+    #[inline(always)]
     fn emitted(&self, world: &World, path: &Path, ray: &Ray, at: &SurfaceInteraction) -> Rgb {
         let Some(id) = world.scene.surface(at.shape).light(at.prim) else {
             return Rgb::BLACK;
@@ -435,7 +435,7 @@ impl<'a> Vertex<'a> {
         (!value.is_black()).then(|| BsdfEval { value: value * shadowing, pdf })
     }
 
-    #[inline]
+    #[inline(always)]
     fn sample(&self, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Vec3)> {
         let mut sample = self.bsdf.sample(self.wo, u_lobe, u)?;
         let direction = self.frame.to_world(sample.wi);
