@@ -10,6 +10,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use steradian::id::ShapeId;
 use steradian::math::{Vec2, Vec3};
+use steradian::texture::Footprint;
 use steradian::{Error, Result, compile, import};
 
 #[derive(Deserialize)]
@@ -34,7 +35,7 @@ fn evaluate(material: &Value, pairs: &[[[f32; 3]; 2]]) -> Result<Vec<[f32; 4]>> 
         "shapes": [{ "type": "sphere", "material": "m" }]
     });
     let scene = compile::compile(&import::parse_scene(&scene.to_string(), path)?, path)?;
-    let bsdf = scene.material(ShapeId::new(0)).bsdf(&scene.textures, Vec2::ZERO);
+    let bsdf = scene.material(ShapeId::new(0)).bsdf(&scene.textures, || Footprint::point(Vec2::ZERO));
     let values = pairs.iter().map(|pair| {
         let [wo, wi] = pair.map(Vec3::from_array);
         let eval = bsdf.eval(wo, wi);

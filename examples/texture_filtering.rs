@@ -3,11 +3,12 @@
 //! `cargo run --release --example texture_filtering`. A camera one unit above the plane sees it from below its feet to the horizon. Each pixel's
 //! samples are those of the renderer's sampler; the reference has 4,096 points per pixel. The ways are
 //!
-//! - `point`: bilinear where the ray meets the plane, as the renderer does it;
+//! - `point`: bilinear where the ray meets the plane;
 //! - `stochastic`: bilinear at a random point of the parallelogram that a pixel covers;
-//! - `mip`: trilinear in a pyramid, at the level of the ray cone's width across the ray divided by the cosine (Akenine-Möller et al.,
-//!   "Texture Level of Detail Strategies for Real-Time Ray Tracing");
-//! - `mip / sqrt(n)`: the same with a cone that is narrower by the square root of the samples per pixel.
+//! - `pixel's cone`: in the image's pyramid, over the area where the ray cone of a pixel meets the plane (Akenine-Möller et al., "Texture Level
+//!   of Detail Strategies for Real-Time Ray Tracing");
+//! - `samples' cone`: the same with a cone that is narrower by the root of the samples per pixel, as the renderer does it;
+//! - `longer axis`, `shorter axis`: the same by one axis of that area in place of their geometric mean.
 //!
 //! The last column is the error that remains at 1,024 samples: what the way blurs.
 
@@ -18,7 +19,7 @@ use std::time::Instant;
 use steradian::import::{ImageData, Samples};
 use steradian::math::{Vec2, vec2};
 use steradian::sampling::{Sampler, SamplerKind};
-use steradian::texture::{Bitmap, Decoding, Image};
+use steradian::texture::{Bitmap, Decoding, Footprint, Image};
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 64;
@@ -29,40 +30,10 @@ const TEXELS: usize = 256;
 /// Repetitions of the image per unit of the plane.
 const TILES: f32 = 0.5;
 
-/// An image and its halves, quarters and so on.
-struct Pyramid {
-    levels: Vec<Bitmap>,
-}
-
-impl Pyramid {
-    fn new(texel: impl Fn(usize, usize) -> f32) -> Self {
-        let mut side = TEXELS;
-        let mut values: Vec<f32> = (0..side * side).map(|i| texel(i % side, i / side)).collect();
-        let mut levels = Vec::new();
-        loop {
-            let data = ImageData { width: side, height: side, channels: 1, samples: Samples::F32(values.clone()) };
-            levels.push(Bitmap::new(Arc::new(Image::new(data).expect("a finite image")), Decoding::Linear));
-            if side == 1 {
-                return Self { levels };
-            }
-            side /= 2;
-            let at = |x: usize, y: usize| values[y * 2 * side + x];
-            let mean = |x: usize, y: usize| 0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1));
-            values = (0..side * side).map(|i| mean(i % side * 2, i / side * 2)).collect();
-        }
-    }
-
-    fn bilinear(&self, uv: Vec2) -> f32 {
-        self.levels[0].scalar(uv)
-    }
-
-    /// For a footprint of this width in uv.
-    fn trilinear(&self, uv: Vec2, width: f32) -> f32 {
-        let level = (width * TEXELS as f32).log2().clamp(0.0, (self.levels.len() - 1) as f32);
-        let below = level as usize;
-        let [fine, coarse] = [below, (below + 1).min(self.levels.len() - 1)].map(|level| self.levels[level].scalar(uv));
-        fine + (coarse - fine) * (level - below as f32)
-    }
+fn bitmap(texel: impl Fn(usize, usize) -> f32) -> Bitmap {
+    let values = (0..TEXELS * TEXELS).map(|i| texel(i % TEXELS, i / TEXELS)).collect();
+    let data = ImageData { width: TEXELS, height: TEXELS, channels: 1, samples: Samples::F32(values) };
+    Bitmap::new(Arc::new(Image::new(data).expect("a finite image")), Decoding::Linear)
 }
 
 /// Where the ray through a point of the picture (in pixels) meets the plane, in uv.
@@ -78,44 +49,56 @@ fn footprint(x: f32, y: f32) -> [Vec2; 2] {
     [uv_at(x + 0.5, y) - uv_at(x - 0.5, y), (uv_at(x, y + step) - uv_at(x, y - step)) / (2.0 * step)]
 }
 
-/// The width of a ray cone of one pixel where it meets the plane, in uv.
-fn cone_width(x: f32, y: f32) -> f32 {
+/// The axes, in uv, of the ellipse where a ray cone of one pixel meets the plane: the shorter one first.
+fn cone_axes(x: f32, y: f32) -> [f32; 2] {
     let down = (y / HEIGHT as f32).max(1e-6) * LOWEST;
     let across = (2.0 * x / WIDTH as f32 - 1.0) * SIDE;
     let length = (1.0 + down * down + across * across).sqrt();
     let (distance, cosine) = (length / down, down / length);
     let spread = LOWEST / HEIGHT as f32 / length;
-    spread * distance / cosine * TILES
+    [1.0, 1.0 / cosine].map(|stretch| spread * distance * TILES * stretch)
 }
 
 #[derive(Clone, Copy)]
 enum Way {
     Point,
     Stochastic,
-    Mip,
-    NarrowMip,
+    PixelCone,
+    SampleCone,
+    LongerAxis,
+    ShorterAxis,
 }
 
 impl Way {
-    const ALL: [(Self, &'static str); 4] =
-        [(Self::Point, "point"), (Self::Stochastic, "stochastic"), (Self::Mip, "mip"), (Self::NarrowMip, "mip / sqrt(n)")];
+    const ALL: [(Self, &'static str); 6] = [
+        (Self::Point, "point"),
+        (Self::Stochastic, "stochastic"),
+        (Self::PixelCone, "pixel's cone"),
+        (Self::SampleCone, "samples' cone"),
+        (Self::LongerAxis, "longer axis"),
+        (Self::ShorterAxis, "shorter axis"),
+    ];
 
     /// What a sample at a point of the picture sees; `u` are two more random numbers.
-    fn look(self, image: &Pyramid, [x, y]: [f32; 2], u: [f32; 2], samples: u32) -> f32 {
+    fn look(self, image: &Bitmap, [x, y]: [f32; 2], u: [f32; 2], samples: u32) -> f32 {
         let uv = uv_at(x, y);
+        let over = |area: f32, samples: u32| image.scalar_over(&Footprint { uv, area: area / samples as f32 });
+        let [shorter, longer] = cone_axes(x, y);
         match self {
-            Self::Point => image.bilinear(uv),
+            Self::Point => image.scalar(uv),
             Self::Stochastic => {
                 let [dx, dy] = footprint(x, y);
-                image.bilinear(uv + dx * (u[0] - 0.5) + dy * (u[1] - 0.5))
+                image.scalar(uv + dx * (u[0] - 0.5) + dy * (u[1] - 0.5))
             }
-            Self::Mip => image.trilinear(uv, cone_width(x, y)),
-            Self::NarrowMip => image.trilinear(uv, cone_width(x, y) / (samples as f32).sqrt()),
+            Self::PixelCone => over(shorter * longer, 1),
+            Self::SampleCone => over(shorter * longer, samples),
+            Self::LongerAxis => over(longer * longer, samples),
+            Self::ShorterAxis => over(shorter * shorter, samples),
         }
     }
 }
 
-fn picture(image: &Pyramid, way: Way, samples: u32) -> Vec<f64> {
+fn picture(image: &Bitmap, way: Way, samples: u32) -> Vec<f64> {
     let sampler = Sampler::new(SamplerKind::Sobol, 1);
     let pixel = |i: u32| {
         let (x, y) = (i % WIDTH, i / WIDTH);
@@ -130,12 +113,12 @@ fn picture(image: &Pyramid, way: Way, samples: u32) -> Vec<f64> {
 }
 
 /// The mean of 64 x 64 points of each pixel.
-fn reference(image: &Pyramid) -> Vec<f64> {
+fn reference(image: &Bitmap) -> Vec<f64> {
     let n = 64;
     let middle = |i: u32| (i as f32 + 0.5) / n as f32;
     let pixel = |i: u32| {
         let (x, y) = ((i % WIDTH) as f32, (i / WIDTH) as f32);
-        (0..n * n).map(|k| f64::from(image.bilinear(uv_at(x + middle(k % n), y + middle(k / n))))).sum::<f64>() / f64::from(n * n)
+        (0..n * n).map(|k| f64::from(image.scalar(uv_at(x + middle(k % n), y + middle(k / n))))).sum::<f64>() / f64::from(n * n)
     };
     (0..WIDTH * HEIGHT).map(pixel).collect()
 }
@@ -149,7 +132,7 @@ fn main() {
         let hash = ((x * 73_856_093) ^ (y * 19_349_663)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         0.1 + 0.8 * ((hash >> 40) & 0xffff) as f32 / 65_535.0
     };
-    let images = [("checker", Pyramid::new(|x, y| if (x / 32 + y / 32) % 2 == 0 { 0.1 } else { 0.9 })), ("noise", Pyramid::new(noise))];
+    let images = [("checker", bitmap(|x, y| if (x / 32 + y / 32) % 2 == 0 { 0.1 } else { 0.9 })), ("noise", bitmap(noise))];
     println!("relMSE against 4,096 points per pixel");
     println!("{:<8} {:<14} {:>8} {:>8} {:>8} {:>8} {:>8} {:>10}", "image", "way", "1 spp", "4", "16", "64", "1,024", "ns/lookup");
     for (name, image) in &images {

@@ -11,7 +11,7 @@ use crate::bsdf::{
 use crate::color::Rgb;
 use crate::id::MaterialId;
 use crate::math::Vec2;
-use crate::texture::Texture;
+use crate::texture::{Footprint, Texture};
 
 /// A material.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,16 +163,16 @@ pub struct PrincipledInputs {
 }
 
 impl PrincipledInputs {
-    fn parameters(&self, textures: &[Texture], uv: Vec2) -> PrincipledParameters {
-        let at = |input: &ScalarInput| input.at(textures, uv);
+    fn parameters(&self, textures: &[Texture], footprint: &Footprint) -> PrincipledParameters {
+        let at = |input: &ScalarInput| input.at(textures, footprint);
         PrincipledParameters {
-            base_color: self.base_color.at(textures, uv),
+            base_color: self.base_color.at(textures, footprint),
             metallic: at(&self.metallic),
             roughness: at(&self.roughness),
             anisotropic: at(&self.anisotropic),
             ior: match &self.specular {
                 Some(specular) => PrincipledParameters::ior_of_specular(at(specular)),
-                None => self.ior.at(textures, uv),
+                None => self.ior.at(textures, footprint),
             },
             specular_tint: at(&self.specular_tint),
             sheen: at(&self.sheen),
@@ -205,46 +205,54 @@ impl PrincipledInputs {
 }
 
 impl Varying {
-    /// The scattering at `uv`.
-    fn bsdf(&self, textures: &[Texture], uv: Vec2) -> Bsdf {
+    /// The scattering over `footprint`.
+    fn bsdf(&self, textures: &[Texture], footprint: &Footprint) -> Bsdf {
         match self {
-            Self::Diffuse { albedo, roughness } => match (albedo.at(textures, uv), roughness.at(textures, uv)) {
+            Self::Diffuse { albedo, roughness } => match (albedo.at(textures, footprint), roughness.at(textures, footprint)) {
                 (albedo, 0.0) => Bsdf::Lambert(Lambert { albedo }),
                 (albedo, roughness) => Bsdf::Eon(Eon { albedo, roughness }),
             },
-            Self::DiffuseTransmission { reflectance, transmittance } => {
-                Bsdf::DiffuseTransmission(DiffuseTransmission::new(reflectance.at(textures, uv), transmittance.at(textures, uv)))
-            }
-            Self::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: reflectance.at(textures, uv) }),
+            Self::DiffuseTransmission { reflectance, transmittance } => Bsdf::DiffuseTransmission(DiffuseTransmission::new(
+                reflectance.at(textures, footprint),
+                transmittance.at(textures, footprint),
+            )),
+            Self::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: reflectance.at(textures, footprint) }),
             Self::Conductor { metal, tint, alpha, multiscatter } => {
-                let metal = metal.with_surface(alpha.at(textures, uv), tint.at(textures, uv));
+                let metal = metal.with_surface(alpha.at(textures, footprint), tint.at(textures, footprint));
                 Bsdf::Conductor(if *multiscatter { metal } else { metal.single_scattering() })
             }
             Self::Dielectric { ior, alpha, multiscatter } => {
-                let glass = Dielectric::new(*ior, alpha.at(textures, uv));
+                let glass = Dielectric::new(*ior, alpha.at(textures, footprint));
                 Bsdf::Dielectric(if *multiscatter { glass } else { glass.single_scattering() })
             }
             Self::Phong { diffuse, specular, exponent } => {
                 // What exceeds 1 together is taken from the diffuse part.
-                let specular = specular.at(textures, uv);
-                let diffuse = diffuse.at(textures, uv);
+                let specular = specular.at(textures, footprint);
+                let diffuse = diffuse.at(textures, footprint);
                 let left = Rgb::WHITE - specular;
                 let diffuse = Rgb::new(diffuse.r.min(left.r), diffuse.g.min(left.g), diffuse.b.min(left.b));
-                Bsdf::Glossy(Glossy::phong(diffuse, specular, exponent.at(textures, uv)))
+                Bsdf::Glossy(Glossy::phong(diffuse, specular, exponent.at(textures, footprint)))
             }
             Self::CookTorrance { albedo, d, s, m, f0 } => {
                 // What exceeds 1 together is taken from the diffuse part.
-                let s = s.at(textures, uv);
-                let d = d.at(textures, uv).min(1.0 - s);
-                Bsdf::Glossy(Glossy::new(albedo.at(textures, uv) * d, f0.at(textures, uv) * s, Rgb::splat(s), m.at(textures, uv)))
+                let s = s.at(textures, footprint);
+                let d = d.at(textures, footprint).min(1.0 - s);
+                Bsdf::Glossy(Glossy::new(
+                    albedo.at(textures, footprint) * d,
+                    f0.at(textures, footprint) * s,
+                    Rgb::splat(s),
+                    m.at(textures, footprint),
+                ))
             }
-            Self::ThinDielectric { ior } => Bsdf::ThinDielectric(ThinDielectric { ior: ior.at(textures, uv) }),
-            Self::Plastic { coat, albedo } => Bsdf::Plastic(Plastic { diffuse: albedo.at(textures, uv), coat: coat.at(textures, uv) }),
+            Self::ThinDielectric { ior } => Bsdf::ThinDielectric(ThinDielectric { ior: ior.at(textures, footprint) }),
+            Self::Plastic { coat, albedo } => {
+                Bsdf::Plastic(Plastic { diffuse: albedo.at(textures, footprint), coat: coat.at(textures, footprint) })
+            }
             Self::Coated { coat, tint, base } => {
-                let base = base.bsdf(textures, uv);
-                Bsdf::Coated(Box::new(Coated::new(coat.at(textures, uv), tint.at(textures, uv), base)))
+                let base = base.bsdf(textures, || *footprint);
+                Bsdf::Coated(Box::new(Coated::new(coat.at(textures, footprint), tint.at(textures, footprint), base)))
             }
-            Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, uv))),
+            Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, footprint))),
         }
     }
 
@@ -299,12 +307,12 @@ impl Varying {
 }
 
 impl Material {
-    /// The scattering at `uv`; nothing for what consists of other materials, which [`Material::part`] resolves first.
+    /// The scattering over a footprint; nothing for what consists of other materials, which [`Material::part`] resolves first.
     #[inline]
-    pub fn bsdf(&self, textures: &[Texture], uv: Vec2) -> Bsdf {
+    pub fn bsdf(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint) -> Bsdf {
         match self {
             Self::Constant(bsdf) => bsdf.clone(),
-            Self::Varying(varying) => varying.bsdf(textures, uv),
+            Self::Varying(varying) => varying.bsdf(textures, &footprint()),
             Self::Mix { .. } | Self::TwoSided { .. } => Bsdf::Lambert(Lambert { albedo: Rgb::BLACK }),
         }
     }
@@ -315,7 +323,7 @@ impl Material {
         match self {
             Self::Varying(varying) => match **varying {
                 Varying::Dielectric { alpha, multiscatter, .. } => {
-                    Some(Varying::Dielectric { ior, alpha, multiscatter }.bsdf(textures, uv))
+                    Some(Varying::Dielectric { ior, alpha, multiscatter }.bsdf(textures, &Footprint::point(uv)))
                 }
                 _ => None,
             },
@@ -328,7 +336,7 @@ impl Material {
     pub fn part(&self, textures: &[Texture], uv: Vec2, is_front: bool, u: impl FnOnce() -> f32) -> Option<MaterialId> {
         match self {
             Self::Constant(_) | Self::Varying(_) => None,
-            Self::Mix { first, second, amount } => Some(if u() < amount.at(textures, uv) { *second } else { *first }),
+            Self::Mix { first, second, amount } => Some(if u() < amount.at(textures, &Footprint::point(uv)) { *second } else { *first }),
             Self::TwoSided { front, back } => Some(if is_front { *front } else { *back }),
         }
     }
@@ -382,7 +390,11 @@ impl Material {
 impl From<Varying> for Material {
     /// What no texture changes is prepared once.
     fn from(varying: Varying) -> Self {
-        if varying.is_constant() { Self::Constant(varying.bsdf(&[], Vec2::ZERO)) } else { Self::Varying(Box::new(varying)) }
+        if varying.is_constant() {
+            Self::Constant(varying.bsdf(&[], &Footprint::point(Vec2::ZERO)))
+        } else {
+            Self::Varying(Box::new(varying))
+        }
     }
 }
 

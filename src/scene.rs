@@ -10,7 +10,7 @@ use crate::math::Vec3;
 use crate::math::random::mix;
 use crate::medium::Media;
 use crate::relief::Relief;
-use crate::texture::Texture;
+use crate::texture::{Footprint, Texture};
 
 /// How a shape looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +49,8 @@ pub struct Features {
     pub instances: bool,
     /// Some material is textured.
     pub textures: bool,
+    /// Some material has an image that is looked up over what a ray stands for.
+    pub filtered_textures: bool,
     /// Some surface has a normal map or a bump map.
     pub reliefs: bool,
     /// Some surface's shading normal differs from its geometric one.
@@ -107,15 +109,21 @@ impl Scene {
         &self.materials[self.surface(shape).material.index()]
     }
 
-    /// The scattering at a point for a ray that arrives in `direction`.
+    /// The scattering at a point for a ray that arrives in `direction` and stands for `footprint`.
     /// What is not the same everywhere is made in `place`.
     #[inline(always)]
-    pub fn bsdf<'a>(&'a self, at: &SurfaceInteraction, direction: Vec3, place: &'a mut Option<Bsdf>) -> &'a Bsdf {
+    pub fn bsdf<'a>(
+        &'a self,
+        at: &SurfaceInteraction,
+        direction: Vec3,
+        footprint: impl FnOnce() -> Footprint,
+        place: &'a mut Option<Bsdf>,
+    ) -> &'a Bsdf {
         let material = self.material(at.shape);
         if let Material::Constant(bsdf) = material {
             bsdf
         } else {
-            place.insert(self.met_material(at, direction).bsdf(&self.textures, at.uv))
+            place.insert(self.met_material(at, direction).bsdf(&self.textures, footprint))
         }
     }
 

@@ -10,6 +10,7 @@ use steradian::integrator::World;
 use steradian::math::{Ray, Vec3, vec3};
 use steradian::output;
 use steradian::scene::Scene;
+use steradian::texture::Footprint;
 
 use crate::util::folder::Folder;
 use steradian::math::random::Rng;
@@ -42,7 +43,7 @@ fn meet(scene: &Scene, ray: &Ray) -> Option<(SurfaceInteraction, Vec3)> {
 fn bsdf_at(scene: &Scene, x: f32, y: f32) -> Bsdf {
     let ray = Ray::new(vec3(x, y, 5.0), -Vec3::Z);
     let (at, _) = meet(scene, &ray).expect("the ray meets a shape");
-    scene.bsdf(&at, ray.direction, &mut None).clone()
+    scene.bsdf(&at, ray.direction, || Footprint::point(at.uv), &mut None).clone()
 }
 
 /// Codes of the base colour taken for light; or the curve applied to roughness too.

@@ -12,6 +12,7 @@ use steradian::integrator::World;
 use steradian::light::Light;
 use steradian::math::{DVec3, Ray, Vec2, Vec3};
 use steradian::scene::Scene;
+use steradian::texture::Footprint;
 
 use crate::util::folder::{Folder, good_scene, set};
 
@@ -238,13 +239,13 @@ fn maps_of_an_mtl_colour_mirrors_metals_and_lamps() {
     ] {
         let scene = compile(mtl);
         let material = scene.material(ShapeId(0));
-        let [black, white] = [dark, bright].map(|uv| match material.bsdf(&scene.textures, uv) {
+        let [black, white] = [dark, bright].map(|uv| match material.bsdf(&scene.textures, || Footprint::point(uv)) {
             Bsdf::Mirror(mirror) => mirror.reflectance.g,
             Bsdf::Conductor(metal) => metal.albedo(Vec3::Z).g,
             other => panic!("{mtl}: {other:?}"),
         });
         assert!(black == 0.0 && (white - expected).abs() < 1e-4, "{mtl}: {black} {white}");
-        assert!(material.bsdf(&scene.textures, dark).eval(w, w).value.is_black());
+        assert!(material.bsdf(&scene.textures, || Footprint::point(dark)).eval(w, w).value.is_black());
     }
     for (mtl, expected) in [("Ke 2 3 4\nmap_Ke map.png", 3.0), ("map_Ke map.png", 1.0)] {
         let scene = compile(mtl);

@@ -8,7 +8,7 @@ pub use lens::{Blades, Lens, lens_equation};
 
 use std::f64::consts::{PI, TAU};
 
-use crate::math::{DVec3, Motion, Ray, Transform, Vec2, Vec3};
+use crate::math::{DVec3, Motion, Ray, RayCone, Transform, Vec2, Vec3};
 
 /// How points of the picture become directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -156,6 +156,30 @@ impl Camera {
             Some(motion) => moved(motion, time, origin, direction),
         };
         Ray { time, ..Ray::new(origin.as_vec3(), direction.normalize().as_vec3()) }
+    }
+
+    /// The cone of a pixel around one of the camera's rays, which may start further along: as wide as the root of the pixel's area across the
+    /// ray, without what a lens or the camera's motion adds.
+    pub fn pixel_cone(&self, ray: &Ray, size: [u32; 2]) -> RayCone {
+        let (width, height) = (f64::from(size[0]), f64::from(size[1]));
+        let from_pinhole = |spread: f64| {
+            let gone = if self.is_moving() { 0.0 } else { (ray.origin.as_dvec3() - self.position()).length() };
+            RayCone { width: (spread * gone) as f32, spread: spread as f32 }
+        };
+        match &self.projection {
+            Projection::Perspective { half_height, .. } => {
+                // A pixel's solid angle shrinks with the third power of the cosine to the view axis.
+                let cos = f64::from(self.axis().dot(ray.direction)).clamp(0.0, 1.0);
+                from_pinhole(2.0 * half_height / height * (self.framing.pixel_aspect * cos.powi(3)).sqrt())
+            }
+            Projection::Orthographic { half_height } => {
+                RayCone { width: (2.0 * half_height / height * self.framing.pixel_aspect.sqrt()) as f32, spread: 0.0 }
+            }
+            Projection::Environment => {
+                let cos = f64::from(self.up().dot(ray.direction));
+                from_pinhole((PI / height * TAU / width * (1.0 - cos * cos).max(0.0).sqrt()).sqrt())
+            }
+        }
     }
 
     /// The point of a picture at z = -1.

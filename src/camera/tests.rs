@@ -164,3 +164,31 @@ fn time_is_drawn_only_while_the_shutter_is_open() {
     assert_eq!(camera(None).time(0.3), 0.3);
     assert_eq!(camera(None).with_shutter([2.0, 2.0]).time(0.3), 0.0);
 }
+
+#[test]
+fn the_cone_of_a_pixel_has_its_area() {
+    let lens = Lens { radius: 1e-4, focus_distance: 5.0, blades: None };
+    let perspective = Projection::Perspective { half_height: 0.8, lens: Some(lens) };
+    let framing = Framing { pixel_aspect: 1.5, shift: [0.1, -0.2] };
+    for projection in [perspective, Projection::Orthographic { half_height: 2.0 }, Projection::Environment] {
+        let camera = placed(projection).with_framing(framing).with_near(0.3);
+        for (x, y) in [(100.5, 50.5), (3.5, 4.5), (190.5, 20.5)] {
+            let at = |x: f32, y: f32| {
+                let ray = camera.ray(Vec2::new(x, y), [200, 100], [0.5; 2], 0.0);
+                // All at the same distance from the camera.
+                let distance = 40.0 - (ray.origin - PLACE.as_vec3()).length();
+                (ray, ray.at(distance).as_dvec3())
+            };
+            let (ray, _) = at(x, y);
+            let (right, down) = (at(x + 0.5, y).1 - at(x - 0.5, y).1, at(x, y + 0.5).1 - at(x, y - 0.5).1);
+            // The area as seen along the ray.
+            let expected = right.cross(down).dot(ray.direction.as_dvec3()).abs().sqrt();
+            let moved = Ray::new(ray.at(7.0), ray.direction);
+            for ray in [ray, moved] {
+                let distance = 40.0 - (ray.origin - PLACE.as_vec3()).length();
+                let width = f64::from(camera.pixel_cone(&ray, [200, 100]).width_at(distance));
+                assert!((width / expected - 1.0).abs() < 0.02, "{projection:?} {x} {y}: {width} {expected}");
+            }
+        }
+    }
+}

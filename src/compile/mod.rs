@@ -35,6 +35,7 @@ use crate::import::AssetError;
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::scene::{Features, Scene, Surface};
+use crate::texture::Texture;
 
 use lights::LightTable;
 use materials::MaterialTable;
@@ -139,6 +140,8 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
+            filtered_textures: materials.iter().any(Material::is_textured)
+                && self.materials.textures.textures.iter().any(Texture::is_filtered),
             reliefs,
             shading_normals: reliefs || self.geometry.shapes.iter().any(smooth),
             parameters: anisotropic || !self.materials.textures.textures.is_empty(),

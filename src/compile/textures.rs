@@ -186,6 +186,7 @@ impl Loader<'_> {
                     filter: match filter {
                         TextureFilterDesc::Nearest => Filter::Nearest,
                         TextureFilterDesc::Bilinear => Filter::Bilinear,
+                        TextureFilterDesc::Trilinear => Filter::Trilinear,
                     },
                     wrap: match wrap {
                         WrapDesc::Both(mode) => [wrap_mode(*mode); 2],

@@ -34,7 +34,7 @@ pub enum TextureDesc {
         /// How whole numbers become colours. Default: `auto`.
         #[serde(default)]
         color_space: ColorSpaceDesc,
-        /// What stands between the middles of pixels. Default: `bilinear`.
+        /// What stands between the middles of pixels, and what is seen where they are small in the picture. Default: `trilinear`.
         #[serde(default)]
         filter: TextureFilterDesc,
         /// What lies beyond the edges: one word, or one for u and one for v. Default: `repeat`.
@@ -78,15 +78,21 @@ pub enum ColorSpaceDesc {
     Linear,
 }
 
-/// What stands between the middles of an image's pixels.
+/// What stands between the middles of an image's pixels, and what is seen where they are smaller than what a sample of the picture stands for.
+///
+/// A sample stands for its pixel divided by the samples per pixel that the render has been asked for, seen through mirrors and glass too; after
+/// other surfaces, for the part of the light that they gather from. So pictures have less noise, and what is blurred vanishes as the samples
+/// become more. Opacity, normal and bump maps, emission and the amount of a mix are always looked up as `bilinear` does it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TextureFilterDesc {
     /// The nearest pixel.
     Nearest,
     /// The four nearest pixels, blended in linear colours.
-    #[default]
     Bilinear,
+    /// As `bilinear`, in smaller versions of the image where a sample stands for more than a pixel of it.
+    #[default]
+    Trilinear,
 }
 
 /// What lies beyond the edges of an image: the same along u and v, or `[along u, along v]`.

@@ -340,11 +340,18 @@ impl Mesh {
             // MikkTSpace's frame is that of the interpolated vectors before they are normalised, up to a factor common to all three.
             return Parameters { dp_du: tangent / length, dp_dv: n_s.cross(tangent) * side, uv };
         }
-        let (d1, d2) = (uv_b - uv_a, uv_c - uv_a);
-        let inverse = 1.0 / (d1.x * d2.y - d1.y * d2.x);
-        let (dp_du, dp_dv) = ((edge_b * d2.y - edge_c * d1.y) * inverse, (edge_c * d1.x - edge_b * d2.x) * inverse);
+        let [dp_du, dp_dv] = derivatives([edge_b, edge_c], [uv_b - uv_a, uv_c - uv_a]);
         let (dp_du, dp_dv) = if dp_du.is_finite() && dp_dv.is_finite() { (dp_du, dp_dv) } else { (edge_b, edge_c) };
         Parameters { dp_du, dp_dv, uv }
+    }
+
+    /// Changes of the point with u and v at a hit, whatever tangents normal maps have; not finite where uv do not span the triangle.
+    pub(super) fn uv_derivatives(&self, hit: &Hit, time: f32) -> [Vec3; 2] {
+        let points = self.triangle_points_at(hit.prim, time);
+        let edges = [points.b - points.a, points.c - points.a];
+        let Some(uvs) = &self.uvs else { return edges };
+        let [a, b, c] = self.triangles[hit.prim.index()].map(|i| Vec2::from(uvs[i as usize]));
+        derivatives(edges, [b - a, c - a])
     }
 
     /// The interpolated tangent for normal maps and the side of the bitangent; `None` where the mesh has none.
@@ -359,6 +366,13 @@ impl Mesh {
         let ((from, side), (to, _)) = (at(first)?, at(second)?);
         Some((from * (1.0 - s) + to * s, side))
     }
+}
+
+/// Changes of the point with u and v on a triangle with these edges in space and in uv.
+#[inline]
+fn derivatives([edge_b, edge_c]: [Vec3; 2], [d1, d2]: [Vec2; 2]) -> [Vec3; 2] {
+    let inverse = 1.0 / (d1.x * d2.y - d1.y * d2.x);
+    [(edge_b * d2.y - edge_c * d1.y) * inverse, (edge_c * d1.x - edge_b * d2.x) * inverse]
 }
 
 #[derive(Default)]

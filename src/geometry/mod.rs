@@ -219,4 +219,20 @@ impl Geometry {
         let dp_dv = local(&instance.object_ray(ray));
         instance::finite_or_zero(instance.transform_at(ray.time).vector(dp_dv.as_dvec3()).as_vec3())
     }
+
+    /// Changes of the point with u and v at a hit of `ray`, as uv has them even where normal maps have tangents of their own. Not finite, or
+    /// zero, where uv do not span the surface.
+    #[inline(never)]
+    pub fn uv_derivatives(&self, ray: &Ray, hit: &Hit) -> [Vec3; 2] {
+        let local = |ray: &Ray| match self.shape(hit.shape) {
+            Shape::Mesh(mesh) => mesh.uv_derivatives(hit, ray.time),
+            Shape::Analytic(placed) => placed.interaction_and_dp_dv(ray, hit).map_or([Vec3::ZERO; 2], |(at, dp_dv)| [at.dp_du, dp_dv]),
+        };
+        if hit.instance == Hit::NO_INSTANCE {
+            return local(ray);
+        }
+        let instance = self.instance(hit.instance);
+        let transform = instance.transform_at(ray.time);
+        local(&instance.object_ray(ray)).map(|derivative| transform.vector(derivative.as_dvec3()).as_vec3())
+    }
 }

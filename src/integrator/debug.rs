@@ -7,6 +7,7 @@ use crate::film::PixelSample;
 use crate::geometry::SurfaceInteraction;
 use crate::math::{Frame, Ray, Vec3};
 use crate::sampling::{Sampler, warp};
+use crate::texture::Footprint;
 
 /// What a [`DebugView`] shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +63,7 @@ impl Integrator for DebugView {
         for_each_first_surface(world, samples, out, counts, |_, ray, at| PixelSample {
             radiance: self.view.color(world, at),
             alpha: 1.0,
-            surface: surface_sample(world, self.needs, at, ray.direction),
+            surface: surface_sample(world, self.needs, at, ray.direction, || Footprint::point(at.uv)),
         });
     }
 }
@@ -91,7 +92,7 @@ impl Integrator for AmbientOcclusion {
             PixelSample {
                 radiance: Rgb::splat(f32::from(u8::from(free))),
                 alpha: 1.0,
-                surface: surface_sample(world, self.needs, at, ray.direction),
+                surface: surface_sample(world, self.needs, at, ray.direction, || Footprint::point(at.uv)),
             }
         });
         counts.shadow += shadow_rays;

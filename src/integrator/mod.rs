@@ -4,6 +4,7 @@
 //! shade all hits, trace all shadow rays. Accelerators can then trace rays side by side that belong together, and each stage's code and
 //! data stay in the caches. `docs/wavefront.md` has the figures behind this choice.
 
+mod cones;
 mod debug;
 mod media;
 mod path;
@@ -19,8 +20,9 @@ pub use world::World;
 use crate::desc::{IntegratorDesc, StrategyDesc};
 use crate::film::{PixelSample, SurfaceSample};
 use crate::geometry::SurfaceInteraction;
-use crate::math::Ray;
+use crate::math::{Ray, Vec3};
 use crate::sampling::{PixelSeed, Sampler};
+use crate::texture::Footprint;
 
 /// Sets of four dimensions of the sampler, by purpose.
 pub mod dimensions {
@@ -130,7 +132,13 @@ impl From<StrategyDesc> for Strategy {
 }
 
 /// What the layers need of the first surface.
-fn surface_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInteraction, direction: crate::math::Vec3) -> SurfaceSample {
+fn surface_sample(
+    world: &World,
+    needs: SurfaceNeeds,
+    at: &SurfaceInteraction,
+    direction: Vec3,
+    footprint: impl FnOnce() -> Footprint,
+) -> SurfaceSample {
     let mut sample = SurfaceSample::default();
     if needs.geometry {
         sample.depth = world.scene.camera.depth(at.p, at.time);
@@ -139,7 +147,7 @@ fn surface_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInteraction, d
     }
     if needs.albedo {
         let frame = crate::math::Frame::from_normal(at.n_s);
-        sample.albedo = world.scene.bsdf(at, direction, &mut None).albedo(frame.to_local(-direction));
+        sample.albedo = world.scene.bsdf(at, direction, footprint, &mut None).albedo(frame.to_local(-direction));
     }
     sample
 }

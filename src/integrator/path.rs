@@ -14,9 +14,10 @@ use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::light::{Light, Receiver, ShadowTarget};
-use crate::math::{DVec3, Frame, Ray, Vec3};
+use crate::math::{DVec3, Frame, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
 use crate::sampling::{PixelSeed, Sampler, power_heuristic};
+use crate::texture::Footprint;
 
 /// How directions towards lights are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,6 +83,8 @@ struct Scratch {
     pending: Vec<Pending>,
     /// Beside `paths`, in scenes with media.
     media: Vec<MediaState>,
+    /// Beside `paths`, in pictures of scenes with filtered textures; else empty.
+    cones: Vec<RayCone>,
 }
 
 thread_local! {
@@ -115,6 +118,9 @@ impl PathIntegrator {
             scratch.media.clear();
             scratch.media.extend(scratch.rays.iter().map(|ray| MediaState { here: world.media_at_start(ray), ..MediaState::default() }));
         }
+
+        scratch.cones.clear();
+        scratch.cones.extend(scratch.rays.iter().map_while(|ray| world.camera_cone(ray)));
 
         for bounce in 0..self.max_depth {
             let count = scratch.rays.len();
@@ -154,9 +160,10 @@ impl PathIntegrator {
     /// Takes every path through media to the next surface where something happens to it; says how many rays that took.
     #[inline(never)]
     fn arrive_all(&self, world: &World, scratch: &mut Scratch) -> u64 {
-        let Scratch { paths, rays, hits, media, .. } = scratch;
+        let Scratch { paths, rays, hits, media, cones, .. } = scratch;
         let mut passed = 0;
         for (i, path) in paths.iter_mut().enumerate() {
+            let start = rays[i].origin;
             let arrival = world.arrive(&mut rays[i], hits[i], &mut media[i]);
             hits[i] = arrival.hit;
             path.throughput *= arrival.transmittance;
@@ -164,6 +171,9 @@ impl PathIntegrator {
                 // No shadow ray would have come so far.
                 path.pdf = f32::INFINITY;
                 passed += u64::from(arrival.passed);
+                if let Some(cone) = cones.get_mut(i) {
+                    *cone = cone.moved((rays[i].origin - start).length());
+                }
             }
             if matches!(arrival.ior, Some(RelativeIor::Dispersed(_))) {
                 // Each colour goes its own way: the path follows one of them.
@@ -183,7 +193,7 @@ impl PathIntegrator {
     /// Large results stay where they were returned and are read through references: a copy would have to wait for them.
     /// `MEDIA` is whether the scene has media.
     fn shade_all<const MEDIA: bool>(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, media, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, .. } = scratch;
         shadow_rays.clear();
         pending.clear();
         let mut alive = 0;
@@ -195,10 +205,12 @@ impl PathIntegrator {
                 sample.radiance += self.clamped(path.throughput * self.escaped(world, path, ray.direction), bounce);
                 continue;
             };
+            let cone = cones.get(i).copied();
+            let footprint = || world.footprint(cone.as_ref(), ray, hits[i].as_ref(), at);
             if bounce == 0 {
                 sample.alpha = 1.0;
                 if self.needs != SurfaceNeeds::default() {
-                    sample.surface = surface_sample(world, self.needs, at, ray.direction);
+                    sample.surface = surface_sample(world, self.needs, at, ray.direction, footprint);
                 }
             }
             sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
@@ -208,7 +220,7 @@ impl PathIntegrator {
 
             let mut bsdf = None;
             let boundary = if MEDIA { world.boundary_bsdf(at, ray.direction, &media[i]) } else { None };
-            let mut vertex = Vertex::new(world, at, ray, &mut bsdf);
+            let mut vertex = Vertex::new(world, at, ray, footprint, &mut bsdf);
             if let Some(boundary) = &boundary {
                 vertex.bsdf = boundary;
             }
@@ -224,6 +236,9 @@ impl PathIntegrator {
                 if MEDIA {
                     let here = world.media_toward(at, ray.direction, next.direction, &media[i].here);
                     media[alive] = MediaState { here, ..media[i] };
+                }
+                if let Some(cone) = cone {
+                    cones[alive] = world.scattered_cone(cone, at.t, path.pdf);
                 }
                 paths[alive] = path;
                 rays[alive] = next;
@@ -365,14 +380,21 @@ pub(super) struct Vertex<'a> {
 }
 
 impl<'a> Vertex<'a> {
-    /// The vertex at `at`, where `ray` arrives; `bsdf` is the place for scattering that is not the same everywhere.
+    /// The vertex at `at`, where `ray` arrives, which stands for `footprint`; `bsdf` is the place for scattering that is not the same
+    /// everywhere.
     #[inline(always)]
-    pub fn new(world: &'a World, at: &'a SurfaceInteraction, ray: &Ray, bsdf: &'a mut Option<Bsdf>) -> Self {
+    pub fn new(
+        world: &'a World,
+        at: &'a SurfaceInteraction,
+        ray: &Ray,
+        footprint: impl FnOnce() -> Footprint,
+        bsdf: &'a mut Option<Bsdf>,
+    ) -> Self {
         let back = -ray.direction;
         let cos_geometric = back.dot(at.n_g);
         let n_s = if world.scene.features.shading_normals { facing_normal(back, at.n_s, at.n_g) } else { at.n_g };
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
-        let bsdf = world.scene.bsdf(at, ray.direction, bsdf);
+        let bsdf = world.scene.bsdf(at, ray.direction, footprint, bsdf);
         // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
         let has_relief = world.scene.features.reliefs && world.scene.relief(at, ray.direction).is_some();
         let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));

@@ -6,11 +6,12 @@ use super::path::Vertex;
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
-use crate::geometry::SurfaceInteraction;
+use crate::geometry::{Hit, SurfaceInteraction};
 use crate::light::{Light, ShadowTarget};
-use crate::math::Ray;
 use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::{Ray, RayCone};
 use crate::medium::Interior;
+use crate::texture::Footprint;
 
 /// Whitted's ray tracing. Area lights shine from their middle, so shadows are hard; scattering that is neither mirror-like nor lit by a
 /// light contributes only through the ambient term.
@@ -29,12 +30,12 @@ impl Integrator for Whitted {
         for (sample, out) in samples.iter().zip(out) {
             let in_media = world.scene.features.media;
             let here = if in_media { world.media_at_start(&sample.ray) } else { Interior::default() };
-            let segment = Segment::trace(world, sample.ray, here, counts);
+            let segment = Segment::trace(world, sample.ray, world.camera_cone(&sample.ray), here, counts);
             *out = match &segment.end {
                 Some(at) => PixelSample {
                     radiance: self.shade(world, &segment, at, 1, counts) * segment.transmittance,
                     alpha: 1.0,
-                    surface: surface_sample(world, self.needs, at, segment.ray.direction),
+                    surface: surface_sample(world, self.needs, at, segment.ray.direction, || segment.footprint(world, at)),
                 },
                 None => PixelSample { radiance: segment.escaped(world), ..PixelSample::default() },
             };
@@ -46,6 +47,9 @@ impl Integrator for Whitted {
 struct Segment {
     /// From the last surface that it passed, if media lie on its way.
     ray: Ray,
+    /// Around the ray, where textures are filtered.
+    cone: Option<RayCone>,
+    hit: Option<Hit>,
     end: Option<SurfaceInteraction>,
     /// The media that contain its end.
     media: MediaState,
@@ -55,16 +59,24 @@ struct Segment {
 
 impl Segment {
     /// Traces a ray that starts within the media `here`.
-    fn trace(world: &World, mut ray: Ray, here: Interior, counts: &mut RayCounts) -> Self {
+    fn trace(world: &World, mut ray: Ray, cone: Option<RayCone>, here: Interior, counts: &mut RayCounts) -> Self {
         let mut media = MediaState { here, ..MediaState::default() };
-        if !world.scene.features.media {
-            return Self { ray, end: world.closest(&ray), media, transmittance: Rgb::WHITE };
-        }
         let hit = world.accel.intersect(&ray);
+        if !world.scene.features.media {
+            return Self { ray, cone, hit, end: world.resolve(&ray, hit), media, transmittance: Rgb::WHITE };
+        }
+        let start = ray.origin;
         let arrival = world.arrive(&mut ray, hit, &mut media);
         counts.indirect += u64::from(arrival.passed);
         media.ior = arrival.ior.map(|ior| ior.of(None));
-        Self { ray, end: world.resolve(&ray, arrival.hit), media, transmittance: arrival.transmittance }
+        let cone = cone.map(|cone| cone.moved((ray.origin - start).length()));
+        let hit = arrival.hit;
+        Self { ray, cone, hit, end: world.resolve(&ray, hit), media, transmittance: arrival.transmittance }
+    }
+
+    /// What the ray stands for on the surface at its end.
+    fn footprint(&self, world: &World, at: &SurfaceInteraction) -> Footprint {
+        world.footprint(self.cone.as_ref(), &self.ray, self.hit.as_ref(), at)
     }
 
     /// What arrives from infinity.
@@ -76,14 +88,14 @@ impl Segment {
 impl Whitted {
     /// Radiance leaving `at`, the end of the segment number `depth` of its path, against that.
     fn shade(&self, world: &World, segment: &Segment, at: &SurfaceInteraction, depth: u32, counts: &mut RayCounts) -> Rgb {
-        let Segment { ray, media, .. } = segment;
+        let Segment { ray, cone, media, .. } = segment;
         let mut radiance = world.emitted(at, -ray.direction);
         if depth >= self.max_depth {
             return radiance;
         }
         let mut bsdf = None;
         let boundary = world.boundary_bsdf(at, ray.direction, media);
-        let mut vertex = Vertex::new(world, at, ray, &mut bsdf);
+        let mut vertex = Vertex::new(world, at, ray, || segment.footprint(world, at), &mut bsdf);
         if let Some(boundary) = &boundary {
             vertex.bsdf = boundary;
         }
@@ -105,7 +117,7 @@ impl Whitted {
             }
             counts.indirect += 1;
             let here = world.media_toward(at, ray.direction, direction, &media.here);
-            let next = Segment::trace(world, at.spawn(direction), here, counts);
+            let next = Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), here, counts);
             let arriving = match &next.end {
                 Some(end) => self.shade(world, &next, end, depth + 1, counts) * next.transmittance,
                 None => next.escaped(world),

@@ -1,5 +1,6 @@
 //! A scene with its accelerator: rays in, surface interactions out.
 
+use super::cones::Division;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
 use crate::geometry::{Detail, Hit, SurfaceInteraction};
@@ -19,6 +20,8 @@ pub struct World<'a> {
     pub accel: &'a dyn Accelerator,
     bounds: Aabb,
     detail: Detail,
+    /// Of pictures of scenes with [filtered textures](crate::scene::Features::filtered_textures).
+    pub(super) division: Option<Division>,
     /// Around all surfaces of media.
     pub(super) media_bounds: Aabb,
 }
@@ -27,7 +30,7 @@ impl<'a> World<'a> {
     /// A scene with its accelerator.
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator) -> Self {
         let detail = if scene.features.parameters { Detail::Full } else { Detail::Place };
-        Self { scene, accel, bounds: accel.bounds(), detail, media_bounds: super::media::bounds(scene) }
+        Self { scene, accel, bounds: accel.bounds(), detail, division: None, media_bounds: super::media::bounds(scene) }
     }
 
     /// With the parametrisation of every surface, whether or not the scene needs it.

@@ -4,7 +4,7 @@ use crate::bsdf::Coat;
 use crate::color::Rgb;
 use crate::id::TextureId;
 use crate::math::Vec2;
-use crate::texture::Texture;
+use crate::texture::{Footprint, Texture};
 
 /// A colour that is constant or comes from a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,12 +16,12 @@ pub enum ColorInput {
 }
 
 impl ColorInput {
-    /// The colour at `uv`.
+    /// The colour over `footprint`.
     #[inline]
-    pub fn at(&self, textures: &[Texture], uv: Vec2) -> Rgb {
+    pub fn at(&self, textures: &[Texture], footprint: &Footprint) -> Rgb {
         match self {
             Self::Constant(color) => *color,
-            Self::Texture(id) => textures[id.index()].color(uv).map(|v| v.clamp(0.0, 1.0)),
+            Self::Texture(id) => textures[id.index()].color_over(footprint).map(|v| v.clamp(0.0, 1.0)),
         }
     }
 
@@ -40,12 +40,12 @@ pub enum ScalarInput {
 }
 
 impl ScalarInput {
-    /// The number at `uv`.
+    /// The number over `footprint`.
     #[inline]
-    pub fn at(&self, textures: &[Texture], uv: Vec2) -> f32 {
+    pub fn at(&self, textures: &[Texture], footprint: &Footprint) -> f32 {
         match self {
             Self::Constant(value) => *value,
-            Self::Texture(id) => textures[id.index()].scalar(uv).clamp(0.0, 1.0),
+            Self::Texture(id) => textures[id.index()].scalar_over(footprint).clamp(0.0, 1.0),
         }
     }
 
@@ -74,12 +74,12 @@ pub enum RangedInput {
 }
 
 impl RangedInput {
-    /// The number at `uv`.
+    /// The number over `footprint`.
     #[inline]
-    pub fn at(&self, textures: &[Texture], uv: Vec2) -> f32 {
+    pub fn at(&self, textures: &[Texture], footprint: &Footprint) -> f32 {
         match *self {
             Self::Constant(value) => value,
-            Self::Texture { id, range: [low, high] } => low + (high - low) * ScalarInput::Texture(id).at(textures, uv),
+            Self::Texture { id, range: [low, high] } => low + (high - low) * ScalarInput::Texture(id).at(textures, footprint),
         }
     }
 
@@ -98,10 +98,10 @@ pub struct AlphaInput {
 }
 
 impl AlphaInput {
-    /// Alpha at `uv`.
+    /// Alpha over `footprint`.
     #[inline]
-    pub fn at(&self, textures: &[Texture], uv: Vec2) -> [f32; 2] {
-        self.axes.map(|input| input.at(textures, uv)).map(|value| if self.squared { value * value } else { value })
+    pub fn at(&self, textures: &[Texture], footprint: &Footprint) -> [f32; 2] {
+        self.axes.map(|input| input.at(textures, footprint)).map(|value| if self.squared { value * value } else { value })
     }
 
     /// Whether no texture changes it.
@@ -128,17 +128,19 @@ impl CoatInput {
     /// A coat with these inputs.
     pub fn new(ior: RangedInput, alpha: AlphaInput) -> Self {
         match ior {
-            RangedInput::Constant(ior) if alpha.is_constant() => Self::Constant(Coat::new(ior, alpha.at(&[], Vec2::ZERO))),
+            RangedInput::Constant(ior) if alpha.is_constant() => {
+                Self::Constant(Coat::new(ior, alpha.at(&[], &Footprint::point(Vec2::ZERO))))
+            }
             ior => Self::Varying { ior, alpha },
         }
     }
 
-    /// The coat at `uv`.
+    /// The coat over `footprint`.
     #[inline]
-    pub(super) fn at(&self, textures: &[Texture], uv: Vec2) -> Coat {
+    pub(super) fn at(&self, textures: &[Texture], footprint: &Footprint) -> Coat {
         match self {
             Self::Constant(coat) => *coat,
-            Self::Varying { ior, alpha } => Coat::looked_up(ior.at(textures, uv), alpha.at(textures, uv)),
+            Self::Varying { ior, alpha } => Coat::looked_up(ior.at(textures, footprint), alpha.at(textures, footprint)),
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod aabb;
 pub mod bernstein;
+mod cone;
 pub mod float;
 mod frame;
 mod motion;
@@ -12,6 +13,7 @@ mod transform;
 mod trig;
 
 pub use aabb::{Aabb, Bounds};
+pub use cone::RayCone;
 pub use frame::Frame;
 pub use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3, Vec4, dvec2, dvec3, vec2, vec3};
 pub use motion::Motion;

@@ -79,7 +79,7 @@ impl<'a> Job<'a> {
             geometry: wanted(LayerKind::Z) || wanted(LayerKind::N) || wanted(LayerKind::P),
             albedo: wanted(LayerKind::Albedo),
         };
-        let world = World::new(scene, accel);
+        let world = World::new(scene, accel).of_picture(settings.size, settings.spp);
         Self {
             world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
             integrator: integrator::build(&settings.integrator, sampler, needs),

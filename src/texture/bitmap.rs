@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use super::footprint::Footprint;
 use super::image::{Channel, Decoding, Image};
 use super::mapping::{UvTransform, Wrap};
 use crate::color::Rgb;
@@ -16,8 +17,10 @@ pub enum Filter {
     /// The colour of the texel.
     Nearest,
     /// The colours of the four nearest texels, blended.
-    #[default]
     Bilinear,
+    /// As `Bilinear`, in the two levels of the image's [pyramid](super::Pyramid) whose texels are about as large as the footprint, blended.
+    #[default]
+    Trilinear,
 }
 
 /// An image with a way to look it up.
@@ -40,13 +43,13 @@ pub struct Bitmap {
 }
 
 /// The four texels around a place, as columns and rows, and their weights.
-struct Footprint {
+struct Texels {
     texels: [[usize; 2]; 4],
     weights: [f32; 4],
 }
 
 impl Bitmap {
-    /// An image as it is: bilinear, repeated.
+    /// An image as it is: blended, repeated.
     pub fn new(image: Arc<Image>, decoding: Decoding) -> Self {
         let (filter, wrap) = (Filter::default(), [Wrap::default(); 2]);
         Self { image, decoding, filter, wrap, transform: UvTransform::IDENTITY, channel: None, invert: false }
@@ -69,39 +72,98 @@ impl Bitmap {
     /// The colour at `uv`.
     #[inline]
     pub fn color(&self, uv: Vec2) -> Rgb {
+        self.color_in(&self.image, self.decoding, uv)
+    }
+
+    /// One number at `uv`: the chosen channel, grey, or else the luminance.
+    #[inline]
+    pub fn scalar(&self, uv: Vec2) -> f32 {
+        self.scalar_in(&self.image, self.decoding, uv)
+    }
+
+    /// The colour over a footprint.
+    #[inline]
+    pub fn color_over(&self, footprint: &Footprint) -> Rgb {
+        match self.levels(footprint) {
+            None => self.color(footprint.uv),
+            Some(levels) => {
+                let [fine, coarse] = levels.images.map(|(image, decoding)| self.color_in(image, decoding, footprint.uv));
+                fine * (1.0 - levels.fraction) + coarse * levels.fraction
+            }
+        }
+    }
+
+    /// As [`scalar`](Self::scalar), over a footprint.
+    #[inline]
+    pub fn scalar_over(&self, footprint: &Footprint) -> f32 {
+        match self.levels(footprint) {
+            None => self.scalar(footprint.uv),
+            Some(levels) => {
+                let [fine, coarse] = levels.images.map(|(image, decoding)| self.scalar_in(image, decoding, footprint.uv));
+                fine * (1.0 - levels.fraction) + coarse * levels.fraction
+            }
+        }
+    }
+
+    /// The levels of the pyramid for a footprint; `None` where the image itself is it.
+    #[inline]
+    fn levels(&self, footprint: &Footprint) -> Option<Levels<'_>> {
+        let [along_u, along_v] = self.transform.axes();
+        let size = vec2(self.image.width() as f32, self.image.height() as f32);
+        let texels = footprint.area * (along_u * size).perp_dot(along_v * size).abs();
+        // Written so that a NaN means the image too.
+        if self.filter == Filter::Trilinear && texels > 1.0 { Some(self.levels_of_area(texels)) } else { None }
+    }
+
+    /// The levels where a texel covers about so many of the image's.
+    #[inline(never)]
+    fn levels_of_area(&self, texels: f32) -> Levels<'_> {
+        let pyramid = self.image.pyramid(self.decoding);
+        let level = (0.5 * texels.log2()).min(pyramid.last() as f32);
+        let below = level as usize;
+        let image = |level: usize| match pyramid.level(level) {
+            Some(image) => (image, Decoding::Linear),
+            None => (&*self.image, self.decoding),
+        };
+        Levels { images: [image(below), image((below + 1).min(pyramid.last()))], fraction: level - below as f32 }
+    }
+
+    /// The colour at `uv` of the image or a level of it.
+    #[inline]
+    fn color_in(&self, image: &Image, decoding: Decoding, uv: Vec2) -> Rgb {
         let color = match self.channel {
-            Some(channel) => Rgb::splat(self.channel_value(uv, channel)),
+            Some(channel) => Rgb::splat(self.channel_value(image, decoding, uv, channel)),
             None => match self.filter {
                 Filter::Nearest => {
-                    let [x, y] = self.nearest(uv);
-                    self.image.color(x, y, self.decoding)
+                    let [x, y] = self.nearest(image, uv);
+                    image.color(x, y, decoding)
                 }
-                Filter::Bilinear => {
-                    let footprint = self.footprint(uv);
-                    self.image.weigh(footprint.texels, footprint.weights, self.decoding)
+                Filter::Bilinear | Filter::Trilinear => {
+                    let around = self.around(image, uv);
+                    image.weigh(around.texels, around.weights, decoding)
                 }
             },
         };
         if self.invert { Rgb::WHITE - color } else { color }
     }
 
-    /// One number at `uv`: the chosen channel, grey, or else the luminance.
+    /// One number at `uv` of the image or a level of it.
     #[inline]
-    pub fn scalar(&self, uv: Vec2) -> f32 {
+    fn scalar_in(&self, image: &Image, decoding: Decoding, uv: Vec2) -> f32 {
         let value = match self.channel {
-            Some(channel) => self.channel_value(uv, channel),
-            None if self.image.has_color() => return self.color(uv).luminance(),
-            None => self.channel_value(uv, Channel::R),
+            Some(channel) => self.channel_value(image, decoding, uv, channel),
+            None if image.has_color() => return self.color_in(image, decoding, uv).luminance(),
+            None => self.channel_value(image, decoding, uv, Channel::R),
         };
         if self.invert { 1.0 - value } else { value }
     }
 
-    fn channel_value(&self, uv: Vec2, channel: Channel) -> f32 {
-        let value = |[x, y]: [usize; 2]| self.image.value(x, y, channel, self.decoding);
+    fn channel_value(&self, image: &Image, decoding: Decoding, uv: Vec2, channel: Channel) -> f32 {
+        let value = |[x, y]: [usize; 2]| image.value(x, y, channel, decoding);
         match self.filter {
-            Filter::Nearest => value(self.nearest(uv)),
-            Filter::Bilinear => {
-                let Footprint { texels, weights } = self.footprint(uv);
+            Filter::Nearest => value(self.nearest(image, uv)),
+            Filter::Bilinear | Filter::Trilinear => {
+                let Texels { texels, weights } = self.around(image, uv);
                 texels.into_iter().zip(weights).map(|(texel, weight)| value(texel) * weight).sum()
             }
         }
@@ -109,26 +171,32 @@ impl Bitmap {
 
     /// The texel around a place.
     #[inline]
-    fn nearest(&self, uv: Vec2) -> [usize; 2] {
+    fn nearest(&self, image: &Image, uv: Vec2) -> [usize; 2] {
         let at = self.transform.apply(uv);
-        let (width, height) = (self.image.width(), self.image.height());
+        let (width, height) = (image.width(), image.height());
         let (x, y) = (self.wrap[0].fold(at.x) * width as f32, (1.0 - self.wrap[1].fold(at.y)) * height as f32);
         [(x as usize).min(width - 1), (y as usize).min(height - 1)]
     }
 
+    /// The texels around a place.
     #[inline]
-    fn footprint(&self, uv: Vec2) -> Footprint {
+    fn around(&self, image: &Image, uv: Vec2) -> Texels {
         let at = self.transform.apply(uv);
-        let (width, height) = (self.image.width(), self.image.height());
+        let (width, height) = (image.width(), image.height());
         let x = Between::new(self.wrap[0].fold(at.x), width, self.wrap[0]);
         let y = Between::new(1.0 - self.wrap[1].fold(at.y), height, self.wrap[1]);
         let ([x0, x1], [y0, y1]) = (x.texels, y.texels);
         let (s, t) = (x.fraction, y.fraction);
-        Footprint {
-            texels: [[x0, y0], [x1, y0], [x0, y1], [x1, y1]],
-            weights: [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t],
-        }
+        Texels { texels: [[x0, y0], [x1, y0], [x0, y1], [x1, y1]], weights: [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t] }
     }
+}
+
+/// Two neighbouring levels of an image's pyramid.
+struct Levels<'a> {
+    /// The finer one first, with how whole numbers become colours.
+    images: [(&'a Image, Decoding); 2],
+    /// How far the footprint is from the first to the second, from 0 to 1.
+    fraction: f32,
 }
 
 /// A place between the middles of two texels of a row.

@@ -1,9 +1,10 @@
 //! Images as textures keep them: the numbers of the file, decoded when they are looked up.
 
-use std::sync::LazyLock;
+use std::sync::{LazyLock, OnceLock};
 
 use half::f16;
 
+use super::pyramid::Pyramid;
 use crate::color::{Rgb, linear_from_srgb};
 use crate::import::{ImageData, Samples};
 
@@ -62,6 +63,8 @@ pub struct Image {
     ranges: [[f32; 2]; 2],
     /// Linear values of the codes of an 8-bit image, in proportion and by the sRGB curve.
     tables: &'static [[f32; 256]; 2],
+    /// Smaller versions by [`Decoding`], made when they are first asked for.
+    pyramids: [OnceLock<Box<Pyramid>>; 2],
 }
 
 /// Linear values of the 256 codes, in proportion and by the sRGB curve.
@@ -104,7 +107,7 @@ impl Image {
             Samples::F32(s) => s.iter().enumerate().try_for_each(|(i, v)| check(i, *v))?,
             Samples::U8(_) | Samples::U16(_) => ranges = [[0.0, 1.0]; 2],
         }
-        Ok(Self { data, ranges, tables: &TABLES_U8 })
+        Ok(Self { data, ranges, tables: &TABLES_U8, pyramids: [OnceLock::new(), OnceLock::new()] })
     }
 
     /// Width in pixels.
@@ -166,6 +169,17 @@ impl Image {
                 Samples::F16(s) => same(s, channels),
                 Samples::F32(s) => same(s, channels),
             }
+    }
+
+    /// The numbers, `width * height` times as many as channels.
+    pub(super) fn samples(&self) -> &Samples {
+        &self.data.samples
+    }
+
+    /// The smaller versions of the image; made at the first call.
+    #[inline]
+    pub fn pyramid(&self, decoding: Decoding) -> &Pyramid {
+        self.pyramids[decoding as usize].get_or_init(|| Box::new(Pyramid::new(self, decoding)))
     }
 
     /// Bytes of the pixels.

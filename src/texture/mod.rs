@@ -1,16 +1,21 @@
 //! Textures: colours and numbers as functions of uv.
 //!
-//! Lookups are points: no mip levels, no footprints. The samples of a pixel integrate over its footprint.
+//! A lookup is a point, or stands for what a sample of a pixel covers: then it takes a smaller version of the image where the samples of the
+//! pixel together would miss texels.
 
 mod bitmap;
 mod checker;
+mod footprint;
 mod image;
 mod mapping;
+mod pyramid;
 
 pub use bitmap::{Bitmap, Filter};
 pub use checker::Checker;
+pub use footprint::Footprint;
 pub use image::{Channel, Decoding, Image, ImageError};
 pub use mapping::{UvTransform, Wrap};
+pub use pyramid::Pyramid;
 
 use crate::color::Rgb;
 use crate::math::Vec2;
@@ -47,6 +52,35 @@ impl Texture {
             Self::Bitmap(bitmap) => bitmap.scalar(uv),
             Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar(uv)),
             Self::Constant(_) | Self::Checker(_) => self.color(uv).luminance(),
+        }
+    }
+
+    /// The colour over a footprint. Of a product, each factor's own.
+    #[inline]
+    pub fn color_over(&self, footprint: &Footprint) -> Rgb {
+        match self {
+            Self::Constant(_) | Self::Checker(_) => self.color(footprint.uv),
+            Self::Bitmap(bitmap) => bitmap.color_over(footprint),
+            Self::Product(factors) => factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color_over(footprint)),
+        }
+    }
+
+    /// As [`scalar`](Self::scalar), over a footprint.
+    #[inline]
+    pub fn scalar_over(&self, footprint: &Footprint) -> f32 {
+        match self {
+            Self::Bitmap(bitmap) => bitmap.scalar_over(footprint),
+            Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar_over(footprint)),
+            Self::Constant(_) | Self::Checker(_) => self.scalar(footprint.uv),
+        }
+    }
+
+    /// Whether a footprint has a say in it.
+    pub fn is_filtered(&self) -> bool {
+        match self {
+            Self::Constant(_) | Self::Checker(_) => false,
+            Self::Bitmap(bitmap) => bitmap.filter == Filter::Trilinear,
+            Self::Product(factors) => factors.iter().any(Self::is_filtered),
         }
     }
 

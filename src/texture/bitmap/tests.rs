@@ -178,3 +178,48 @@ fn what_is_no_image_is_refused() {
     assert_eq!(new(3, 2, 3, Samples::F32(floats)).unwrap_err(), ImageError::NotFinite { x: 1, y: 1 });
     assert_eq!(new(1, 1, 1, Samples::F16(vec![f16::INFINITY])).unwrap_err(), ImageError::NotFinite { x: 0, y: 0 });
 }
+
+/// A square of uv in which as many texels lie of an image that fills the unit square.
+fn over(uv: Vec2, texels: f32, count: usize) -> Footprint {
+    Footprint { uv, area: texels / count as f32 }
+}
+
+#[test]
+fn footprints_choose_the_level_of_their_texels() {
+    let noise: Vec<u8> = (0u32..16 * 8).map(|i| (i * i * 97 % 251) as u8).collect();
+    let bitmap = Bitmap::new(grey(16, &noise), Decoding::Srgb);
+    let level =
+        |level: usize| Bitmap { image: Arc::new(bitmap.image.pyramid(Decoding::Srgb).level(level).unwrap().clone()), ..bitmap.clone() };
+    let levels = [1, 2].map(|i| Bitmap { decoding: Decoding::Linear, ..level(i) });
+    let mean = noise.iter().map(|&v| linear_from_srgb(f32::from(v) / 255.0)).sum::<f32>() / 128.0;
+    for i in 0..50 {
+        let uv = vec2(i as f32 * 0.617, i as f32 * 0.378);
+        // No larger than a texel: the image itself, to the last bit.
+        for texels in [0.0, 0.3, 1.0, f32::NAN] {
+            assert_eq!(bitmap.color_over(&over(uv, texels, 128)), bitmap.color(uv));
+            assert_eq!(bitmap.scalar_over(&over(uv, texels, 128)), bitmap.scalar(uv));
+        }
+        let at = |texels: f32| bitmap.scalar_over(&over(uv, texels, 128));
+        let close = |a: f32, b: f32| assert!((a - b).abs() < 1e-5, "{uv}: {a} {b}");
+        close(at(4.0), levels[0].scalar(uv));
+        close(at(8.0), 0.5 * (levels[0].scalar(uv) + levels[1].scalar(uv)));
+        close(at(2.0), 0.5 * (bitmap.scalar(uv) + levels[0].scalar(uv)));
+        close(at(1e4), mean);
+        close(at(f32::INFINITY), mean);
+        close(bitmap.color_over(&over(uv, 1e4, 128)).g, mean);
+        // An image that is shown four times has four times as many texels there; one that says 1 - v has their means the same way.
+        let scaled = Bitmap { transform: UvTransform::new(vec2(4.0, -1.0), 0.4, Vec2::ZERO), invert: true, ..bitmap.clone() };
+        let upright = Bitmap { transform: scaled.transform, invert: true, ..levels[0].clone() };
+        close(scaled.scalar_over(&over(uv, 1.0, 128)), upright.scalar(uv));
+    }
+}
+
+#[test]
+fn without_a_pyramid_a_footprint_is_a_point() {
+    let noise: Vec<u8> = (0u32..35).map(|i| (i * 97 % 256) as u8).collect();
+    for filter in [Filter::Nearest, Filter::Bilinear] {
+        let bitmap = Bitmap { filter, ..Bitmap::new(grey(5, &noise), Decoding::Linear) };
+        let uv = vec2(0.3, 0.8);
+        assert_eq!(bitmap.color_over(&over(uv, 20.0, 35)), bitmap.color(uv));
+    }
+}

@@ -1,0 +1,78 @@
+//! Ray cones: what a path's samples stand for where they look up a texture (Akenine-Möller et al., "Improved Shader and Texture Level of Detail
+//! Using Ray Cones").
+//!
+//! A camera ray's cone is as wide as its pixel divided by the root of the samples per pixel: the samples share the pixel, so with more of them
+//! each looks up a smaller part, and the picture converges to that of point lookups. The cone keeps its spread at mirrors and glass, whose
+//! curvature does not count. At all other surfaces it spreads at least as the solid angle `1 / pdf` around the direction that was chosen, again
+//! shared by the samples.
+
+use std::f32::consts::PI;
+
+use super::World;
+use crate::geometry::{Hit, SurfaceInteraction};
+use crate::math::{Ray, RayCone};
+use crate::texture::Footprint;
+
+/// How a picture is divided into samples.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Division {
+    /// Width and height in pixels.
+    size: [u32; 2],
+    /// One over the root of the samples per pixel.
+    share: f32,
+}
+
+impl World<'_> {
+    /// As part of a picture of `size` pixels with `spp` samples each: textures are looked up over what a sample stands for.
+    #[must_use]
+    pub fn of_picture(mut self, size: [u32; 2], spp: u32) -> Self {
+        let division = Division { size, share: 1.0 / (spp.max(1) as f32).sqrt() };
+        self.division = self.scene.features.filtered_textures.then_some(division);
+        self
+    }
+
+    /// The cone of a camera ray; `None` if no texture would make use of it.
+    #[inline]
+    pub(super) fn camera_cone(&self, ray: &Ray) -> Option<RayCone> {
+        let Division { size, share } = self.division?;
+        let RayCone { width, spread } = self.scene.camera.pixel_cone(ray, size);
+        Some(RayCone { width: width * share, spread: spread * share })
+    }
+
+    /// The cone of a ray that leaves a surface at the distance `t` along the ray of `cone`, in a direction chosen with density `pdf`
+    /// (infinite for mirrors and glass).
+    #[inline]
+    pub(super) fn scattered_cone(&self, cone: RayCone, t: f32, pdf: f32) -> RayCone {
+        scattered(cone, t, pdf, self.division.map_or(0.0, |division| division.share))
+    }
+
+    /// What `ray`, whose hit led to `at`, stands for in uv.
+    #[inline(never)]
+    pub(super) fn footprint(&self, cone: Option<&RayCone>, ray: &Ray, hit: Option<&Hit>, at: &SurfaceInteraction) -> Footprint {
+        // Behind a rounding artefact another surface is met than the hit says.
+        let hit = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids());
+        let (Some(cone), Some(hit)) = (cone, hit) else { return Footprint::point(at.uv) };
+        let derivatives = self.scene.geometry.uv_derivatives(ray, hit);
+        Footprint::of_cone(at.uv, cone.width_at(at.t), ray.direction.dot(at.n_g), derivatives)
+    }
+}
+
+#[inline]
+fn scattered(cone: RayCone, t: f32, pdf: f32, share: f32) -> RayCone {
+    RayCone { width: cone.width_at(t), spread: cone.spread.max(share / (PI * pdf).sqrt()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cones_spread_at_rough_surfaces_and_not_at_mirrors() {
+        let cone = RayCone { width: 0.5, spread: 0.01 };
+        let after = |pdf| scattered(cone, 20.0, pdf, 0.25);
+        assert_eq!(after(f32::INFINITY), RayCone { width: 0.7, spread: 0.01 });
+        // The middle of a diffuse lobe, and a lobe so narrow that the cone is wider.
+        assert_eq!(after(1.0 / PI), RayCone { width: 0.7, spread: 0.25 });
+        assert_eq!(after(1e6).spread, 0.01);
+    }
+}
