@@ -50,6 +50,8 @@ mod relief;
 mod scene_files;
 /// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
 mod self_intersection;
+/// Shadow as soft on coarse smooth meshes as on what they stand for, without leaks.
+mod terminator;
 /// Images on every shape, at seams and poles too.
 mod textures;
 /// Layers, file lengths, unsafe code, printing.

@@ -164,7 +164,7 @@ fn tolerances_live_in_one_place() {
 
 #[test]
 fn every_known_flaw_has_its_tests() {
-    let text = std::fs::read_to_string("docs/flaws.md").unwrap();
+    let text = fs::read_to_string("docs/flaws.md").unwrap();
     let files = sources(&["src", "tests"]);
     let is_test = |name: &str| {
         files
