@@ -1,4 +1,4 @@
-//! Makes the textures of `scenes/textures.json`, and a ring with uv that wears two of them.
+//! Makes the textures of `scenes/`, and a ring with uv that wears two of them.
 //!
 //! `cargo run --release --example make_textures` writes them anew, byte for byte the same.
 
@@ -24,6 +24,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     cut_out(&picture(128, 128, |uv| leaf(uv).color), |uv| leaf(uv).height).save(textures.join("leaf.png"))?;
     picture(256, 64, |uv| rope(uv).color).save(textures.join("rope.png"))?;
     normals(256, 64, 0.1, |uv| rope(uv).height).save(textures.join("rope_normal.png"))?;
+    cut_out(&picture(128, 128, |uv| blossom(uv).color), |uv| blossom(uv).height).save(textures.join("blossom.png"))?;
+    normals(256, 256, 0.02, waves).save(textures.join("waves_normal.png"))?;
     fs::write(scenes.join("meshes/ring.obj"), ring(72, 20))?;
     fs::write(scenes.join("meshes/ring.mtl"), "newmtl rope\nKd 1 1 1\nmap_Kd ../textures/rope.png\nnorm ../textures/rope_normal.png\n")?;
     Ok(())
@@ -195,6 +197,37 @@ fn leaf(uv: V2) -> Relief {
     let tone = 0.8 + 0.4 * layers(uv, [8, 8], 3);
     let color = if is_vein { vec3(0.30, 0.40, 0.10) } else { vec3(0.10, 0.28, 0.04) } * tone;
     Relief { color, height: ((width.max(stalk) - x) * 64.0).clamp(0.0, 1.0) }
+}
+
+/// Five blossoms of five petals; their height is 1 inside and falls to 0 over a few pixels outside.
+fn blossom(uv: V2) -> Relief {
+    let mut out = Relief { color: vec3(0.75, 0.50, 0.55), height: 0.0 };
+    for (i, middle) in [vec2(0.27, 0.30), vec2(0.72, 0.26), vec2(0.50, 0.52), vec2(0.26, 0.74), vec2(0.74, 0.73)].into_iter().enumerate() {
+        let p = uv - middle;
+        let angle = p.y.atan2(p.x) + i as f32;
+        let distance = p.length() / 0.235;
+        let edge = 0.62 + 0.38 * (2.5 * angle).cos().abs().sqrt();
+        if distance < edge + 0.07 {
+            let heart = (1.0 - distance / 0.32).clamp(0.0, 1.0);
+            let shade = 0.85 + 0.15 * (2.5 * angle).cos().abs();
+            out.color = (vec3(0.80, 0.60, 0.64).lerp(vec3(0.62, 0.16, 0.25), heart)) * shade;
+            out.height = ((edge - distance) * 15.0 + 0.5).clamp(out.height, 1.0);
+        }
+    }
+    out
+}
+
+/// Ripples of a wind along u: sines that repeat, of lengths from a half to a fortieth of the picture.
+fn waves(uv: V2) -> f32 {
+    let mut height = 0.0;
+    for i in 0..56 {
+        let (a, b) = (hash(i, 901), hash(i, 902));
+        let count = (2.0 * 20f32.powf(i as f32 / 55.0)).round();
+        let turned = TAU * 0.33 * (a - 0.5);
+        let (m, n) = ((count * turned.cos()).round(), (count * turned.sin()).round());
+        height += (TAU * (m * uv.x + n * uv.y + b)).sin() / count.powf(1.3);
+    }
+    height
 }
 
 /// Three twisted strands.

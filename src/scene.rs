@@ -109,7 +109,7 @@ impl Scene {
 
     /// The scattering at a point for a ray that arrives in `direction`.
     /// What is not the same everywhere is made in `place`.
-    #[inline]
+    #[inline(always)]
     pub fn bsdf<'a>(&'a self, at: &SurfaceInteraction, direction: Vec3, place: &'a mut Option<Bsdf>) -> &'a Bsdf {
         let material = self.material(at.shape);
         if let Material::Constant(bsdf) = material {

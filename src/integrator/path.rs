@@ -270,7 +270,7 @@ impl PathIntegrator {
     }
 
     /// Light that the surface itself gives off against `ray`.
-    #[inline]
+    #[inline(always)]
     fn emitted(&self, world: &World, path: &Path, ray: &Ray, at: &SurfaceInteraction) -> Rgb {
         let Some(id) = world.scene.surface(at.shape).light(at.prim) else {
             return Rgb::BLACK;
@@ -448,7 +448,7 @@ impl<'a> Vertex<'a> {
     }
 
     /// A scattered direction and the ray that follows it.
-    #[inline]
+    #[inline(always)]
     fn sample(&self, world: &World, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray)> {
         let mut sample = self.bsdf.sample(self.wo, u_lobe, u)?;
         let direction = self.frame.to_world(sample.wi);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use image::codecs::png::PngEncoder;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::write_atomically;
@@ -18,7 +18,8 @@ use crate::film::{Image, LayerKind};
 pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<()> {
     let bytes = encode(image, exposure);
     write_atomically(path, |out| {
-        PngEncoder::new(out).write_image(&bytes, image.crop.width, image.crop.height, ExtendedColorType::Rgb8).map_err(|e| e.to_string())
+        let encoder = PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive);
+        encoder.write_image(&bytes, image.crop.width, image.crop.height, ExtendedColorType::Rgb8).map_err(|e| e.to_string())
     })
 }
 

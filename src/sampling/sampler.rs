@@ -53,7 +53,7 @@ impl Sampler {
     }
 
     /// Four numbers in `[0, 1)`, multiples of `2^-24`: dimensions `4 set .. 4 set + 4` of one sample of a pixel.
-    #[inline]
+    #[inline(always)]
     pub fn sample_4d(&self, pixel: PixelSeed, sample: u32, set: u32) -> [f32; 4] {
         let bits = match self.kind {
             SamplerKind::Sobol => sobol_4d(pixel, sample, set),

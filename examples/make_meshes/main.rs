@@ -1,6 +1,10 @@
-//! Makes the meshes and textures of `scenes/`: a knot of 72,000 triangles, a terrain of 131,072 and a sky.
+//! Makes meshes of `scenes/` (a knot of 72,000 triangles and a coarse one of 1,920, a terrain of 131,072, plants, an island, the beams of a
+//! gate), a sky, and the scene `shrine.json`, in which more than a thousand of the plants stand.
 //!
 //! `cargo run --release --example make_meshes` writes them anew, byte for byte the same.
+
+mod plants;
+mod shrine;
 
 use std::error::Error;
 use std::f32::consts::{PI, TAU};
@@ -16,20 +20,34 @@ fn main() -> std::result::Result<(), Box<dyn Error>> {
     fs::create_dir_all(scenes.join("textures"))?;
     fs::write(scenes.join("meshes/knot.ply"), ply(&grid(600, 60, true, knot)))?;
     fs::write(scenes.join("meshes/terrain.ply"), ply(&grid(256, 256, false, terrain)))?;
+    let coarse = Mesh { normals: Vec::new(), ..grid(96, 10, true, knot) };
+    fs::write(scenes.join("meshes/coarse_knot.ply"), ply(&coarse))?;
+    let tree = plants::tree();
+    fs::write(scenes.join("meshes/tree_wood.ply"), ply(&tree.wood))?;
+    fs::write(scenes.join("meshes/tree_leaves.ply"), ply(&tree.leaves))?;
+    fs::write(scenes.join("meshes/crown.ply"), ply(&plants::crown()))?;
+    fs::write(scenes.join("meshes/conifer.ply"), ply(&plants::conifer()))?;
+    fs::write(scenes.join("meshes/island.ply"), ply(&Mesh { normals: Vec::new(), ..grid(72, 72, false, shrine::island) }))?;
+    fs::write(scenes.join("meshes/gate_beam.ply"), ply(&shrine::beam()))?;
+    fs::write(scenes.join("shrine.json"), shrine::scene())?;
     write_sky(&scenes.join("textures/sky.exr"))?;
     Ok(())
 }
 
+/// A mesh of polygons; `normals` and `corners` are empty or as many as `positions`.
+#[derive(Default)]
 struct Mesh {
     positions: Vec<V>,
     normals: Vec<V>,
-    triangles: Vec<[u32; 3]>,
+    /// u and v, which are 0 or 1.
+    corners: Vec<[u8; 2]>,
+    polygons: Vec<Vec<u32>>,
 }
 
 /// A mesh over a grid of `nu` x `nv` cells from a surface over the unit square; a closed one joins its ends in both directions.
 fn grid(nu: u32, nv: u32, closed: bool, surface: impl Fn(f32, f32) -> V) -> Mesh {
     let (rows, columns) = if closed { (nu, nv) } else { (nu + 1, nv + 1) };
-    let mut mesh = Mesh { positions: Vec::new(), normals: Vec::new(), triangles: Vec::new() };
+    let mut mesh = Mesh::default();
     for i in 0..rows {
         for j in 0..columns {
             let (u, v) = (i as f32 / nu as f32, j as f32 / nv as f32);
@@ -44,8 +62,8 @@ fn grid(nu: u32, nv: u32, closed: bool, surface: impl Fn(f32, f32) -> V) -> Mesh
     for i in 0..nu {
         for j in 0..nv {
             let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
-            mesh.triangles.push([a, b, c]);
-            mesh.triangles.push([a, c, d]);
+            mesh.polygons.push(vec![a, b, c]);
+            mesh.polygons.push(vec![a, c, d]);
         }
     }
     mesh
@@ -84,23 +102,28 @@ fn terrain(u: f32, v: f32) -> V {
     vec3(x, height * rise * rise * (3.0 - 2.0 * rise), z)
 }
 
-/// Binary little-endian PLY with normals.
+/// Binary little-endian PLY.
 fn ply(mesh: &Mesh) -> Vec<u8> {
-    let mut out = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-         property float nx\nproperty float ny\nproperty float nz\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
-        mesh.positions.len(),
-        mesh.triangles.len()
-    )
-    .into_bytes();
-    for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
-        for x in p.to_array().into_iter().chain(n.to_array()) {
+    let mut header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", mesh.positions.len());
+    header += "property float x\nproperty float y\nproperty float z\n";
+    if !mesh.normals.is_empty() {
+        header += "property float nx\nproperty float ny\nproperty float nz\n";
+    }
+    if !mesh.corners.is_empty() {
+        header += "property uchar u\nproperty uchar v\n";
+    }
+    header += &format!("element face {}\nproperty list uchar int vertex_indices\nend_header\n", mesh.polygons.len());
+    let mut out = header.into_bytes();
+    for (i, p) in mesh.positions.iter().enumerate() {
+        let n = mesh.normals.get(i).map(V::to_array);
+        for x in p.to_array().into_iter().chain(n.into_iter().flatten()) {
             out.extend(x.to_le_bytes());
         }
+        out.extend(mesh.corners.get(i).into_iter().flatten());
     }
-    for triangle in &mesh.triangles {
-        out.push(3);
-        for i in triangle {
+    for polygon in &mesh.polygons {
+        out.push(polygon.len() as u8);
+        for i in polygon {
             out.extend(i.to_le_bytes());
         }
     }
@@ -129,6 +152,7 @@ fn write_sky(path: &Path) -> std::result::Result<(), Box<dyn Error>> {
     let channels = SpecificChannels::rgb(|p: Vec2<usize>| texel(p.x(), p.y()));
     let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::FAST_LOSSLESS };
     let layer = Layer::new((width, height), LayerAttributes::default(), encoding, channels);
-    Image::from_layer(layer).write().to_file(path)?;
+    // Threads would write its blocks in any order.
+    Image::from_layer(layer).write().non_parallel().to_file(path)?;
     Ok(())
 }
