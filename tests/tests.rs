@@ -54,6 +54,8 @@ mod scene_files;
 mod self_intersection;
 /// Images smaller in the picture than they are.
 mod texture_filtering;
+/// Shadow as soft on coarse smooth meshes as on what they stand for, without leaks.
+mod terminator;
 /// Images on every shape, at seams and poles too.
 mod textures;
 /// Layers, file lengths, unsafe code, printing.

@@ -5,7 +5,7 @@ pub use super::triangle::TrianglePoints;
 use super::{Detail, Hit, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
-use crate::math::{Aabb, Bounds, Ray, Vec2, Vec3};
+use crate::math::{Aabb, Bounds, DVec3, Ray, Transform, Vec2, Vec3};
 
 /// Why a mesh is refused; indices count from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -321,6 +321,28 @@ impl Mesh {
         let n = n / length;
         // A mesh may be wound against its normals: the shading normal follows the front.
         (if n.dot(n_g) < 0.0 { -n } else { n }, length)
+    }
+
+    /// The point `p` of a triangle moved to the surface that the corners' normals suggest (Hanika, "Hacking the Shadow Terminator"): to the
+    /// mean of its projections onto the planes through the corners at right angles to their normals. Only outwards on the side of `toward`;
+    /// `None` where it stays. `p` and `toward` are in the world, where `placement` puts the mesh.
+    pub(super) fn raised(&self, prim: PrimId, p: DVec3, toward: DVec3, time: f32, placement: Option<&Transform>) -> Option<DVec3> {
+        let normals = self.corner_normals(prim, time)?.map(|n| {
+            let n = n.as_dvec3();
+            placement.map_or(n, |t| t.normal(n)).normalize_or_zero()
+        });
+        let points = self.triangle_points_at(prim, time);
+        let from_corner = [points.a, points.b, points.c].map(|corner| {
+            let corner = corner.as_dvec3();
+            p - placement.map_or(corner, |t| t.point(corner))
+        });
+        let [a, b, c] = from_corner;
+        let cross = (b - a).cross(c - a);
+        let weights = [b.cross(c), c.cross(a), a.cross(b)].map(|area| area.dot(cross).max(0.0) / cross.length_squared());
+        let side = 1f64.copysign((0..3).map(|i| weights[i] * normals[i].dot(toward)).sum());
+        let depths = [0, 1, 2].map(|i| (-side * normals[i].dot(from_corner[i])).max(0.0));
+        let raise = (0..3).map(|i| normals[i] * (side * depths[i] * weights[i])).sum::<DVec3>();
+        (raise != DVec3::ZERO && raise.is_finite()).then_some(p + raise)
     }
 
     /// The parametrisation at a hit with the shading normal of this [length](Self::shading_normal).

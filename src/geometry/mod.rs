@@ -37,7 +37,7 @@ pub use triangle::{TriangleHit, TriangleRay, TriangleSample};
 
 use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
 use crate::math::float::step_past;
-use crate::math::{Aabb, Ray, Vec3};
+use crate::math::{Aabb, DVec3, Ray, Vec3};
 
 /// A triangle mesh or one analytic surface.
 ///
@@ -200,6 +200,14 @@ impl Geometry {
         } else {
             self.instance(hit.instance).interaction(self.shape(hit.shape), detail, ray, hit)
         }
+    }
+
+    /// The point of the surface that a smooth mesh's normals suggest above a point of a facet, on the side of `toward`; `None` where it is not
+    /// above the facet, and on other shapes.
+    pub fn raised(&self, at: &SurfaceInteraction, toward: Vec3) -> Option<DVec3> {
+        let Shape::Mesh(mesh) = self.shape(at.shape) else { return None };
+        let placement = at.is_instanced().then(|| self.instance(at.instance).transform_at(at.time));
+        mesh.raised(at.prim, at.p, toward.as_dvec3(), at.time, placement.as_deref())
     }
 
     /// Change of the point with v at a hit of `ray`, as [`SurfaceInteraction::dp_du`]; apart from the interaction, for few surfaces need it.

@@ -6,7 +6,7 @@
 use std::cell::RefCell;
 
 use super::media::MediaState;
-use super::shading::{facing_normal, terminator_factor};
+use super::shading::{facing_normal, raised_start, terminator_factor};
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions, surface_sample};
 use crate::accel::Coherence;
 use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
@@ -315,7 +315,14 @@ impl PathIntegrator {
         if self.strategy == Strategy::Bsdf && !sample.is_delta {
             return None;
         }
-        let eval = vertex.eval(sample.wi)?;
+        let raised;
+        let (eval, start) = match vertex.eval(sample.wi) {
+            Some(eval) => (eval, vertex.at),
+            None => {
+                raised = vertex.eval_raised(world, sample.wi)?;
+                (raised.eval, &raised.start)
+            }
+        };
         let pdf = sample.pdf * choice.pmf;
         let weight = match self.strategy {
             Strategy::Mis if !sample.is_delta => power_heuristic(pdf, eval.pdf),
@@ -326,8 +333,8 @@ impl PathIntegrator {
             return None;
         }
         let ray = match &sample.target {
-            ShadowTarget::Point(target) => vertex.at.spawn_to(target),
-            ShadowTarget::Infinity => vertex.at.spawn(sample.wi),
+            ShadowTarget::Point(target) => start.spawn_to(target),
+            ShadowTarget::Infinity => start.spawn(sample.wi),
         };
         Some(ShadowRay { ray, contribution })
     }
@@ -336,7 +343,7 @@ impl PathIntegrator {
     #[inline(always)]
     fn scatter(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32) -> Option<(Path, Ray)> {
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::bsdf(bounce));
-        let (sample, direction) = vertex.sample(u[0], [u[1], u[2]])?;
+        let (sample, ray) = vertex.sample(world, u[0], [u[1], u[2]])?;
         let mut throughput = path.throughput * sample.weight;
         let eta_squared = path.eta_squared * (sample.eta * sample.eta);
 
@@ -356,7 +363,7 @@ impl PathIntegrator {
 
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, vertex.at.spawn(direction)))
+        Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, ray))
     }
 }
 
@@ -364,6 +371,13 @@ impl PathIntegrator {
 struct ShadowRay {
     ray: Ray,
     contribution: Rgb,
+}
+
+/// Reflection into a direction that the facet does not see.
+pub(super) struct RaisedEval {
+    pub eval: BsdfEval,
+    /// The point above the facet where a ray in that direction starts.
+    pub start: SurfaceInteraction,
 }
 
 /// A surface point with its scattering and the frame for it.
@@ -435,14 +449,36 @@ impl<'a> Vertex<'a> {
         (!value.is_black()).then(|| BsdfEval { value: value * shadowing, pdf })
     }
 
+    /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other directions, and where
+    /// [`raised_start`] finds no start.
+    #[inline]
+    pub fn eval_raised(&self, world: &World, direction: Vec3) -> Option<RaisedEval> {
+        let start = self.raised(world, direction)?;
+        Some(RaisedEval { eval: self.bsdf.eval(self.wo, self.frame.to_local(direction)), start })
+    }
+
+    /// Where a ray starts in a direction that the shading normal sees and the facet does not.
+    #[inline]
+    fn raised(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
+        let in_frame = direction.dot(self.frame.z) * self.wo.z > 0.0;
+        let hidden = in_frame && direction.dot(self.at.n_g) * self.cos_geometric <= 0.0;
+        // Under a relief, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
+        if !hidden || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.transmits() {
+            return None;
+        }
+        raised_start(world, self.at, self.receiver().n)
+    }
+
+    /// A scattered direction and the ray that follows it.
     #[inline(always)]
-    fn sample(&self, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Vec3)> {
+    fn sample(&self, world: &World, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray)> {
         let mut sample = self.bsdf.sample(self.wo, u_lobe, u)?;
         let direction = self.frame.to_world(sample.wi);
         let shadowing = self.shadowing(sample.wi, direction);
-        if !sample.is_delta {
+        if !sample.is_delta && shadowing > 0.0 {
             sample.weight *= shadowing;
         }
-        (shadowing > 0.0).then_some((sample, direction))
+        let ray = if shadowing > 0.0 { self.at.spawn(direction) } else { self.raised(world, direction)?.spawn(direction) };
+        Some((sample, ray))
     }
 }

@@ -1,7 +1,10 @@
 //! Shading normals that differ from the surface's own, on smooth meshes and under normal maps: no reflection below the surface, and under
 //! normal maps no hard edge where the surface turns away from the light.
 
+use super::World;
+use crate::geometry::{SpawnTarget, SurfaceInteraction};
 use crate::math::Vec3;
+use crate::math::float::UNIT_ROUNDOFF;
 
 /// The least cosine to the surface that a mirror reflection keeps, unless the incoming direction itself is shallower.
 const LEAST_REFLECTION: f32 = 0.01;
@@ -44,6 +47,31 @@ pub fn terminator_factor(cos_geometric: f32, cos_shading: f32, cos_normals: f32)
     } else {
         0.0
     }
+}
+
+/// How far above a facet a ray may start at least, in roundings of its place: a multiple of the distances that rays keep from surfaces.
+const LEAST_RAISE: f64 = 256.0;
+
+/// Where rays start that see more than the facet `at` does: above it on the side of the shading normal `n`, on the smooth surface that the
+/// facet stands for. There the shadow of a coarse mesh has no edges but its own. `None` if that surface is not above the facet, or if
+/// something is in between: such a ray gets nowhere that rays from the facet cannot get, in one step or two. Scenes with media have no raised
+/// rays, for the side of the facet says what a ray is in.
+#[cold]
+#[inline(never)]
+pub fn raised_start(world: &World, at: &SurfaceInteraction, n: Vec3) -> Option<SurfaceInteraction> {
+    if world.scene.features.media {
+        return None;
+    }
+    let p = world.scene.geometry.raised(at, n)?;
+    let raise = p - at.p;
+    let rounding = UNIT_ROUNDOFF * at.p.abs().max_element() + f64::from(at.error);
+    let on_lit_side = raise.dot(at.n_g.as_dvec3()) * f64::from(n.dot(at.n_g)) > 0.0;
+    if !(on_lit_side && raise.length() > LEAST_RAISE * rounding) {
+        return None;
+    }
+    // A little further, so that the distance which rays keep from surfaces is free too.
+    let way = at.spawn_to(&SpawnTarget { p: p + raise * (16.0 / LEAST_RAISE), n: Vec3::ZERO, error: 0.0 });
+    (!world.accel.occluded(&way)).then_some(SurfaceInteraction { p, n_g: n, ..*at })
 }
 
 #[cfg(test)]

@@ -134,8 +134,14 @@ fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, light: &Light
     let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2]) else {
         return Rgb::BLACK;
     };
-    let Some(eval) = vertex.eval(sample.wi) else {
-        return Rgb::BLACK;
+    let raised;
+    let (eval, start) = match vertex.eval(sample.wi) {
+        Some(eval) => (eval, at),
+        None => {
+            raised = vertex.eval_raised(world, sample.wi);
+            let Some(raised) = &raised else { return Rgb::BLACK };
+            (raised.eval, &raised.start)
+        }
     };
     let scattered = eval.value * sample.radiance / sample.pdf;
     if scattered.is_black() {
@@ -143,8 +149,8 @@ fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, light: &Light
     }
     counts.shadow += 1;
     let shadow = match &sample.target {
-        ShadowTarget::Point(target) => at.spawn_to(target),
-        ShadowTarget::Infinity => at.spawn(sample.wi),
+        ShadowTarget::Point(target) => start.spawn_to(target),
+        ShadowTarget::Infinity => start.spawn(sample.wi),
     };
     if world.accel.occluded(&shadow) {
         return Rgb::BLACK;
