@@ -52,10 +52,10 @@ mod relief;
 mod scene_files;
 /// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
 mod self_intersection;
-/// Images smaller in the picture than they are.
-mod texture_filtering;
 /// Shadow as soft on coarse smooth meshes as on what they stand for, without leaks.
 mod terminator;
+/// Images smaller in the picture than they are.
+mod texture_filtering;
 /// Images on every shape, at seams and poles too.
 mod textures;
 /// Layers, file lengths, unsafe code, printing.
