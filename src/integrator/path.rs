@@ -13,7 +13,7 @@ use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::{Light, Receiver, ShadowTarget};
+use crate::light::{Light, Receiver};
 use crate::math::{DVec3, Frame, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
 use crate::sampling::{PixelSeed, Sampler, power_heuristic};
@@ -315,14 +315,8 @@ impl PathIntegrator {
         if self.strategy == Strategy::Bsdf && !sample.is_delta {
             return None;
         }
-        let raised;
-        let (eval, start) = match vertex.eval(sample.wi) {
-            Some(eval) => (eval, vertex.at),
-            None => {
-                raised = vertex.eval_raised(world, sample.wi)?;
-                (raised.eval, &raised.start)
-            }
-        };
+        let mut raised = None;
+        let (eval, start) = vertex.eval_toward(world, sample.wi, &mut raised)?;
         let pdf = sample.pdf * choice.pmf;
         let weight = match self.strategy {
             Strategy::Mis if !sample.is_delta => power_heuristic(pdf, eval.pdf),
@@ -332,11 +326,7 @@ impl PathIntegrator {
         if contribution.is_black() {
             return None;
         }
-        let ray = match &sample.target {
-            ShadowTarget::Point(target) => start.spawn_to(target),
-            ShadowTarget::Infinity => start.spawn(sample.wi),
-        };
-        Some(ShadowRay { ray, contribution })
+        Some(ShadowRay { ray: sample.shadow_ray(start), contribution })
     }
 
     /// The path after its next scattering with its next ray, unless it ends here.
@@ -375,9 +365,9 @@ struct ShadowRay {
 
 /// Reflection into a direction that the facet does not see.
 pub(super) struct RaisedEval {
-    pub eval: BsdfEval,
+    eval: BsdfEval,
     /// The point above the facet where a ray in that direction starts.
-    pub start: SurfaceInteraction,
+    start: SurfaceInteraction,
 }
 
 /// A surface point with its scattering and the frame for it.
@@ -439,7 +429,7 @@ impl<'a> Vertex<'a> {
     }
 
     #[inline(always)]
-    pub fn eval(&self, direction: Vec3) -> Option<BsdfEval> {
+    fn eval(&self, direction: Vec3) -> Option<BsdfEval> {
         let wi = self.frame.to_local(direction);
         let shadowing = self.shadowing(wi, direction);
         if shadowing == 0.0 {
@@ -449,10 +439,25 @@ impl<'a> Vertex<'a> {
         (!value.is_black()).then(|| BsdfEval { value: value * shadowing, pdf })
     }
 
+    /// What is scattered from a direction, and where a ray in that direction starts: here, or above the facet if that hides it (then in `place`).
+    #[inline(always)]
+    pub fn eval_toward<'b>(
+        &'b self,
+        world: &World,
+        direction: Vec3,
+        place: &'b mut Option<RaisedEval>,
+    ) -> Option<(BsdfEval, &'b SurfaceInteraction)> {
+        if let Some(eval) = self.eval(direction) {
+            return Some((eval, self.at));
+        }
+        *place = self.eval_raised(world, direction);
+        place.as_ref().map(|raised| (raised.eval, &raised.start))
+    }
+
     /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other directions, and where
     /// [`raised_start`] finds no start.
     #[inline]
-    pub fn eval_raised(&self, world: &World, direction: Vec3) -> Option<RaisedEval> {
+    fn eval_raised(&self, world: &World, direction: Vec3) -> Option<RaisedEval> {
         let start = self.raised(world, direction)?;
         Some(RaisedEval { eval: self.bsdf.eval(self.wo, self.frame.to_local(direction)), start })
     }

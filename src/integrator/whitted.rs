@@ -7,7 +7,7 @@ use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sa
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::{Light, ShadowTarget};
+use crate::light::Light;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Ray, RayCone};
 use crate::medium::Interior;
@@ -134,24 +134,16 @@ fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, light: &Light
     let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2]) else {
         return Rgb::BLACK;
     };
-    let raised;
-    let (eval, start) = match vertex.eval(sample.wi) {
-        Some(eval) => (eval, at),
-        None => {
-            raised = vertex.eval_raised(world, sample.wi);
-            let Some(raised) = &raised else { return Rgb::BLACK };
-            (raised.eval, &raised.start)
-        }
+    let mut raised = None;
+    let Some((eval, start)) = vertex.eval_toward(world, sample.wi, &mut raised) else {
+        return Rgb::BLACK;
     };
     let scattered = eval.value * sample.radiance / sample.pdf;
     if scattered.is_black() {
         return scattered;
     }
     counts.shadow += 1;
-    let shadow = match &sample.target {
-        ShadowTarget::Point(target) => start.spawn_to(target),
-        ShadowTarget::Infinity => start.spawn(sample.wi),
-    };
+    let shadow = sample.shadow_ray(start);
     if world.accel.occluded(&shadow) {
         return Rgb::BLACK;
     }

@@ -24,8 +24,8 @@ pub use spot::SpotLight;
 pub use tree::Receiver;
 
 use crate::color::Rgb;
-use crate::geometry::{Geometry, SpawnTarget};
-use crate::math::{DVec2, DVec3, Vec3};
+use crate::geometry::{Geometry, SpawnTarget, SurfaceInteraction};
+use crate::math::{DVec2, DVec3, Ray, Vec3};
 use crate::texture::Texture;
 use bounds::LightBounds;
 
@@ -77,6 +77,17 @@ pub struct LightSample {
     pub is_delta: bool,
     /// Where the shadow ray ends.
     pub target: ShadowTarget,
+}
+
+impl LightSample {
+    /// The ray from a surface to where the light comes from.
+    #[inline(always)]
+    pub fn shadow_ray(&self, from: &SurfaceInteraction) -> Ray {
+        match &self.target {
+            ShadowTarget::Point(target) => from.spawn_to(target),
+            ShadowTarget::Infinity => from.spawn(self.wi),
+        }
+    }
 }
 
 /// The point of the unit circle at `u` of a turn, of unit length in `f64`, within `f32` rounding of that angle.
