@@ -3,6 +3,7 @@
 //! The image fills the unit square of uv with its bottom left corner at the origin: v grows upward, as in OBJ files. Texels are squares whose
 //! colours stand at their middles.
 
+use std::ops::{Add, Mul};
 use std::sync::Arc;
 
 use super::footprint::Footprint;
@@ -86,10 +87,7 @@ impl Bitmap {
     pub fn color_over(&self, footprint: &Footprint) -> Rgb {
         match self.levels(footprint) {
             None => self.color(footprint.uv),
-            Some(levels) => {
-                let [fine, coarse] = levels.images.map(|(image, decoding)| self.color_in(image, decoding, footprint.uv));
-                fine * (1.0 - levels.fraction) + coarse * levels.fraction
-            }
+            Some(levels) => levels.blend(|image, decoding| self.color_in(image, decoding, footprint.uv)),
         }
     }
 
@@ -98,10 +96,7 @@ impl Bitmap {
     pub fn scalar_over(&self, footprint: &Footprint) -> f32 {
         match self.levels(footprint) {
             None => self.scalar(footprint.uv),
-            Some(levels) => {
-                let [fine, coarse] = levels.images.map(|(image, decoding)| self.scalar_in(image, decoding, footprint.uv));
-                fine * (1.0 - levels.fraction) + coarse * levels.fraction
-            }
+            Some(levels) => levels.blend(|image, decoding| self.scalar_in(image, decoding, footprint.uv)),
         }
     }
 
@@ -197,6 +192,15 @@ struct Levels<'a> {
     images: [(&'a Image, Decoding); 2],
     /// How far the footprint is from the first to the second, from 0 to 1.
     fraction: f32,
+}
+
+impl Levels<'_> {
+    /// A value between those of both levels.
+    #[inline]
+    fn blend<T: Mul<f32, Output = T> + Add<Output = T>>(&self, value: impl Fn(&Image, Decoding) -> T) -> T {
+        let [fine, coarse] = self.images.map(|(image, decoding)| value(image, decoding));
+        fine * (1.0 - self.fraction) + coarse * self.fraction
+    }
 }
 
 /// A place between the middles of two texels of a row.
