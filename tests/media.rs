@@ -373,6 +373,17 @@ fn a_label_on_a_bottle_is_opaque_and_the_rest_of_the_surface_is_not() {
 }
 
 #[test]
+fn a_relief_leaves_the_medium_within() {
+    let materials = json!({
+        "clear": { "type": "dielectric", "ior": 1, "absorption": { "color": RED } },
+        "m": { "type": "relief", "material": "clear", "bump_map": { "texture": "flat" } }
+    });
+    let mut scene = through(6.0, materials, json!([block("m", [0.0, 2.0])]));
+    scene["textures"] = json!({ "flat": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0.5, 0.5, 0.5] } });
+    assert_close(exact(&scene), left(RED, 2.0), 1e-5, "through a block with relief");
+}
+
+#[test]
 fn a_prism_parts_colours_as_snells_law_says() {
     // A ray meets a wedge of 30 degrees: each colour leaves it by its own angle, and lamps wait where red and blue go.
     let (ior, abbe) = (1.6f64, 10.0f64);

@@ -408,6 +408,10 @@ fn a_relief_on_what_has_one_within_is_refused() {
     scene["materials"]["inner"] = json!({ "type": "relief", "material": "plain", "normal_map": { "texture": "map" } });
     let message = folder.compile(&scene).unwrap_err().to_string();
     assert!(message.contains("materials.m.material") && message.contains("relief of its own"), "{message}");
+    let mut coated = scene.clone();
+    coated["materials"]["m"] = json!({ "type": "coated", "base": "inner" });
+    let message = folder.compile(&coated).unwrap_err().to_string();
+    assert!(message.contains("materials.m.base") && message.contains("relief of its own"), "{message}");
     scene["materials"]["inner"]["material"] = json!("m");
     let message = folder.compile(&scene).unwrap_err().to_string();
     assert!(message.contains("consists of itself"), "{message}");
