@@ -34,6 +34,8 @@ textures        textures        288x144  1024
 tree            tree            240x240  256
 smooth_normals  smooth_normals  320x140  512
 depth_of_field  depth_of_field  288x162  1024
+classic         classic         288x144  64
+classic_path    classic         288x144  1024  --integrator path
 motion          motion          288x162  1024
 many_lights     many_lights     288x162  1024
 knot            knot            288x162  512
