@@ -1,4 +1,4 @@
-//! Accelerators compared on the same rays: record, replay, check, report.
+//! Accelerators compared on the same rays: record, replay, check, report; and numerical stability.
 
 pub mod agreement;
 mod epo;
@@ -10,6 +10,7 @@ mod record;
 pub mod report;
 mod reports;
 mod scaling;
+pub mod stability;
 
 pub use machine::Machine;
 pub use measure::{AccelReport, BuildReport, KindReport, Mode, Options, RateReport, SceneReport, bench_scene};

@@ -4,8 +4,7 @@ mod discrete;
 mod mis;
 mod piecewise;
 mod sampler;
-#[cfg(test)]
-pub(crate) mod statistics;
+pub mod statistics;
 pub mod warp;
 
 pub use discrete::{AliasTable, DiscreteSample};

@@ -1,4 +1,4 @@
-//! For tests: whether samples follow a density, and points to draw them from.
+//! Whether samples follow a density, and points to draw them from.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -36,7 +36,7 @@ pub fn chi_squared_p_value(observed: &[u32], expected: &[f64]) -> f64 {
     if terms < 2 {
         return 1.0;
     }
-    1.0 - ChiSquared::new(f64::from(terms - 1)).expect("positive degrees of freedom").cdf(statistic)
+    ChiSquared::new(f64::from(terms - 1)).expect("positive degrees of freedom").sf(statistic)
 }
 
 /// What [`compare_directions`] found.

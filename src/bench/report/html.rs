@@ -20,16 +20,25 @@ td:not(:first-child) { font-variant-numeric: tabular-nums; }
 figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; border-radius: 6px; } figcaption { opacity: .8; font-size: 13px; }
 code { overflow-wrap: anywhere; }";
 
-fn escape(text: &str) -> String {
+/// Text with the characters of markup written out.
+pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-pub fn write(report: &Report) -> Result<String> {
-    let mut out = format!(
+/// A page down to the line that says where it was measured.
+pub fn begin(title: &str, header: &str) -> String {
+    format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width\">\n<title>Accelerators</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>Accelerators</h1>\n<p>{}</p>\n",
-        escape(&markdown::header(report))
-    );
+         content=\"width=device-width\">\n<title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n",
+        escape(header)
+    )
+}
+
+/// What ends a page.
+pub const END: &str = "</body>\n</html>\n";
+
+pub fn write(report: &Report) -> Result<String> {
+    let mut out = begin("Accelerators", &markdown::header(report));
     for scene in &report.scenes {
         add_scene(&mut out, scene)?;
     }
@@ -47,7 +56,7 @@ pub fn write(report: &Report) -> Result<String> {
         figure(&mut out, &plot::curves(&of_builds, "triangles", "ms to build", &[])?, "Time to build with all threads.");
         add_table(&mut out, &table);
     }
-    out.push_str("</body>\n</html>\n");
+    out.push_str(END);
     Ok(out)
 }
 
@@ -141,11 +150,13 @@ fn crossing(a: (f64, f64), b: (f64, f64)) -> Option<f64> {
     (n.is_finite() && n > 0.0).then_some(n)
 }
 
-fn figure(out: &mut String, svg: &str, caption: &str) {
+/// Adds a plot with its caption.
+pub fn figure(out: &mut String, svg: &str, caption: &str) {
     let _ = write!(out, "<figure>\n{svg}\n<figcaption>{}</figcaption>\n</figure>\n", escape(caption));
 }
 
-fn add_table(out: &mut String, table: &Table) {
+/// Adds a table below its title.
+pub fn add_table(out: &mut String, table: &Table) {
     let cells = |tag: &str, row: &[String]| row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect::<String>();
     let _ = write!(
         out,

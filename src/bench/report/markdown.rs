@@ -195,7 +195,8 @@ pub fn scaling(report: &Report) -> Option<Table> {
     Some(Table { title: "Cost over the number of triangles".into(), heads: heads(&names), rows: rows.collect() })
 }
 
-fn add(out: &mut String, table: &Table) {
+/// Adds a table below its title.
+pub fn add(out: &mut String, table: &Table) {
     let line = |cells: &[String]| format!("| {} |\n", cells.iter().map(|c| c.replace('|', "\\|")).collect::<Vec<_>>().join(" | "));
     let _ = write!(out, "\n{}\n\n{}|{}\n", table.title, line(&table.heads), "---|".repeat(table.heads.len()));
     for row in &table.rows {

@@ -1,9 +1,9 @@
 //! Reports: JSON, CSV, Markdown, and one page of HTML that needs no network.
 
 mod csv;
-mod html;
-mod markdown;
-mod plot;
+pub(super) mod html;
+pub(super) mod markdown;
+pub(super) mod plot;
 
 use std::path::Path;
 
@@ -72,13 +72,21 @@ impl Report {
     /// # Errors
     /// [`Error::Output`] naming the file.
     pub fn write_to(&self, folder: &Path) -> Result<()> {
-        std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.into(), message: e.to_string() })?;
         let files = [("accel.json", self.json()?), ("accel.csv", self.csv()), ("accel.md", self.markdown()), ("accel.html", self.html()?)];
-        for (name, text) in files {
-            crate::output::write_atomically(&folder.join(name), |out| {
-                std::io::Write::write_all(out, text.as_bytes()).map_err(|e| e.to_string())
-            })?;
-        }
-        Ok(())
+        write_files(folder, &files)
     }
+}
+
+/// Writes texts into a folder, which is made if it does not exist.
+///
+/// # Errors
+/// [`Error::Output`] naming the file.
+pub(super) fn write_files(folder: &Path, files: &[(&str, String)]) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.into(), message: e.to_string() })?;
+    for (name, text) in files {
+        crate::output::write_atomically(&folder.join(name), |out| {
+            std::io::Write::write_all(out, text.as_bytes()).map_err(|e| e.to_string())
+        })?;
+    }
+    Ok(())
 }

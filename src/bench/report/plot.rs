@@ -69,7 +69,7 @@ pub fn bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String> {
             .map_err(failed)?;
         let width = 0.84 / series.len().max(1) as f64;
         for (i, s) in series.iter().enumerate() {
-            let color = color(&s.name);
+            let color = color(&s.name, i);
             let left = |group: usize| group as f64 - 0.42 + width * i as f64;
             let present = || s.values.iter().enumerate().filter_map(|(group, value)| value.map(|v| (left(group), v)));
             chart
@@ -90,10 +90,10 @@ pub fn bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String> {
     Ok(svg)
 }
 
-/// The colour of an accelerator in every plot, paler for its batches. `name` begins with the accelerator's.
-fn color(name: &str) -> RGBAColor {
+/// The colour of an accelerator in every plot, paler for its batches, if `name` begins with one; of the `nth` curve otherwise.
+fn color(name: &str, nth: usize) -> RGBAColor {
     let accel = name.split([',', ' ']).next().unwrap_or(name);
-    let index = AccelKind::CHOICES.iter().position(|(choice, _)| *choice == accel).unwrap_or(0);
+    let index = AccelKind::CHOICES.iter().position(|(choice, _)| *choice == accel).unwrap_or(nth);
     let strength = if name.contains("coherent") { 0.35 } else { if name.contains("batches") { 0.65 } else { 1.0 } };
     COLORS[index % COLORS.len()].mix(strength)
 }
@@ -127,8 +127,8 @@ pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, marks: &[(f64, f64
             .axis_desc_style(("sans-serif", 14))
             .draw()
             .map_err(failed)?;
-        for curve in curves {
-            let color = color(&curve.name);
+        for (i, curve) in curves.iter().enumerate() {
+            let color = color(&curve.name, i);
             chart
                 .draw_series(LineSeries::new(curve.points.iter().copied(), color.stroke_width(2)))
                 .map_err(failed)?

@@ -113,6 +113,47 @@ pub enum BenchCommand {
     /// Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
     #[command(long_about = BENCH_REPORTS_ABOUT)]
     Reports(BenchReportsArgs),
+    /// Check numerical stability: every check with its criterion and what was measured
+    #[command(long_about = BENCH_STABILITY_ABOUT, after_help = BENCH_STABILITY_EXAMPLES)]
+    Stability(BenchStabilityArgs),
+}
+
+const BENCH_STABILITY_ABOUT: &str = "\
+Check numerical stability: every check with its criterion and what was measured.
+
+Shapes from a thousandth to a million radii away, rays that leave surfaces of every size anywhere, closed meshes that must not leak, accelerators \
+against testing everything, sampled directions against their densities, lights, cameras and films against closed forms. A check that falls short says \
+why; one that fails ends the run with exit code 1 and leaves pictures of what it found in DIR/evidence.";
+
+const BENCH_STABILITY_EXAMPLES: &str = "\
+Examples:
+  steradian bench stability --out stability      All checks: stability.html with plots, stability.md, stability.json
+  steradian bench stability --quick              The same checks with fewer samples, as the tests run them
+  steradian bench stability A3 B                 One check and one group
+
+Ctrl-C ends after the present check and reports what there is.";
+
+/// Arguments of `bench stability`.
+#[derive(Debug, Args)]
+pub struct BenchStabilityArgs {
+    /// Checks (A3) or groups of checks (B). Default: all
+    #[arg(value_name = "ID")]
+    pub checks: Vec<String>,
+    /// Fewer rays and samples: about a second a check
+    #[arg(long)]
+    pub quick: bool,
+    /// List the checks and run none
+    #[arg(long)]
+    pub list: bool,
+    /// Folder for stability.html, stability.md and stability.json; without it the table goes to stdout
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Without --out: print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+    /// Say nothing but results and errors
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// Arguments of `bench reports`.

@@ -6,11 +6,12 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use steradian::accel::{self, AccelKind};
 use steradian::bench::agreement::{describe, parse_ray};
 use steradian::bench::report::Report;
+use steradian::bench::stability::{self, Effort, StabilityReport};
 use steradian::bench::{Machine, Options, ReportsOptions, SceneReport, Watch, bench_reports, bench_scaling, bench_scene, record};
 use steradian::render::{Overrides, Settings};
 use steradian::{Error, Result, compile, import};
 
-use crate::args::{BenchAccelArgs, BenchCommand, BenchReportsArgs};
+use crate::args::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 use crate::interrupt::Interrupt;
 use crate::text;
 
@@ -19,6 +20,7 @@ pub fn run(command: &BenchCommand) -> Result<u8> {
     match command {
         BenchCommand::Accel(arguments) => accel(arguments),
         BenchCommand::Reports(arguments) => reports(arguments),
+        BenchCommand::Stability(arguments) => stability(arguments),
     }
 }
 
@@ -59,8 +61,7 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         _ => None,
     };
     watch.bar.finish_and_clear();
-    let command = std::iter::once("steradian".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
-    let report = Report { machine, command, scenes, scaling };
+    let report = Report { machine, command: command_line(), scenes, scaling };
     match &arguments.out {
         Some(folder) => {
             report.write_to(folder)?;
@@ -83,6 +84,48 @@ fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
     watch.bar.finish_and_clear();
     text::print(if arguments.json { report.json()? } else { report.markdown() }.trim_end())?;
     Ok(if watch.is_stopped() { interrupt.exit_code() } else { 0 })
+}
+
+fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
+    let checks = stability::choose(&arguments.checks)?;
+    if arguments.list {
+        for check in checks {
+            text::print(&format!("{:<5}{}: {}", check.id, check.name, check.setup))?;
+        }
+        return Ok(0);
+    }
+    if let Some(folder) = &arguments.out {
+        std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.clone(), message: e.to_string() })?;
+        steradian::output::check_creatable(&folder.join("stability.json"))?;
+    }
+    let interrupt = Interrupt::listen()?;
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let machine = Machine::here();
+    let effort = if arguments.quick { Effort::Quick } else { Effort::Full };
+    let results = stability::run(&checks, effort, &watch);
+    watch.bar.finish_and_clear();
+    let interrupted = results.len() < checks.len();
+    let report = StabilityReport { machine, command: command_line(), effort, interrupted, checks: results };
+    match &arguments.out {
+        Some(folder) => {
+            report.write_to(folder)?;
+            if !arguments.quiet {
+                text::print(&format!("stability.html, stability.md and stability.json are in {}", folder.display()))?;
+            }
+        }
+        None if arguments.json => text::print(&report.json()?)?,
+        None => text::print(report.markdown().trim_end())?,
+    }
+    let failed: Vec<_> = report.failures().map(|check| check.id).collect();
+    if interrupted {
+        return Ok(interrupt.exit_code());
+    }
+    if failed.is_empty() { Ok(0) } else { Err(Error::Internal(format!("failed checks: {}", failed.join(", ")))) }
+}
+
+/// The command as it was given, without the folder of the program.
+fn command_line() -> String {
+    std::iter::once("steradian".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
 }
 
 fn options(arguments: &BenchAccelArgs) -> Options {

@@ -1,0 +1,3 @@
+//! Group F: accelerators against the linear oracle.
+
+checks! {}

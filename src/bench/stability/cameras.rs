@@ -1,0 +1,3 @@
+//! Group K: cameras.
+
+checks! {}

@@ -1,0 +1,3 @@
+//! Group E: degenerate input.
+
+checks! {}

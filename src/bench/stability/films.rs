@@ -1,0 +1,3 @@
+//! Group M: films.
+
+checks! {}

@@ -1,0 +1,3 @@
+//! Group L: lights.
+
+checks! {}

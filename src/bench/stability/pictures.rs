@@ -1,0 +1,3 @@
+//! Group R: pictures.
+
+checks! {}

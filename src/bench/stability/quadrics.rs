@@ -1,0 +1,3 @@
+//! Group C: quadrics and flat shapes.
+
+checks! {}

@@ -1,0 +1,155 @@
+//! Scenes written as JSON values, rendered, and statistics of the picture.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use crate::accel::{self, AccelKind};
+use crate::film::Image;
+use crate::render::{self, Overrides, RenderResult, Settings, Silent};
+use crate::scene::Scene;
+use crate::{compile, import};
+use serde_json::{Value, json};
+
+/// Scenes of checks are written here, not by users.
+const VALID: &str = "scenes of checks are valid";
+
+/// A compiled scene with its settings.
+pub struct Prepared {
+    /// What is rendered.
+    pub scene: Scene,
+    /// How.
+    pub settings: Settings,
+}
+
+/// Compiles a scene given as JSON.
+pub fn prepare(scene: &Value, overrides: &Overrides) -> Prepared {
+    let path = Path::new("test.json");
+    let desc = import::parse_scene(&scene.to_string(), path).expect(VALID);
+    let settings = Settings::new(&desc, overrides).expect(VALID);
+    let scene = compile::compile(&desc, path).expect(VALID);
+    Prepared { scene, settings }
+}
+
+/// Renders a scene with two threads.
+pub fn render_with(prepared: &Prepared, kind: AccelKind) -> RenderResult {
+    let accel = accel::build(kind, &prepared.scene.geometry, 2).expect(VALID);
+    render::render(&prepared.scene, &*accel, &prepared.settings, &Silent, &AtomicBool::new(false)).expect(VALID)
+}
+
+/// Renders a scene given as JSON through Embree.
+pub fn render(scene: &Value) -> Image {
+    render_with(&prepare(scene, &Overrides { threads: Some(2), ..Overrides::default() }), AccelKind::EMBREE).image
+}
+
+/// A scene with a camera at `position` looking at `look_at` through a very narrow angle, so that all pixels see nearly one point.
+pub fn probe(position: [f64; 3], look_at: [f64; 3], rest: Value) -> Value {
+    let mut scene = json!({
+        "film": { "width": 16, "height": 16, "filter": { "type": "box" } },
+        "camera": { "position": position, "look_at": look_at, "up": [0.1, 1.0, 0.2], "vertical_fov_degrees": 0.01 },
+        "sampler": { "type": "independent", "spp": 1024 },
+    });
+    merge(&mut scene, rest);
+    scene
+}
+
+/// Puts the keys of `from` into `into`, object by object.
+pub fn merge(into: &mut Value, from: Value) {
+    match (into, from) {
+        (Value::Object(into), Value::Object(from)) => {
+            for (key, value) in from {
+                merge(into.entry(key).or_insert(Value::Null), value);
+            }
+        }
+        (into, from) => *into = from,
+    }
+}
+
+/// Mean over the pixels of a picture with the standard error of that mean.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate {
+    /// The mean.
+    pub mean: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+impl Estimate {
+    /// Of one colour channel.
+    pub fn of(image: &Image, channel: usize) -> Self {
+        let values: Vec<f64> = pixels(image).map(|p| f64::from(p[channel])).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0);
+        Self { mean, error: (variance / n).sqrt() }
+    }
+
+    /// Asserts that the mean agrees with `expected`: 5.5 standard errors (two-sided false-alarm rate 4e-8 for a normal mean, below 1e-6 with
+    /// 255 degrees of freedom), or the relative rounding bound where there is no noise.
+    #[track_caller]
+    pub fn assert_is(&self, expected: f64, what: &str) {
+        let bound = 5.5 * self.error + 1e-5 * expected.abs();
+        assert!((self.mean - expected).abs() <= bound, "{what}: {} +- {}, expected {expected}", self.mean, self.error);
+    }
+}
+
+/// The colours of a picture, row by row.
+pub fn pixels(image: &Image) -> impl Iterator<Item = [f32; 3]> + '_ {
+    let [width, height] = image.size;
+    (0..height).flat_map(move |y| (0..width).filter_map(move |x| image.rgb(x, y)))
+}
+
+/// A white diffuse floor at y = 0 seen from above at `at`: its radiance times pi is the irradiance.
+pub fn floor_probe(at: [f64; 3], lights: Value) -> Value {
+    let mut scene = probe(
+        [at[0] + 0.6, at[1] + 0.45, at[2] - 0.3],
+        at,
+        json!({
+            "integrator": { "type": "path", "max_depth": 2 },
+            "materials": { "white": { "type": "diffuse", "albedo": 1.0 }, "black": { "type": "diffuse", "albedo": 0.0 } },
+            "shapes": [{ "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] }]
+        }),
+    );
+    for light in lights.as_array().into_iter().flatten() {
+        scene["shapes"].as_array_mut().expect(VALID).push(light.clone());
+    }
+    scene
+}
+
+/// Asserts the irradiance on the floor of [`floor_probe`], by every strategy.
+#[track_caller]
+pub fn assert_irradiance(scene: &Value, expected: f64, what: &str) {
+    for strategy in ["mis", "light", "bsdf"] {
+        let mut scene = scene.clone();
+        scene["integrator"]["strategy"] = json!(strategy);
+        let estimate = Estimate::of(&render(&scene), 0);
+        estimate.assert_is(expected / std::f64::consts::PI, &format!("{what}, {strategy}"));
+    }
+}
+
+/// Means over 12 x 12 pixels of all channels together.
+pub fn block_means(image: &Image) -> Vec<f64> {
+    let [width, _] = image.size;
+    let blocks = width as usize / 12;
+    let mut sums = vec![0.0; blocks * blocks];
+    for (i, p) in pixels(image).enumerate() {
+        let (x, y) = (i % width as usize, i / width as usize);
+        sums[y / 12 * blocks + x / 12] += p.iter().map(|&c| f64::from(c)).sum::<f64>() / 144.0;
+    }
+    sums
+}
+
+/// Welch's test for each block: t with about 14 degrees of freedom, |t| < 11 has a false-alarm rate below 1e-7.
+#[track_caller]
+pub fn assert_blocks_agree(a: &[Vec<f64>], b: &[Vec<f64>], what: &str) {
+    let moments = |runs: &[Vec<f64>], block: usize| {
+        let n = runs.len() as f64;
+        let mean = runs.iter().map(|r| r[block]).sum::<f64>() / n;
+        let variance = runs.iter().map(|r| (r[block] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (mean, variance / n)
+    };
+    for block in 0..a[0].len() {
+        let ((ma, va), (mb, vb)) = (moments(a, block), moments(b, block));
+        let t = (ma - mb) / (va + vb).sqrt();
+        assert!(t.abs() < 11.0 && ma > 0.0, "{what}, block {block}: {ma} against {mb}, t = {t}");
+    }
+}

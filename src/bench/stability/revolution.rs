@@ -1,0 +1,3 @@
+//! Group D: surfaces of revolution.
+
+checks! {}

@@ -1,0 +1,3 @@
+//! Group S: samplers.
+
+checks! {}

@@ -1,0 +1,3 @@
+//! Group G: scattering at surfaces.
+
+checks! {}

@@ -1,0 +1,3 @@
+//! Group B: rays that leave a surface.
+
+checks! {}

@@ -1,0 +1,3 @@
+//! Group I: light transport.
+
+checks! {}
