@@ -27,6 +27,11 @@ impl Sequence {
     }
 }
 
+/// Fewer where an interpreter looks for undefined behaviour.
+fn many(n: usize) -> usize {
+    if cfg!(miri) { n.div_ceil(100) } else { n }
+}
+
 /// Points on a coarse grid now and then, so that edges, corners and planes are met exactly.
 fn corner(random: &mut Sequence) -> Vec3 {
     let p = random.vec();
@@ -61,7 +66,7 @@ fn block(triangles: &[TrianglePoints]) -> Block {
 fn lanes_answer_as_the_shared_triangle_test_bit_for_bit() {
     let mut random = Sequence(5);
     let mut hits = 0;
-    for _ in 0..60_000 {
+    for _ in 0..many(60_000) {
         let triangles: Vec<_> = (0..BLOCK)
             .map(|i| {
                 let (a, b) = (corner(&mut random), corner(&mut random));
@@ -94,7 +99,7 @@ fn lanes_answer_as_the_shared_triangle_test_bit_for_bit() {
 #[test]
 fn lanes_open_the_boxes_that_the_scalar_test_opens() {
     let mut random = Sequence(6);
-    for _ in 0..60_000 {
+    for _ in 0..many(60_000) {
         let boxes: Vec<_> = (0..WIDTH)
             .map(|_| {
                 let (a, b) = (corner(&mut random), corner(&mut random));
@@ -145,12 +150,12 @@ fn soup(random: &mut Sequence, count: usize) -> Geometry {
 #[test]
 fn without_simd_the_answers_are_the_same() {
     let mut random = Sequence(7);
-    let geometry = soup(&mut random, 3_000);
+    let geometry = soup(&mut random, many(3_000));
     let simd = TwoLevel::<Bvh>::new(&geometry, &BvhOptions::default(), 1);
     let portable = TwoLevel::<Bvh>::over_world(&geometry, |items| Bvh::wide(items, None));
     assert!(portable.description().contains("scalar"));
     let mut hits = 0;
-    for _ in 0..20_000 {
+    for _ in 0..many(20_000) {
         let ray = ray(&mut random);
         let hit: Option<Hit> = simd.intersect(&ray);
         assert_eq!(portable.intersect(&ray), hit, "{ray:?}");
@@ -162,7 +167,7 @@ fn without_simd_the_answers_are_the_same() {
 
 #[test]
 fn any_number_of_threads_builds_the_same_tree() {
-    let geometry = soup(&mut Sequence(8), 30_000);
+    let geometry = soup(&mut Sequence(8), many(30_000));
     let nodes = |threads: usize| {
         let accel = TwoLevel::<Bvh>::new(&geometry, &BvhOptions::default(), threads);
         let mut nodes = Vec::new();
@@ -206,7 +211,7 @@ fn garbage_ends_in_a_bounded_tree() {
 #[test]
 fn the_stack_holds_the_deepest_tree() {
     // The builder halves below its depth cap; this bounds the levels of the wide form for four billion references.
-    let geometry = soup(&mut Sequence(10), 5_000);
+    let geometry = soup(&mut Sequence(10), many(5_000));
     let items = Items::of_shapes(&geometry, &geometry.world);
     let Form::Wide(Wide { depth, .. }, _) = Bvh::wide(&items, None).0 else { panic!("a wide tree") };
     assert!(depth * (WIDTH - 1) < STACK, "{depth}");

@@ -153,3 +153,33 @@ pub fn assert_blocks_agree(a: &[Vec<f64>], b: &[Vec<f64>], what: &str) {
         assert!(t.abs() < 11.0 && ma > 0.0, "{what}, block {block}: {ma} against {mb}, t = {t}");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Small enough for an interpreter that looks for undefined behaviour and data races.
+    #[test]
+    fn a_small_picture_is_the_same_through_every_tree_and_without_embree() {
+        let scene = json!({
+            "film": { "width": 6, "height": 4 },
+            "camera": { "position": [0, 1, 5], "look_at": [0, 0.5, 0], "vertical_fov_degrees": 40 },
+            "sampler": { "spp": 1 },
+            "integrator": { "type": "path", "max_depth": 3 },
+            "materials": { "white": { "type": "diffuse", "albedo": 0.7 }, "glass": { "type": "dielectric", "ior": 1.5, "roughness": 0.3 } },
+            "shapes": [
+                { "type": "quad", "material": "white", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
+                { "type": "sphere", "material": "glass", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] },
+                { "type": "mesh", "material": "white", "positions": [[-1, 0, -1], [1, 0, -1], [0, 2, -1]], "triangles": [[0, 1, 2]] },
+                { "type": "sphere", "material": "white", "radius": 0.3, "emission": { "radiance": [9, 9, 9] }, "transform": [{ "translate": [1, 3, 1] }] }
+            ]
+        });
+        let prepared = prepare(&scene, &Overrides { threads: Some(2), ..Overrides::default() });
+        let picture = |name: &str| render_with(&prepared, name.parse().expect("an accelerator")).image;
+        let linear = picture("linear");
+        assert!(pixels(&linear).any(|p| p[0] > 0.0));
+        for name in ["bvh", "bvh:binary", "kdtree", "octree"] {
+            assert_eq!(picture(name), linear, "{name}");
+        }
+    }
+}
