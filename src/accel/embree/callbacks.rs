@@ -51,7 +51,7 @@ pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *con
     placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32)
 }
 
-/// Writes `ray` in the space of the moving [`Instance`] behind `instance`; false if it cannot be traced there.
+/// Writes `ray` in the space of the [`Instance`] behind `instance`; false if it cannot be traced there.
 pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *const sys::StRay, inside: *mut sys::StRay) -> bool {
     // SAFETY: `instance` was made from a `&Instance` inside the geometry that the accelerator borrows; both rays are on the shim's stack,
     // and `StRay` has the layout of `Ray`.

@@ -72,7 +72,8 @@ impl UserShapes {
     }
 }
 
-/// The user data of the instances that move; the others have none. Embree keeps addresses into it.
+/// The user data of the instances that move or stretch unevenly, into whose space we move the rays ourselves; the others have none. Embree
+/// keeps addresses into it.
 pub(super) struct MovingInstances(Vec<Option<sys::StMovingInstance>>);
 
 // SAFETY: the pointers inside lead to the geometry and to Embree's scenes, and are only read through, which both allow from any thread.
@@ -84,7 +85,9 @@ impl MovingInstances {
     /// The table for `geometry`, over the committed scenes of its objects, which must live as long.
     pub(super) fn new(geometry: &Geometry, objects: &[Scene]) -> Self {
         let of = |instance: &Instance| {
-            instance.motion.as_ref()?;
+            if instance.motion.is_none() && !instance.is_uneven() {
+                return None;
+            }
             let object = geometry.object(instance.object);
             let inside = object.shapes.iter().fold(Aabb::EMPTY, |b, &id| b.union(&geometry.shape(id).bounds()));
             let Aabb { min, max } = instance.bounds(&inside);
@@ -167,7 +170,7 @@ impl GeometryHandle {
         unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, items, 0, 12, count) }
     }
 
-    /// The committed geometry of an instance that moves.
+    /// The committed geometry of an instance into whose space we move the rays.
     ///
     /// # Safety
     /// The user data, the instance and the scene it names must outlive every scene the geometry is attached to, and must not move.

@@ -41,7 +41,7 @@ pub(super) fn b4_closed_boxes(effort: Effort) -> Outcome {
 pub(super) fn b7_instances(effort: Effort) -> Outcome {
     let mut rng = Rng::new(7);
     let mut outcome = Outcome::new();
-    for anisotropy in [1.0, 100.0] {
+    for anisotropy in [1.0, 10.0, 100.0] {
         let mut tally = <[Leavings; 2]>::default();
         for _ in 0..effort.pick(60, 600) {
             let scale = rng.magnitude(-2.0, 2.0);

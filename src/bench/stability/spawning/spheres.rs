@@ -5,8 +5,9 @@ use serde_json::{Value, json};
 use super::{Effort, Outcome};
 use crate::bench::stability::render::{pixels, render};
 
-/// Of the radii, as far as OSPRay's test goes.
-const RADII: [f64; 2] = [1e-3, 3e5];
+/// The smallest and the largest, as far as OSPRay's test goes, and one that has all digits of the smallest.
+const RADII: [f64; 3] = [1e-3, 3e5, 1e-3 * (1 << 28) as f64];
+/// In radii.
 const DISTANCES: [f64; 3] = [3.0, 8e3, 2e5];
 
 /// A white sphere that fills most of the picture. Either the camera or the sphere is at the world's origin.
@@ -40,24 +41,33 @@ pub(super) fn b10_spheres(effort: Effort) -> Outcome {
     let samples = effort.pick(16, 1_024);
     let sky = json!({ "type": "environment", "radiance": [1, 1, 1] });
     let sun = json!({ "type": "directional", "direction": [0.3, -1, 0.2], "irradiance": [3, 3, 3] });
-    let (mut off_white, mut difference, mut dark) = (0f64, 0f64, 1f64);
+    let (mut off_white, mut lit) = (0f64, 1f64);
+    // From the smallest radius to the others, by distance.
+    let mut differences = [[0f64; 2]; DISTANCES.len()];
     for camera_moves in [false, true] {
-        let reference = picture(&scene(1.0, DISTANCES[0], camera_moves, samples, sun.clone(), "light"));
-        for distance in DISTANCES {
-            let [small, large] = RADII.map(|radius| {
+        let nearby = picture(&scene(1.0, DISTANCES[0], camera_moves, samples, sun.clone(), "light"));
+        for (distance, differences) in DISTANCES.into_iter().zip(&mut differences) {
+            let pictures = RADII.map(|radius| {
                 // Directions are sampled by the material, so that each sample is 1; a false hit is black.
                 let white = picture(&scene(radius, distance, camera_moves, samples, sky.clone(), "bsdf"));
                 off_white = white.iter().map(|v| (v - 1.0).abs()).fold(off_white, f64::max);
                 picture(&scene(radius, distance, camera_moves, samples, sun.clone(), "light"))
             });
-            difference = difference.max(relative_rmse(&small, &large));
-            // How much of the lit side is there, beside the nearest camera's larger perspective.
-            let lit = |picture: &[f64]| picture.iter().filter(|&&v| v > 0.0).count() as f64;
-            dark = dark.min(lit(&small).min(lit(&large)) / lit(&reference));
+            let count = |picture: &[f64]| picture.iter().filter(|&&v| v > 0.0).count() as f64;
+            lit = pictures.iter().map(|picture| count(picture) / count(&nearby)).fold(lit, f64::min);
+            for (difference, other) in differences.iter_mut().zip(&pictures[1..]) {
+                *difference = difference.max(relative_rmse(&pictures[0], other));
+            }
         }
     }
+    let [near, far, farthest] = differences;
     Outcome::new()
         .at_most("under a sky: largest deviation of a pixel from white", off_white, 1e-5)
-        .at_most("under a sun: relative RMSE between radii", difference, 0.01)
-        .at_least("under a sun: lit pixels, of those from nearby", dark, 0.9)
+        .at_least("under a sun: lit pixels, of those from nearby", lit, 0.9)
+        .at_most("under a sun: relative RMSE between radii with the same digits", near[1].max(far[1]).max(farthest[1]), 0.0)
+        .at_most("under a sun: relative RMSE between radii, 3 and 8000 radii away", near[0].max(far[0]), 0.01)
+        // Half an ulp of each coordinate at 2e5 radii is up to 0.02 radii together, a quarter of a pixel: of the lit rim, 36 of 576 pixels, a
+        // quarter comes or goes.
+        .at_most("under a sun: relative RMSE between radii, 2e5 radii away", farthest[0], 0.1)
+        .short("at 2e5 radii the roundings of positions and directions to f32 move the sphere by up to a quarter of a pixel; the catalogue asks for 1 %")
 }
