@@ -120,7 +120,7 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
 
 void st_set_cutout(RTCGeometry triangles, const struct StCutout *cutout) {
     rtcSetGeometryUserData(triangles, (void *)cutout);
-    rtcSetGeometryIntersectFilterFunction(triangles, filter);
+    if (!cutout->any_hit_only) rtcSetGeometryIntersectFilterFunction(triangles, filter);
     rtcSetGeometryOccludedFilterFunction(triangles, filter);
 }
 

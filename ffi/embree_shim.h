@@ -64,13 +64,14 @@ RTCGeometry st_new_moving_instance(RTCDevice device, const struct StMovingInstan
 /* A new, committed geometry of one user primitive; null on an error. */
 RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape);
 
-/* The user data of triangles with holes. It must outlive the geometry. */
+/* The user data of triangles with holes or slivers. It must outlive the geometry. */
 struct StCutout {
     const void *user;
     StCounts counts;
+    bool any_hit_only;
 };
 
-/* Lets hits of triangles count only where `cutout` says so. To be called before the geometry is committed. */
+/* Lets hits of triangles (or only those of any-hit queries) count only where `cutout` says so. To be called before the geometry is committed. */
 void st_set_cutout(RTCGeometry triangles, const struct StCutout *cutout);
 
 /* Room for what Embree is called with. The caller owns it, so that the calls below are jumps and cost no frame of their own. */

@@ -127,37 +127,6 @@ fn at_each_time_a_moving_scene_is_one_at_rest() {
     }
 }
 
-#[test]
-fn rays_that_leave_a_moving_surface_do_not_find_it_again() {
-    let mut rng = Rng::new(83);
-    let geometry = {
-        let shapes =
-            placed_analytic_shapes(&mut rng, DVec3::ZERO).into_iter().take(1).chain([Shape::Mesh(cube(DMat3::IDENTITY, DVec3::ZERO))]);
-        let shapes: Vec<_> = shapes.collect();
-        let objects = (0..shapes.len()).map(|i| Object { shapes: vec![ShapeId::new(i)] }).collect();
-        let instances = (0..shapes.len()).map(|i| Instance::moving(ObjectId::new(i), motion(&mut rng)).unwrap()).collect();
-        Geometry { shapes, objects, instances, ..Geometry::default() }
-    };
-    for (kind, name) in AccelKind::ALL {
-        let accel = build(kind, &geometry, 1).unwrap();
-        let mut left = 0;
-        for ray in rays(&mut rng, 4_000) {
-            let Some(hit) = accel.intersect(&ray) else { continue };
-            let Some(at) = geometry.interaction(&ray, &hit) else { continue };
-            // Out of a convex body nothing of it is in the way.
-            let n = if at.n_g.dot(ray.direction) < 0.0 { at.n_g } else { -at.n_g };
-            if at.n_g.dot(ray.direction) > 0.0 {
-                continue;
-            }
-            let out = at.spawn((n + 0.9 * rng.direction().as_vec3()).normalize());
-            left += 1;
-            let again = accel.intersect(&out).filter(|hit| hit.instance == at.instance && hit.t < 1e-3);
-            assert!(again.is_none(), "{name}: {at:?} {again:?}");
-        }
-        assert!(left > 200, "{name}: {left}");
-    }
-}
-
 /// A black card that passes before a white sky, in the middle of the picture for half of the time.
 fn passing_card(shapes: Value, rest: Value) -> Value {
     let mut scene = json!({

@@ -62,5 +62,3 @@ mod textures;
 mod tidy;
 /// Shared helpers.
 mod util;
-/// Hit accuracy, and meshes without holes.
-mod watertight;

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::{Detail, Hit, Shape, SurfaceInteraction};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Aabb, Bounds, Motion, Ray, Transform, Vec3};
+use crate::math::{Aabb, Bounds, DMat3, Motion, Ray, Transform, Vec3};
 
 /// A group of shapes in a space of its own.
 #[derive(Clone, Debug, Default)]
@@ -36,6 +36,14 @@ impl Instance {
         let transform = Transform::new(motion.map_at(0.0))?;
         let motion = motion.as_constant().is_none().then(|| Box::new(motion));
         Some(Self { object, transform, motion })
+    }
+
+    /// Whether the map stretches so unevenly that an inverse made in `f32` is off by more than [`SurfaceInteraction::error`] says.
+    pub fn is_uneven(&self) -> bool {
+        let squared_norm = |m: &DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
+        // The product is 9 for a rotation with a scale; the square of the limit is that of a stretch by about 8 along one axis.
+        let Transform { world_from_object, object_from_world, .. } = &self.transform;
+        squared_norm(&world_from_object.matrix3) * squared_norm(&object_from_world.matrix3) > 9.0 * 16.0
     }
 
     /// Where it stands at a time from 0 to 1.

@@ -56,6 +56,7 @@ pub struct Mesh {
     pub(super) later: Vec<MeshStep>,
     /// For normal maps, those of each triangle at each time; else empty.
     pub(super) tangents: Vec<Vec<CornerTangents>>,
+    has_slivers: bool,
 }
 
 /// The vertices of a deforming mesh at one time.
@@ -108,7 +109,9 @@ impl Mesh {
         }
         positions.push([0.0; 3]);
         positions.shrink_to_fit();
-        Ok(Self { positions, triangles, normals, uvs, later: Vec::new(), tangents: Vec::new() })
+        let mut mesh = Self { positions, triangles, normals, uvs, later: Vec::new(), tangents: Vec::new(), has_slivers: false };
+        mesh.has_slivers = (0..mesh.triangles.len()).any(|i| mesh.triangle_points(PrimId::new(i)).is_sliver());
+        Ok(mesh)
     }
 
     /// This mesh deforming: its own vertices are those at the opening of the shutter, `later` has those at further times, evenly spaced to the
@@ -119,6 +122,7 @@ impl Mesh {
     pub fn deforming(self, later: Vec<MeshStep>) -> Result<Self, MeshError> {
         let vertices = self.positions().len();
         let mut checked = Vec::with_capacity(later.len());
+        let mut has_slivers = self.has_slivers;
         for step in later {
             if step.positions.len() != vertices {
                 return Err(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices });
@@ -127,10 +131,22 @@ impl Mesh {
             if self.has_normals() && normals.is_none() {
                 return Err(MeshError::Count { what: "normals at a later time", count: 0, vertices });
             }
-            let Self { positions, normals, .. } = Self::new(step.positions, self.triangles.clone(), normals, None)?;
-            checked.push(MeshStep { positions, normals });
+            let step = Self::new(step.positions, self.triangles.clone(), normals, None)?;
+            has_slivers |= step.has_slivers;
+            checked.push(MeshStep { positions: step.positions, normals: step.normals });
         }
-        Ok(Self { later: checked, tangents: Vec::new(), ..self })
+        Ok(Self { later: checked, tangents: Vec::new(), has_slivers, ..self })
+    }
+
+    /// Whether a triangle is so flat that [hits are to be confirmed](Self::confirms_hit).
+    pub fn has_slivers(&self) -> bool {
+        self.has_slivers
+    }
+
+    /// Whether a triangle that was found in `f32` to be hit lies ahead of the ray.
+    pub fn confirms_hit(&self, prim: PrimId, ray: &Ray) -> bool {
+        let points = self.triangle_points_at(prim, ray.time);
+        points.plane_distance(points.cross(), ray) > 0.0
     }
 
     /// Whether vertices move.
@@ -270,13 +286,11 @@ impl Mesh {
 
         // The hit point in f64, on the plane of the triangle.
         let cross = points.cross();
-        let origin = ray.origin.as_dvec3();
-        let direction = ray.direction.as_dvec3();
-        let t = cross.dot(points.a.as_dvec3() - origin) / cross.dot(direction);
+        let t = points.plane_distance(cross, ray);
         if !(t > 0.0 && t < f64::INFINITY) {
             return None;
         }
-        let p = origin + direction * t;
+        let p = ray.origin.as_dvec3() + ray.direction.as_dvec3() * t;
         let n_g = (cross / cross.length()).as_vec3();
 
         // Embree subtracts the origin from the corners and forms the normal in f32: 4 units of roundoff of the extent seen from here.

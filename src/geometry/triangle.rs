@@ -55,6 +55,27 @@ impl TrianglePoints {
         (self.b.as_dvec3() - a).cross(self.c.as_dvec3() - a)
     }
 
+    /// The distance along `ray` to the plane of the triangle, in `f64`; not finite if they are parallel. `cross` is [`cross`](Self::cross).
+    #[inline]
+    pub fn plane_distance(&self, cross: DVec3, ray: &Ray) -> f64 {
+        cross.dot(self.a.as_dvec3() - ray.origin.as_dvec3()) / cross.dot(ray.direction.as_dvec3())
+    }
+
+    /// The inverse sine of the angle between the two shortest edges, at least 1: a normal computed from them in `f32` is off by so many units
+    /// of roundoff.
+    pub fn flatness(&self) -> f64 {
+        let [a, b, c] = [self.a, self.b, self.c].map(Vec3::as_dvec3);
+        let [ab, bc, ca] = [b - a, c - b, a - c].map(DVec3::length);
+        (ab * bc).min(bc * ca).min(ca * ab) / self.cross().length()
+    }
+
+    /// Whether the triangle is so flat that rays which leave it may be found to hit it in `f32`, although they start where they should.
+    pub fn is_sliver(&self) -> bool {
+        // The offset of rays is 4 units of roundoff of the extent; without an area there is nothing to hit.
+        let flatness = self.flatness();
+        flatness > 4.0 && flatness < f64::INFINITY
+    }
+
     /// Area.
     pub fn area(&self) -> f64 {
         0.5 * self.cross().length()
@@ -178,14 +199,13 @@ mod tests {
     }
 
     #[test]
-    fn a_sliver_far_away_answers_without_nan() {
-        let bad = TrianglePoints {
-            a: Vec3::new(-1_113.454_6, -79.049_614, -56.243_19),
-            b: Vec3::new(-1_113.454_6, -79.049_614, -56.243_19),
-            c: Vec3::new(-1_113.454_7, -79.049_61, -56.243_19),
-        };
-        assert!(bad.intersect(&Ray::new(Vec3::ZERO, Vec3::new(-1_113.454_6, -79.049_61, -56.243_19))).is_none());
-        assert!(bad.sample([0.3, 0.4]).is_none_or(|s| s.p.is_finite()));
+    fn slivers_are_flat_and_needles_are_not() {
+        let with_tip = |x: f32, y: f32| TrianglePoints { c: Vec3::new(x, y, 0.0), ..UNIT };
+        assert!((UNIT.flatness() - 1.0).abs() < 1e-12 && !UNIT.is_sliver());
+        assert!(with_tip(0.5, 0.01).is_sliver() && (with_tip(0.5, 0.01).flatness() / 25.01 - 1.0).abs() < 1e-6);
+        assert!(!with_tip(0.0, 0.01).is_sliver());
+        // Nothing to hit.
+        assert!(!with_tip(0.5, 0.0).is_sliver() && !with_tip(0.0, 0.0).is_sliver());
     }
 
     #[test]

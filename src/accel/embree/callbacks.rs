@@ -7,7 +7,7 @@ use super::device::Monitor;
 use super::gate::{Gate, RayWords};
 use super::packet::INVALID;
 use super::sys;
-use crate::geometry::{Geometry, Hit, Instance, Placed};
+use crate::geometry::{Geometry, Hit, Instance, Placed, Shape};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::Ray;
 
@@ -51,7 +51,7 @@ pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *con
     placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32)
 }
 
-/// Writes `ray` in the space of the moving [`Instance`] behind `instance`; false if it cannot be traced there.
+/// Writes `ray` in the space of the [`Instance`] behind `instance`; false if it cannot be traced there.
 pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *const sys::StRay, inside: *mut sys::StRay) -> bool {
     // SAFETY: `instance` was made from a `&Instance` inside the geometry that the accelerator borrows; both rays are on the shim's stack,
     // and `StRay` has the layout of `Ray`.
@@ -62,7 +62,7 @@ pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *co
     Gate::OPEN.admits(&RayWords::new(&local))
 }
 
-/// A shape with holes, as the user data of its geometry.
+/// A shape with holes or slivers, as the user data of its geometry.
 pub(super) struct Cutout {
     geometry: *const Geometry,
     shape: ShapeId,
@@ -103,7 +103,14 @@ pub(super) unsafe extern "C" fn counts(user: *const c_void, ray: *const sys::StR
     let (cutout, ray, hit) = unsafe { (&*user.cast::<Cutout>(), &*ray.cast::<Ray>(), &*hit) };
     // SAFETY: the accelerator borrows the geometry.
     let geometry = unsafe { cutout.geometry() };
+    let prim = PrimId(hit.prim);
+    if let Shape::Mesh(mesh) = geometry.shape(cutout.shape)
+        && mesh.has_slivers()
+        && !mesh.confirms_hit(prim, ray)
+    {
+        return false;
+    }
     let instance = Cutout::instance(geometry, hit.instance);
-    let hit = Hit { t: hit.t, u: hit.u, v: hit.v, shape: cutout.shape, prim: PrimId(hit.prim), instance };
+    let hit = Hit { t: hit.t, u: hit.u, v: hit.v, shape: cutout.shape, prim, instance };
     geometry.cutouts.counts(&geometry.shapes, key, ray, &hit)
 }

@@ -14,10 +14,10 @@ use crate::math::Aabb;
 
 /// What Embree's callbacks need of one shape. Embree keeps addresses of it.
 pub(super) enum UserData {
-    /// Triangles without holes need nothing.
+    /// Triangles of which every hit counts.
     Triangles,
-    /// Triangles with holes.
-    TrianglesWithHoles(sys::StCutout, #[allow(dead_code)] Box<Cutout>),
+    /// Triangles with holes or slivers.
+    FilteredTriangles(sys::StCutout, #[allow(dead_code)] Box<Cutout>),
     /// An analytic shape, with its own data where it has holes.
     Analytic(sys::StUserShape, #[allow(dead_code)] Option<Box<Cutout>>),
 }
@@ -35,12 +35,16 @@ impl UserShapes {
     pub(super) fn new(geometry: &Geometry) -> Self {
         let of = |(i, shape): (usize, &Shape)| {
             let id = ShapeId::new(i);
-            let cutout = geometry.cutouts.has_holes(id).then(|| Box::new(Cutout::new(geometry, id)));
+            let has_holes = geometry.cutouts.has_holes(id);
+            let has_slivers = matches!(shape, Shape::Mesh(mesh) if mesh.has_slivers());
+            let cutout = (has_holes || has_slivers).then(|| Box::new(Cutout::new(geometry, id)));
             match (shape, cutout) {
                 (Shape::Mesh(_), None) => UserData::Triangles,
                 (Shape::Mesh(_), Some(cutout)) => {
-                    let raw = sys::StCutout { user: std::ptr::from_ref(&*cutout).cast::<c_void>(), counts: Some(counts) };
-                    UserData::TrianglesWithHoles(raw, cutout)
+                    // Whoever asks for closest hits confirms them.
+                    let user = std::ptr::from_ref(&*cutout).cast::<c_void>();
+                    let raw = sys::StCutout { user, counts: Some(counts), any_hit_only: !has_holes };
+                    UserData::FilteredTriangles(raw, cutout)
                 }
                 (Shape::Analytic(placed), cutout) => {
                     let Aabb { min, max } = placed.bounds().padded();
@@ -68,7 +72,8 @@ impl UserShapes {
     }
 }
 
-/// The user data of the instances that move; the others have none. Embree keeps addresses into it.
+/// The user data of the instances that move or stretch unevenly, into whose space we move the rays ourselves; the others have none. Embree
+/// keeps addresses into it.
 pub(super) struct MovingInstances(Vec<Option<sys::StMovingInstance>>);
 
 // SAFETY: the pointers inside lead to the geometry and to Embree's scenes, and are only read through, which both allow from any thread.
@@ -80,7 +85,9 @@ impl MovingInstances {
     /// The table for `geometry`, over the committed scenes of its objects, which must live as long.
     pub(super) fn new(geometry: &Geometry, objects: &[Scene]) -> Self {
         let of = |instance: &Instance| {
-            instance.motion.as_ref()?;
+            if instance.motion.is_none() && !instance.is_uneven() {
+                return None;
+            }
             let object = geometry.object(instance.object);
             let inside = object.shapes.iter().fold(Aabb::EMPTY, |b, &id| b.union(&geometry.shape(id).bounds()));
             let Aabb { min, max } = instance.bounds(&inside);
@@ -118,7 +125,7 @@ impl GeometryHandle {
             // SAFETY: the caller keeps the mesh alive.
             (Shape::Mesh(mesh), UserData::Triangles) => unsafe { Self::of_mesh(device, mesh, None) },
             // SAFETY: the caller keeps the mesh and the user data alive.
-            (Shape::Mesh(mesh), UserData::TrianglesWithHoles(cutout, _)) => unsafe { Self::of_mesh(device, mesh, Some(cutout)) },
+            (Shape::Mesh(mesh), UserData::FilteredTriangles(cutout, _)) => unsafe { Self::of_mesh(device, mesh, Some(cutout)) },
             (Shape::Analytic(_), UserData::Analytic(user, _)) => {
                 // SAFETY: the device is alive; the caller keeps the user data alive.
                 let handle = unsafe { sys::st_new_user_geometry(device.handle(), user) };
@@ -163,7 +170,7 @@ impl GeometryHandle {
         unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, items, 0, 12, count) }
     }
 
-    /// The committed geometry of an instance that moves.
+    /// The committed geometry of an instance into whose space we move the rays.
     ///
     /// # Safety
     /// The user data, the instance and the scene it names must outlive every scene the geometry is attached to, and must not move.

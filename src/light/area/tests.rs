@@ -1,7 +1,6 @@
 use std::f64::consts::{PI, TAU};
 
 use super::*;
-use crate::geometry::Hit;
 use crate::light::test_support::assert_chi_squared;
 use crate::math::Rng;
 
@@ -280,36 +279,6 @@ fn triangles_without_area_give_no_light() {
         let both = AreaLight { emission: Emission { two_sided: true, ..WHITE }, ..light };
         assert!(both.sample(&geometry, &[], DVec3::new(0.3, 0.2, 1.0), [0.3, 0.6]).is_none());
         assert_eq!(both.power(), 0.0);
-    }
-}
-
-#[test]
-fn a_shadow_ray_reaches_the_light_it_was_made_for() {
-    let geometry = ceiling();
-    for light in AreaLight::for_shape(ShapeId(0), WHITE, &geometry, &[]) {
-        let mut random = Rng::new(5);
-        for _ in 0..20_000 {
-            let distance = 10f64.powf(f64::from(random.unit_f32()) * 7.0 - 3.0);
-            let p = DVec3::new(0.1, 0.2, 1.0 - distance);
-            let Some(s) = light.sample(&geometry, &[], p, random.pair()) else { continue };
-            let ShadowTarget::Point(target) = s.target else { panic!("an area light is not at infinity") };
-            let from = SurfaceInteraction {
-                p,
-                t: 1.0,
-                error: 0.0,
-                n_g: Vec3::Z,
-                n_s: Vec3::Z,
-                dp_du: Vec3::ZERO,
-                uv: Vec2::ZERO,
-                shape: ShapeId(9),
-                prim: PrimId(0),
-                instance: Hit::NO_INSTANCE,
-                time: 0.0,
-            };
-            let ray = from.spawn_to(&target);
-            let blocked = (0..2).any(|i| geometry.shape(ShapeId(0)).intersect_prim(&ray, ShapeId(0), PrimId(i)).is_some());
-            assert!(!blocked, "{distance}");
-        }
     }
 }
 

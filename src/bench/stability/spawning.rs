@@ -1,3 +1,0 @@
-//! Group B: rays that leave a surface.
-
-checks! {}
