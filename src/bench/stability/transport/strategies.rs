@@ -4,11 +4,6 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{Effort, Estimate, Outcome, STRATEGIES, Tests, Value, json, mean, scene, with_strategy};
 
-/// Relative variance of a sample below which a strategy counts as all but exact: both together may then exceed it by far, since what is
-/// proven (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering") bounds the excess by a part of the squared
-/// mean. They must only stay below this too.
-const ALL_BUT_EXACT: f64 = 0.01;
-
 /// A plate of metal below a lamp in the direction of its mirror image, the camera at 45 degrees and so narrow that all pixels see one point.
 fn plate(spp: u32, side: u32, alpha: f64, radius: f64) -> Value {
     scene(
@@ -31,7 +26,8 @@ pub(super) fn i7_strategies(effort: Effort) -> Outcome {
     let (spp, side) = effort.pick((16, 32), (256, 128));
     let pixels = (side * side) as usize;
     let mut tests = Tests::new();
-    let (mut worst, mut at, mut exact) = (0f64, String::new(), 0f64);
+    let (mut worst, mut at) = (0f64, String::new());
+    let (mut ratio, mut ratio_at) = (0f64, String::new());
     for alpha in [0.03, 0.1, 0.3, 0.7] {
         for radius in [0.1, 1.0] {
             let scene = plate(spp, side, alpha, radius);
@@ -43,22 +39,29 @@ pub(super) fn i7_strategies(effort: Effort) -> Outcome {
             if bsdf.error < 0.05 * bsdf.mean {
                 tests.same(&format!("{name}: both and scattering"), mis, bsdf, pixels);
             }
+            // Two samples, one of each strategy, exceed the better strategy's variance by half of the squared mean at most (Veach and
+            // Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering").
             let samples = pixels as f64 * f64::from(spp);
             let [mis, light, bsdf] = [mis, light, bsdf].map(|e| samples * (e.error / e.mean).powi(2));
             let lesser = light.min(bsdf);
-            if lesser < ALL_BUT_EXACT {
-                exact = exact.max(mis);
-            } else if !(mis / lesser <= worst) {
-                (worst, at) = (mis / lesser, name);
+            let bound = (1.1 * lesser).max(lesser + 0.5);
+            if mis / lesser > ratio {
+                (ratio, ratio_at) = (mis / lesser, name.clone());
+            }
+            if !(mis / bound <= worst) {
+                (worst, at) = (mis / bound, name);
             }
         }
     }
     // The ratio of two sample variances has this much noise.
     let freedom = (pixels - 1) as f64;
     let noise = FisherSnedecor::new(freedom, freedom).map_or(f64::NAN, |law| law.inverse_cdf(1.0 - 1e-6));
-    tests.judge(Outcome::new()).at_most(format!("variance of both over the lesser of one ({at})"), worst, 1.1 * noise).at_most(
-        "relative variance of a sample of both where one strategy is all but exact",
-        exact,
-        ALL_BUT_EXACT,
-    )
+    tests
+        .judge(Outcome::new())
+        .at_most(format!("variance of both over its bound ({at})"), worst, noise)
+        .tell(format!("variance of both over the lesser of one ({ratio_at})"), ratio)
+        .short(
+            "1.1 times the lesser variance is asked everywhere: a strategy that is good already is exceeded by more, since light sampling gets \
+             its share of the weight where both densities are alike, as in the tail of a sharp lobe within a large lamp",
+        )
 }
