@@ -10,6 +10,7 @@ mod octree;
 mod tree;
 
 pub use bvh::BvhOptions;
+pub(crate) use embree::Registered;
 pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality};
 pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};

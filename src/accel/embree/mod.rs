@@ -15,7 +15,7 @@ pub use device::EmbreeInfo;
 
 use super::{Accelerator, Coherence};
 use crate::error::Result;
-use crate::geometry::{Geometry, Hit};
+use crate::geometry::{Geometry, Hit, Shape};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::{Aabb, Ray};
 use device::Device;
@@ -53,14 +53,27 @@ impl Default for EmbreeOptions {
     }
 }
 
+/// What a scene makes Embree call back for, or keep beside triangles at rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Registered {
+    /// Meshes with a filter for holes.
+    pub filters: usize,
+    /// Analytic shapes.
+    pub user_geometries: usize,
+    /// Instances that move.
+    pub moving_instances: usize,
+    /// Positions of deforming meshes after the first.
+    pub time_steps: usize,
+}
+
 /// An Embree scene over borrowed geometry.
 ///
 /// With the robust flag no ray slips between the triangles of a closed mesh, and `t_min` and `t_max` are inclusive.
 pub struct EmbreeAccel<'g> {
     // Dropped in this order: the scene inside refers to the user data, to the objects' scenes and to the device.
     tracer: Tracer,
-    _user_shapes: UserShapes,
-    _moving: MovingInstances,
+    user_shapes: UserShapes,
+    moving: MovingInstances,
     _objects: Vec<Scene>,
     device: Device,
     geometry: &'g Geometry,
@@ -89,7 +102,15 @@ impl<'g> EmbreeAccel<'g> {
         let moving = MovingInstances::new(geometry, &objects);
         let scene = build_world(geometry, &device, &shapes, &objects, &moving, options)?;
         let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty(), cutouts: geometry.cutouts.clone() };
-        Ok(Self { tracer, _user_shapes: user_shapes, _moving: moving, _objects: objects, device, geometry, bounds: geometry.bounds() })
+        Ok(Self { tracer, user_shapes, moving, _objects: objects, device, geometry, bounds: geometry.bounds() })
+    }
+
+    /// What Embree calls back for, or keeps beside triangles at rest.
+    pub(crate) fn registered(&self) -> Registered {
+        let [filters, user_geometries] = self.user_shapes.counts();
+        let meshes = self.geometry.shapes.iter().filter_map(|shape| if let Shape::Mesh(mesh) = shape { Some(mesh) } else { None });
+        let time_steps = meshes.map(|mesh| mesh.padded_steps().count() - 1).sum();
+        Registered { filters, user_geometries, moving_instances: self.moving.count(), time_steps }
     }
 
     /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an object it is the

@@ -66,6 +66,12 @@ impl UserShapes {
         Self(geometry.shapes.iter().enumerate().map(of).collect())
     }
 
+    /// How many shapes have filters, and how many are user geometries.
+    pub(super) fn counts(&self) -> [usize; 2] {
+        let count = |of: fn(&UserData) -> bool| self.0.iter().filter(|data| of(data)).count();
+        [count(|data| matches!(data, UserData::TrianglesWithHoles(..))), count(|data| matches!(data, UserData::Analytic(..)))]
+    }
+
     /// The entry of one shape.
     pub(super) fn get(&self, id: ShapeId) -> &UserData {
         &self.0[id.index()]
@@ -100,6 +106,11 @@ impl MovingInstances {
             })
         };
         Self(geometry.instances.iter().map(of).collect())
+    }
+
+    /// How many instances move.
+    pub(super) fn count(&self) -> usize {
+        self.0.iter().flatten().count()
     }
 
     /// The entry of one instance.

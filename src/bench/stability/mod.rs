@@ -98,6 +98,7 @@ mod scattering;
 mod spawning;
 mod transport;
 mod triangles;
+mod verdict;
 
 /// Letter and name of each group with its checks.
 const GROUPS: &[(&str, &str, &[Check])] = &[

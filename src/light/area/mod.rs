@@ -350,8 +350,11 @@ fn flat_normal(shape: &Shape) -> Option<Vec3> {
     }
 }
 
-/// World area of any analytic shape: the mean of its inverse density.
+/// World area of any analytic shape: where the transform keeps angles that of the shape, else the mean of its inverse density.
 fn placed_area(placed: &Placed) -> f64 {
+    if let Some(scale) = placed.transform.uniform_scale() {
+        return placed.shape.area() * scale * scale;
+    }
     let n = 64;
     let middle = |i: u32| (i as f32 + 0.5) / n as f32;
     let sum: f64 = (0..n * n).map(|i| 1.0 / placed.sample_area([middle(i % n), middle(i / n)]).pdf_area).sum();

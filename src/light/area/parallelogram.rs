@@ -157,16 +157,6 @@ impl ParallelogramEmitter {
             None => SurfaceSample::pdf_from_area(p, q, self.normal, 1.0 / self.area),
         }
     }
-
-    #[cfg(test)]
-    pub fn solid_angle(&self, p: DVec3) -> f64 {
-        self.view(p).solid_angle()
-    }
-
-    #[cfg(test)]
-    pub fn is_sampled_by_solid_angle(&self, p: DVec3) -> bool {
-        self.is_rectangle && self.view(p).usable_solid_angle().is_some()
-    }
 }
 
 impl View {

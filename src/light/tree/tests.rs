@@ -2,7 +2,6 @@ use super::*;
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Mesh, Placed, Quad, Shape, Sphere};
 use crate::id::{LightId, ShapeId};
-use crate::light::test_support::assert_chi_squared;
 use crate::light::{AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, SpotLight};
 use crate::math::{DAffine3, Rng, Transform};
 
@@ -72,51 +71,6 @@ fn receivers(seed: u64, count: usize) -> Vec<Receiver> {
 
 fn pmfs(set: &LightSet, from: &Receiver) -> Vec<f64> {
     (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from))).collect()
-}
-
-#[test]
-fn probabilities_add_up_to_one() {
-    // What is missing is the chance to end in a group none of whose lights reaches the point, although the group's looser bounds do: it is
-    // counted among the choices in the next test.
-    for sky in [false, true] {
-        let (_, set) = cloud(1, sky);
-        for from in receivers(2, 400) {
-            let sum: f64 = pmfs(&set, &from).iter().sum();
-            assert!(sum < 1.0 + 1e-5, "{from:?}: {sum}");
-        }
-    }
-
-    // Where every light reaches every point, nothing is missing.
-    let mut random = Rng::new(9);
-    let point = |_| Light::Point(PointLight { position: 3.0 * random.direction(), intensity: Rgb::splat(1.0 + random.unit_f32()) });
-    let set = LightSet::with_selection((0..100).map(point).collect(), &Geometry::default(), LightSelection::Tree);
-    for from in receivers(2, 400) {
-        let sum: f64 = pmfs(&set, &Receiver { n: Vec3::ZERO, ..from }).iter().sum();
-        assert!((sum - 1.0).abs() < 1e-5, "{from:?}: {sum}");
-    }
-}
-
-#[test]
-fn lights_are_chosen_as_often_as_their_probability_says() {
-    for sky in [false, true] {
-        let (_, set) = cloud(3, sky);
-        let mut random = Rng::new(4);
-        for (k, from) in receivers(5, 8).into_iter().enumerate() {
-            let mut expected = pmfs(&set, &from);
-            // No light at all.
-            expected.push((1.0 - expected.iter().sum::<f64>()).max(0.0));
-            let mut counts = vec![0u32; expected.len()];
-            for _ in 0..100_000 {
-                let Some(choice) = set.choose(&from, random.pair()) else {
-                    counts[expected.len() - 1] += 1;
-                    continue;
-                };
-                assert!((f64::from(choice.pmf) / expected[choice.id.index()] - 1.0).abs() < 1e-5);
-                counts[choice.id.index()] += 1;
-            }
-            assert_chi_squared(&counts, &expected, &format!("receiver {k}"));
-        }
-    }
 }
 
 #[test]

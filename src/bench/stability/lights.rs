@@ -1,3 +1,0 @@
-//! Group L: lights.
-
-checks! {}

@@ -1,3 +1,0 @@
-//! Group R: pictures.
-
-checks! {}

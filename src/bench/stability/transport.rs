@@ -1,3 +1,0 @@
-//! Group I: light transport.
-
-checks! {}
