@@ -4,6 +4,7 @@
 //! the numbers must be.
 
 pub mod geometry;
+pub mod oracle;
 mod outcome;
 pub mod render;
 mod report;
@@ -98,6 +99,7 @@ mod scattering;
 mod spawning;
 mod transport;
 mod triangles;
+mod vectors;
 
 /// Letter and name of each group with its checks.
 const GROUPS: &[(&str, &str, &[Check])] = &[
