@@ -1,12 +1,13 @@
 //! Nanoseconds per ray of analytic shapes: the test alone, through Embree as user geometry, and of a mesh of the same sphere through Embree.
-//! Answers are compared before anything is timed. One thread.
+//! Answers are compared before anything is timed. One thread. At the end a table of surfaces of revolution by the number of their segments
+//! and the kind of ray, beside a sphere.
 
 #[path = "common/mod.rs"]
 mod common;
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use common::models::tessellated_sphere;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -81,5 +82,54 @@ fn shape_tests(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, shape_tests);
+/// A wavy column of so many cubic segments, as a B-spline.
+fn column(segments: usize) -> Analytic {
+    let points: Vec<[f64; 2]> = (0..segments + 3)
+        .map(|i| {
+            let s = (i as f64 - 1.0) / segments as f64;
+            [0.6 + 0.25 * (7.0 * s).sin(), 2.0 * s - 1.0]
+        })
+        .collect();
+    Analytic::Revolution(Revolution::new(&Profile::b_spline(&points).expect("a profile"), TAU).expect("valid"))
+}
+
+/// The best of many passes over `rays`, in nanoseconds per ray.
+fn nanoseconds(shape: &Placed, rays: &[Ray]) -> f64 {
+    let end = Instant::now() + Duration::from_millis(300);
+    let mut best = f64::INFINITY;
+    while Instant::now() < end {
+        let start = Instant::now();
+        black_box(black_box(rays).iter().filter(|ray| shape.intersect(ray).is_some()).count());
+        best = best.min(start.elapsed().as_secs_f64() * 1e9 / rays.len() as f64);
+    }
+    best
+}
+
+/// Rays from afar that hit and that pass through the bounds without, level rays, rays along the axis.
+fn kinds_of_rays(geometry: &Geometry, shape: &Placed) -> Vec<(&'static str, Vec<Ray>)> {
+    let (hits, misses): (Vec<Ray>, Vec<Ray>) = rays(geometry).into_iter().partition(|ray| shape.intersect(ray).is_some());
+    let mut random = Rng::new(4);
+    let mut through = |direction: fn(DVec3) -> DVec3| -> Vec<Ray> {
+        let mut ray = |_| {
+            let d = direction(random.direction()).normalize();
+            Ray::new((shape.shape.sample([random.unit(), random.unit()]).p + 0.05 * random.cube() - 3.0 * d).as_vec3(), d.as_vec3())
+        };
+        (0..4_096).map(&mut ray).collect()
+    };
+    let (level, axial) = (through(|d| DVec3::new(d.x, 0.0, d.z)), through(|_| DVec3::Y));
+    vec![("hit", hits), ("miss", misses), ("level", level), ("axial", axial)]
+}
+
+fn revolution_table(_: &mut Criterion) {
+    println!("ns per ray           hit   miss  level  axial");
+    let sphere = ("sphere".to_owned(), Analytic::Sphere(Sphere::full(1.0).expect("valid")));
+    for (name, shape) in std::iter::once(sphere).chain([1, 2, 4, 8, 16].map(|n| (format!("{n} segments"), column(n)))) {
+        let placed = Placed::new(shape.clone(), Transform::IDENTITY);
+        let cells = kinds_of_rays(&world(shape), &placed);
+        let cells: String = cells.iter().map(|(_, rays)| format!("{:7.0}", nanoseconds(&placed, rays))).collect();
+        println!("{name:<17}{cells}");
+    }
+}
+
+criterion_group!(benches, shape_tests, revolution_table);
 criterion_main!(benches);

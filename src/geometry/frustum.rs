@@ -8,7 +8,8 @@
 use super::sector::{Sector, direction_from_axis};
 use super::shape_error::{not_negative, positive};
 use super::{LocalHit, LocalSurface, ShapeError, ShapeSample};
-use crate::math::{Bounds, DVec3, RayF64, dvec3, solve_quadratic};
+use crate::math::float::F64_CHAIN_ERROR;
+use crate::math::{Bounds, DVec3, Quadratic, RayF64, dvec3, quadratic_roots, solve_quadratic};
 
 /// The side of a cylinder, a cone or a frustum.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +18,11 @@ pub struct Frustum {
     top_radius: f64,
     height: f64,
     sector: Sector,
+    /// The height where the radius would be zero, unless that is far away.
+    apex: Option<f64>,
+    /// The lowest and the highest `z` that counts: an apex reaches a rounding farther.
+    z_min: f64,
+    z_max: f64,
     /// Length of a straight line on the surface from bottom to top.
     slant: f64,
     area: f64,
@@ -37,7 +43,20 @@ impl Frustum {
         let sector = Sector::new(phi_max)?;
         let slant = (top_radius - radius).hypot(height);
         let area = 0.5 * sector.phi_max() * (radius + top_radius) * slant;
-        Ok(Self { radius, top_radius, height, sector, slant, area })
+        let apex = if top_radius == 0.0 { height } else { height * (radius / (radius - top_radius)) };
+        let is_near = (radius - top_radius).abs() >= 0.5 * radius.max(top_radius);
+        let beyond = |r: f64| if r == 0.0 { F64_CHAIN_ERROR * height } else { 0.0 };
+        Ok(Self {
+            radius,
+            top_radius,
+            height,
+            sector,
+            apex: is_near.then_some(apex),
+            z_min: -beyond(radius),
+            z_max: height + beyond(top_radius),
+            slant,
+            area,
+        })
     }
 
     /// A cylinder; `phi_max` in radians.
@@ -67,25 +86,48 @@ impl Frustum {
     /// The first hit within the ray's interval.
     #[inline]
     pub fn intersect(&self, ray: &RayF64) -> Option<LocalHit> {
-        // height² (x² + y²) = (radius * height + (top_radius - radius) z)², homogeneous in the height: nothing is divided by.
-        let (o, d) = (ray.origin, ray.direction);
-        let spread = self.top_radius - self.radius;
-        let q = self.radius * self.height + spread * o.z;
-        let squared = self.height * self.height;
-        let a = squared * (d.x * d.x + d.y * d.y) - spread * spread * d.z * d.z;
-        let half_b = squared * (o.x * d.x + o.y * d.y) - spread * q * d.z;
-        let c = squared * (o.x * o.x + o.y * o.y) - q * q;
-        let roots = solve_quadratic(a, half_b, c)?;
+        let roots = self.roots(ray)?;
 
         // The clip in z also removes the other half of the double cone.
         let accept = |t: f64| {
             let p = ray.at(t);
-            ray.contains(t) && t.is_finite() && 0.0 <= p.z && p.z <= self.height && self.sector.contains(p.x, p.y)
+            ray.contains(t) && t.is_finite() && self.z_min <= p.z && p.z <= self.z_max && self.sector.contains(p.x, p.y)
         };
         if accept(roots.near) {
             return Some(LocalHit { t: roots.near, profile: 0.0 });
         }
         accept(roots.far).then_some(LocalHit { t: roots.far, profile: 0.0 })
+    }
+
+    /// Where the ray meets the whole double cone or cylinder.
+    #[inline]
+    fn roots(&self, ray: &RayF64) -> Option<Quadratic> {
+        // height² (x² + y²) = (radius * height + (top_radius - radius) z)², homogeneous in the height: nothing is divided by.
+        let (o, d) = (ray.origin, ray.direction);
+        let spread = self.top_radius - self.radius;
+        let squared = self.height * self.height;
+        let a = squared * (d.x * d.x + d.y * d.y) - spread * spread * d.z * d.z;
+        let Some(apex) = self.apex else {
+            let q = self.radius * self.height + spread * o.z;
+            let half_b = squared * (o.x * d.x + o.y * d.y) - spread * q * d.z;
+            let c = squared * (o.x * o.x + o.y * o.y) - q * q;
+            return solve_quadratic(a, half_b, c);
+        };
+
+        // About the apex the discriminant is a form of the ray's moments. Of the coefficients only the last digits would be left there, and
+        // rays from inside would pass.
+        let o = dvec3(o.x, o.y, o.z - apex);
+        let (spread_squared, moment) = (spread * spread, o.cross(d));
+        let form = spread_squared * (moment.x * moment.x + moment.y * moment.y) - squared * moment.z * moment.z;
+        let noise = F64_CHAIN_ERROR * (self.height + self.radius + self.top_radius);
+        let rounding = (squared + spread_squared) * noise * noise * d.length_squared();
+        let discriminant = squared * if form < 0.0 && form >= -rounding { 0.0 } else { form };
+        let t_closest = -o.dot(d) / d.length_squared();
+        let p = o + d * t_closest;
+        let half_b = squared * (p.x * d.x + p.y * d.y) - spread_squared * p.z * d.z;
+        let c = squared * (p.x * p.x + p.y * p.y) - spread_squared * p.z * p.z;
+        let roots = quadratic_roots(a, half_b, c, discriminant)?;
+        Some(Quadratic { near: roots.near + t_closest, far: roots.far + t_closest })
     }
 
     /// The surface at a hit of `ray`. At an apex the normal is that of the line on the cone at the ray's own angle, or at phi = 0.

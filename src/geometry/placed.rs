@@ -152,13 +152,16 @@ impl Placed {
     /// `ray` in the shape's own space, accurate relative to the size of the shape however far away the ray starts.
     #[inline]
     fn centered_ray(&self, ray: &Ray) -> CenteredRay {
-        let direction = ray.direction.as_dvec3();
-        let from_center = ray.origin.as_dvec3() - self.placed_center;
+        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let from_center = origin - self.placed_center;
+        // What the difference rounds off (Knuth's two-sum). Far away it is as large as what decides at a silhouette.
+        let taken = origin - from_center;
+        let lost = (origin - (from_center + taken)) + (taken - self.placed_center);
 
         // With 24 bits, the shift times the direction (also 24 bits) is exact, and the sum rounds at the size of the result.
         let to_closest = -from_center.dot(direction) / direction.length_squared();
         let shift = f64::from_bits(to_closest.to_bits() & !((1 << 29) - 1));
-        let near_center = from_center + direction * shift;
+        let near_center = (from_center + direction * shift) + lost;
 
         let ray = RayF64 {
             origin: self.center + self.transform.inverse_vector(near_center),
@@ -172,9 +175,14 @@ impl Placed {
     /// The first hit of a ray in the space the shape is placed in.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<LocalHit> {
-        let centered = self.centered_ray(ray);
-        let hit = self.shape.intersect(&centered.ray)?;
-        Some(LocalHit { t: hit.t + centered.shift, ..hit })
+        let CenteredRay { ray: mut local, shift } = self.centered_ray(ray);
+        let mut hit = self.shape.intersect(&local)?;
+        if hit.t + shift < f64::from(ray.t_min) {
+            // The start of the interval is lost in the shift: a ray that steps past its own start would hit there for ever.
+            local.t_min = hit.t.next_up();
+            hit = self.shape.intersect(&local)?;
+        }
+        Some(LocalHit { t: hit.t + shift, ..hit })
     }
 
     /// Bounds, which turn with the shape (rather than its box) where it makes a full turn; to be [padded](Bounds::padded) for an

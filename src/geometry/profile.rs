@@ -98,31 +98,6 @@ mod tests {
     }
 
     #[test]
-    fn a_b_spline_equals_its_bezier_segments() {
-        let points = [[0.3, -1.0], [1.0, 0.2], [2.5, 0.9], [1.5, 2.0], [0.1, 2.2], [0.7, 3.0]];
-        let profile = Profile::b_spline(&points).unwrap();
-        assert_eq!(profile.segments().len(), 3);
-        for segment in 0..3 {
-            for i in 0..=50 {
-                let s = f64::from(i) / 50.0;
-                // The basis functions of the uniform cubic B-spline.
-                let basis = [
-                    (1.0 - s).powi(3) / 6.0,
-                    (3.0 * s.powi(3) - 6.0 * s * s + 4.0) / 6.0,
-                    (-3.0 * s.powi(3) + 3.0 * s * s + 3.0 * s + 1.0) / 6.0,
-                    s.powi(3) / 6.0,
-                ];
-                let expected: DVec2 = (0..4).map(|k| DVec2::from(points[segment + k]) * basis[k]).sum();
-                let found = profile.point(segment as f64 + s);
-                assert!((found - expected).abs().max_element() < 3.0 * f64::EPSILON * 3.0, "{segment} {s}");
-            }
-        }
-        for pair in profile.segments().windows(2) {
-            assert_eq!(pair[0][3], pair[1][0]);
-        }
-    }
-
-    #[test]
     fn tripled_points_are_reached() {
         let points = [[0.0, 0.1], [0.0, 0.1], [0.0, 0.1], [1.0, 0.7], [0.3, 0.9], [0.3, 0.9], [0.3, 0.9]];
         let profile = Profile::b_spline(&points).unwrap();

@@ -19,6 +19,6 @@ pub use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3, Vec4, dvec2, dvec3, ve
 pub use motion::Motion;
 pub use random::Rng;
 pub use ray::{Ray, RayF64};
-pub use roots::{Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, solve_quadratic};
+pub use roots::{Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, quadratic_roots, solve_quadratic};
 pub use transform::Transform;
 pub use trig::{sin_cos_eighth, sin_cos_turns};

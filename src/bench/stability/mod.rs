@@ -4,6 +4,7 @@
 //! the numbers must be.
 
 pub mod geometry;
+pub mod oracle;
 mod outcome;
 pub mod render;
 mod report;
@@ -99,6 +100,7 @@ mod spawning;
 mod transport;
 mod triangles;
 mod verdict;
+mod vectors;
 
 /// Letter and name of each group with its checks.
 const GROUPS: &[(&str, &str, &[Check])] = &[

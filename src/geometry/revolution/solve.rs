@@ -137,11 +137,14 @@ impl Search<'_> {
         let slack = CULL_SLACK * (size + level.z.abs());
         for (index, segment) in segments.iter().enumerate() {
             let reach = (segment.r_range.max * segment.r_range.max - level.h_squared).max(0.0).sqrt() * level.climb.abs() + slack;
-            let outside = level.z + reach < segment.z_range.min || level.z - reach > segment.z_range.max;
-            if outside || segment.r_range.max < level.h {
+            let is_outside = |low: f64, high: f64| level.z + reach < low || level.z - reach > high;
+            if segment.r_range.max < level.h || is_outside(segment.z_range.min, segment.z_range.max) {
                 continue;
             }
             for pair in segment.knots.windows(2) {
+                if is_outside(pair[0].z.min(pair[1].z), pair[0].z.max(pair[1].z)) {
+                    continue;
+                }
                 let Some([from, to]) = level.clip(segment, pair[0], pair[1]) else { continue };
                 // The two points of the ray at one distance from the axis; one search where they are at one height.
                 let sides: &[f64] = if level.climb == 0.0 { &[1.0] } else { &[-1.0, 1.0] };
@@ -208,12 +211,16 @@ impl Level {
         let [from, to] = piece;
         let (chord_from, chord_to) = (self.chord(from.r), self.chord(to.r));
         let slope = side * self.climb;
-        let bracket = Bracket { lo: from.s, hi: to.s, at_lo: self.above(side, &from), at_hi: self.above(side, &to), guess: from.s };
+        let (at_lo, at_hi) = (self.above(side, &from), self.above(side, &to));
+        let guess = from.s + (to.s - from.s) * (at_lo / (at_lo - at_hi));
+        let bracket = Bracket { lo: from.s, hi: to.s, at_lo, at_hi, guess };
 
         // The difference of two monotone terms: monotone itself if they run against each other.
         let (rise, sink) = (to.z - from.z, slope * (chord_to - chord_from));
         if rise * sink <= 0.0 || rise.abs() + sink.abs() <= self.noise || depth == MAX_DEPTH {
-            if bracket.changes_sign() {
+            if bracket.changes_sign() && self.climb == 0.0 {
+                found(newton_in_bracket(&bracket, |s| (segment.z.value(s) - self.z, segment.z.derivative(s))));
+            } else if bracket.changes_sign() {
                 found(bisect(&bracket, |s| {
                     let knot = Knot { s, r: segment.r.value(s), z: segment.z.value(s) };
                     self.above(side, &knot)

@@ -1,3 +1,0 @@
-//! Group C: quadrics and flat shapes.
-
-checks! {}

@@ -1,3 +1,0 @@
-//! Group D: surfaces of revolution.
-
-checks! {}
