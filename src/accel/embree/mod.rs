@@ -92,6 +92,13 @@ impl<'g> EmbreeAccel<'g> {
         Ok(Self { tracer, _user_shapes: user_shapes, _moving: moving, _objects: objects, device, geometry, bounds: geometry.bounds() })
     }
 
+    /// Gives everything back and tells how many bytes Embree holds after that: none, if it works.
+    pub fn release(self) -> isize {
+        let memory = self.device.memory();
+        drop(self);
+        memory.bytes()
+    }
+
     /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an object it is the
     /// shape's place there.
     #[inline(always)]

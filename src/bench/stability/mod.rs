@@ -7,6 +7,7 @@ pub mod geometry;
 mod outcome;
 pub mod render;
 mod report;
+pub mod scenes;
 
 use std::time::Instant;
 
