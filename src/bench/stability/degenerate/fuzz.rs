@@ -14,7 +14,7 @@ const SCENES: [&str; 6] = [
     include_str!("../../../../scenes/cornell.json"),
     include_str!("../../../../scenes/glass.json"),
     include_str!("../../../../scenes/motion.json"),
-    include_str!("../../../../scenes/textures.json"),
+    include_str!("../../../../scenes/analytic.json"),
     include_str!("../../../../scenes/shapes.json"),
     include_str!("../../../../scenes/depth_of_field.json"),
 ];
@@ -65,7 +65,7 @@ fn mutate(rng: &mut Rng, bytes: &mut Vec<u8>) {
     let at = rng.below(bytes.len());
     let span = at..(at + 1 + rng.below(40)).min(bytes.len());
     let word = WORDS[rng.below(WORDS.len())].bytes();
-    match rng.below(12) {
+    match rng.below(18) {
         0 => bytes[at] ^= 1 << rng.below(8),
         1 => bytes[at] = rng.bits() as u8,
         2 => drop(bytes.drain(span)),
@@ -75,6 +75,12 @@ fn mutate(rng: &mut Rng, bytes: &mut Vec<u8>) {
         }
         4 => drop(bytes.splice(at..at, word)),
         5 => bytes.truncate(at),
+        6..=11 => {
+            // One digit, or the sign, of the number that follows.
+            let is_part = |b: &u8| b.is_ascii_digit() || *b == b'-';
+            let place = at + bytes[at..].iter().position(is_part).unwrap_or(0);
+            bytes[place] = b"0123456789-"[rng.below(11)];
+        }
         _ => {
             // The number, or what else is a word, that follows.
             let is_part = |b: &u8| b.is_ascii_alphanumeric() || b"+-.".contains(b);
@@ -151,10 +157,10 @@ pub(super) fn e10_mutated_files(effort: Effort) -> Outcome {
     let ply = |bytes: &[u8]| through_file(bytes, &|path| import::read_ply(path).map(drop));
     let ies = |bytes: &[u8]| through_file(bytes, &|path| import::read_ies(path).map(drop));
     let parts: [(&str, usize, &[&str], &Reader<'_>); 4] = [
-        ("scenes", effort.pick(600, 50_000), &SCENES, &scene),
-        ("OBJ files", effort.pick(500, 30_000), &[OBJ], &obj),
-        ("PLY files", effort.pick(500, 30_000), &[PLY], &ply),
-        ("IES files", effort.pick(500, 30_000), &[IES], &ies),
+        ("scenes", effort.pick(300, 50_000), &SCENES, &scene),
+        ("OBJ files", effort.pick(200, 30_000), &[OBJ], &obj),
+        ("PLY files", effort.pick(200, 30_000), &[PLY], &ply),
+        ("IES files", effort.pick(200, 30_000), &[IES], &ies),
     ];
     parts
         .into_iter()

@@ -23,12 +23,12 @@ fn picture(rng: &mut Rng) -> Image {
     Image { size: [40, 30], crop, layers: LayerKind::ALL.iter().map(&mut layer).collect() }
 }
 
-/// How many of the pictures end in a file of other bytes than the first.
+/// How many of the pictures end in a PNG of other bytes than the first. (An EXR tells the seconds it took.)
 pub(super) fn differing_files(images: &[Image]) -> usize {
     let Ok(folder) = tempfile::tempdir() else { return images.len() };
     let written = |image: &Image| {
-        let path = folder.path().join("a.exr");
-        write_exr(&path, image, &OutputDesc::new("a.exr"), &RenderInfo::default()).ok()?;
+        let path = folder.path().join("a.png");
+        write_png(&path, image, 0.0).ok()?;
         std::fs::read(&path).ok()
     };
     let first = written(&images[0]);
