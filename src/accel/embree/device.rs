@@ -36,6 +36,13 @@ pub(super) struct Monitor {
     pub(super) bytes: AtomicIsize,
 }
 
+impl Monitor {
+    /// Bytes that Embree has taken and not given back.
+    pub(super) fn bytes(&self) -> isize {
+        self.bytes.load(Ordering::Relaxed)
+    }
+}
+
 /// An Embree device.
 pub(super) struct Device {
     handle: NonNull<sys::RTCDeviceTy>,
@@ -90,7 +97,12 @@ impl Device {
 
     /// Bytes Embree holds.
     pub(super) fn memory_bytes(&self) -> usize {
-        usize::try_from(self.monitor.bytes.load(Ordering::Relaxed)).unwrap_or(0)
+        usize::try_from(self.monitor.bytes()).unwrap_or(0)
+    }
+
+    /// What counts the bytes, which outlives the device.
+    pub(super) fn memory(&self) -> Arc<Monitor> {
+        Arc::clone(&self.monitor)
     }
 
     pub(super) fn info(&self) -> EmbreeInfo {

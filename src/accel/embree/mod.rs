@@ -113,6 +113,13 @@ impl<'g> EmbreeAccel<'g> {
         Registered { filters, user_geometries, moving_instances: self.moving.count(), time_steps }
     }
 
+    /// Gives everything back and tells how many bytes Embree holds after that: none, if it works.
+    pub fn release(self) -> isize {
+        let memory = self.device.memory();
+        drop(self);
+        memory.bytes()
+    }
+
     /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an object it is the
     /// shape's place there.
     #[inline(always)]

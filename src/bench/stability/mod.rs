@@ -8,6 +8,7 @@ pub mod oracle;
 mod outcome;
 pub mod render;
 mod report;
+pub mod scenes;
 
 use std::time::Instant;
 

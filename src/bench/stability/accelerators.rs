@@ -1,3 +1,0 @@
-//! Group F: accelerators against the linear oracle.
-
-checks! {}

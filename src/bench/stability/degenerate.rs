@@ -1,3 +1,0 @@
-//! Group E: degenerate input.
-
-checks! {}

@@ -1,3 +1,0 @@
-//! Group M: films.
-
-checks! {}
