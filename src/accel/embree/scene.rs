@@ -69,7 +69,7 @@ impl UserShapes {
     /// How many shapes have filters, and how many are user geometries.
     pub(super) fn counts(&self) -> [usize; 2] {
         let count = |of: fn(&UserData) -> bool| self.0.iter().filter(|data| of(data)).count();
-        [count(|data| matches!(data, UserData::TrianglesWithHoles(..))), count(|data| matches!(data, UserData::Analytic(..)))]
+        [count(|data| matches!(data, UserData::FilteredTriangles(..))), count(|data| matches!(data, UserData::Analytic(..)))]
     }
 
     /// The entry of one shape.
