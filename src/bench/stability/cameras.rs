@@ -238,7 +238,7 @@ fn exact_coverage(column: usize, shutter: [f64; 2]) -> f64 {
 }
 
 fn k4_shutter(effort: Effort) -> Outcome {
-    let spp = effort.pick(256, 16_384);
+    let spp = effort.pick(256, 4_096);
     let samples = (ROWS as u32 * spp) as f64;
     let (mut least, mut impossible, mut tests) = (1f64, 0, 0);
     let mut evidence = (Vec::new(), Vec::new());

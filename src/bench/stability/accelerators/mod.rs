@@ -55,18 +55,24 @@ fn asked(oracle: &dyn Accelerator, rays: Vec<Ray>) -> Vec<(Ray, Option<Hit>)> {
     rays.into_par_iter().map(|ray| (ray, oracle.intersect(&ray))).collect()
 }
 
-/// The scenes of F1 with rays of each kind and what the oracle says of them.
-fn cases(count: usize) -> Vec<(&'static str, Geometry, Vec<(Ray, Option<Hit>)>)> {
+/// A scene with rays and what the oracle says of them.
+struct Case {
+    geometry: Geometry,
+    asked: Vec<(Ray, Option<Hit>)>,
+}
+
+/// The scenes of F1 with rays of each kind.
+fn cases(count: usize) -> Vec<Case> {
     let mut rng = Rng::new(31);
-    let mut all = scenes();
-    all.push(("moving", moving_scene(&mut rng)));
-    let mut with_rays = |(name, geometry): (&'static str, Geometry)| {
+    let mut geometries: Vec<Geometry> = scenes().into_iter().map(|(_, geometry)| geometry).collect();
+    geometries.push(moving_scene(&mut rng));
+    let mut with_rays = |geometry: Geometry| {
         let mut rays = path_rays(&geometry, &mut rng, count).concat();
         rays.extend(test_rays(&mut rng, &geometry, 4 * count));
-        let rays = asked(&LinearAccel::new(&geometry), at_times(&mut rng, rays));
-        (name, geometry, rays)
+        let asked = asked(&LinearAccel::new(&geometry), at_times(&mut rng, rays));
+        Case { geometry, asked }
     };
-    all.into_iter().map(&mut with_rays).collect()
+    geometries.into_iter().map(&mut with_rays).collect()
 }
 
 /// How Embree's answers compare with the oracle's.
@@ -98,7 +104,7 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
     let mut ours: Vec<(&str, usize)> = Vec::new();
     let mut embree = Agreement::default();
-    for (_, geometry, asked) in &cases {
+    for Case { geometry, asked } in &cases {
         let found = asked.iter().filter(|(_, hit)| hit.is_some()).count();
         rays += asked.len();
         hits += found;
