@@ -100,7 +100,7 @@ impl Agreement {
 }
 
 fn f1_closest_hits(effort: Effort) -> Outcome {
-    let cases = cases(effort.pick(250, 15_000));
+    let cases = cases(effort.pick(250, 10_000));
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
     let mut ours: Vec<(&str, usize)> = Vec::new();
     let mut embree = Agreement::default();
