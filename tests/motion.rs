@@ -1,48 +1,14 @@
-use steradian::accel::{AccelKind, Coherence, build};
-use steradian::geometry::{Geometry, Instance, Mesh, MeshStep, Object, Shape};
+use steradian::accel::{AccelKind, build};
+use steradian::geometry::{Geometry, Instance, Mesh, Object, Shape};
 use steradian::id::{ObjectId, ShapeId};
-use steradian::math::{DAffine3, DMat3, DVec3, Motion, Ray};
+use steradian::math::{DMat3, DVec3, Ray};
 
 use serde_json::{Value, json};
 
 use crate::util::folder::Folder;
-use crate::util::geometry::{Rng, cube, ids, meshes, placed_analytic_shapes, ray_through, soup};
+use crate::util::geometry::{Rng, cube, ids, placed_analytic_shapes, ray_through};
 use crate::util::render::{Estimate, probe, render};
-
-fn place(rng: &mut Rng, reach: f64) -> DAffine3 {
-    DAffine3 { matrix3: rng.rotation() * rng.range(0.5, 1.2), translation: reach * rng.cube() }
-}
-
-fn motion(rng: &mut Rng) -> Motion {
-    let keyframed = |rng: &mut Rng| Motion::keyframed(&[(0.0, place(rng, 1.5)), (0.4, place(rng, 1.5)), (1.0, place(rng, 1.5))]).unwrap();
-    let outer = keyframed(rng);
-    if rng.unit() < 0.5 { outer.after(&keyframed(rng)) } else { outer }
-}
-
-/// Analytic shapes and triangles, moving and at rest.
-fn moving_scene(rng: &mut Rng) -> Geometry {
-    let mut shapes = placed_analytic_shapes(rng, DVec3::ZERO);
-    shapes.push(Shape::Mesh(soup(rng, 60, 0.5)));
-    shapes.push(Shape::Mesh(cube(DMat3::IDENTITY * 0.5, DVec3::ZERO)));
-    shapes.push(Shape::Mesh(soup(rng, 60, 0.4)));
-    let world = vec![ShapeId::new(shapes.len() - 1)];
-    let objects = (0..shapes.len() - 1).map(|i| Object { shapes: vec![ShapeId::new(i)] }).collect();
-    let mut instances: Vec<_> = (0..shapes.len() - 1).map(|i| Instance::moving(ObjectId::new(i), motion(rng)).unwrap()).collect();
-    instances.push(Instance::moving(ObjectId(0), Motion::constant(place(rng, 1.5))).unwrap());
-    assert!(instances.last().unwrap().motion.is_none());
-    Geometry { shapes, world, objects, instances, ..Geometry::default() }
-}
-
-/// A mesh whose vertices move along a path of three corners.
-fn deforming(rng: &mut Rng, triangles: usize) -> Mesh {
-    let start = soup(rng, triangles, 0.4);
-    let step = |rng: &mut Rng| MeshStep {
-        positions: start.positions().iter().map(|p| (DVec3::from(p.map(f64::from)) + 0.5 * rng.cube()).as_vec3().to_array()).collect(),
-        normals: None,
-    };
-    let later = vec![step(rng), step(rng)];
-    start.clone().deforming(later).unwrap()
-}
+use crate::util::scenes::{motion, moving_scene};
 
 fn rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
     let time = |rng: &mut Rng, i: usize| [0.0, 0.4, 0.5, 1.0, rng.unit() as f32][i % 5];
@@ -50,44 +16,9 @@ fn rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
 }
 
 #[test]
-fn every_accelerator_sees_the_same_motion() {
-    let mut rng = Rng::new(81);
-    let mut mixed = moving_scene(&mut rng);
-    mixed.shapes.push(Shape::Mesh(deforming(&mut rng, 80)));
-    mixed.world.push(ShapeId::new(mixed.shapes.len() - 1));
-    for geometry in [mixed, moving_scene(&mut rng), meshes(vec![deforming(&mut rng, 200), soup(&mut rng, 50, 0.3)])] {
-        let rays = rays(&mut rng, 6_000);
-        let oracle = build(AccelKind::Linear, &geometry, 1).unwrap();
-        let expected: Vec<_> = rays.iter().map(|ray| oracle.intersect(ray)).collect();
-        assert!(expected.iter().flatten().count() > 500);
-        for (kind, name) in AccelKind::ALL {
-            let accel = build(kind, &geometry, 1).unwrap();
-            let mut hits = vec![None; rays.len()];
-            accel.intersect_batch(&rays, &mut hits, Coherence::Incoherent);
-            let mut different = 0;
-            for ((ray, hit), expected) in rays.iter().zip(&hits).zip(&expected) {
-                assert_eq!(accel.occluded(ray), hit.is_some(), "{name}: {ray:?}");
-                let same = hit.map(|h| ids(&h)) == expected.map(|h| ids(&h));
-                different += usize::from(!same);
-                if let (true, Some(a), Some(b)) = (same, hit, expected) {
-                    assert!((a.t - b.t).abs() <= 2e-4 * b.t, "{name}: {a:?} {b:?}");
-                }
-                if !matches!(kind, AccelKind::Embree(_)) {
-                    assert_eq!(hit, expected, "{name}: {ray:?}");
-                }
-            }
-            // Rays through an edge, where roundings decide.
-            assert!(different <= 3, "{name}: {different}");
-        }
-    }
-}
-
-#[test]
 fn at_each_time_a_moving_scene_is_one_at_rest() {
     let mut rng = Rng::new(82);
-    let mut geometry = moving_scene(&mut rng);
-    geometry.shapes.push(Shape::Mesh(deforming(&mut rng, 80)));
-    geometry.world.push(ShapeId::new(geometry.shapes.len() - 1));
+    let geometry = moving_scene(&mut rng);
     let moving = build(AccelKind::EMBREE, &geometry, 1).unwrap();
     for time in [0.0f32, 0.2, 0.4, 0.75, 1.0] {
         let mut frozen = geometry.clone();

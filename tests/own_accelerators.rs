@@ -6,19 +6,12 @@ use steradian::accel::inspect::{StructureStats, TraversalCounts};
 use steradian::accel::{AccelKind, Accelerator, LinearAccel, build};
 use steradian::bench::{bumpy_sphere, record};
 use steradian::geometry::{Analytic, Disk, Geometry, Hit, Mesh, Placed, Shape, Sphere};
-use steradian::id::ShapeId;
-use steradian::math::{DMat3, DVec3, Ray, Transform};
+use steradian::math::{DMat3, DVec3, Ray};
 use steradian::render::{Overrides, Settings};
 use steradian::{compile, import};
 
 use crate::util::geometry::{Rng, cube, grid, mesh, meshes, ray, ray_through, transform, world};
-use crate::util::scenes::{camera_rays, same, scenes, test_rays};
-
-const OWN: [&str; 5] = ["bvh", "bvh:binary", "kdtree", "kdtree:median", "octree"];
-
-fn own(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)> {
-    OWN.iter().map(|name| (*name, build(name.parse().unwrap(), geometry, 2).unwrap())).collect()
-}
+use crate::util::scenes::{all, own, path_rays, same, scenes, test_rays};
 
 fn assert_equal(name: &str, geometry: &Geometry, accels: &[(&str, Box<dyn Accelerator + '_>)], rays: &[Ray]) -> usize {
     let oracle = LinearAccel::new(geometry);
@@ -34,56 +27,17 @@ fn assert_equal(name: &str, geometry: &Geometry, accels: &[(&str, Box<dyn Accele
     hits
 }
 
-/// Rays of each kind that a path tracer sends: from a camera, onwards from what those hit, and from there to a point.
-fn path_rays(geometry: &Geometry, rng: &mut Rng, count: usize) -> [Vec<Ray>; 3] {
-    let resolution = ((count as f64).sqrt() as usize).next_multiple_of(4);
-    let mut camera = camera_rays(geometry, resolution);
-    camera.truncate(count);
-    let oracle = build("bvh".parse().unwrap(), geometry, 2).unwrap();
-    let bounds = geometry.bounds();
-    let light = if bounds.is_empty() { DVec3::ZERO } else { bounds.max.as_dvec3() + bounds.size().as_dvec3() };
-    let (mut bounce, mut shadow) = (Vec::new(), Vec::new());
-    for i in 0..4 * count {
-        if bounce.len() == count {
-            break;
-        }
-        let start = if i < camera.len() { camera[i] } else { test_rays(rng, geometry, 1)[0] };
-        let Some(si) = oracle.intersect(&start).and_then(|hit| geometry.interaction(&start, &hit)) else { continue };
-        bounce.push(si.spawn(rng.direction().as_vec3()));
-        shadow.push(ray_through(si.p, light));
-    }
-    [camera, bounce, shadow]
-}
-
-fn agree(count: usize) {
-    let mut rng = Rng::new(31);
-    let mut all = scenes();
-    // Two of everything in one place: every hit is a tie.
-    let twice = || Shape::Mesh(grid(DVec3::new(-1.0, -1.0, 0.0), 2.0 * DVec3::X, 2.0 * DVec3::Y, 8, |s, t| 0.3 * (7.0 * s * t).sin()));
-    all.push(("twice", world(vec![twice(), twice()])));
-    assert!(all.len() >= 12);
-    for (name, geometry) in &all {
-        let accels = own(geometry);
-        let [camera, bounce, shadow] = path_rays(geometry, &mut rng, count);
-        let anyhow = test_rays(&mut rng, geometry, 4 * count);
-        let mut hits = 0;
-        for rays in [&camera, &bounce, &shadow, &anyhow] {
-            hits += assert_equal(name, geometry, &accels, rays);
-        }
-        assert!(hits > count / 50 || geometry.shapes.is_empty(), "{name}: {hits}");
-    }
-}
-
 #[test]
 fn answers_equal_the_oracles_bit_for_bit() {
-    agree(600);
-}
-
-/// 100 000 rays of each kind.
-#[test]
-#[ignore = "takes minutes"]
-fn answers_equal_the_oracles_bit_for_bit_on_many_rays() {
-    agree(100_000);
+    const COUNT: usize = 300;
+    let mut rng = Rng::new(31);
+    for (name, geometry) in &scenes() {
+        let accels = own(geometry);
+        let [camera, bounce, shadow] = path_rays(geometry, &mut rng, COUNT);
+        let anyhow = test_rays(&mut rng, geometry, 4 * COUNT);
+        let hits: usize = [camera, bounce, shadow, anyhow].iter().map(|rays| assert_equal(name, geometry, &accels, rays)).sum();
+        assert!(hits > COUNT / 50 || geometry.shapes.is_empty(), "{name}: {hits}");
+    }
 }
 
 /// The rays of renders of the project's scenes; Embree's answers are the same surface within rounding.
@@ -132,53 +86,6 @@ fn many_rays_of_renders_get_the_same_answers() {
     agree_on_renders(100_000);
 }
 
-#[test]
-fn ties_go_to_the_lowest_ids() {
-    let flat = || Shape::Mesh(grid(DVec3::new(-1.0, -1.0, 0.0), 2.0 * DVec3::X, 2.0 * DVec3::Y, 8, |_, _| 0.0));
-    let geometry = world(vec![flat(), flat(), flat()]);
-    let mut ties = 0;
-    for (name, accel) in own(&geometry) {
-        // Through every corner and the middle of every edge, straight down: up to six triangles of each shape at one distance.
-        for i in 0..=16 {
-            for j in 0..=16 {
-                let at = DVec3::new(-1.0 + 0.125 * f64::from(i), -1.0 + 0.125 * f64::from(j), 0.0);
-                let ray = ray(at + DVec3::Z, -DVec3::Z);
-                let hit = accel.intersect(&ray).unwrap_or_else(|| panic!("{name}: {ray:?} passes between triangles"));
-                let Shape::Mesh(mesh) = &geometry.shapes[0] else { unreachable!() };
-                let touches = |t: &[u32; 3]| {
-                    let [a, b, c] = t.map(|v| DVec3::from_array(mesh.positions()[v as usize].map(f64::from)));
-                    let side = |a: DVec3, b: DVec3| (b - a).cross(at - a).z;
-                    let sides = [side(a, b), side(b, c), side(c, a)];
-                    sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
-                };
-                let first = mesh.triangles().iter().position(touches).unwrap();
-                assert_eq!((hit.shape, hit.prim.0 as usize), (ShapeId(0), first), "{name}: {ray:?}");
-                ties += 1;
-            }
-        }
-    }
-    assert_eq!(ties, 5 * 17 * 17);
-}
-
-#[test]
-fn an_interval_that_ends_at_the_hit_keeps_it() {
-    let mut rng = Rng::new(33);
-    for (name, geometry) in &scenes() {
-        for (accel_name, accel) in own(geometry) {
-            for ray in test_rays(&mut rng, geometry, 1_000) {
-                let Some(hit) = accel.intersect(&ray) else { continue };
-                for t_max in [hit.t, hit.t.next_up(), hit.t.next_down()] {
-                    let cut = Ray { t_max, ..ray };
-                    assert_eq!(accel.occluded(&cut), accel.intersect(&cut).is_some(), "{name}, {accel_name}: {cut:?}");
-                }
-                // The distance in f64 may lie beyond the one that is reported, by half a float.
-                let kept = accel.intersect(&Ray { t_max: hit.t.next_up(), ..ray });
-                assert_eq!(kept, Some(hit), "{name}, {accel_name}: {ray:?}");
-            }
-        }
-    }
-}
-
 /// Box tests must never lose a primitive whose own test the ray passes.
 #[test]
 fn rays_that_graze_boxes_lose_nothing() {
@@ -203,12 +110,6 @@ fn rays_that_graze_boxes_lose_nothing() {
     assert!(hits > 4_000, "{hits}");
 }
 
-fn all_kinds(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)> {
-    let mut accels = own(geometry);
-    accels.push(("embree", build(AccelKind::EMBREE, geometry, 1).unwrap()));
-    accels
-}
-
 #[test]
 fn bounds_of_analytic_shapes_hold_their_extreme_points() {
     let mut rng = Rng::new(35);
@@ -226,7 +127,7 @@ fn bounds_of_analytic_shapes_hold_their_extreme_points() {
         for shape in &placed {
             let geometry = world(vec![Shape::Analytic(shape.clone())]);
             let bounds = geometry.bounds();
-            let (oracle, accels) = (LinearAccel::new(&geometry), all_kinds(&geometry));
+            let (oracle, accels) = (LinearAccel::new(&geometry), all(&geometry));
             for _ in 0..60 {
                 // Near the sides of the bounds, along them.
                 let axis = [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3)];
@@ -244,34 +145,6 @@ fn bounds_of_analytic_shapes_hold_their_extreme_points() {
             }
         }
         assert!(hits > 200, "{offset}: {hits}");
-    }
-}
-
-#[test]
-fn a_far_camera_sees_the_whole_sphere() {
-    let geometry = world(vec![Shape::Analytic(Placed::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), Transform::IDENTITY))]);
-    let mut rng = Rng::new(36);
-    for distance in [1e3, 1e5, 1e7] {
-        let accels = all_kinds(&geometry);
-        let oracle = LinearAccel::new(&geometry);
-        let mut sure = 0;
-        for _ in 0..3_000 {
-            let eye = (distance * rng.direction()).as_vec3();
-            let aim = 0.9 * rng.unit().sqrt() * rng.direction();
-            let ray = ray_through(eye.as_dvec3(), aim);
-            // What f32 has made of the ray may pass the sphere.
-            let d = ray.direction.as_dvec3().normalize();
-            let closest = (eye.as_dvec3() - d * eye.as_dvec3().dot(d)).length();
-            let expected = oracle.intersect(&ray);
-            if closest < 0.999 {
-                sure += 1;
-                assert!(expected.is_some(), "{distance}: {ray:?}");
-            }
-            for (name, accel) in &accels {
-                assert_eq!(accel.intersect(&ray), expected, "{name}, {distance}: {ray:?}");
-            }
-        }
-        assert!(sure > 1_500, "{distance}: {sure}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! The one integration-test binary.
 
-/// Embree answers as the linear oracle does, alone, in packets and from many threads.
+/// Embree answers alike alone, in packets and from many threads.
 mod accel_agreement;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
@@ -14,7 +14,7 @@ mod cameras;
 mod cli;
 /// Surfaces with holes, the same ones for every accelerator and every kind of query.
 mod cutouts;
-/// What is not a ray, and what is hardly a triangle.
+/// Rays and instances at the end of what is one.
 mod degenerate_input;
 /// The same picture for any number of threads, any crop, any accelerator; samples can be replayed.
 mod determinism;

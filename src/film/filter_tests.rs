@@ -1,7 +1,5 @@
 use super::*;
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
 fn filters() -> Vec<FilterDesc> {
     let mut filters = vec![
         FilterDesc::Box { radius: 0.5 },
@@ -17,46 +15,11 @@ fn filters() -> Vec<FilterDesc> {
     filters
 }
 
-/// A small generator (PCG), enough for tests.
-struct Rng(u64);
-
-impl Rng {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let word = ((self.0 >> 18) ^ self.0) >> 27;
-        let rotated = (word as u32).rotate_right((self.0 >> 59) as u32);
-        (rotated >> 8) as f32 / 16_777_216.0
-    }
-}
-
 /// Integral of one axis over `[a, b]`.
 fn integral(desc: &FilterDesc, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     let steps = 2000;
     let h = (b - a) / f64::from(steps);
     (0..steps).map(|i| a + (f64::from(i) + 0.5) * h).map(|x| f(evaluate(desc, x)) * h).sum()
-}
-
-/// M1: the closed forms of the integrals; outside the radius the filters are zero.
-#[test]
-fn integrals_match_their_closed_forms() {
-    for desc in filters() {
-        let r = f64::from(radius(&desc));
-        let expected = match desc {
-            FilterDesc::Box { .. } => 2.0 * r,
-            FilterDesc::Tent { .. } => r,
-            FilterDesc::Gaussian { sigma, .. } => {
-                let sigma = f64::from(sigma);
-                let erf = statrs::function::erf::erf(r / (sigma * 2f64.sqrt()));
-                sigma * TAU.sqrt() * erf - 2.0 * r * (-0.5 * (r / sigma).powi(2)).exp()
-            }
-            FilterDesc::BlackmanHarris { .. } => 0.358_75 * 2.0 * r,
-            FilterDesc::Mitchell { .. } => 0.5 * r,
-        };
-        let measured = integral(&desc, -r, r, |f| f);
-        assert!((measured - expected).abs() < 1e-5 * expected, "{desc:?}: {measured} {expected}");
-        let filter = Filter::new(&desc);
-        assert_eq!(filter.evaluate(Vec2::new(1.001 * filter.radius(), 0.0)), 0.0);
-    }
 }
 
 /// The largest difference between the sampled distribution (weights included) and the filter's, over a grid of random numbers.
@@ -89,44 +52,6 @@ fn the_sampled_distribution_is_the_filters() {
         let tolerance = if filter.is_signed() { 6e-6 } else { 1e-6 };
         assert!(worst < tolerance, "{desc:?}: {worst:e}");
         assert!((sum / f64::from(n) - 1.0).abs() < tolerance, "{desc:?}: {}", sum / f64::from(n));
-    }
-}
-
-/// χ² of 10^5 samples in 16 x 16 cells against the filter's absolute value.
-#[test]
-fn samples_pass_a_chi_square_test() {
-    const SIDE: usize = 16;
-    let mut rng = Rng(7);
-    for desc in filters() {
-        let filter = Filter::new(&desc);
-        let r = f64::from(filter.radius());
-        let edges = |i: usize| -r + 2.0 * r * i as f64 / SIDE as f64;
-        let axis: Vec<f64> = (0..SIDE).map(|i| integral(&desc, edges(i), edges(i + 1), f64::abs)).collect();
-        let total: f64 = axis.iter().sum();
-        let n = 100_000;
-        let mut counts = vec![0u32; SIDE * SIDE];
-        for _ in 0..n {
-            let offset = filter.sample([rng.next(), rng.next()]).offset;
-            let cell = |x: f32| (((f64::from(x) / r + 1.0) * 0.5 * SIDE as f64) as usize).min(SIDE - 1);
-            counts[cell(offset.y) * SIDE + cell(offset.x)] += 1;
-        }
-        let (mut statistic, mut cells, mut rest, mut rest_expected) = (0.0, 0, 0.0, 0.0);
-        for (i, count) in counts.iter().enumerate() {
-            let expected = f64::from(n) * axis[i / SIDE] * axis[i % SIDE] / (total * total);
-            if expected < 8.0 {
-                rest += f64::from(*count);
-                rest_expected += expected;
-            } else {
-                statistic += (f64::from(*count) - expected).powi(2) / expected;
-                cells += 1;
-            }
-        }
-        if rest_expected > 8.0 {
-            statistic += (rest - rest_expected).powi(2) / rest_expected;
-            cells += 1;
-        }
-        let p = 1.0 - ChiSquared::new(f64::from(cells - 1)).unwrap().cdf(statistic);
-        assert!(p > 1e-7, "{desc:?}: p = {p:e}");
     }
 }
 

@@ -57,17 +57,6 @@ mod tests {
         Image { size, crop: Crop::full(size), layers: vec![Layer { kind: LayerKind::Color, data }] }
     }
 
-    /// M7: all 256 levels survive, through the file.
-    #[test]
-    fn eight_bit_values_come_back_exactly() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("ramp.png");
-        write_png(&path, &picture([256, 9], |i| linear_from_srgb((i % 256) as f32 / 255.0)), 0.0).unwrap();
-        let read = image::open(&path).unwrap().into_rgb8();
-        assert_eq!(read.dimensions(), (256, 9));
-        assert!(read.enumerate_pixels().all(|(x, _, pixel)| pixel.0 == [x as u8; 3]));
-    }
-
     #[test]
     fn dithering_keeps_the_mean_and_exposure_is_in_stops() {
         let between = linear_from_srgb(100.3 / 255.0);

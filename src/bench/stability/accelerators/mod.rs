@@ -55,18 +55,24 @@ fn asked(oracle: &dyn Accelerator, rays: Vec<Ray>) -> Vec<(Ray, Option<Hit>)> {
     rays.into_par_iter().map(|ray| (ray, oracle.intersect(&ray))).collect()
 }
 
-/// The scenes of F1 with rays of each kind and what the oracle says of them.
-fn cases(count: usize) -> Vec<(&'static str, Geometry, Vec<(Ray, Option<Hit>)>)> {
+/// A scene with rays and what the oracle says of them.
+struct Case {
+    geometry: Geometry,
+    asked: Vec<(Ray, Option<Hit>)>,
+}
+
+/// The scenes of F1 with rays of each kind.
+fn cases(count: usize) -> Vec<Case> {
     let mut rng = Rng::new(31);
-    let mut all = scenes();
-    all.push(("moving", moving_scene(&mut rng)));
-    let mut with_rays = |(name, geometry): (&'static str, Geometry)| {
+    let mut geometries: Vec<Geometry> = scenes().into_iter().map(|(_, geometry)| geometry).collect();
+    geometries.push(moving_scene(&mut rng));
+    let mut with_rays = |geometry: Geometry| {
         let mut rays = path_rays(&geometry, &mut rng, count).concat();
         rays.extend(test_rays(&mut rng, &geometry, 4 * count));
-        let rays = asked(&LinearAccel::new(&geometry), at_times(&mut rng, rays));
-        (name, geometry, rays)
+        let asked = asked(&LinearAccel::new(&geometry), at_times(&mut rng, rays));
+        Case { geometry, asked }
     };
-    all.into_iter().map(&mut with_rays).collect()
+    geometries.into_iter().map(&mut with_rays).collect()
 }
 
 /// How Embree's answers compare with the oracle's.
@@ -94,11 +100,11 @@ impl Agreement {
 }
 
 fn f1_closest_hits(effort: Effort) -> Outcome {
-    let cases = cases(effort.pick(250, 15_000));
+    let cases = cases(effort.pick(250, 10_000));
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
     let mut ours: Vec<(&str, usize)> = Vec::new();
     let mut embree = Agreement::default();
-    for (_, geometry, asked) in &cases {
+    for Case { geometry, asked } in &cases {
         let found = asked.iter().filter(|(_, hit)| hit.is_some()).count();
         rays += asked.len();
         hits += found;
@@ -116,10 +122,18 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let outcome = Outcome::new().tell("rays", rays as f64).tell("hits", hits as f64).none("scenes hardly hit", poor);
     let outcome =
         ours.into_iter().fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
-    outcome
-        .none("Embree's distances beyond 8 ulp and 4 roundoffs of the reach", embree.distances)
+    let outcome = outcome
+        .at_most(
+            "Embree's distances beyond 8 ulp and 4 roundoffs of the reach, in a million hits",
+            1e6 * embree.distances as f64 / hits as f64,
+            10.0,
+        )
         .none("rays that only Embree, or only the oracle, says to hit", embree.flags)
-        .tell("Embree's other primitives at the same distance", embree.ties as f64)
+        .tell("Embree's other primitives at the same distance", embree.ties as f64);
+    if embree.distances == 0 {
+        return outcome;
+    }
+    outcome.short(format!("{} of {hits} distances of Embree differ by more from the oracle's; what sets these rays apart has not been found; wished for is none", embree.distances))
 }
 
 fn f2_ties(_: Effort) -> Outcome {
@@ -185,6 +199,15 @@ fn f3_any_hit(effort: Effort) -> Outcome {
             }
         }
     }
+    // One ray in a million was seen; what sets it apart has not been found.
     let told = Outcome::new().tell("rays", total as f64);
-    outcome.into_iter().fold(told, |told, (name, wrong)| told.none(format!("contradictions of {name}"), wrong))
+    let judged = |told: Outcome, (name, wrong): (&str, usize)| {
+        match (name, wrong) {
+        ("embree", 1..) => told
+            .at_most("contradictions of embree in a million rays", 1e6 * wrong as f64 / total as f64, 10.0)
+            .short(format!("{wrong} of {total} rays get answers of Embree that do not fit each other; what sets them apart has not been found; wished for is none")),
+        _ => told.none(format!("contradictions of {name}"), wrong),
+    }
+    };
+    outcome.into_iter().fold(told, judged)
 }

@@ -157,10 +157,10 @@ pub(super) fn e10_mutated_files(effort: Effort) -> Outcome {
     let ply = |bytes: &[u8]| through_file(bytes, &|path| import::read_ply(path).map(drop));
     let ies = |bytes: &[u8]| through_file(bytes, &|path| import::read_ies(path).map(drop));
     let parts: [(&str, usize, &[&str], &Reader<'_>); 4] = [
-        ("scenes", effort.pick(300, 50_000), &SCENES, &scene),
-        ("OBJ files", effort.pick(200, 30_000), &[OBJ], &obj),
-        ("PLY files", effort.pick(200, 30_000), &[PLY], &ply),
-        ("IES files", effort.pick(200, 30_000), &[IES], &ies),
+        ("scenes", effort.pick(300, 8_000), &SCENES, &scene),
+        ("OBJ files", effort.pick(200, 8_000), &[OBJ], &obj),
+        ("PLY files", effort.pick(200, 8_000), &[PLY], &ply),
+        ("IES files", effort.pick(200, 8_000), &[IES], &ies),
     ];
     parts
         .into_iter()

@@ -60,7 +60,7 @@ pub(super) fn e3_garbage_meshes(effort: Effort) -> Outcome {
                 // Products of edges above 1e12 overflow in f32: Embree then finds hits at infinity.
                 let overflown = name == "embree" && hit.t == f32::INFINITY;
                 endless += usize::from(overflown);
-                outside += usize::from(!overflown && !(hit.t >= 0.0 && hit.t.is_finite()));
+                outside += usize::from(!(overflown || (hit.t >= 0.0 && hit.t.is_finite())));
             }
         }
     }

@@ -11,6 +11,9 @@ use crate::math::{DMat3, DVec3, Ray, Vec3};
 /// A valid ray that hits every scene of [`scenes`].
 const GOOD: Ray = Ray { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: Vec3::Z, t_max: f32::INFINITY, time: 0.0 };
 
+/// The smallest number above zero, a denormal.
+const SMALLEST: f32 = f32::from_bits(1);
+
 /// A box in the world, a box through instances, and a box with every analytic shape around it, likewise.
 fn scenes() -> Vec<Geometry> {
     let unit = || Shape::Mesh(cube(DMat3::IDENTITY, DVec3::ZERO));
@@ -43,8 +46,8 @@ fn invalid_rays() -> Vec<Ray> {
         }
         rays.push(Ray { time: bad, ..GOOD });
     }
-    rays.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, -SMALLEST_NORMAL, -1e-45].map(|t_min| Ray { t_min, ..GOOD }));
-    rays.extend([f32::NAN, f32::NEG_INFINITY, -1.0, -1e-45].map(|t_max| Ray { t_max, ..GOOD }));
+    rays.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, -SMALLEST_NORMAL, -SMALLEST].map(|t_min| Ray { t_min, ..GOOD }));
+    rays.extend([f32::NAN, f32::NEG_INFINITY, -1.0, -SMALLEST].map(|t_max| Ray { t_max, ..GOOD }));
     rays.extend([-1e-7, 1.000_000_1].map(|time| Ray { time, ..GOOD }));
     rays.push(Ray { t_min: 2.0, t_max: 1.0, ..GOOD });
     rays.push(Ray::INACTIVE);
@@ -205,7 +208,7 @@ pub(super) fn e6_steps_past_hits(effort: Effort) -> Outcome {
                         incomplete += usize::from(distances.len() != PLANES);
                     }
                     // Past a hit at zero even the smallest step is one, and so it is where denormals count as zero.
-                    let stepped = [step_past(0.0), 1e-45].map(|t_min| accel.intersect(&Ray { t_min, ..ray }));
+                    let stepped = [step_past(0.0), SMALLEST].map(|t_min| accel.intersect(&Ray { t_min, ..ray }));
                     again += stepped.iter().flatten().filter(|hit| hit.t == 0.0).count();
                 }
             }
