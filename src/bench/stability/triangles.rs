@@ -151,7 +151,7 @@ fn with_two_steps(mesh: Mesh) -> Mesh {
 fn a3_watertight_meshes(effort: Effort) -> Outcome {
     let mut rng = Rng::new(3);
     let (slices, rings) = effort.pick((60, 30), (500, 250));
-    let count = effort.pick(4_000, 200_000);
+    let count = effort.pick(4_000, 100_000);
     let mut from_inside = |center: DVec3| -> (Mesh, Vec<Ray>) {
         let rays = (0..count).map(|_| Ray { time: rng.unit_f32(), ..ray(center + 0.5 * rng.cube(), rng.direction()) });
         (sphere_mesh(center, 2.0, slices, rings), rays.collect())
