@@ -50,7 +50,7 @@ checks! {
     "B12" b12_emitters "shadow rays reach the emitter":
         "from a floor to sampled points of an emitter of each shape, 1e-3 to 1e6 away: nothing is in the way (pbrt, SpawnRayTo)";
     "B13" b13_schemes "offset schemes side by side":
-        "rotated cube of half size 1e-6 to 1e6, and one of half size 1000 at 0 to 1e7 from the origin; rays from inside, reflected at random: the own face again is a false hit, no hit is a leak. Others: none, t_min = 1e-4, Waechter and Binder (Ray Tracing Gems, ch. 6), along the normal by 8.94e-5 (1 + largest coordinate) as Mitsuba";
+        "rotated cube of half size 1e-6 to 1e6, and one of half size 1000 at 0 to 1e7 from the world's centre; rays from inside, reflected at random: the own face again is a false hit, no hit is a leak. Others: none, from 1e-4 along the ray, Waechter and Binder (Ray Tracing Gems, ch. 6), along the normal by 8.94e-5 (1 + largest coordinate) as Mitsuba";
     "B14" b14_moving "moving surfaces are not found again":
         "cube and sphere in instances that move, a deforming cube at rest and in one that moves, at random times and at 0.66; rays that leave outwards, closest and any hit";
     "B15" b15_sliver_emitters "shadow rays reach emitters of slivers":

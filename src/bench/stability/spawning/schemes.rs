@@ -26,7 +26,7 @@ enum Scheme {
 const SCHEMES: [(Scheme, &str); 5] = [
     (Scheme::Ours, "ours"),
     (Scheme::None, "none"),
-    (Scheme::FixedStart, "t_min 1e-4"),
+    (Scheme::FixedStart, "from 1e-4 along the ray"),
     (Scheme::Floats, "Waechter-Binder"),
     (Scheme::AlongNormal, "along the normal"),
 ];
@@ -130,6 +130,6 @@ pub(super) fn b13_schemes(effort: Effort) -> Outcome {
         };
     }
     let [a, b] = sweep("half size", &by_scale);
-    let [c, d] = sweep("distance from the world's origin", &by_distance);
+    let [c, d] = sweep("distance from the world's centre", &by_distance);
     outcome.plot(a).plot(b).plot(c).plot(d)
 }

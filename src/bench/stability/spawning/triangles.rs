@@ -90,7 +90,7 @@ pub(super) fn b6_neighbours(effort: Effort) -> Outcome {
         let geometry = meshes(vec![plane.clone()]);
         let oracle = LinearAccel::new(&geometry);
         let accels = accelerators(&geometry);
-        for _ in 0..effort.pick(250, 10_000) {
+        for _ in 0..effort.pick(250, 3_000) {
             let prim = PrimId::new(rng.below(plane.triangles().len()));
             let target = point_on(&mut rng, &plane, prim);
             for (_, accel) in &accels {
