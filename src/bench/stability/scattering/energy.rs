@@ -46,7 +46,7 @@ fn cosines(least: f32, count: u32) -> impl Iterator<Item = f32> {
 }
 
 pub(super) fn g5_energy(effort: Effort) -> Outcome {
-    let (angles, samples) = effort.pick((6, 1 << 10), (32, 1 << 13));
+    let (angles, samples) = effort.pick((6, 1 << 10), (20, 1 << 12));
     let found: Vec<_> = white()
         .par_iter()
         .flat_map_iter(|material| {
@@ -139,7 +139,7 @@ impl Family {
 
     /// From cosine 1 down to 0.01.
     fn measure(&self, effort: Effort) -> Furnace {
-        let (angles, samples) = effort.pick((6, 1 << 12), (24, 1 << 15));
+        let (angles, samples) = effort.pick((6, 1 << 12), (24, 1 << 14));
         let cosines: Vec<f32> = cosines(0.01, angles).collect();
         let extremes = |cos: &f32| {
             let members = self.members.iter().flat_map(|white| self.azimuths.iter().map(move |&turns| (white, turns)));

@@ -53,7 +53,7 @@ fn furnace(effort: Effort) -> f64 {
     for degrees in effort.pick(&[80.0][..], &[20.0, 50.0, 80.0, 85.0]) {
         for (by_map, material, from) in cases() {
             let shape = tilted(*degrees, by_map, material);
-            let Estimate { mean, error } = Estimate::of(&render(&scene(from, effort.pick(64, 1024), shape, sky.clone())), 1);
+            let Estimate { mean, error } = Estimate::of(&render(&scene(from, effort.pick(64, 256), shape, sky.clone())), 1);
             largest = largest.max(mean - 5.0 * error);
         }
     }
@@ -76,7 +76,7 @@ fn leaks() -> usize {
 /// Largest step of the radiance of a leaning white quad from one height of the light to the next, times the number of heights, over the
 /// radiance at full light: a hard edge anywhere would give that number, a slope one of the order of the slope of the cosine.
 fn steepest(effort: Effort) -> f64 {
-    let heights = effort.pick(32, 512u32);
+    let heights = effort.pick(32, 256u32);
     let mut last: Option<f64> = None;
     let mut steepest = 0f64;
     for i in 0..=heights {
@@ -119,7 +119,7 @@ fn reflected_below(effort: Effort) -> usize {
         let reflected = 2.0 * back.dot(n) * n - back;
         usize::from(!(reflected.z * back.z > 0.0 && back.dot(n) * back.z > 0.0))
     };
-    (0..effort.pick(200_000, 20_000_000)).map(|_| below(&mut rng)).sum()
+    (0..effort.pick(200_000, 5_000_000)).map(|_| below(&mut rng)).sum()
 }
 
 pub(super) fn g11_shading_normals(effort: Effort) -> Outcome {
