@@ -102,7 +102,7 @@ pub(super) fn g3_weights(effort: Effort) -> Outcome {
     let mut rng = Rng::new(3);
     let mut found = Weights::default();
     for material in rough().into_iter().chain(smooth()) {
-        check_samples(&mut found, &material, effort.pick(10_000, 1_000_000), &mut rng);
+        check_samples(&mut found, &material, effort.pick(10_000, 200_000), &mut rng);
     }
     found.judge(Outcome::new())
 }
