@@ -14,6 +14,7 @@ mod world;
 
 pub use debug::{AmbientOcclusion, DebugView, View};
 pub use path::{PathIntegrator, Strategy};
+pub(crate) use shading::{facing_normal, terminator_factor};
 pub use whitted::Whitted;
 pub use world::World;
 

@@ -42,8 +42,7 @@ pub struct Energy {
 /// A direction as the tables see it.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
-    /// Cosine with which isotropic microfacets of the larger alpha mask as much.
-    cos: f32,
+    /// By the cosine with which isotropic microfacets of the larger alpha mask as much.
     at: Place,
     /// See [`across`].
     across: f32,
@@ -62,7 +61,7 @@ impl Energy {
         let [ax, ay] = self.ggx.alpha();
         let cos = w.z.clamp(0.0, 1.0);
         if ax == ay {
-            return Seen { cos, at: Place::of_cosine(cos, self.alpha), across: 0.0 };
+            return Seen { at: Place::of_cosine(cos, self.alpha), across: 0.0 };
         }
         // What counts is the tangent times the alpha along the direction.
         let (x, y) = (ax * w.x, ay * w.y);
@@ -70,17 +69,13 @@ impl Energy {
         let run = (x2 + y2).sqrt() / self.alpha;
         let cos = cos / (cos * cos + run * run).sqrt();
         let (major, minor) = if ax > ay { (w.x, w.y) } else { (w.y, w.x) };
-        Seen { cos, at: Place::of_cosine(cos, self.alpha), across: across(major * major, minor * minor, self.aspect) }
+        Seen { at: Place::of_cosine(cos, self.alpha), across: across(major * major, minor * minor, self.aspect) }
     }
 
     /// What perfect mirrors would scatter.
     #[inline]
     pub fn mirrors(&self, w: Vec3) -> f32 {
-        self.mirrors_seen(self.see(w))
-    }
-
-    #[inline]
-    fn mirrors_seen(&self, seen: Seen) -> f32 {
+        let seen = self.see(w);
         const AXIS: usize = ALPHAS * COSINES;
         let lookup = |aspect: usize, axis: usize| MIRRORS.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, seen.at);
         if self.aspect == 1.0 {
@@ -102,11 +97,41 @@ impl Energy {
         if self.aspect == 1.0 { lost } else { 1.01 * lost }
     }
 
-    /// What mirrors of reflectance `(1 - cos)^5` would scatter: Schlick's approximation is linear in this and [`Energy::mirrors`].
+    /// What mirrors of reflectance `(1 - cos)^5` would scatter: Schlick's approximation is linear in this and [`Energy::mirrors`]. Of anisotropic
+    /// microfacets at least that, to a hundredth, and 0.02 more on average.
     #[inline]
     pub fn schlick(&self, w: Vec3) -> f32 {
-        let seen = self.see(w);
-        SCHLICK.bilinear_from(0, COSINES, self.at_alpha, seen.at) + schlick_weight(smoothed(seen.cos, self.alpha))
+        let cos = w.z.clamp(0.0, 1.0);
+        let of = |alpha: f32, at_alpha: Place| {
+            SCHLICK.bilinear_from(0, COSINES, at_alpha, Place::of_cosine(cos, alpha)) + schlick_weight(smoothed(cos, alpha))
+        };
+        let weight = of(self.alpha, self.at_alpha);
+        if self.aspect == 1.0 {
+            return weight;
+        }
+        let alpha = self.grazed_alpha(w);
+        weight.max(of(alpha, Place::of_alpha(alpha)))
+    }
+
+    /// Alpha of round microfacets that grazing light from `w` meets at the angles at which it meets these, or at greater ones.
+    #[inline]
+    fn grazed_alpha(&self, w: Vec3) -> f32 {
+        let [ax, ay] = self.ggx.alpha();
+        let (x2, y2) = ((ax * w.x) * (ax * w.x), (ay * w.y) * (ay * w.y));
+        let run2 = x2 + y2;
+        if run2 <= 0.0 {
+            return self.alpha;
+        }
+        // Where alpha is divided out, visible normals are distributed by their cosine with the direction. Its square has the mean 1/2, those
+        // with the two axes across have 1/4 each. Round microfacets show as much of their normals for alpha² = q / (1 - 3 q).
+        let (ax2, ay2) = (ax * ax, ay * ay);
+        let along = (ax2 * x2 + ay2 * y2) / run2;
+        let across = (ax2 * y2 + ay2 * x2) / run2;
+        let skew = (x2 * y2).sqrt() / run2 * (ax2 - ay2).abs();
+        let q = run2 / (w.x * w.x + w.y * w.y) / (1.0 + 2.0 * along + across + skew);
+        let alpha = if q < 0.25 { (q / (1.0 - 3.0 * q)).sqrt() } else { 1.0 };
+        // Fitted, so that hardly any weight is too small.
+        alpha * (0.78 + 0.22 * self.aspect)
     }
 
     /// What dielectric microfacets reflect and refract together, for the index of refraction beyond them over that on this side, within

@@ -62,26 +62,9 @@ fn directions_follow_the_density_and_weights_are_value_over_density() {
 }
 
 #[test]
-fn everything_is_reciprocal() {
-    for (name, bsdf) in all() {
-        for u in random_points(5, 5_000) {
-            let (a, b) = (direction(0.02 + 0.98 * u[0], u[1]), direction(0.02 + 0.98 * u[2], u[3]));
-            for (a, b) in [(a, b), (a, vec3(b.x, b.y, -b.z))] {
-                let (ab, ba) = (bsdf.eval(a, b).value.g / b.z.abs(), bsdf.eval(b, a).value.g / a.z.abs());
-                assert!((ab - ba).abs() <= 3e-4 * ab.max(ba), "{name} {a:?} {b:?} {ab} {ba}");
-            }
-        }
-    }
-}
-
-#[test]
-fn white_rough_diffuse_surfaces_lose_nothing() {
+fn the_albedo_of_rough_diffuse_surfaces_is_what_they_scatter() {
     for roughness in [0.01, 0.3, 0.7, 1.0] {
-        let white = Bsdf::Eon(Eon { albedo: Rgb::WHITE, roughness });
         for cos in [1.0, 0.7, 0.3, 0.1, 0.02] {
-            let total = scattered(&white, direction(cos, 0.3));
-            assert!((total.g - 1.0).abs() < 0.015, "{roughness} {cos}: {total:?}");
-            // The closed form of a coloured one.
             let wo = direction(cos, 0.3);
             let (found, expected) = (scattered(&eon(roughness), wo), eon(roughness).albedo(wo));
             assert!(

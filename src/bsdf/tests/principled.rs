@@ -2,8 +2,7 @@
 
 use super::energy::scattered_by;
 use super::*;
-use crate::math::float::ONE_MINUS_EPSILON;
-use crate::sampling::statistics::{compare_directions, random_points};
+use crate::sampling::statistics::random_points;
 
 /// A corner of the unit cube of ten parameters, for a white base; from bit 10 on: a thin sheet, half diffuse transmission.
 fn corner(bits: u32) -> PrincipledParameters {
@@ -24,75 +23,6 @@ fn corner(bits: u32) -> PrincipledParameters {
         thin,
         diffuse_transmission: if thin { 0.5 } else { 0.0 },
         ..PrincipledParameters::default()
-    }
-}
-
-/// Some inner points, coloured.
-fn blends() -> Vec<(String, Bsdf)> {
-    let color = Rgb::new(0.8, 0.3, 0.1);
-    let half =
-        PrincipledParameters { base_color: color, sheen: 0.5, clearcoat: 0.6, clearcoat_gloss: 0.3, ..PrincipledParameters::default() };
-    let list = [
-        ("plain", PrincipledParameters { base_color: color, ..PrincipledParameters::default() }),
-        ("coated cloth", half),
-        ("half metal", PrincipledParameters { metallic: 0.5, anisotropic: 0.7, specular_tint: 1.0, ..half }),
-        ("flat", PrincipledParameters { subsurface: 0.8, roughness: 0.9, ..half }),
-        ("half glass", PrincipledParameters { transmission: 0.5, roughness: 0.4, ..half }),
-        ("glass", PrincipledParameters { transmission: 1.0, base_color: color, ..PrincipledParameters::default() }),
-        ("sheet", PrincipledParameters { thin: true, transmission: 0.5, diffuse_transmission: 0.3, ..half }),
-        ("all", PrincipledParameters { metallic: 0.3, transmission: 0.4, anisotropic: 0.5, subsurface: 0.5, ..half }),
-    ];
-    list.map(|(name, parameters)| (name.to_owned(), Bsdf::Principled(Principled::new(&parameters)))).into()
-}
-
-#[test]
-fn directions_follow_the_density() {
-    for (name, bsdf) in blends() {
-        for cos in [0.9, 0.3, -0.6] {
-            let wo = direction(cos, 0.1);
-            let sample = |u: [f32; 4]| bsdf.sample(wo, u[2], [u[0], u[1]]).map(|s| s.wi);
-            compare_directions(100_000, 23, sample, |wi| bsdf.eval(wo, wi).pdf).check(&format!("{name} {cos}"));
-        }
-    }
-}
-
-#[test]
-fn weights_are_value_over_density_and_sides_are_told() {
-    for (name, bsdf) in blends() {
-        for u in random_points(2, 20_000) {
-            let wo = direction(2.0 * u[3] - 1.0, 0.3);
-            let Some(s) = bsdf.sample(wo, u[2], [u[0], u[1]]) else { continue };
-            let eval = bsdf.eval(wo, s.wi);
-            assert_eq!((eval.pdf, eval.value / eval.pdf, s.wi.z * wo.z < 0.0), (s.pdf, s.weight, s.is_transmission), "{name}");
-            let bends = s.is_transmission && name != "sheet";
-            assert_eq!(
-                s.eta,
-                if !bends {
-                    1.0
-                } else if wo.z > 0.0 {
-                    1.5
-                } else {
-                    1.0 / 1.5
-                },
-                "{name}"
-            );
-        }
-    }
-}
-
-#[test]
-fn reflection_is_reciprocal_as_is_what_passes_a_sheet() {
-    for (name, bsdf) in blends() {
-        for u in random_points(5, 5_000) {
-            let (a, b) = (direction(0.02 + 0.98 * u[0], u[1]), direction(0.02 + 0.98 * u[2], u[3]));
-            let beyond = vec3(b.x, b.y, -b.z);
-            for (a, b) in [(a, b)].into_iter().chain((name == "sheet").then_some((a, beyond))) {
-                let (ab, ba) = (bsdf.eval(a, b).value / b.z.abs(), bsdf.eval(b, a).value / a.z.abs());
-                for (x, y) in ab.to_array().into_iter().zip(ba.to_array()) {
-                    assert!((x - y).abs() <= 3e-4 * x.max(y), "{name} {a:?} {b:?} {x} {y}");
-                }
-            }
-        }
     }
 }
 
@@ -156,8 +86,9 @@ fn no_corner_reflects_more_than_it_receives_by_quadrature() {
     let (rows, columns) = (200, 100);
     for bits in (0..512).filter(|bits| bits & 0b10 != 0) {
         let bsdf = Bsdf::Principled(Principled::new(&corner(bits & !0b1000_0000)));
-        for cos in [0.999, 0.6, 0.2, 0.05] {
-            let wo = direction(cos, 0.07);
+        let turns: &[f32] = if bits & 0b100 == 0 { &[0.07] } else { &[0.07, 0.2, 0.25] };
+        for (cos, turns) in [0.999, 0.6, 0.2, 0.05].into_iter().flat_map(|cos| turns.iter().map(move |&turns| (cos, turns))) {
+            let wo = direction(cos, turns);
             let mut sum = 0.0;
             for row in 0..rows {
                 // Denser towards grazing.
@@ -170,7 +101,7 @@ fn no_corner_reflects_more_than_it_receives_by_quadrature() {
             let total = sum * std::f64::consts::TAU / f64::from(rows * columns);
             // Tables interpolate: of anisotropic microfacets, at azimuths between their axes, to a hundredth.
             let bound = if bits & 0b100 == 0 { 1.002 } else { 1.01 };
-            assert!(total <= bound, "{bits:b} at {cos}: {total}");
+            assert!(total <= bound, "{bits:b} at {cos} {turns}: {total}");
         }
     }
 }
@@ -207,30 +138,6 @@ fn masking_and_distribution_share_their_alpha() {
         let mean =
             random_points(4, 10_000).map(|u| bsdf.sample(wo, u[2], [u[0], u[1]]).map_or(0.0, |s| s.weight.g)).sum::<f32>() / 10_000.0;
         assert!((mean - 1.0).abs() < 0.005, "{cos}: {mean}");
-    }
-}
-
-#[test]
-fn everything_is_finite_at_every_corner() {
-    for bits in 0..2048 {
-        let bsdf = Bsdf::Principled(Principled::new(&corner(bits)));
-        for cos in [1.0f32, 1e-3, 1e-6, 1e-12, 1e-30, 1e-45, 0.0] {
-            for wo in [direction(cos, 0.2), direction(-cos, 0.7)] {
-                assert!(bsdf.albedo(wo).is_finite(), "{bits:b} {wo:?}");
-                for lobe in [0.0, 0.3, 0.5, 0.8, ONE_MINUS_EPSILON] {
-                    for u in [[0.0, 0.0], [0.0, ONE_MINUS_EPSILON], [ONE_MINUS_EPSILON, 0.0], [0.4, 0.6]] {
-                        let Some(s) = bsdf.sample(wo, lobe, u) else { continue };
-                        let sound =
-                            s.weight.is_finite() && s.weight.to_array().iter().all(|&v| v >= 0.0) && s.pdf.is_finite() && s.pdf > 0.0;
-                        assert!(sound && s.wi.is_finite() && (s.wi.length() - 1.0).abs() < 1e-4, "{bits:b} {wo:?} {s:?}");
-                    }
-                }
-                for cos_i in [1.0f32, 1e-3, 1e-12, 1e-30, -1e-6, -1.0, 0.0] {
-                    let eval = bsdf.eval(wo, direction(cos_i, 0.7));
-                    assert!(eval.value.is_finite() && eval.pdf.is_finite() && eval.pdf >= 0.0, "{bits:b} {wo:?} {cos_i} {eval:?}");
-                }
-            }
-        }
     }
 }
 

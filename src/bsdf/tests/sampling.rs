@@ -1,49 +1,7 @@
 //! Sampled directions, densities and weights agree.
 
 use super::*;
-use crate::sampling::statistics::{compare_directions, random_points};
-
-fn check_density(name: &str, bsdf: &Bsdf, wo: Vec3) {
-    let sample = |u: [f32; 4]| bsdf.sample(wo, u[2], [u[0], u[1]]).map(|s| s.wi);
-    compare_directions(100_000, 17, sample, |wi| bsdf.eval(wo, wi).pdf).check(&format!("{name} from {wo:?}"));
-}
-
-#[test]
-fn directions_follow_the_density_and_it_integrates_to_what_is_sampled() {
-    for (name, bsdf) in rough_bsdfs() {
-        for cos in [1.0, 0.707, 0.05] {
-            check_density(&name, &bsdf, direction(cos, 0.1));
-        }
-    }
-}
-
-#[test]
-fn directions_follow_the_density_from_inside_of_glass() {
-    for alpha in ALPHAS {
-        for ior in [1.5, 0.8] {
-            let bsdf = Bsdf::Dielectric(Dielectric::new(ior, alpha));
-            // At -0.707 most microfacets reflect totally for 1.5.
-            for cos in [-1.0, -0.707, -0.05] {
-                check_density(&format!("dielectric {ior} {alpha:?}"), &bsdf, direction(cos, 0.35));
-            }
-        }
-    }
-}
-
-#[test]
-fn directions_follow_the_density_on_the_back() {
-    for bsdf in [gold([0.3, 0.1]), blue_plastic([0.3, 0.1]), Bsdf::Lambert(Lambert { albedo: Rgb::WHITE })] {
-        check_density("back", &bsdf, direction(-0.6, 0.6));
-    }
-}
-
-#[test]
-fn the_base_of_smooth_plastic_follows_its_density() {
-    let bsdf = blue_plastic([0.0; 2]);
-    let wo = direction(0.4, 0.0);
-    let sample = |u: [f32; 4]| bsdf.sample(wo, u[2], [u[0], u[1]]).filter(|s| !s.is_delta).map(|s| s.wi);
-    compare_directions(100_000, 18, sample, |wi| bsdf.eval(wo, wi).pdf).check("smooth plastic");
-}
+use crate::sampling::statistics::random_points;
 
 /// Largest relative difference between a sample and the evaluation of its direction, over the samples of some directions.
 fn worst_disagreement(bsdf: &Bsdf, cosines: &[f32]) -> f32 {
@@ -76,43 +34,6 @@ fn weights_are_value_over_density() {
         assert!(worst < limit, "{name}: {worst}");
     }
     assert!(worst_disagreement(&white_plastic([0.0; 2]), &[1.0, 0.5, 0.05]) < 1e-5);
-}
-
-#[test]
-fn reflection_is_reciprocal() {
-    for (name, bsdf) in rough_bsdfs() {
-        for u in random_points(5, 5_000) {
-            let (a, b) = (direction(0.02 + 0.98 * u[0], u[1]), direction(0.02 + 0.98 * u[2], u[3]));
-            // Without the cosine of the second direction.
-            let (ab, ba) = (bsdf.eval(a, b).value / b.z, bsdf.eval(b, a).value / a.z);
-            for (x, y) in [(ab.r, ba.r), (ab.g, ba.g), (ab.b, ba.b)] {
-                assert!((x - y).abs() <= 1e-4 * x.max(y), "{name} {a:?} {b:?} {x} {y}");
-            }
-        }
-    }
-}
-
-#[test]
-fn refraction_is_reciprocal_but_for_the_squared_index() {
-    for ior in [1.5f32, 0.7, 2.4] {
-        for alpha in ALPHAS {
-            let bsdf = Bsdf::Dielectric(Dielectric::new(ior, alpha));
-            let mut compared = 0;
-            for u in random_points(6, 10_000) {
-                let a = direction(0.05 + 0.95 * u[0], u[1]);
-                let Some(b) = bsdf.sample(a, u[2], [u[3], u[0]]).filter(|s| s.is_transmission).map(|s| s.wi) else { continue };
-                if b.z > -0.05 {
-                    continue;
-                }
-                // Radiance towards the outside is smaller by ior² than the reverse.
-                let outside = bsdf.eval(a, b).value.r / -b.z;
-                let inside = bsdf.eval(b, a).value.r / a.z;
-                assert!((outside * ior * ior - inside).abs() <= 3e-4 * inside, "{ior} {alpha:?} {a:?} {b:?}");
-                compared += 1;
-            }
-            assert!(compared > 1000, "{compared}");
-        }
-    }
 }
 
 #[test]

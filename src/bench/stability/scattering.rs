@@ -1,3 +1,0 @@
-//! Group G: scattering at surfaces.
-
-checks! {}
