@@ -43,7 +43,7 @@ struct Size {
 }
 
 fn size(effort: Effort) -> Size {
-    effort.pick(Size { spp: 8, reference: 48, tested: 32 }, Size { spp: 64, reference: 256, tested: 128 })
+    effort.pick(Size { spp: 8, reference: 48, tested: 32 }, Size { spp: 32, reference: 256, tested: 128 })
 }
 
 fn reference(effort: Effort) -> (Size, Renders) {

@@ -14,7 +14,7 @@ fn compare(tests: &mut Tests, effort: Effort, name: &str, at: [f64; 3], shapes: 
     let mut worst = 0f64;
     for strategy in STRATEGIES {
         // By chance small lights are found rarely.
-        let spp = if strategy == "bsdf" { effort.pick(512, 32_768) } else { effort.pick(64, 8192) };
+        let spp = if strategy == "bsdf" { effort.pick(512, 8192) } else { effort.pick(64, 4096) };
         scene["sampler"]["spp"] = json!(spp);
         let found = mean(&with_strategy(&scene, strategy), 0);
         let irradiance = Estimate { mean: PI * found.mean, error: PI * found.error };
@@ -121,7 +121,7 @@ fn slab(spp: u32, back: f64, front: f64) -> Value {
 
 pub(super) fn i8_slab(effort: Effort) -> Outcome {
     // r = 0.04 at each surface: R = 2 r / (1 + r).
-    let (reflected, spp) = (0.08 / 1.04, effort.pick(256, 32_768));
+    let (reflected, spp) = (0.08 / 1.04, effort.pick(256, 16_384));
     let mut tests = Tests::new();
     tests.mean("transmitted", mean(&slab(spp, 1.0, 0.0), 0), PIXELS, 1.0 - reflected, 0.0);
     let back = mean(&slab(spp, 0.0, 1.0), 0);

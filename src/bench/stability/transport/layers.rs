@@ -116,5 +116,5 @@ pub(super) fn i10_motion(effort: Effort) -> Outcome {
     });
     let different = different.sum();
     let outcome = Outcome::new().none("pixels of cards with two equal steps that differ from those at rest", different);
-    tests.judge_means(outcome, effort.pick(3.0, 0.3))
+    tests.judge_means(outcome, effort.pick(1.0, 0.15))
 }
