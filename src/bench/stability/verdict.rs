@@ -6,6 +6,26 @@ use super::render::Estimate;
 use super::{Outcome, sidak_level};
 use crate::sampling::statistics::chi_squared_p_value;
 
+/// Mean of some numbers with its standard error.
+pub(super) fn estimate(values: &[f64]) -> Estimate {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    Estimate { mean, error: (variance / n).sqrt() }
+}
+
+/// Two-sided p-value of Welch's test for means over so many values each, which may differ by `slack`.
+pub(super) fn welch(a: Estimate, na: usize, b: Estimate, nb: usize, slack: f64) -> f64 {
+    let (va, vb) = (a.error * a.error, b.error * b.error);
+    let difference = ((a.mean - b.mean).abs() - slack).max(0.0);
+    if va + vb == 0.0 {
+        // Two means without noise are equal or not.
+        return if difference > 0.0 { 0.0 } else { 1.0 };
+    }
+    let freedom = (va + vb).powi(2) / (va * va / (na - 1) as f64 + vb * vb / (nb - 1) as f64);
+    StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| 2.0 * law.sf(difference / (va + vb).sqrt()))
+}
+
 /// The p-values of a check's tests.
 pub(super) struct Tests {
     least: f64,
@@ -25,7 +45,8 @@ impl Tests {
     pub fn add(&mut self, name: &str, p_value: f64) {
         self.count += 1;
         // A NaN is as bad as can be.
-        if !(p_value >= self.least) {
+        let p_value = if p_value.is_nan() { 0.0 } else { p_value };
+        if p_value < self.least {
             (self.least, self.worst) = (p_value, name.to_owned());
         }
     }
@@ -50,20 +71,13 @@ impl Tests {
         // Without any noise only rounding is allowed.
         let t = if excess > 0.0 { excess / estimate.error } else { 0.0 };
         let p_value = StudentsT::new(0.0, 1.0, (values.max(2) - 1) as f64).map_or(f64::NAN, |law| 2.0 * law.sf(t));
-        self.add(name, if estimate.mean.is_finite() { p_value } else { f64::NAN });
+        self.add(name, if estimate.mean.is_finite() { p_value } else { 0.0 });
         self.blur = self.blur.max(estimate.error / expected.abs());
     }
 
     /// Two means that must be the same, each over this many independent values (Welch's test).
     pub fn same(&mut self, name: &str, a: Estimate, b: Estimate, values: usize) {
-        let (va, vb) = (a.error * a.error, b.error * b.error);
-        let freedom = (va + vb).powi(2) / (va * va + vb * vb) * (values.max(2) - 1) as f64;
-        let difference = ((a.mean - b.mean).abs() - 1e-5 * a.mean.abs()).max(0.0);
-        let t = if difference > 0.0 { difference / (va + vb).sqrt() } else { 0.0 };
-        // Two means without noise are equal or not.
-        let exact = if difference > 0.0 { 0.0 } else { 1.0 };
-        let by_law = || StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| 2.0 * law.sf(t));
-        self.add(name, if va + vb > 0.0 { by_law() } else { exact });
+        self.add(name, welch(a, values, b, values, 1e-5 * a.mean.abs()));
     }
 
     /// What the smallest of the p-values must reach.

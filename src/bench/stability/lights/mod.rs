@@ -19,6 +19,7 @@ use crate::math::{DMat3, DVec3, Transform};
 
 use emitters::l5_partial_emitters;
 use polygons::l6_polygons;
+pub(super) use polygons::lambert;
 use power::l1_power;
 use selection::l8_choice;
 use sky::l7_environment_maps;

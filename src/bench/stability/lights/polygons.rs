@@ -31,8 +31,8 @@ fn quad_solid_angle(p: DVec3, corner: DVec3, u: DVec3, v: DVec3) -> f64 {
     triangle_solid_angle([a, a + u, a + u + v]) + triangle_solid_angle([a, a + u + v, a + v])
 }
 
-/// Irradiance at the origin from a polygon of radiance 1 above the horizon (Lambert).
-fn lambert(corners: &[DVec3], n: DVec3) -> f64 {
+/// Irradiance at the origin from a polygon of radiance 1 above the horizon: E = 1/2 sum acos(a·b) n·(a x b) / |a x b| (Lambert).
+pub(in crate::bench::stability) fn lambert(corners: &[DVec3], n: DVec3) -> f64 {
     let around = corners.iter().zip(corners.iter().cycle().skip(1));
     let sum: f64 = around.map(|(a, b)| a.angle_between(*b) * n.dot(a.cross(*b).normalize())).sum();
     (0.5 * sum).abs()

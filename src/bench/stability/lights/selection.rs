@@ -133,7 +133,7 @@ pub(super) fn l8_choice(effort: Effort) -> Outcome {
     let [exact, excess] = sums(9);
     let mut rng = Rng::new(4);
     let (mut tests, mut difference, mut power_mean) = (Tests::new(), 0f64, 0f64);
-    let count = effort.pick(60_000, 3_000_000);
+    let count = effort.pick(60_000, 1_000_000);
     for (selection, name) in [(LightSelection::Power, "by power"), (LightSelection::Tree, "by tree")] {
         for sky in [false, true] {
             let set = cloud(3, sky, selection);
@@ -155,7 +155,7 @@ pub(super) fn l8_choice(effort: Effort) -> Outcome {
 
     // The mean over points of one over the probability, as pbrt takes it: there are a hundred lights of about the same power around them.
     let set = points(&mut rng);
-    let (from, n) = (receivers(&mut rng, effort.pick(20, 100)), count);
+    let (from, n) = (receivers(&mut rng, effort.pick(20, 50)), effort.pick(60_000, 200_000));
     let means: Vec<f64> = from
         .iter()
         .map(|from| {

@@ -1,29 +1,13 @@
 //! Whether two sets of renders may be of the same scene.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
-use super::{Effort, Outcome, PIXELS, Prepared, Tests, json, pictures, prepared, room};
-use crate::bench::stability::render::Estimate;
+use super::{Effort, Outcome, PIXELS, Prepared, SIDE, Tests, json, pictures, prepared, room};
+use crate::bench::stability::verdict::{estimate, welch};
 
 /// Independent renders of a scene, each a row of pixels.
 type Renders = Vec<Vec<f64>>;
 
-/// Mean of some numbers with its standard error.
-fn estimate(values: impl Iterator<Item = f64> + Clone) -> Estimate {
-    let n = values.clone().count() as f64;
-    let mean = values.clone().sum::<f64>() / n;
-    let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    Estimate { mean, error: (variance / n).sqrt() }
-}
-
-/// Two-sided p-value of Welch's test.
-fn welch(a: Estimate, na: usize, b: Estimate, nb: usize) -> f64 {
-    let (va, vb) = (a.error * a.error, b.error * b.error);
-    if va + vb == 0.0 {
-        return if a.mean == b.mean { 1.0 } else { 0.0 };
-    }
-    let freedom = (va + vb).powi(2) / (va * va / (na - 1) as f64 + vb * vb / (nb - 1) as f64);
-    StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| 2.0 * law.sf(((a.mean - b.mean) / (va + vb).sqrt()).abs()))
+fn mean_picture(renders: &Renders) -> Vec<f64> {
+    (0..PIXELS).map(|pixel| renders.iter().map(|picture| picture[pixel]).sum::<f64>() / renders.len() as f64).collect()
 }
 
 /// What the test finds.
@@ -41,13 +25,14 @@ fn compare(a: &Renders, b: &Renders) -> Agreement {
     let level = 1.0 - 0.99f64.powf(1.0 / PIXELS as f64);
     let (mut accepted, mut histogram) = (0, vec![0u32; 16]);
     for pixel in 0..PIXELS {
-        let [at_a, at_b] = [a, b].map(|renders| estimate(renders.iter().map(move |picture| picture[pixel])));
-        let p_value = welch(at_a, a.len(), at_b, b.len());
+        let [at_a, at_b] = [a, b].map(|renders| estimate(&renders.iter().map(|picture| picture[pixel]).collect::<Vec<_>>()));
+        let p_value = welch(at_a, a.len(), at_b, b.len(), 0.0);
         accepted += usize::from(p_value > level);
         histogram[((p_value * 16.0) as usize).min(15)] += 1;
     }
-    let [all_a, all_b] = [a, b].map(|renders| estimate(renders.iter().map(|picture| picture.iter().sum::<f64>() / PIXELS as f64)));
-    Agreement { accepted: accepted as f64 / PIXELS as f64, whole: welch(all_a, a.len(), all_b, b.len()), histogram }
+    let [all_a, all_b] =
+        [a, b].map(|renders| estimate(&renders.iter().map(|picture| picture.iter().sum::<f64>() / PIXELS as f64).collect::<Vec<_>>()));
+    Agreement { accepted: accepted as f64 / PIXELS as f64, whole: welch(all_a, a.len(), all_b, b.len(), 0.0), histogram }
 }
 
 /// How many renders of how many samples a reference has, and one to be tested.
@@ -58,7 +43,7 @@ struct Size {
 }
 
 fn size(effort: Effort) -> Size {
-    effort.pick(Size { spp: 8, reference: 48, tested: 32 }, Size { spp: 64, reference: 256, tested: 128 })
+    effort.pick(Size { spp: 8, reference: 48, tested: 32 }, Size { spp: 32, reference: 256, tested: 128 })
 }
 
 fn reference(effort: Effort) -> (Size, Renders) {
@@ -70,11 +55,13 @@ fn reference(effort: Effort) -> (Size, Renders) {
 pub(super) fn r1_agreement(effort: Effort) -> Outcome {
     let (size, reference) = reference(effort);
     let scene: Prepared = prepared(&room(), size.spp);
-    let found = compare(&reference, &pictures(scene, 1000..1000 + size.tested));
+    let tested = pictures(scene, 1000..1000 + size.tested);
+    let found = compare(&reference, &tested);
     let mut tests = Tests::new();
     tests.add("whole picture", found.whole);
     tests.counts("p-values of pixels are uniform", &found.histogram, &[PIXELS as f64 / 16.0; 16]);
-    tests.judge(Outcome::new().at_least("share of pixels accepted", found.accepted, 0.9975))
+    let outcome = tests.judge(Outcome::new().at_least("share of pixels accepted", found.accepted, 0.9975));
+    outcome.pictures("room", SIDE as usize, &mean_picture(&tested), &mean_picture(&reference))
 }
 
 pub(super) fn r3_power(effort: Effort) -> Outcome {

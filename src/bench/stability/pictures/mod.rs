@@ -30,7 +30,7 @@ checks! {
         "relative squared error of the room for 1, 2, 4, ... samples a pixel against many Sobol samples: falls as 1 / n (with and without the \
          largest thousandth of pixels)";
     "R7" r7_pay_for_use "nothing is paid for that is not used":
-        "what triangles at rest without holes, each feature alone, and scenes without light register with Embree or trace";
+        "what triangles at rest without holes and each feature alone register with Embree, and rays of pictures that need no second one";
     "R8" r8_gallery "gallery":
         "every scene of the folder scenes if it is there, else cornell, glass and phi_max, small, with two seeds: numbers that are not finite, \
          pixels above 20 times the median of the 24 around them in one of both pictures";

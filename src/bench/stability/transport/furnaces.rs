@@ -43,7 +43,7 @@ fn cameras() -> [(&'static str, Value); 4] {
 }
 
 pub(super) fn i1_furnaces(effort: Effort) -> Outcome {
-    let spp = effort.pick(16, 1024);
+    let spp = effort.pick(16, 512);
     let mut tests = Tests::new();
     for (camera, change) in cameras() {
         for sampler in ["independent", "sobol"] {
@@ -56,7 +56,7 @@ pub(super) fn i1_furnaces(effort: Effort) -> Outcome {
             }
         }
     }
-    tests.judge_means(Outcome::new(), effort.pick(0.025, 0.005))
+    tests.judge_means(Outcome::new(), effort.pick(0.01, 0.002))
 }
 
 pub(super) fn i2_depth(effort: Effort) -> Outcome {

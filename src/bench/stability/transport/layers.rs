@@ -3,6 +3,7 @@
 use super::{Effort, Outcome, PIXELS, SIDE, Tests, Value, json, merge, pixels, prepare, render, render_with, scene};
 use crate::accel::{AccelKind, EmbreeOptions, EmbreeQuality};
 use crate::bench::stability::render::Estimate;
+use crate::bench::stability::verdict::estimate;
 use crate::render::Overrides;
 
 /// Meshes of two triangles each, with opacity one half, before a sky of radiance 1: the diagonal runs from corner to corner of the picture.
@@ -25,14 +26,6 @@ fn stack(spp: u32, layers: u32) -> Value {
     )
 }
 
-/// Mean over some of the values, with its standard error.
-fn mean_of(values: &[f64]) -> Estimate {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    Estimate { mean, error: (variance / n).sqrt() }
-}
-
 pub(super) fn i9_alpha(effort: Effort) -> Outcome {
     let high = AccelKind::Embree(EmbreeOptions { quality: EmbreeQuality::High, ..EmbreeOptions::default() });
     let kinds = AccelKind::ALL.into_iter().chain([(high, "embree:high")]);
@@ -51,7 +44,7 @@ pub(super) fn i9_alpha(effort: Effort) -> Outcome {
                 let all = pixels(&image).enumerate().filter(|(i, _)| on_diagonal(*i) == diagonal);
                 all.map(|(_, p)| f64::from(p[1])).collect()
             };
-            diagonals.mean(&format!("{name}, {layers} layers, diagonal"), mean_of(&of(true)), side, expected, 0.0);
+            diagonals.mean(&format!("{name}, {layers} layers, diagonal"), estimate(&of(true)), side, expected, 0.0);
         }
     }
     let outcome = diagonals.judge_means(Outcome::new(), effort.pick(1.0, 0.2));
@@ -111,7 +104,7 @@ pub(super) fn i10_motion(effort: Effort) -> Outcome {
         let values: Vec<f64> = pixels(&image).map(|p| f64::from(p[1])).collect();
         for column in 0..SIDE {
             let rows: Vec<f64> = values.iter().skip(column as usize).step_by(SIDE as usize).copied().collect();
-            tests.mean(&format!("{name}, column {column}"), mean_of(&rows), rows.len(), 1.0 - coverage(column), 0.0);
+            tests.mean(&format!("{name}, column {column}"), estimate(&rows), rows.len(), 1.0 - coverage(column), 0.0);
         }
     }
 
@@ -123,5 +116,5 @@ pub(super) fn i10_motion(effort: Effort) -> Outcome {
     });
     let different = different.sum();
     let outcome = Outcome::new().none("pixels of cards with two equal steps that differ from those at rest", different);
-    tests.judge_means(outcome, effort.pick(3.0, 0.3))
+    tests.judge_means(outcome, effort.pick(1.0, 0.15))
 }

@@ -91,7 +91,7 @@ fn surroundings(spp: u32, materials: &Value, shape: &Value) -> Value {
 }
 
 pub(super) fn i3_white_furnace(effort: Effort) -> Outcome {
-    let spp = effort.pick(16, 1024);
+    let spp = effort.pick(16, 600);
     let sphere = json!({ "type": "sphere", "material": "m" });
     let cube = json!({ "type": "cube", "material": "m",
         "transform": [{ "scale": 0.8 }, { "rotate": { "axis": [1, 1, 0], "degrees": 30 } }] });

@@ -34,7 +34,7 @@ checks! {
     "I5" i5_quad "quad light":
         "irradiance by Lambert's formula, a quad, two triangles and a sheared quad, by every strategy";
     "I6" i6_sphere "sphere light":
-        "irradiance pi L (R / d)² cos, whole spheres, one stretched mesh of one, by every strategy";
+        "irradiance pi L (R / d)² cos, a sphere, one scaled and mirrored, one in two parts, one overhead, by every strategy";
     "I7" i7_strategies "multiple importance sampling":
         "metal of four roughnesses under lamps of two sizes (Veach's plates): the three strategies agree (Welch), and the variance of both together \
          is at most 1.1 times the lesser one, or half of the squared mean more (F-test)";

@@ -23,7 +23,7 @@ fn plate(spp: u32, side: u32, alpha: f64, radius: f64) -> Value {
 }
 
 pub(super) fn i7_strategies(effort: Effort) -> Outcome {
-    let (spp, side) = effort.pick((16, 32), (256, 128));
+    let (spp, side) = effort.pick((16, 32), (256, 64));
     let pixels = (side * side) as usize;
     let mut tests = Tests::new();
     let (mut worst, mut at) = (0f64, String::new());
