@@ -1,14 +1,13 @@
 use steradian::accel::{AccelKind, build};
-use steradian::geometry::{Geometry, Instance, Mesh, Object, Shape};
-use steradian::id::{ObjectId, ShapeId};
-use steradian::math::{DMat3, DVec3, Ray};
+use steradian::geometry::{Instance, Mesh, Shape};
+use steradian::math::Ray;
 
 use serde_json::{Value, json};
 
 use crate::util::folder::Folder;
-use crate::util::geometry::{Rng, cube, ids, placed_analytic_shapes, ray_through};
+use crate::util::geometry::{Rng, ids, ray_through};
 use crate::util::render::{Estimate, probe, render};
-use crate::util::scenes::{motion, moving_scene};
+use crate::util::scenes::moving_scene;
 
 fn rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
     let time = |rng: &mut Rng, i: usize| [0.0, 0.4, 0.5, 1.0, rng.unit() as f32][i % 5];

@@ -100,8 +100,8 @@ mod scattering;
 mod spawning;
 mod transport;
 mod triangles;
-mod verdict;
 mod vectors;
+mod verdict;
 
 /// Letter and name of each group with its checks.
 const GROUPS: &[(&str, &str, &[Check])] = &[
