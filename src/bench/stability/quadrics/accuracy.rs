@@ -174,7 +174,7 @@ fn half_at_rims(rng: &mut Rng) -> Aim {
 }
 
 pub(super) fn c1_hit_accuracy(effort: Effort) -> Outcome {
-    let rays = effort.pick(60, 6_000);
+    let rays = effort.pick(60, 3_000);
     let mut rng = Rng::new(31);
     let mut all = Tallies::default();
     let mut outcome = Outcome::new();
