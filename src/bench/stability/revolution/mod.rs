@@ -22,7 +22,7 @@ checks! {
     "D4" d4_joints_and_poles "joints and poles are closed":
         "rays from inside to the joint of a ball of two cubics, also level and within 1e-12 to 1e-16 of it, and through its poles, also within 1e-6 to 1e-16; each must be hit once";
     "D5" d5_spheroids_are_not_hit_again "rays that leave a convex surface":
-        "spheroids of radius 1e-6, 1 and 1e6, offsets of 0 to 1e6 radii, directions of every angle with the normal, half of them grazing by 1e-5 to 1e-1";
+        "spheroids of radius 1e-6, 1 and 1e6, centres at 0 to 1e6 radii, directions of every angle with the normal, half of them grazing by 1e-5 to 1e-1";
     "D6" d6_areas "areas by Pappus":
         "cylinder, cone and ring as lines, a torus as four cubics, a ball as two (within 3e-4 of the sphere)";
     "D7" d7_b_splines "B-splines are Bezier curves":
