@@ -48,7 +48,7 @@ impl Filter {
     }
 
     /// An offset chosen in proportion to the filter's absolute value.
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> FilterSample {
         match &self.kernel {
             Kernel::Box { radius } => {
