@@ -37,6 +37,20 @@ enum Kernel {
 }
 
 impl Filter {
+    /// Every kind of filter, with usual parameters and others, to be checked.
+    pub(crate) const EXAMPLES: [FilterDesc; 10] = [
+        FilterDesc::Box { radius: 0.5 },
+        FilterDesc::Box { radius: 0.8 },
+        FilterDesc::Tent { radius: 1.0 },
+        FilterDesc::Gaussian { radius: 1.5, sigma: 0.5 },
+        FilterDesc::Gaussian { radius: 2.0, sigma: 3.0 },
+        FilterDesc::BlackmanHarris { radius: 1.5 },
+        FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0 },
+        FilterDesc::Mitchell { radius: 2.0, b: 1.0, c: 0.0 },
+        FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5 },
+        FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 1.0 },
+    ];
+
     /// From its description; radii and the Gaussian's deviation are above 0.
     pub fn new(desc: &FilterDesc) -> Self {
         let kernel = match *desc {

@@ -1,20 +1,5 @@
 use super::*;
 
-fn filters() -> Vec<FilterDesc> {
-    let mut filters = vec![
-        FilterDesc::Box { radius: 0.5 },
-        FilterDesc::Box { radius: 0.8 },
-        FilterDesc::Tent { radius: 1.0 },
-        FilterDesc::Gaussian { radius: 1.5, sigma: 0.5 },
-        FilterDesc::Gaussian { radius: 2.0, sigma: 3.0 },
-        FilterDesc::BlackmanHarris { radius: 1.5 },
-    ];
-    for (b, c) in [(1.0 / 3.0, 1.0 / 3.0), (1.0, 0.0), (0.0, 0.5), (0.0, 1.0)] {
-        filters.push(FilterDesc::Mitchell { radius: 2.0, b, c });
-    }
-    filters
-}
-
 /// Integral of one axis over `[a, b]`.
 fn integral(desc: &FilterDesc, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     let steps = 2000;
@@ -25,7 +10,7 @@ fn integral(desc: &FilterDesc, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
 /// The largest difference between the sampled distribution (weights included) and the filter's, over a grid of random numbers.
 #[test]
 fn the_sampled_distribution_is_the_filters() {
-    for desc in filters() {
+    for desc in Filter::EXAMPLES {
         let r = f64::from(radius(&desc));
         let filter = Filter::new(&desc);
         let n = 1 << 19;
@@ -58,7 +43,7 @@ fn the_sampled_distribution_is_the_filters() {
 /// First and second moments with weights: unbiased for the filter itself, negative lobes included.
 #[test]
 fn weighted_moments_match_the_filter() {
-    for desc in filters() {
+    for desc in Filter::EXAMPLES {
         let filter = Filter::new(&desc);
         let r = f64::from(filter.radius());
         let total = integral(&desc, -r, r, |f| f);
@@ -88,7 +73,7 @@ fn weighted_moments_match_the_filter() {
 #[test]
 fn extreme_random_numbers_stay_within_the_radius() {
     let ends = [0.0, f32::MIN_POSITIVE, 0.5f32.next_down(), 0.5, 0.5f32.next_up(), 1.0f32.next_down()];
-    for desc in filters() {
+    for desc in Filter::EXAMPLES {
         let filter = Filter::new(&desc);
         for u in ends {
             let sample = filter.sample([u, 1.0 - f32::EPSILON]);

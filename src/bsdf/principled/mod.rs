@@ -21,6 +21,7 @@
 //! Mitsuba 3's `principled` adds its lobes as well, has exact Fresnel terms for the untinted layer, G as a product, no compensation, and no
 //! `diffuse_transmission` without `principledthin`.
 
+mod corners;
 pub(super) mod shapes;
 
 use std::f32::consts::{FRAC_1_PI, PI};

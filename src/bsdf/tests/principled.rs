@@ -4,28 +4,6 @@ use super::energy::scattered_by;
 use super::*;
 use crate::sampling::statistics::random_points;
 
-/// A corner of the unit cube of ten parameters, for a white base; from bit 10 on: a thin sheet, half diffuse transmission.
-fn corner(bits: u32) -> PrincipledParameters {
-    let bit = |i: u32| (bits >> i & 1) as f32;
-    let thin = bits >> 10 & 1 == 1;
-    PrincipledParameters {
-        base_color: Rgb::WHITE,
-        metallic: bit(0),
-        roughness: bit(1),
-        anisotropic: bit(2),
-        ior: PrincipledParameters::ior_of_specular(bit(3)),
-        specular_tint: bit(4),
-        sheen: bit(5),
-        clearcoat: bit(6),
-        clearcoat_gloss: bit(7),
-        subsurface: bit(8),
-        transmission: bit(9),
-        thin,
-        diffuse_transmission: if thin { 0.5 } else { 0.0 },
-        ..PrincipledParameters::default()
-    }
-}
-
 /// The corner with the bits cleared that have no effect on it.
 fn essential(bits: u32) -> u32 {
     let (metal, glass, coat) = (bits & 1 == 1, bits >> 9 & 1 == 1, bits >> 6 & 1 == 1);
@@ -52,7 +30,7 @@ fn no_corner_scatters_more_than_it_receives() {
             corners.push(bits);
             continue;
         }
-        let [a, b] = [bits, essential(bits)].map(|bits| Principled::new(&corner(bits)));
+        let [a, b] = [bits, essential(bits)].map(|bits| Principled::new(&PrincipledParameters::white_corner(bits)));
         for u in random_points(bits, 4) {
             let (wo, wi) = (direction(u[0], u[1]), direction(2.0 * u[2] - 1.0, u[3]));
             assert_eq!(a.eval(wo, wi), b.eval(wo, wi), "{bits:b}");
@@ -61,7 +39,7 @@ fn no_corner_scatters_more_than_it_receives() {
     assert_eq!(corners.len(), 252);
     let mut worst = 0f32;
     for bits in corners {
-        let bsdf = Bsdf::Principled(Principled::new(&corner(bits)));
+        let bsdf = Bsdf::Principled(Principled::new(&PrincipledParameters::white_corner(bits)));
         // Only glass has another inside.
         let inside = (bits >> 9 & 1 == 1).then_some(-0.5);
         for cos in [1.0, 0.7, 0.3, 0.1, 0.02].into_iter().chain(inside) {
@@ -85,7 +63,7 @@ fn no_corner_reflects_more_than_it_receives_by_quadrature() {
     // Opaque corners with broad lobes, by a product rule over all directions.
     let (rows, columns) = (200, 100);
     for bits in (0..512).filter(|bits| bits & 0b10 != 0) {
-        let bsdf = Bsdf::Principled(Principled::new(&corner(bits & !0b1000_0000)));
+        let bsdf = Bsdf::Principled(Principled::new(&PrincipledParameters::white_corner(bits & !0b1000_0000)));
         let turns: &[f32] = if bits & 0b100 == 0 { &[0.07] } else { &[0.07, 0.2, 0.25] };
         for (cos, turns) in [0.999, 0.6, 0.2, 0.05].into_iter().flat_map(|cos| turns.iter().map(move |&turns| (cos, turns))) {
             let wo = direction(cos, turns);

@@ -11,22 +11,6 @@ use crate::film::Filter;
 use crate::math::Vec2;
 use crate::sampling::statistics::chi_squared_p_value;
 
-const THIRD: f32 = 1.0 / 3.0;
-
-/// Every filter, with usual parameters and others.
-pub(super) const ALL: [FilterDesc; 10] = [
-    FilterDesc::Box { radius: 0.5 },
-    FilterDesc::Box { radius: 0.8 },
-    FilterDesc::Tent { radius: 1.0 },
-    FilterDesc::Gaussian { radius: 1.5, sigma: 0.5 },
-    FilterDesc::Gaussian { radius: 2.0, sigma: 3.0 },
-    FilterDesc::BlackmanHarris { radius: 1.5 },
-    FilterDesc::Mitchell { radius: 2.0, b: THIRD, c: THIRD },
-    FilterDesc::Mitchell { radius: 2.0, b: 1.0, c: 0.0 },
-    FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5 },
-    FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 1.0 },
-];
-
 /// The integral of a filter along one axis.
 fn closed_form(desc: &FilterDesc, r: f64) -> f64 {
     match *desc {
@@ -44,7 +28,7 @@ fn closed_form(desc: &FilterDesc, r: f64) -> f64 {
 pub(super) fn m1_integrals(effort: Effort) -> Outcome {
     let steps = effort.pick(256, 2048);
     let (mut worst, mut outside) = (0f64, 0);
-    for desc in &ALL {
+    for desc in &Filter::EXAMPLES {
         let filter = Filter::new(desc);
         let r = f64::from(filter.radius());
         let at = |i: u32| (r * (2.0 * (f64::from(i) + 0.5) / f64::from(steps) - 1.0)) as f32;
@@ -110,14 +94,14 @@ fn p_value(filter: &Filter, rng: &mut Rng, draws: u32) -> f64 {
 pub(super) fn m2_sampled_filters(effort: Effort) -> Outcome {
     let mut rng = Rng::new(2);
     let (mut mass, mut least) = (0f64, 1f64);
-    for desc in &ALL {
+    for desc in &Filter::EXAMPLES {
         let filter = Filter::new(desc);
         mass = mass.max(mass_error(&filter, 1 << 19));
         least = least.min(p_value(&filter, &mut rng, effort.pick(100_000, 4_000_000)));
     }
     Outcome::new().at_most("error of the mass of half a pixel", mass, 1e-5).at_least(
-        format!("smallest p-value of {} χ² tests", ALL.len()),
+        format!("smallest p-value of {} χ² tests", Filter::EXAMPLES.len()),
         least,
-        sidak_level(ALL.len()),
+        sidak_level(Filter::EXAMPLES.len()),
     )
 }

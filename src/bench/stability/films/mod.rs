@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use files::m7_files;
-use filters::{ALL, m1_integrals, m2_sampled_filters};
+use filters::{m1_integrals, m2_sampled_filters};
 
 use super::geometry::Rng;
 use super::render::{Estimate, pixels, prepare, render, render_with};
@@ -60,7 +60,7 @@ fn m3_constants(effort: Effort) -> Outcome {
     let mut rng = Rng::new(3);
     let (mut worst, mut short) = (0f64, 0);
     let error = |image: &Image| image.layers[0].data.iter().map(|v| f64::from((v - 1.0).abs())).fold(0.0, f64::max);
-    for (desc, tile_size) in ALL.iter().flat_map(|desc| [1, 7, 64].map(|size| (desc, size))) {
+    for (desc, tile_size) in Filter::EXAMPLES.iter().flat_map(|desc| [1, 7, 64].map(|size| (desc, size))) {
         let filter = Filter::new(desc);
         for crop in [Crop::full([20, 13]), Crop { x: 3, y: 5, width: 11, height: 7 }] {
             for _ in 0..effort.pick(1, 40) {
@@ -123,7 +123,7 @@ fn bytes(image: &Image) -> Vec<u8> {
 
 /// A film whose tiles are filled in this order, each sample in that of its index.
 fn filled(order: &[usize]) -> Film {
-    let filter = Filter::new(&ALL[8]);
+    let filter = Filter::new(&Filter::EXAMPLES[8]);
     let mut film = film([40, 30], Crop::full([40, 30]), &LayerSet::FULL, 8);
     for &tile in order {
         let tile = &mut film.tiles_mut()[tile];

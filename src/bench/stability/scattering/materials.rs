@@ -185,26 +185,9 @@ pub fn white() -> Vec<Material> {
 /// A corner of the unit cube of ten parameters of the principled model, for a white base; from bit 10 on: a thin sheet, half diffuse
 /// transmission.
 pub fn corner(bits: u32) -> Material {
-    let bit = |i: u32| (bits >> i & 1) as f32;
-    let thin = bits >> 10 & 1 == 1;
-    let parameters = PrincipledParameters {
-        base_color: Rgb::WHITE,
-        metallic: bit(0),
-        roughness: bit(1),
-        anisotropic: bit(2),
-        ior: PrincipledParameters::ior_of_specular(bit(3)),
-        specular_tint: bit(4),
-        sheen: bit(5),
-        clearcoat: bit(6),
-        clearcoat_gloss: bit(7),
-        subsurface: bit(8),
-        transmission: bit(9),
-        thin,
-        diffuse_transmission: if thin { 0.5 } else { 0.0 },
-        ..PrincipledParameters::default()
-    };
+    let parameters = PrincipledParameters::white_corner(bits);
     // Glass has an index of at least 1.05.
-    let ior = if thin { 1.0 } else { parameters.ior.max(1.05) };
+    let ior = if parameters.thin { 1.0 } else { parameters.ior.max(1.05) };
     Material { ior, ..Material::new(format!("principled corner {bits:011b}"), principled(&parameters)) }
 }
 
