@@ -182,6 +182,7 @@ impl TriangleRay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Rng;
 
     const UNIT: TrianglePoints = TrianglePoints { a: Vec3::ZERO, b: Vec3::X, c: Vec3::Y };
 
@@ -217,5 +218,33 @@ mod tests {
             assert!((s.p.x - f64::from(s.u)).abs() < 1e-7 && (s.p.y - f64::from(s.v)).abs() < 1e-7);
             assert_eq!(s.pdf_area, 2.0);
         }
+    }
+
+    #[test]
+    fn sides_of_edges_are_those_of_exact_predicates() {
+        let mut rng = Rng::new(21);
+        let exact = |p: DVec3| robust::Coord3D { x: p.x, y: p.y, z: p.z };
+        let (mut hits, mut misses) = (0, 0);
+        for i in 0..200_000 {
+            let mut point = |reach: f64| (rng.cube() * reach).as_vec3();
+            let [a, b, c] = [(); 3].map(|()| point(1.0));
+            let origin = point(if i % 2 == 0 { 4.0 } else { 1e4 });
+            // At a point of an edge, up to the rounding of the direction.
+            let target = a.as_dvec3().lerp(b.as_dvec3(), rng.unit());
+            let ray = Ray::new(origin, (target - origin.as_dvec3()).as_vec3());
+            // The sum of two f32 of about one size is exact in f64.
+            let [from, to] = [ray.origin.as_dvec3(), ray.origin.as_dvec3() + ray.direction.as_dvec3()].map(exact);
+            let side = |p: Vec3, q: Vec3| robust::orient3d(from, to, exact(p.as_dvec3()), exact(q.as_dvec3()));
+            let sides = [side(b, c), side(c, a), side(a, b)];
+            let hit = TrianglePoints { a, b, c }.intersect(&ray).is_some();
+            if sides.iter().all(|s| *s > 0.0) || sides.iter().all(|s| *s < 0.0) {
+                hits += 1;
+                assert!(hit, "{ray:?} {a} {b} {c} {sides:?}");
+            } else if sides.iter().any(|s| *s > 0.0) && sides.iter().any(|s| *s < 0.0) {
+                misses += 1;
+                assert!(!hit, "{ray:?} {a} {b} {c} {sides:?}");
+            }
+        }
+        assert!(hits > 50_000 && misses > 50_000, "{hits} {misses}");
     }
 }

@@ -201,16 +201,15 @@ pub fn camera_rays(geometry: &Geometry, resolution: usize) -> Vec<Ray> {
     (0..blocks * 16).map(pixel).collect()
 }
 
-/// Whether two hits of `ray` are the same within rounding: 8 ulp of t and 4 roundoffs of the reach, over the cosine with the surface.
+/// Whether two hits of `ray` are the same within rounding: 8 ulp of t, and over the cosine with the surface 4 roundoffs of the reach and the
+/// error with which an accelerator may see the surface (in the space of an instance rays are rounded anew).
 pub fn same(geometry: &Geometry, ray: &Ray, a: &Hit, b: &Hit) -> bool {
     let length = f64::from(ray.direction.length());
     let slack = |hit: &Hit| {
-        let cosine = geometry.interaction(ray, hit).map_or(1.0, |si| f64::from(si.n_g.dot(ray.direction).abs()) / length);
-        let origin = f64::from(ray.origin.abs().max_element());
-        // What moves is rounded in its place: rays in the space of instances, vertices between two times.
-        let deforming = matches!(geometry.shape(hit.shape), Shape::Mesh(mesh) if mesh.is_deforming());
-        let placed = if hit.instance == Hit::NO_INSTANCE && !deforming { 0.0 } else { origin };
-        16.0 * UNIT_ROUNDOFF * f64::from(hit.t) + 4.0 * UNIT_ROUNDOFF * (reach(geometry, ray, hit) + placed) / (length * cosine.max(1e-6))
+        let seen = geometry.interaction(ray, hit).map(|si| (f64::from(si.n_g.dot(ray.direction).abs()) / length, f64::from(si.error)));
+        let (cosine, error) = seen.unwrap_or((1.0, 0.0));
+        let off_plane = 4.0 * UNIT_ROUNDOFF * reach(geometry, ray, hit) + error;
+        16.0 * UNIT_ROUNDOFF * f64::from(hit.t) + off_plane / (length * cosine.max(1e-6))
     };
     (f64::from(a.t) - f64::from(b.t)).abs() <= slack(a) + slack(b)
 }

@@ -21,7 +21,8 @@ use crate::math::{DVec3, Ray};
 checks! {
     "F1" f1_closest_hits "closest hits are the oracle's":
         "19 scenes: soups, bumpy, tiny, far and sliver meshes, overlaps, stairs, analytic shapes, instances, motion, nothing; camera, bounce, shadow, \
-         random, axis-parallel and grazing rays (Mitsuba, test_kdtrees; CGAL, aabb_naive_vs_tree_triangle_test)";
+         random, axis-parallel and grazing rays; Embree's distances within 8 ulp, and over the cosine 4 roundoffs of the reach and the bound on \
+         the surface's error (Mitsuba, test_kdtrees; CGAL, aabb_naive_vs_tree_triangle_test)";
     "F2" f2_ties "ties go to the lowest ids":
         "three equal grids in one plane, rays through every corner and every middle of an edge (Embree, next_hit)";
     "F3" f3_any_hit "any hit means that there is a closest hit":
@@ -122,18 +123,10 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let outcome = Outcome::new().tell("rays", rays as f64).tell("hits", hits as f64).none("scenes hardly hit", poor);
     let outcome =
         ours.into_iter().fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
-    let outcome = outcome
-        .at_most(
-            "Embree's distances beyond 8 ulp and 4 roundoffs of the reach, in a million hits",
-            1e6 * embree.distances as f64 / hits as f64,
-            10.0,
-        )
+    outcome
+        .none("Embree's distances beyond their rounding", embree.distances)
         .none("rays that only Embree, or only the oracle, says to hit", embree.flags)
-        .tell("Embree's other primitives at the same distance", embree.ties as f64);
-    if embree.distances == 0 {
-        return outcome;
-    }
-    outcome.short(format!("{} of {hits} distances of Embree differ by more from the oracle's; what sets these rays apart has not been found; wished for is none", embree.distances))
+        .tell("Embree's other primitives at the same distance", embree.ties as f64)
 }
 
 fn f2_ties(_: Effort) -> Outcome {
@@ -199,13 +192,13 @@ fn f3_any_hit(effort: Effort) -> Outcome {
             }
         }
     }
-    // One ray in a million was seen; what sets it apart has not been found.
+    // A ray through an edge, nearly parallel to a side of the box around the triangle, may enter that box some ulp behind the triangle's own distance.
     let told = Outcome::new().tell("rays", total as f64);
     let judged = |told: Outcome, (name, wrong): (&str, usize)| {
         match (name, wrong) {
         ("embree", 1..) => told
             .at_most("contradictions of embree in a million rays", 1e6 * wrong as f64 / total as f64, 10.0)
-            .short(format!("{wrong} of {total} rays get answers of Embree that do not fit each other; what sets them apart has not been found; wished for is none")),
+            .short(format!("{wrong} of {total} rays pass an edge nearly parallel to a side of the box around its triangle, a fraction of a rounding outside: Embree enters the box behind the distance of its own hit (by 75 ulp on one ray), so that an interval cut there leaves the hit out; wished for is none")),
         _ => told.none(format!("contradictions of {name}"), wrong),
     }
     };
