@@ -253,7 +253,7 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
     let plane = grid(-0.5 * (x + y), x, y, 100, |_, _| 0.0);
     let geometry = meshes(vec![plane.clone()]);
     let accels: Vec<Named> = accelerators(&geometry);
-    let (mut rays, mut missed, mut wrong, mut other, mut off) = (0, 0, 0, 0, 0f64);
+    let (mut rays, mut missed, mut missed_by_embree, mut wrong, mut other, mut off) = (0, 0usize, 0usize, 0, 0, 0f64);
     for _ in 0..effort.pick(4_000, 1_000_000) {
         let prim = rng.below(plane.triangles().len());
         let [a, b, c] = corners(&plane, prim);
@@ -261,14 +261,16 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
         let ray = ray_through(1e6 * rng.cube(), centroid);
         let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
         let sine = direction.normalize().dot(n).abs();
-        if sine < 0.1 || centroid.abs().max_element() > 45.0 {
+        // Not so near the border that a rounded ray passes beside it.
+        let inside = [x, y].iter().all(|axis| centroid.dot(*axis).abs() <= 45.0 * axis.length());
+        if sine < 0.1 || !inside {
             continue;
         }
         rays += 1;
         let p = origin + direction * (n.dot(a - origin) / n.dot(direction));
         for (name, accel) in &accels {
             let Some(found) = accel.intersect(&ray).map(|hit| hit.prim.index()) else {
-                missed += 1;
+                *(if *name == "embree" { &mut missed_by_embree } else { &mut missed }) += 1;
                 continue;
             };
             // On the way into the plane the distance from the ray grows by the inverse sine.
@@ -284,7 +286,9 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
     }
     Outcome::new()
         .at_least("rays", f64::from(rays), 1_000.0)
-        .none("missed", missed)
+        .none("missed by ours", missed)
+        // At 1e6 corners less the origin lie on a grid of 1/16, so that some rays meet corners exactly, of which Embree loses a few (A5).
+        .at_most("fraction missed by Embree", missed_by_embree as f64 / f64::from(rays), 2e-5)
         .none("other triangles than the ray meets, ours", wrong)
         // Corners less the origin have one unit of roundoff, the edge functions made of them up to seven more.
         .at_most("embree: distance of the ray from the triangle found, units of roundoff of the origin", off, 8.0)

@@ -148,10 +148,13 @@ pub(super) fn c4_derivatives(effort: Effort) -> Outcome {
             let Some(s) = hit_from_above(&shape, sample.p, sample.n) else { continue };
             for (step, expected) in [(s.dp_du, [1.0, 0.0]), (s.dp_dv, [0.0, 1.0])] {
                 slope = slope.max(step.dot(s.n).abs() / step.length());
+                // To both sides, since on one of them may be a joint of a profile.
                 let eps = 1e-5;
-                let Some(moved) = hit_from_above(&shape, s.p + eps * step, s.n) else { continue };
+                let moved = [eps, -eps].map(|eps| hit_from_above(&shape, s.p + eps * step, s.n).map(|moved| (eps, moved)));
+                let [Some(ahead), Some(behind)] = moved else { continue };
                 for (k, expected) in expected.iter().enumerate() {
-                    change = change.max(((moved.uv[k] - s.uv[k]) / eps - expected).abs());
+                    let error = |(eps, moved): &(f64, LocalSurface)| ((moved.uv[k] - s.uv[k]) / eps - expected).abs();
+                    change = change.max(error(&ahead).min(error(&behind)));
                 }
                 tried += 1;
             }

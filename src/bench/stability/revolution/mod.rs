@@ -201,7 +201,7 @@ fn d9_nearest_first(effort: Effort) -> Outcome {
                 None => lost += 1,
             }
         }
-        behind += usize::from(shape.intersect(&endless(ray.origin + ray.direction * 1e3, ray.direction)).is_some());
+        behind += usize::from(shape.intersect(&endless(ray.origin + ray.direction.normalize() * 1e3, ray.direction)).is_some());
     }
     Outcome::new()
         .none("hits out of order", disordered)
