@@ -96,7 +96,7 @@ impl Conductor {
     }
 
     /// A reflection at a visible normal, or by the cosine for light scattered several times.
-    #[inline(always)]
+    #[inline]
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         if wo.z.abs() <= MIN_COSINE {
             return None;

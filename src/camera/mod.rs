@@ -131,7 +131,7 @@ impl Camera {
 
     /// The ray through `film`, in pixels from the upper left corner of a picture of `size` pixels, from the point of the lens that `lens_u`
     /// (in the unit square) chooses, at a [time](Self::time). The direction is unit.
-    #[inline(always)]
+    #[inline]
     pub fn ray(&self, film: Vec2, size: [u32; 2], lens_u: [f32; 2], time: f32) -> Ray {
         let (mut origin, direction) = match &self.projection {
             Projection::Perspective { half_height, lens } => {

@@ -62,7 +62,7 @@ impl Filter {
     }
 
     /// An offset chosen in proportion to the filter's absolute value.
-    #[inline(always)]
+    #[inline]
     pub fn sample(&self, u: [f32; 2]) -> FilterSample {
         match &self.kernel {
             Kernel::Box { radius } => {

@@ -183,7 +183,7 @@ impl AreaLight {
     }
 
     /// Light that arrives at `p` from a chosen point of the surface; `None` where `p` sees the dark side.
-    #[inline(always)]
+    #[inline]
     pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
         if !self.emission.is_even() {
             return self.sample_textured(geometry, textures, p, u);
