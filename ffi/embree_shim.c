@@ -102,7 +102,7 @@ RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *sha
 }
 
 static void filter(const struct RTCFilterFunctionNArguments *args) {
-    const struct StCutout *cutout = args->geometryUserPtr;
+    const struct StFilter *filter_data = args->geometryUserPtr;
     const unsigned n = args->N;
     const float *rays = (const float *)args->ray;
     const float *reals = (const float *)args->hit;
@@ -114,13 +114,13 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
             ray.t_max, reals[U * n + lane], reals[V * n + lane],
             ids[PRIM_ID * n + lane], ids[GEOM_ID * n + lane], ids[INST_ID * n + lane],
         };
-        if (!cutout->counts(cutout->user, &ray, key_of_lane(rays, n, lane), &hit)) args->valid[lane] = 0;
+        if (!filter_data->counts(filter_data->user, &ray, key_of_lane(rays, n, lane), &hit)) args->valid[lane] = 0;
     }
 }
 
-void st_set_cutout(RTCGeometry triangles, const struct StCutout *cutout) {
-    rtcSetGeometryUserData(triangles, (void *)cutout);
-    if (!cutout->any_hit_only) rtcSetGeometryIntersectFilterFunction(triangles, filter);
+void st_set_filter(RTCGeometry triangles, const struct StFilter *filter_data) {
+    rtcSetGeometryUserData(triangles, (void *)filter_data);
+    if (!filter_data->any_hit_only) rtcSetGeometryIntersectFilterFunction(triangles, filter);
     rtcSetGeometryOccludedFilterFunction(triangles, filter);
 }
 
@@ -170,13 +170,13 @@ void st_fill16(struct RTCRay16 *packet, const struct StRay *rays) {
 static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit, unsigned instance);
 static void trace_any(RTCScene scene, struct RTCRay *ray, unsigned instance);
 
-static void moving_bounds(const struct RTCBoundsFunctionArguments *args) {
-    const struct StMovingInstance *instance = args->geometryUserPtr;
+static void entered_bounds(const struct RTCBoundsFunctionArguments *args) {
+    const struct StEnteredInstance *instance = args->geometryUserPtr;
     set_bounds(args->bounds_o, instance->lower, instance->upper);
 }
 
-static void moving_intersect(const struct RTCIntersectFunctionNArguments *args) {
-    const struct StMovingInstance *instance = args->geometryUserPtr;
+static void entered_intersect(const struct RTCIntersectFunctionNArguments *args) {
+    const struct StEnteredInstance *instance = args->geometryUserPtr;
     const unsigned n = args->N;
     float *rays = (float *)args->rayhit;
     float *reals = rays + HIT * n;
@@ -203,8 +203,8 @@ static void moving_intersect(const struct RTCIntersectFunctionNArguments *args) 
     }
 }
 
-static void moving_occluded(const struct RTCOccludedFunctionNArguments *args) {
-    const struct StMovingInstance *instance = args->geometryUserPtr;
+static void entered_occluded(const struct RTCOccludedFunctionNArguments *args) {
+    const struct StEnteredInstance *instance = args->geometryUserPtr;
     const unsigned n = args->N;
     float *rays = (float *)args->ray;
     for (unsigned lane = 0; lane < n; lane++) {
@@ -219,8 +219,8 @@ static void moving_occluded(const struct RTCOccludedFunctionNArguments *args) {
     }
 }
 
-RTCGeometry st_new_moving_instance(RTCDevice device, const struct StMovingInstance *instance) {
-    return new_user_geometry(device, instance, moving_bounds, moving_intersect, moving_occluded);
+RTCGeometry st_new_entered_instance(RTCDevice device, const struct StEnteredInstance *instance) {
+    return new_user_geometry(device, instance, entered_bounds, entered_intersect, entered_occluded);
 }
 
 #if RTC_VERSION_MAJOR == 3

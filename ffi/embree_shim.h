@@ -45,12 +45,12 @@ struct StUserShape {
 };
 
 /*
- * Writes `ray` in the space of an instance that moves, at the ray's time; false if it cannot be traced there.
+ * Writes `ray` in the space of an instance, at the ray's time; false if it cannot be traced there.
  */
 typedef bool (*StEnter)(const void *instance, const struct StRay *ray, struct StRay *inside);
 
-/* The user data of an instance that moves. It must outlive the geometry. */
-struct StMovingInstance {
+/* The user data of an instance whose rays we map ourselves: it moves, or stretches unevenly. It must outlive the geometry. */
+struct StEnteredInstance {
     const void *instance;
     StEnter enter;
     RTCScene object;
@@ -58,21 +58,21 @@ struct StMovingInstance {
     float upper[3];
 };
 
-/* A new, committed geometry of one moving instance; null on an error. Its hits name the geometry's number as their instance. */
-RTCGeometry st_new_moving_instance(RTCDevice device, const struct StMovingInstance *instance);
+/* A new, committed geometry of one such instance; null on an error. Its hits name the geometry's number as their instance. */
+RTCGeometry st_new_entered_instance(RTCDevice device, const struct StEnteredInstance *instance);
 
 /* A new, committed geometry of one user primitive; null on an error. */
 RTCGeometry st_new_user_geometry(RTCDevice device, const struct StUserShape *shape);
 
 /* The user data of triangles with holes or slivers. It must outlive the geometry. */
-struct StCutout {
+struct StFilter {
     const void *user;
     StCounts counts;
     bool any_hit_only;
 };
 
-/* Lets hits of triangles (or only those of any-hit queries) count only where `cutout` says so. To be called before the geometry is committed. */
-void st_set_cutout(RTCGeometry triangles, const struct StCutout *cutout);
+/* Lets hits of triangles (or only those of any-hit queries) count only where `filter_data` says so. To be called before the geometry is committed. */
+void st_set_filter(RTCGeometry triangles, const struct StFilter *filter_data);
 
 /* Room for what Embree is called with. The caller owns it, so that the calls below are jumps and cost no frame of their own. */
 struct StQuery {

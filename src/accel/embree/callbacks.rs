@@ -63,12 +63,12 @@ pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *co
 }
 
 /// A shape with holes or slivers, as the user data of its geometry.
-pub(super) struct Cutout {
+pub(super) struct Filter {
     geometry: *const Geometry,
     shape: ShapeId,
 }
 
-impl Cutout {
+impl Filter {
     /// The user data of a shape of `geometry`.
     pub(super) fn new(geometry: &Geometry, shape: ShapeId) -> Self {
         Self { geometry, shape }
@@ -87,30 +87,30 @@ impl Cutout {
     }
 }
 
-/// As [`intersect_placed`] for the [`Cutout`] of an analytic shape: hits in its holes do not count.
-pub(super) unsafe extern "C" fn intersect_cutout(cutout: *const c_void, ray: *const sys::StRay, key: u32, instance: u32) -> f32 {
-    // SAFETY: `cutout` was made from a `&Cutout` that the accelerator owns; the ray as in `intersect_placed`.
-    let (cutout, ray) = unsafe { (&*cutout.cast::<Cutout>(), &*ray.cast::<Ray>()) };
+/// As [`intersect_placed`] for the [`Filter`] of an analytic shape: hits in its holes do not count.
+pub(super) unsafe extern "C" fn intersect_cutout(filter: *const c_void, ray: *const sys::StRay, key: u32, instance: u32) -> f32 {
+    // SAFETY: `filter` was made from a `&Filter` that the accelerator owns; the ray as in `intersect_placed`.
+    let (filter, ray) = unsafe { (&*filter.cast::<Filter>(), &*ray.cast::<Ray>()) };
     // SAFETY: the accelerator borrows the geometry.
-    let geometry = unsafe { cutout.geometry() };
-    let instance = Cutout::instance(geometry, instance);
-    geometry.intersect_prim(ray, key, cutout.shape, PrimId(0), instance).map_or(-1.0, |hit| hit.t)
+    let geometry = unsafe { filter.geometry() };
+    let instance = Filter::instance(geometry, instance);
+    geometry.intersect_prim(ray, key, filter.shape, PrimId(0), instance).map_or(-1.0, |hit| hit.t)
 }
 
-/// Whether a hit of a triangle of the [`Cutout`] behind `user` counts.
+/// Whether a hit of a triangle of the [`Filter`] behind `user` counts.
 pub(super) unsafe extern "C" fn counts(user: *const c_void, ray: *const sys::StRay, key: u32, hit: *const sys::StHit) -> bool {
     // SAFETY: as in `intersect_cutout`; `hit` points to a hit on the shim's stack.
-    let (cutout, ray, hit) = unsafe { (&*user.cast::<Cutout>(), &*ray.cast::<Ray>(), &*hit) };
+    let (filter, ray, hit) = unsafe { (&*user.cast::<Filter>(), &*ray.cast::<Ray>(), &*hit) };
     // SAFETY: the accelerator borrows the geometry.
-    let geometry = unsafe { cutout.geometry() };
+    let geometry = unsafe { filter.geometry() };
     let prim = PrimId(hit.prim);
-    if let Shape::Mesh(mesh) = geometry.shape(cutout.shape)
+    if let Shape::Mesh(mesh) = geometry.shape(filter.shape)
         && mesh.has_slivers()
         && !mesh.confirms_hit(prim, ray)
     {
         return false;
     }
-    let instance = Cutout::instance(geometry, hit.instance);
-    let hit = Hit { t: hit.t, u: hit.u, v: hit.v, shape: cutout.shape, prim, instance };
+    let instance = Filter::instance(geometry, hit.instance);
+    let hit = Hit { t: hit.t, u: hit.u, v: hit.v, shape: filter.shape, prim, instance };
     geometry.cutouts.counts(&geometry.shapes, key, ray, &hit)
 }

@@ -21,7 +21,7 @@ use crate::math::{Aabb, Ray};
 use device::Device;
 use gate::Gate;
 use packet::{HitPacket, INVALID, ShadowPacket, Tracer, WIDTH};
-use scene::{GeometryHandle, MovingInstances, Scene, SceneBuilder, UserShapes};
+use scene::{EnteredInstances, GeometryHandle, Scene, SceneBuilder, UserShapes};
 use sys::StHit;
 
 /// How much effort Embree's build makes.
@@ -56,12 +56,12 @@ impl Default for EmbreeOptions {
 /// What a scene makes Embree call back for, or keep beside triangles at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Registered {
-    /// Meshes with a filter for holes.
+    /// Meshes with a filter for holes or slivers.
     pub filters: usize,
     /// Analytic shapes.
     pub user_geometries: usize,
-    /// Instances that move.
-    pub moving_instances: usize,
+    /// Instances that move or stretch unevenly.
+    pub entered_instances: usize,
     /// Positions of deforming meshes after the first.
     pub time_steps: usize,
 }
@@ -73,7 +73,7 @@ pub struct EmbreeAccel<'g> {
     // Dropped in this order: the scene inside refers to the user data, to the objects' scenes and to the device.
     tracer: Tracer,
     user_shapes: UserShapes,
-    moving: MovingInstances,
+    entered: EnteredInstances,
     _objects: Vec<Scene>,
     device: Device,
     geometry: &'g Geometry,
@@ -99,10 +99,10 @@ impl<'g> EmbreeAccel<'g> {
         let user_shapes = UserShapes::new(geometry);
         let shapes = shape_handles(geometry, &device, &user_shapes)?;
         let objects = object_scenes(geometry, &device, &shapes, options)?;
-        let moving = MovingInstances::new(geometry, &objects);
-        let scene = build_world(geometry, &device, &shapes, &objects, &moving, options)?;
+        let entered = EnteredInstances::new(geometry, &objects);
+        let scene = build_world(geometry, &device, &shapes, &objects, &entered, options)?;
         let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty(), cutouts: geometry.cutouts.clone() };
-        Ok(Self { tracer, user_shapes, moving, _objects: objects, device, geometry, bounds: geometry.bounds() })
+        Ok(Self { tracer, user_shapes, entered, _objects: objects, device, geometry, bounds: geometry.bounds() })
     }
 
     /// What Embree calls back for, or keeps beside triangles at rest.
@@ -110,7 +110,7 @@ impl<'g> EmbreeAccel<'g> {
         let [filters, user_geometries] = self.user_shapes.counts();
         let meshes = self.geometry.shapes.iter().filter_map(|shape| if let Shape::Mesh(mesh) = shape { Some(mesh) } else { None });
         let time_steps = meshes.map(|mesh| mesh.padded_steps().count() - 1).sum();
-        Registered { filters, user_geometries, moving_instances: self.moving.count(), time_steps }
+        Registered { filters, user_geometries, entered_instances: self.entered.count(), time_steps }
     }
 
     /// Gives everything back and tells how many bytes Embree holds after that: none, if it works.
@@ -165,16 +165,16 @@ fn build_world(
     device: &Device,
     shapes: &[Option<GeometryHandle>],
     objects: &[Scene],
-    moving: &MovingInstances,
+    entered: &EnteredInstances,
     options: EmbreeOptions,
 ) -> Result<Scene> {
     let mut world = SceneBuilder::new(device, options)?;
     scene::attach_shapes(&mut world, shapes, &geometry.world, |_, id| id.index())?;
     for (i, instance) in geometry.instances.iter().enumerate() {
-        let handle = match moving.get(i) {
+        let handle = match entered.get(i) {
             None => GeometryHandle::of_instance(device, &objects[instance.object.index()], instance)?,
             // SAFETY: the accelerator borrows the geometry, owns the rest, and drops its scene first.
-            Some(user) => unsafe { GeometryHandle::of_moving_instance(device, user) }?,
+            Some(user) => unsafe { GeometryHandle::of_entered_instance(device, user) }?,
         };
         world.attach(&handle, geometry.shapes.len() + i)?;
     }

@@ -4,7 +4,7 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use super::callbacks::{Cutout, counts, enter_instance, intersect_cutout, intersect_placed};
+use super::callbacks::{Filter, counts, enter_instance, intersect_cutout, intersect_placed};
 use super::device::Device;
 use super::{EmbreeOptions, EmbreeQuality, sys};
 use crate::error::{Error, Result};
@@ -17,9 +17,9 @@ pub(super) enum UserData {
     /// Triangles of which every hit counts.
     Triangles,
     /// Triangles with holes or slivers.
-    FilteredTriangles(sys::StCutout, #[allow(dead_code)] Box<Cutout>),
+    FilteredTriangles(sys::StFilter, #[allow(dead_code)] Box<Filter>),
     /// An analytic shape, with its own data where it has holes.
-    Analytic(sys::StUserShape, #[allow(dead_code)] Option<Box<Cutout>>),
+    Analytic(sys::StUserShape, #[allow(dead_code)] Option<Box<Filter>>),
 }
 
 /// The user data of every shape, by [`ShapeId`].
@@ -37,29 +37,29 @@ impl UserShapes {
             let id = ShapeId::new(i);
             let has_holes = geometry.cutouts.has_holes(id);
             let has_slivers = matches!(shape, Shape::Mesh(mesh) if mesh.has_slivers());
-            let cutout = (has_holes || has_slivers).then(|| Box::new(Cutout::new(geometry, id)));
-            match (shape, cutout) {
+            let filter = (has_holes || has_slivers).then(|| Box::new(Filter::new(geometry, id)));
+            match (shape, filter) {
                 (Shape::Mesh(_), None) => UserData::Triangles,
-                (Shape::Mesh(_), Some(cutout)) => {
+                (Shape::Mesh(_), Some(filter)) => {
                     // Whoever asks for closest hits confirms them.
-                    let user = std::ptr::from_ref(&*cutout).cast::<c_void>();
-                    let raw = sys::StCutout { user, counts: Some(counts), any_hit_only: !has_holes };
-                    UserData::FilteredTriangles(raw, cutout)
+                    let user = std::ptr::from_ref(&*filter).cast::<c_void>();
+                    let raw = sys::StFilter { user, counts: Some(counts), any_hit_only: !has_holes };
+                    UserData::FilteredTriangles(raw, filter)
                 }
-                (Shape::Analytic(placed), cutout) => {
+                (Shape::Analytic(placed), filter) => {
                     let Aabb { min, max } = placed.bounds().padded();
                     let (lower, upper) = (min.to_array(), max.to_array());
-                    let raw = match &cutout {
+                    let raw = match &filter {
                         None => {
                             let shape = std::ptr::from_ref(placed).cast::<c_void>();
                             sys::StUserShape { shape, intersect: Some(intersect_placed), lower, upper }
                         }
-                        Some(cutout) => {
-                            let shape = std::ptr::from_ref(&**cutout).cast::<c_void>();
+                        Some(filter) => {
+                            let shape = std::ptr::from_ref(&**filter).cast::<c_void>();
                             sys::StUserShape { shape, intersect: Some(intersect_cutout), lower, upper }
                         }
                     };
-                    UserData::Analytic(raw, cutout)
+                    UserData::Analytic(raw, filter)
                 }
             }
         };
@@ -80,14 +80,14 @@ impl UserShapes {
 
 /// The user data of the instances that move or stretch unevenly, into whose space we move the rays ourselves; the others have none. Embree
 /// keeps addresses into it.
-pub(super) struct MovingInstances(Vec<Option<sys::StMovingInstance>>);
+pub(super) struct EnteredInstances(Vec<Option<sys::StEnteredInstance>>);
 
 // SAFETY: the pointers inside lead to the geometry and to Embree's scenes, and are only read through, which both allow from any thread.
-unsafe impl Send for MovingInstances {}
+unsafe impl Send for EnteredInstances {}
 // SAFETY: as above.
-unsafe impl Sync for MovingInstances {}
+unsafe impl Sync for EnteredInstances {}
 
-impl MovingInstances {
+impl EnteredInstances {
     /// The table for `geometry`, over the committed scenes of its objects, which must live as long.
     pub(super) fn new(geometry: &Geometry, objects: &[Scene]) -> Self {
         let of = |instance: &Instance| {
@@ -97,7 +97,7 @@ impl MovingInstances {
             let object = geometry.object(instance.object);
             let inside = object.shapes.iter().fold(Aabb::EMPTY, |b, &id| b.union(&geometry.shape(id).bounds()));
             let Aabb { min, max } = instance.bounds(&inside);
-            Some(sys::StMovingInstance {
+            Some(sys::StEnteredInstance {
                 instance: std::ptr::from_ref(instance).cast::<c_void>(),
                 enter: Some(enter_instance),
                 object: objects[instance.object.index()].handle(),
@@ -108,13 +108,13 @@ impl MovingInstances {
         Self(geometry.instances.iter().map(of).collect())
     }
 
-    /// How many instances move.
+    /// How many there are.
     pub(super) fn count(&self) -> usize {
         self.0.iter().flatten().count()
     }
 
     /// The entry of one instance.
-    pub(super) fn get(&self, index: usize) -> Option<&sys::StMovingInstance> {
+    pub(super) fn get(&self, index: usize) -> Option<&sys::StEnteredInstance> {
         self.0[index].as_ref()
     }
 }
@@ -136,7 +136,7 @@ impl GeometryHandle {
             // SAFETY: the caller keeps the mesh alive.
             (Shape::Mesh(mesh), UserData::Triangles) => unsafe { Self::of_mesh(device, mesh, None) },
             // SAFETY: the caller keeps the mesh and the user data alive.
-            (Shape::Mesh(mesh), UserData::FilteredTriangles(cutout, _)) => unsafe { Self::of_mesh(device, mesh, Some(cutout)) },
+            (Shape::Mesh(mesh), UserData::FilteredTriangles(filter, _)) => unsafe { Self::of_mesh(device, mesh, Some(filter)) },
             (Shape::Analytic(_), UserData::Analytic(user, _)) => {
                 // SAFETY: the device is alive; the caller keeps the user data alive.
                 let handle = unsafe { sys::st_new_user_geometry(device.handle(), user) };
@@ -150,7 +150,7 @@ impl GeometryHandle {
     ///
     /// # Safety
     /// As for [`of_shape`](Self::of_shape).
-    unsafe fn of_mesh(device: &Device, mesh: &Mesh, cutout: Option<&sys::StCutout>) -> Result<Self> {
+    unsafe fn of_mesh(device: &Device, mesh: &Mesh, filter: Option<&sys::StFilter>) -> Result<Self> {
         // SAFETY: the device is alive.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
         let this = Self::new(device, handle)?;
@@ -164,8 +164,8 @@ impl GeometryHandle {
             }
             let triangles = mesh.triangles();
             this.share(sys::RTC_BUFFER_TYPE_INDEX, 0, sys::RTC_FORMAT_UINT3, triangles.as_ptr().cast(), triangles.len());
-            if let Some(cutout) = cutout {
-                sys::st_set_cutout(handle, cutout);
+            if let Some(filter) = filter {
+                sys::st_set_filter(handle, filter);
             }
             sys::rtcCommitGeometry(handle);
         }
@@ -185,9 +185,9 @@ impl GeometryHandle {
     ///
     /// # Safety
     /// The user data, the instance and the scene it names must outlive every scene the geometry is attached to, and must not move.
-    pub(super) unsafe fn of_moving_instance(device: &Device, user: &sys::StMovingInstance) -> Result<Self> {
+    pub(super) unsafe fn of_entered_instance(device: &Device, user: &sys::StEnteredInstance) -> Result<Self> {
         // SAFETY: the device is alive; the caller keeps the rest alive.
-        let handle = unsafe { sys::st_new_moving_instance(device.handle(), user) };
+        let handle = unsafe { sys::st_new_entered_instance(device.handle(), user) };
         Self::new(device, handle)
     }
 

@@ -37,7 +37,7 @@ fn rays(scene: &Value) -> [u64; 2] {
 
 pub(super) fn r7_pay_for_use(_: Effort) -> Outcome {
     let (nothing, unused) = registered(&plain());
-    let total = |r: Registered| r.filters + r.user_geometries + r.moving_instances + r.time_steps;
+    let total = |r: Registered| r.filters + r.user_geometries + r.entered_instances + r.time_steps;
 
     // Each feature alone registers what it needs, and no other does.
     let path = json!([{ "time": 0 }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }]);
@@ -50,7 +50,7 @@ pub(super) fn r7_pay_for_use(_: Effort) -> Outcome {
     let cases = [
         (holes, Registered { filters: 1, ..none }),
         (analytic, Registered { user_geometries: 1, ..none }),
-        (moving, Registered { moving_instances: 1, ..none }),
+        (moving, Registered { entered_instances: 1, ..none }),
         (deforming, Registered { time_steps: 1, ..none }),
     ];
     let other = cases.iter().filter(|(scene, expected)| registered(scene).0 != *expected).count();

@@ -1,3 +1,0 @@
-//! Scenes written as JSON values, rendered and judged.
-
-pub use steradian::bench::stability::render::*;
