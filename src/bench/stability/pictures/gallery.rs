@@ -6,7 +6,7 @@ use std::path::Path;
 use super::{Effort, Outcome, luminance};
 use crate::accel::AccelKind;
 use crate::bench::stability::render::{Prepared, render_with};
-use crate::error::Result;
+use crate::error::{ErrorKind, Result};
 use crate::film::Image;
 use crate::render::{Overrides, Settings};
 use crate::{compile, import};
@@ -70,20 +70,24 @@ fn examine(desc: &crate::desc::SceneDesc, path: &Path, effort: Effort) -> Result
     Ok(found)
 }
 
-/// The scenes of the folder `scenes`, if it is there; those that do not load lack a mesh that a script fetches.
-fn from_folder(effort: Effort) -> Vec<(String, Found)> {
+/// What was found in each scene, by its name.
+type Scenes = Vec<(String, Result<Found>)>;
+
+/// The scenes of the folder `scenes`, if it is there, but those whose meshes a script would have to fetch.
+fn from_folder(effort: Effort) -> Scenes {
     let entries = fs::read_dir("scenes").into_iter().flatten().flatten();
     let mut paths: Vec<_> = entries.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|e| e == "json")).collect();
     paths.sort();
     let name = |path: &Path| path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let found = |path: &Path| import::load_scene(path).and_then(|desc| examine(&desc, path, effort));
-    paths.iter().filter_map(|path| Some((name(path), found(path).ok()?))).collect()
+    let is_there = |found: &Result<Found>| !matches!(found, Err(e) if e.kind() == ErrorKind::AssetMissing);
+    paths.iter().map(|path| (name(path), found(path))).filter(|(_, found)| is_there(found)).collect()
 }
 
-fn built_in(effort: Effort) -> Vec<(String, Found)> {
+fn built_in(effort: Effort) -> Scenes {
     let path = Path::new("scene.json");
     let found = |text: &str| import::parse_scene(text, path).and_then(|desc| examine(&desc, path, effort));
-    BUILT_IN.iter().filter_map(|(name, text)| Some(((*name).to_owned(), found(text).ok()?))).collect()
+    BUILT_IN.iter().map(|(name, text)| ((*name).to_owned(), found(text))).collect()
 }
 
 pub(super) fn r8_gallery(effort: Effort) -> Outcome {
@@ -92,10 +96,13 @@ pub(super) fn r8_gallery(effort: Effort) -> Outcome {
     if scenes.is_empty() {
         scenes = built_in(effort);
     }
+    let all = scenes.len();
+    let scenes: Vec<(String, Found)> = scenes.into_iter().filter_map(|(name, found)| Some((name, found.ok()?))).collect();
     let invalid: u64 = scenes.iter().map(|(_, found)| found.invalid).sum();
     let share = |found: &Found| found.fireflies as f64 / found.pixels as f64;
     let mut outcome = Outcome::new()
         .at_least("scenes rendered", scenes.len() as f64, BUILT_IN.len() as f64)
+        .none("scenes that end in an error", all - scenes.len())
         .tell("of them from the folder scenes", from_folder as f64)
         .at_most("samples and pixels that are not finite", invalid as f64, 0.0);
     // What R5 leaves out of its error too: a thousandth.
