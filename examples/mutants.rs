@@ -99,11 +99,10 @@ fn survivals<'a>(tree: &Path, mutant: &'a Mutant) -> Result<Vec<&'a str>> {
 fn run_tests(tree: &Path, tests: &[&str]) -> Result<Ending> {
     let (of_tests, of_library): (Vec<&str>, Vec<&str>) = tests.iter().partition(|test| test.starts_with("tests::"));
     let mut ending = Ending::Passed;
-    for (target, names) in [(["--lib", "--lib"], of_library), (["--test", "tests"], of_tests)] {
+    for (target, names) in [(&["--lib"][..], of_library), (&["--test", "tests"], of_tests)] {
         if names.is_empty() {
             continue;
         }
-        let target = if target[0] == "--lib" { &target[..1] } else { &target[..] };
         let cargo = |rest: &[&str]| {
             let mut command = Command::new("timeout");
             command.args(["900", "cargo", "test"]).args(target).args(["--locked", "--quiet"]).args(rest).current_dir(tree);

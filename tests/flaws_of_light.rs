@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use serde_json::{Value, json};
 
 use crate::util::folder::Folder;
-use crate::util::render::{Estimate, assert_irradiance, floor_probe, pixels, probe, render};
+use crate::util::render::{AssertIs, Estimate, assert_irradiance, floor_probe, pixels, probe, render};
 
 fn sphere(center: [f64; 3], radius: f64) -> Value {
     json!({ "type": "sphere", "radius": radius, "material": "black", "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": center }] })

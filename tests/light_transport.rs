@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::util::render::{Estimate, assert_blocks_agree, block_means, floor_probe, merge, render};
+use crate::util::render::{AssertIs, Estimate, assert_blocks_agree, block_means, floor_probe, merge, render};
 
 /// Inside a closed sphere of albedo 1/2 that emits 1/2: radiance 1/2 + 1/4 + 1/8 + ... = 1.
 fn furnace(max_depth: u32, rr_depth: u32) -> Value {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::util::render::{Estimate, probe, render};
+use crate::util::render::{AssertIs, Estimate, probe, render};
 
 /// A square seen from the front or the back, under a white sky, with the material "m".
 fn square(from_front: bool, rest: Value) -> Value {

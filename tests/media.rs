@@ -5,7 +5,7 @@ use steradian::ErrorKind;
 
 use crate::bad_input::{assert_error, assert_faults};
 use crate::util::folder::{Folder, good_scene, set};
-use crate::util::render::{Estimate, merge, pixels, probe, render};
+use crate::util::render::{AssertIs, Estimate, merge, pixels, probe, render};
 
 /// Radiance for red, green and blue of the middle of a picture without noise.
 fn exact(scene: &Value) -> [f64; 3] {

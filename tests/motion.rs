@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::util::folder::Folder;
 use crate::util::geometry::{Rng, ids, ray_through};
-use crate::util::render::{Estimate, probe, render};
+use crate::util::render::{AssertIs, Estimate, probe, render};
 use crate::util::scenes::moving_scene;
 
 fn rays(rng: &mut Rng, count: usize) -> Vec<Ray> {

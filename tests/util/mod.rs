@@ -1,6 +1,6 @@
 //! What several test modules share.
 
 pub mod folder;
-pub mod geometry;
 pub mod render;
-pub mod scenes;
+
+pub use steradian::bench::stability::{geometry, scenes};

@@ -11,10 +11,16 @@ pub use crate::math::Rng;
 use crate::math::float::step_past;
 use crate::math::{DMat3, DVec3, Ray, Transform, Vec3};
 
+/// Shapes of checks and tests are written there, not by users.
+const VALID: &str = "shapes of checks are valid";
+
 /// A mesh from positions in `f64`.
+///
+/// # Panics
+/// If it is no [`Mesh`].
 pub fn mesh(positions: &[DVec3], triangles: Vec<[u32; 3]>) -> Mesh {
     let positions = positions.iter().map(|p| p.as_vec3().to_array()).collect();
-    Mesh::new(positions, triangles, None, None).expect("test meshes are valid")
+    Mesh::new(positions, triangles, None, None).expect(VALID)
 }
 
 /// One triangle.
@@ -107,24 +113,30 @@ pub fn instances(shapes: Vec<Shape>, transforms: &[Transform]) -> Geometry {
 }
 
 /// An instance's transform from its parts.
+///
+/// # Panics
+/// If the linear part is singular.
 pub fn transform(linear: DMat3, translation: DVec3) -> Transform {
-    Transform::new(crate::math::DAffine3 { matrix3: linear, translation }).expect("test transforms are regular")
+    Transform::new(crate::math::DAffine3 { matrix3: linear, translation }).expect(VALID)
 }
 
 /// Analytic shapes of every kind, each reaching no farther than about 2 from the origin.
 pub fn all_analytic_shapes() -> Vec<(&'static str, Analytic)> {
-    let vase = Profile::bezier(&[[0.2, -0.9], [1.1, -0.5], [0.1, 0.2], [0.6, 0.9]]).unwrap();
+    let vase = Profile::bezier(&[[0.2, -0.9], [1.1, -0.5], [0.1, 0.2], [0.6, 0.9]]).expect(VALID);
     vec![
-        ("sphere", Analytic::Sphere(Sphere::full(1.0).unwrap())),
-        ("clipped sphere", Analytic::Sphere(Sphere::new(1.0, -0.4, 0.7, 4.0).unwrap())),
-        ("quad", Analytic::Quad(Quad::new(DVec3::new(-1.0, -0.5, 0.1), DVec3::new(2.0, 0.1, 0.0), DVec3::new(0.3, 1.0, 0.2)).unwrap())),
-        ("disk", Analytic::Disk(Disk::new(1.0, 0.0, TAU).unwrap())),
-        ("ring sector", Analytic::Disk(Disk::new(1.0, 0.4, 2.5).unwrap())),
-        ("cylinder", Analytic::Frustum(Frustum::cylinder(0.6, 1.5, TAU).unwrap())),
-        ("cone", Analytic::Frustum(Frustum::new(0.8, 0.0, 1.2, TAU).unwrap())),
-        ("frustum sector", Analytic::Frustum(Frustum::new(0.8, 0.3, 1.2, 4.5).unwrap())),
-        ("revolution", Analytic::Revolution(Revolution::new(&vase, TAU).unwrap())),
-        ("revolution sector", Analytic::Revolution(Revolution::new(&vase, 3.5).unwrap())),
+        ("sphere", Analytic::Sphere(Sphere::full(1.0).expect(VALID))),
+        ("clipped sphere", Analytic::Sphere(Sphere::new(1.0, -0.4, 0.7, 4.0).expect(VALID))),
+        (
+            "quad",
+            Analytic::Quad(Quad::new(DVec3::new(-1.0, -0.5, 0.1), DVec3::new(2.0, 0.1, 0.0), DVec3::new(0.3, 1.0, 0.2)).expect(VALID)),
+        ),
+        ("disk", Analytic::Disk(Disk::new(1.0, 0.0, TAU).expect(VALID))),
+        ("ring sector", Analytic::Disk(Disk::new(1.0, 0.4, 2.5).expect(VALID))),
+        ("cylinder", Analytic::Frustum(Frustum::cylinder(0.6, 1.5, TAU).expect(VALID))),
+        ("cone", Analytic::Frustum(Frustum::new(0.8, 0.0, 1.2, TAU).expect(VALID))),
+        ("frustum sector", Analytic::Frustum(Frustum::new(0.8, 0.3, 1.2, 4.5).expect(VALID))),
+        ("revolution", Analytic::Revolution(Revolution::new(&vase, TAU).expect(VALID))),
+        ("revolution sector", Analytic::Revolution(Revolution::new(&vase, 3.5).expect(VALID))),
     ]
 }
 
