@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     fn camera(json: &str) -> Result<Camera> {
-        compile(&Files { scene: "s.json".into() }, &serde_json::from_str(json).unwrap())
+        compile(&Files::new("s.json"), &serde_json::from_str(json).unwrap())
     }
 
     fn lens(json: &str) -> Lens {

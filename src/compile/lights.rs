@@ -125,7 +125,10 @@ fn environment(files: &Files, path: &str, desc: &EnvironmentLightDesc) -> Result
         (None, Some(file)) => {
             let place = format!("{path}.file");
             let asset = files.asset(file);
-            let image = read_rgb_image(&asset).map_err(|e| files.asset_error(&place, &asset, e))?;
+            let image = match files.assets.environments.get(file) {
+                Some(image) => image.clone(),
+                None => read_rgb_image(&asset).map_err(|e| files.asset_error(&place, &asset, e))?,
+            };
             let pixels = image.pixels.into_iter().map(Rgb::from).collect();
             let map = EnvironmentMap::new(image.width, image.height, pixels, rotation, scale);
             let map = map.map_err(|e| files.asset_error(&place, &asset, AssetError::Malformed(e.to_string())))?;

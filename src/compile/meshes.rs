@@ -49,9 +49,12 @@ pub fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh
 }
 
 fn load_file(files: &Files, place: &str, file: &str, with_materials: bool) -> Result<Vec<LoadedMesh>> {
+    let plain = |data, material| LoadedMesh { data, later: Vec::new(), material };
+    if let Some(data) = files.assets.meshes.get(file) {
+        return Ok(vec![plain(data.clone(), None)]);
+    }
     let asset = files.asset(file);
     let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let plain = |data, material| LoadedMesh { data, later: Vec::new(), material };
     let loaded = match extension.as_deref() {
         Some("ply") => import::read_ply(&asset).map(|data| vec![plain(data, None)]),
         Some("obj") => {

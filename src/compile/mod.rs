@@ -26,12 +26,13 @@ pub use settings::check_settings;
 pub use summary::Summary;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::id::TextureId;
-use crate::import::AssetError;
+use crate::import::{AssetError, Assets};
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::scene::{Features, Scene, Surface};
@@ -46,8 +47,16 @@ use transforms::Shutter;
 /// # Errors
 /// [`Error::Scene`], [`Error::Asset`] or [`Error::Missing`], each with the place in the scene.
 pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
+    compile_with(desc, scene_file, Arc::default())
+}
+
+/// Compiles a scene that a reader made: what it names is looked up among `assets` first, then beside `scene_file`.
+///
+/// # Errors
+/// As [`compile`].
+pub fn compile_with(desc: &SceneDesc, scene_file: &Path, assets: Arc<Assets>) -> Result<Scene> {
     check_settings(desc, scene_file)?;
-    let files = Files { scene: scene_file.into() };
+    let files = Files { scene: scene_file.into(), assets };
     let camera = camera::compile(&files, &desc.camera)?;
     let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
@@ -77,9 +86,16 @@ const SINGULAR: &str = "the transform is singular: it flattens the shape, or is 
 #[derive(Clone, Debug)]
 struct Files {
     scene: PathBuf,
+    /// What has no file.
+    assets: Arc<Assets>,
 }
 
 impl Files {
+    /// A scene whose assets are all files.
+    fn new(scene: impl Into<PathBuf>) -> Self {
+        Self { scene: scene.into(), assets: Arc::default() }
+    }
+
     /// An error at a place of the scene.
     fn error(&self, path: &str, message: impl Into<String>) -> Error {
         Error::Scene { file: self.scene.clone(), path: path.into(), message: message.into() }

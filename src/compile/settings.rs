@@ -14,7 +14,7 @@ const MAX_SIZE: u32 = 65_536;
 /// # Errors
 /// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.
 pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
-    let files = Files { scene: scene_file.into() };
+    let files = Files::new(scene_file);
     check_film(&files, &desc.film)?;
     if desc.sampler.spp == 0 {
         return Err(files.error("sampler.spp", "must be at least 1"));

@@ -9,7 +9,7 @@ use crate::color::Rgb;
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
 use crate::id::TextureId;
-use crate::import::{AssetError, read_image};
+use crate::import::{AssetError, ImageData, read_image};
 use crate::material::ColorInput;
 use crate::math::Vec2;
 use crate::texture::{Bitmap, Channel, Checker, Decoding, Filter, Image, Texture, UvTransform, Wrap};
@@ -173,7 +173,11 @@ impl Loader<'_> {
                 if !rotation_degrees.is_finite() {
                     return Err(files.error(&format!("{path}.rotation_degrees"), "is not finite"));
                 }
-                let image = load_image(&mut self.images, files, &format!("{path}.file"), &files.asset(file))?;
+                let place = format!("{path}.file");
+                let image = match files.assets.images.get(file) {
+                    Some(data) => kept_image(&mut self.images, files, &place, file, data)?,
+                    None => load_image(&mut self.images, files, &place, &files.asset(file))?,
+                };
                 if *color_space == ColorSpaceDesc::Srgb && image.is_float() {
                     return Err(files.error(&format!("{path}.color_space"), "the image has floats, which are linear"));
                 }
@@ -212,6 +216,16 @@ fn wrap_mode(desc: WrapModeDesc) -> Wrap {
         WrapModeDesc::Clamp => Wrap::Clamp,
         WrapModeDesc::Mirror => Wrap::Mirror,
     }
+}
+
+/// An image that has no file, from `images` if it has been asked for before.
+fn kept_image(images: &mut HashMap<PathBuf, Arc<Image>>, files: &Files, place: &str, name: &str, data: &ImageData) -> Result<Arc<Image>> {
+    let asset = PathBuf::from(name);
+    if let Some(image) = images.get(&asset) {
+        return Ok(Arc::clone(image));
+    }
+    let image = Image::new(data.clone()).map_err(|e| files.asset_error(place, &asset, AssetError::Malformed(e.to_string())))?;
+    Ok(Arc::clone(images.entry(asset).or_insert(Arc::new(image))))
 }
 
 /// The image in a file, from `images` if it has been read before.

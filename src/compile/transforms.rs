@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     fn files() -> Files {
-        Files { scene: "s.json".into() }
+        Files::new("s.json")
     }
 
     fn affine(json: &str) -> Result<DAffine3> {

@@ -69,6 +69,26 @@ pub enum CameraKindDesc {
     Environment,
 }
 
+impl Default for CameraDesc {
+    fn default() -> Self {
+        Self {
+            kind: CameraKindDesc::default(),
+            position: None,
+            look_at: None,
+            up: None,
+            transform: None,
+            vertical_fov_degrees: None,
+            view_height: None,
+            lens: None,
+            shift: None,
+            pixel_aspect: None,
+            near: 0.0,
+            shutter: default_shutter(),
+            motion: Vec::new(),
+        }
+    }
+}
+
 fn default_shutter() -> [f64; 2] {
     [0.0, 1.0]
 }

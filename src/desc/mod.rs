@@ -24,7 +24,7 @@ pub use principled::PrincipledDesc;
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
 pub use shape::{
     ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ObjectDesc,
-    OpacityDesc, ProfileDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeDesc, SphereDesc,
+    OpacityDesc, ProfileDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeCommonMut, ShapeDesc, SphereDesc,
 };
 pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};
@@ -38,7 +38,7 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// A scene: what to render, how, and where to write it.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneDesc {
     /// Link to the JSON Schema, for editors; not used otherwise.

@@ -37,6 +37,23 @@ macro_rules! shapes {
                 #[serde(default)]
                 pub reverse_normal: bool,
             }
+
+            impl $name {
+                /// The shape with its own parameters and every other default.
+                #[allow(clippy::too_many_arguments)]
+                pub fn new($($field: $type,)*) -> Self {
+                    Self {
+                        $($field,)*
+                        name: None,
+                        material: None,
+                        transform: TransformDesc::default(),
+                        motion: Vec::new(),
+                        opacity: None,
+                        emission: None,
+                        reverse_normal: false,
+                    }
+                }
+            }
         )*
 
         /// A shape in the world or in an object.
@@ -47,6 +64,21 @@ macro_rules! shapes {
         }
 
         impl ShapeDesc {
+            /// What all shapes share, to be changed.
+            pub fn common_mut(&mut self) -> ShapeCommonMut<'_> {
+                match self {
+                    $(Self::$variant(shape) => ShapeCommonMut {
+                        name: &mut shape.name,
+                        material: &mut shape.material,
+                        transform: &mut shape.transform,
+                        motion: &mut shape.motion,
+                        opacity: &mut shape.opacity,
+                        emission: &mut shape.emission,
+                        reverse_normal: &mut shape.reverse_normal,
+                    },)*
+                }
+            }
+
             /// What all shapes share.
             pub fn common(&self) -> ShapeCommon<'_> {
                 match self {
@@ -82,6 +114,19 @@ pub struct ShapeCommon<'a> {
     pub emission: Option<&'a EmissionDesc>,
     /// Whether the front is the side against the shape's own normal.
     pub reverse_normal: bool,
+}
+
+/// What all shapes share, to be changed; see [`ShapeCommon`].
+#[derive(Debug)]
+#[allow(missing_docs)]
+pub struct ShapeCommonMut<'a> {
+    pub name: &'a mut Option<String>,
+    pub material: &'a mut Option<String>,
+    pub transform: &'a mut TransformDesc,
+    pub motion: &'a mut Vec<KeyframeDesc>,
+    pub opacity: &'a mut Option<OpacityDesc>,
+    pub emission: &'a mut Option<EmissionDesc>,
+    pub reverse_normal: &'a mut bool,
 }
 
 shapes! {
@@ -244,6 +289,14 @@ pub enum NormalWeightDesc {
     Angle,
     /// By the area of the triangle: large faces stay flatter.
     Area,
+}
+
+impl MeshDesc {
+    /// The mesh of a file, with every other default.
+    pub fn from_file(file: impl Into<String>) -> Self {
+        let shading = MeshShadingDesc::default();
+        Self::new(Some(file.into()), None, None, None, None, Vec::new(), Vec::new(), shading, None, NormalWeightDesc::default())
+    }
 }
 
 fn one() -> f64 {

@@ -35,6 +35,13 @@ pub enum Samples {
     F32(Vec<f32>),
 }
 
+impl ImageData {
+    /// Whether its numbers are floats.
+    pub fn is_float(&self) -> bool {
+        matches!(self.samples, Samples::F16(_) | Samples::F32(_))
+    }
+}
+
 /// More pixels than any texture has; a header that claims more is damaged, or means harm.
 pub(super) const MAX_PIXELS: u64 = 1 << 28;
 

@@ -1,8 +1,10 @@
 //! Files to plain data: scene text to [`SceneDesc`], meshes and images to buffers. Knows nothing of what compilation makes of them.
 
+mod assets;
 mod comments;
 mod environment_image;
 mod fault;
+mod foreign;
 mod ies;
 mod image_file;
 mod jpeg_check;
@@ -13,7 +15,9 @@ mod obj_check;
 mod ply;
 mod scene_file;
 
+pub use assets::Assets;
 pub use environment_image::{RgbImage, read_rgb_image};
+pub use foreign::{Draft, ImportOptions, ImportReport, Imported, Outcome, ReportEntry, read_scene};
 pub use ies::{IesData, read_ies};
 pub use image_file::{ImageData, Samples, read_image};
 pub use mesh_data::MeshData;

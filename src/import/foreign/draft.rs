@@ -1,0 +1,149 @@
+//! A scene of our own format while a reader fills it.
+
+use std::collections::BTreeMap;
+
+use super::{ImportReport, Imported, Outcome, ReportEntry};
+use crate::desc::{CameraDesc, InstanceDesc, LightDesc, MaterialDesc, ObjectDesc, SceneDesc, ShapeDesc, TextureDesc};
+use crate::import::{Assets, ImageData, MeshData, RgbImage};
+
+/// A scene under construction: names are made unique, and the places where things come from are kept for messages.
+#[derive(Debug, Default)]
+pub struct Draft {
+    /// Film, integrator, sampler, camera, and all that is added.
+    pub desc: SceneDesc,
+    /// Meshes and images without files.
+    pub assets: Assets,
+    /// What became of the parameters.
+    pub report: ImportReport,
+    places: BTreeMap<String, String>,
+}
+
+impl Draft {
+    /// Adds a texture under `name` or one like it; the result is its name.
+    pub fn add_texture(&mut self, name: &str, place: &str, texture: TextureDesc) -> String {
+        let name = unique(name, |name| self.desc.textures.contains_key(name));
+        self.places.insert(format!("textures.{name}"), place.into());
+        self.desc.textures.insert(name.clone(), texture);
+        name
+    }
+
+    /// Adds a material under `name` or one like it; the result is its name.
+    pub fn add_material(&mut self, name: &str, place: &str, material: MaterialDesc) -> String {
+        let name = unique(name, |name| self.desc.materials.contains_key(name));
+        self.places.insert(format!("materials.{name}"), place.into());
+        self.desc.materials.insert(name.clone(), material);
+        name
+    }
+
+    /// Adds an object under `name` or one like it, its shapes with their places; the result is its name.
+    pub fn add_object(&mut self, name: &str, place: &str, shapes: Vec<(String, ShapeDesc)>, instances: Vec<InstanceDesc>) -> String {
+        let name = unique(name, |name| self.desc.objects.contains_key(name));
+        self.places.insert(format!("objects.{name}"), place.into());
+        let mut object = ObjectDesc { shapes: Vec::new(), instances };
+        for (i, (place, shape)) in shapes.into_iter().enumerate() {
+            self.places.insert(format!("objects.{name}.shapes[{i}]"), place);
+            object.shapes.push(shape);
+        }
+        self.desc.objects.insert(name.clone(), object);
+        name
+    }
+
+    /// Adds a shape to the world.
+    pub fn add_shape(&mut self, place: &str, shape: ShapeDesc) {
+        self.places.insert(format!("shapes[{}]", self.desc.shapes.len()), place.into());
+        self.desc.shapes.push(shape);
+    }
+
+    /// Places an object in the world.
+    pub fn add_instance(&mut self, place: &str, instance: InstanceDesc) {
+        self.places.insert(format!("instances[{}]", self.desc.instances.len()), place.into());
+        self.desc.instances.push(instance);
+    }
+
+    /// Adds a light that is no shape.
+    pub fn add_light(&mut self, place: &str, light: LightDesc) {
+        self.places.insert(format!("lights[{}]", self.desc.lights.len()), place.into());
+        self.desc.lights.push(light);
+    }
+
+    /// Sets the camera.
+    pub fn set_camera(&mut self, place: &str, camera: CameraDesc) {
+        self.places.insert("camera".into(), place.into());
+        self.desc.camera = camera;
+    }
+
+    /// Keeps a mesh that has no file; the result is what stands for its file's name.
+    pub fn keep_mesh(&mut self, name: &str, mesh: MeshData) -> String {
+        let file = unique_file(name, "ply", &self.assets);
+        self.assets.meshes.insert(file.clone(), mesh);
+        file
+    }
+
+    /// Keeps an image of a texture that has no file; the result is what stands for its file's name.
+    pub fn keep_image(&mut self, name: &str, image: ImageData) -> String {
+        let file = unique_file(name, if image.is_float() { "exr" } else { "png" }, &self.assets);
+        self.assets.images.insert(file.clone(), image);
+        file
+    }
+
+    /// Keeps an image of an environment that has no file; the result is what stands for its file's name.
+    pub fn keep_environment(&mut self, name: &str, image: RgbImage) -> String {
+        let file = unique_file(name, "exr", &self.assets);
+        self.assets.environments.insert(file.clone(), image);
+        file
+    }
+
+    /// Says that a parameter of an element means the same in the scene.
+    pub fn mapped(&mut self, place: &str, element: &str, parameter: &str) {
+        self.note(place, element, parameter, Outcome::Mapped, String::new());
+    }
+
+    /// Says how a parameter of an element was approximated.
+    pub fn approximated(&mut self, place: &str, element: &str, parameter: &str, how: impl Into<String>) {
+        self.note(place, element, parameter, Outcome::Approximated, how.into());
+    }
+
+    /// Says why a parameter of an element was ignored.
+    pub fn ignored(&mut self, place: &str, element: &str, parameter: &str, why: impl Into<String>) {
+        self.note(place, element, parameter, Outcome::Ignored, why.into());
+    }
+
+    fn note(&mut self, place: &str, element: &str, parameter: &str, outcome: Outcome, note: String) {
+        self.report.entries.push(ReportEntry { place: place.into(), element: element.into(), parameter: parameter.into(), outcome, note });
+    }
+
+    /// The scene.
+    pub fn finish(self) -> Imported {
+        Imported { desc: self.desc, assets: self.assets, report: self.report, places: self.places }
+    }
+}
+
+/// `name`, or the first of `name_2`, `name_3`, ... that is not taken.
+fn unique(name: &str, is_taken: impl Fn(&str) -> bool) -> String {
+    let name = if name.is_empty() { "unnamed" } else { name };
+    if !is_taken(name) {
+        return name.into();
+    }
+    (2u64..).map(|i| format!("{name}_{i}")).find(|name| !is_taken(name)).unwrap_or_default()
+}
+
+/// As [`unique`], for a file that any system can write.
+fn unique_file(name: &str, extension: &str, assets: &Assets) -> String {
+    let plain: String = name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).take(60).collect();
+    let stem = unique(&plain, |stem| assets.contains(&format!("{stem}.{extension}")));
+    format!("{stem}.{extension}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_files_are_plain() {
+        let mut draft = Draft::default();
+        let names: Vec<String> = (0..3).map(|_| draft.add_texture("a", "x:1", TextureDesc::Constant { color: [0.0; 3] })).collect();
+        assert_eq!(names, ["a", "a_2", "a_3"]);
+        let files: Vec<String> = (0..2).map(|_| draft.keep_mesh("../ä b", MeshData::default())).collect();
+        assert_eq!(files, ["___ä_b.ply", "___ä_b_2.ply"]);
+    }
+}

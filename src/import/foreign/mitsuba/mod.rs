@@ -1,0 +1,11 @@
+//! Mitsuba 3 scenes.
+
+use std::path::Path;
+
+use super::{ImportOptions, Imported};
+use crate::error::{Error, Result};
+
+/// Reads a Mitsuba 3 XML file.
+pub fn read(path: &Path, _options: &ImportOptions) -> Result<Imported> {
+    Err(Error::Usage(format!("{}: not read yet", path.display())))
+}

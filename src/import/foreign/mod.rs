@@ -1,0 +1,75 @@
+//! Scenes of other renderers, read into our own description.
+
+mod draft;
+mod gltf;
+mod mitsuba;
+mod pbrt;
+mod report;
+
+pub use draft::Draft;
+pub use report::{ImportReport, Outcome, ReportEntry};
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::{Assets, load_scene};
+use crate::desc::SceneDesc;
+use crate::error::{Error, Result};
+
+/// What the user says beside a scene file.
+#[derive(Clone, Debug, Default)]
+pub struct ImportOptions {
+    /// Mitsuba: values of `$name` that replace the defaults of the file.
+    pub defines: Vec<(String, String)>,
+    /// glTF: seconds into the animations.
+    pub time: f64,
+}
+
+/// A scene file in our words.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    /// The scene.
+    pub desc: SceneDesc,
+    /// What it names that is no file.
+    pub assets: Assets,
+    /// What became of the file's parameters; empty for our own format.
+    pub report: ImportReport,
+    /// Where the file says what became `shapes[0]`, `materials.floor` and so on; empty for our own format.
+    pub places: BTreeMap<String, String>,
+}
+
+impl Imported {
+    /// The error about a part of the description, with the place in the file that the part comes from.
+    pub fn locate(&self, error: Error) -> Error {
+        let with_place = |path: String| {
+            let part = self.places.iter().filter(|(part, _)| path.starts_with(part.as_str())).max_by_key(|(part, _)| part.len());
+            match part {
+                Some((_, place)) => format!("{path} (from {place})"),
+                None => path,
+            }
+        };
+        match error {
+            Error::Scene { file, path, message } => Error::Scene { file, path: with_place(path), message },
+            Error::Asset { scene, path, asset, message } => Error::Asset { scene, path: with_place(path), asset, message },
+            other => other,
+        }
+    }
+}
+
+/// Reads a scene file of any kind that its extension names: `.json` (ours, and any other name), `.xml` (Mitsuba 3), `.pbrt` (pbrt-v4),
+/// `.gltf` and `.glb` (glTF 2.0). Files that the scene names are looked up beside it.
+///
+/// # Errors
+/// [`Error::Missing`] if it cannot be read, [`Error::Parse`] or [`Error::Scene`] for what it says.
+pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    match extension.as_str() {
+        "xml" => mitsuba::read(path, options),
+        "pbrt" => pbrt::read(path, options),
+        "gltf" | "glb" => gltf::read(path, options),
+        _ => {
+            let desc = load_scene(path)?;
+            Ok(Imported { desc, assets: Assets::default(), report: ImportReport::default(), places: BTreeMap::new() })
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! What became of each parameter of an imported file.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// What became of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The scene says the same.
+    Mapped,
+    /// The scene says something near to it.
+    Approximated,
+    /// The scene says nothing of it.
+    Ignored,
+}
+
+/// A parameter and what became of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ReportEntry {
+    /// Where it stands: `scene.xml:12:5`, or a path inside a JSON file.
+    pub place: String,
+    /// The element that has it, as `bsdf plastic "floor"`.
+    pub element: String,
+    /// The parameter; empty for the element as a whole.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub parameter: String,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// How it was approximated, or why it was ignored.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub note: String,
+}
+
+/// What became of every parameter of an imported file, in the order of the file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ImportReport {
+    /// The parameters.
+    pub entries: Vec<ReportEntry>,
+}
+
+impl ImportReport {
+    /// How many parameters had this outcome.
+    pub fn count(&self, outcome: Outcome) -> usize {
+        self.entries.iter().filter(|entry| entry.outcome == outcome).count()
+    }
+
+    /// Whether the scene says all that the file said.
+    pub fn is_exact(&self) -> bool {
+        self.entries.iter().all(|entry| entry.outcome == Outcome::Mapped)
+    }
+
+    /// What was not mapped, a line for each kind of it: the same note about the same parameter of many elements is one line.
+    pub fn summary(&self) -> Vec<String> {
+        let mut kinds: BTreeMap<(Outcome, String), (usize, &str)> = BTreeMap::new();
+        for entry in self.entries.iter().filter(|entry| entry.outcome != Outcome::Mapped) {
+            let kind: Vec<&str> = entry.element.split(" \"").take(1).collect();
+            let what =
+                [&kind.concat(), entry.parameter.as_str()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(": ");
+            let note = if entry.note.is_empty() { what } else { format!("{what}: {}", entry.note) };
+            kinds.entry((entry.outcome, note)).or_insert((0, &entry.place)).0 += 1;
+        }
+        let line = |((outcome, what), (count, place)): ((Outcome, String), (usize, &str))| {
+            let outcome = if outcome == Outcome::Approximated { "approximated" } else { "ignored" };
+            let times = if count > 1 { format!(" ({count} times, first at {place})") } else { format!(" ({place})") };
+            format!("{outcome}: {what}{times}")
+        };
+        kinds.into_iter().map(line).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(element: &str, outcome: Outcome, note: &str) -> ReportEntry {
+        ReportEntry { place: "s.xml:1:2".into(), element: element.into(), parameter: "alpha".into(), outcome, note: note.into() }
+    }
+
+    #[test]
+    fn the_same_note_about_many_elements_is_one_line() {
+        let mut report = ImportReport::default();
+        report.entries.push(entry("bsdf plastic \"a\"", Outcome::Mapped, ""));
+        assert!(report.is_exact());
+        report.entries.push(entry("bsdf plastic \"b\"", Outcome::Approximated, "GGX in place of Beckmann"));
+        report.entries.push(entry("bsdf plastic \"c\"", Outcome::Approximated, "GGX in place of Beckmann"));
+        report.entries.push(entry("shape hair", Outcome::Ignored, "there are no curves"));
+        assert!(!report.is_exact());
+        assert_eq!(report.count(Outcome::Approximated), 2);
+        let expected = [
+            "approximated: bsdf plastic: alpha: GGX in place of Beckmann (2 times, first at s.xml:1:2)",
+            "ignored: shape hair: alpha: there are no curves (s.xml:1:2)",
+        ];
+        assert_eq!(report.summary(), expected);
+    }
+}
