@@ -32,7 +32,7 @@ use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::id::TextureId;
-use crate::import::{AssetError, Assets};
+use crate::import::{AssetError, Assets, Imported};
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::scene::{Features, Scene, Surface};
@@ -50,11 +50,19 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
     compile_with(desc, scene_file, Arc::default())
 }
 
+/// Compiles a scene that was read from a file of any kind; errors name the places in that file.
+///
+/// # Errors
+/// As [`compile`].
+pub fn compile_imported(imported: &Imported, scene_file: &Path) -> Result<Scene> {
+    compile_with(&imported.desc, scene_file, Arc::clone(&imported.assets)).map_err(|e| imported.locate(e))
+}
+
 /// Compiles a scene that a reader made: what it names is looked up among `assets` first, then beside `scene_file`.
 ///
 /// # Errors
 /// As [`compile`].
-pub fn compile_with(desc: &SceneDesc, scene_file: &Path, assets: Arc<Assets>) -> Result<Scene> {
+fn compile_with(desc: &SceneDesc, scene_file: &Path, assets: Arc<Assets>) -> Result<Scene> {
     check_settings(desc, scene_file)?;
     let files = Files { scene: scene_file.into(), assets };
     let camera = camera::compile(&files, &desc.camera)?;
