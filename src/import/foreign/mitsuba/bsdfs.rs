@@ -2,7 +2,7 @@
 
 use super::element::Element;
 use super::metals;
-use super::textures::{UvOrigin, luminance};
+use super::textures::{Role, TextureValue, UvOrigin};
 use super::tree::PluginId;
 use super::{Reader, names};
 use crate::desc::{
@@ -131,10 +131,18 @@ impl<'a> Reader<'a> {
             "plastic" | "roughplastic" => {
                 let ior = relative_index(element, "polypropylene")?;
                 let alpha = if element.kind() == "roughplastic" { self.alpha(element, uv)? } else { None };
-                let mut albedo = self.color(element, "diffuse_reflectance", 0.5, uv)?;
-                if element.boolean("nonlinear", false)? {
-                    albedo = self.nonlinear(albedo, f64::from(ior));
+                let color = self.color(element, "diffuse_reflectance", 0.5, uv)?;
+                let rough = match alpha {
+                    Some(RoughnessDesc::Isotropic(alpha)) => alpha,
+                    None | Some(_) => 0.0,
+                };
+                if rough > 0.0 {
+                    element.approximated(
+                        "diffuse_reflectance",
+                        "scaled: the base reflects as much diffuse light as Mitsuba's below a rough coat",
+                    );
                 }
+                let albedo = self.plastic_base(color, ior, rough, element.boolean("nonlinear", false)?);
                 if element.take("specular_reflectance").is_some() {
                     element.ignored("specular_reflectance", "the coat is clear");
                 }
@@ -282,10 +290,9 @@ impl<'a> Reader<'a> {
 
     fn mask(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
         let inner = self.one_part(element, uv)?;
-        let opacity = match self.color(element, "opacity", 0.5, uv)? {
-            ColorDesc::Grey(v) => OpacityDesc::Number(v),
-            ColorDesc::Rgb(color) => OpacityDesc::Number(luminance(color)),
-            ColorDesc::Texture { texture } => OpacityDesc::Texture { texture: self.without_alpha(&texture, element) },
+        let opacity = match self.scalar(element, "opacity", 0.5, 1.0, uv)? {
+            ScalarDesc::Constant(v) => OpacityDesc::Number(v),
+            ScalarDesc::Texture { texture } => OpacityDesc::Texture { texture: self.without_alpha(&texture, element) },
         };
         if inner.opacity.is_some() {
             element.ignored("", "the holes of the bsdf inside are left out");
@@ -339,7 +346,7 @@ impl<'a> Reader<'a> {
             element.boolean("flip_invalid_normals", true)?;
             element.boolean("use_shadowing_function", true)?;
         }
-        let super::textures::TextureValue::Named(texture) = self.texture(texture, uv)? else {
+        let TextureValue::Named(texture) = self.texture(texture, Role::Number, uv)? else {
             // The same everywhere: no relief.
             return Ok(inner);
         };
@@ -355,7 +362,17 @@ impl<'a> Reader<'a> {
             self.draft.approximated(&texture_place.to_string(), &element.plugin.title(), "raw", "normals are taken as they are stored");
         }
         let (normal_map, bump_map) = if is_normal_map {
-            (Some(NormalMapDesc { texture, strength: 1.0, flip_y: false }), None)
+            // Ours turn with the image, Mitsuba's do not: on v that grows downward green is the other way round.
+            let flip_y = match self.draft.desc.textures.get(&texture) {
+                Some(TextureDesc::Image { scale, rotation_degrees, .. }) => {
+                    if *rotation_degrees != 0.0 || scale[0] < 0.0 {
+                        element.approximated("", "the normals turn with their image");
+                    }
+                    scale[0] * scale[1] < 0.0
+                }
+                _ => false,
+            };
+            (Some(NormalMapDesc { texture, strength: 1.0, flip_y }), None)
         } else {
             (None, Some(BumpMapDesc { texture, height: height as f32 }))
         };

@@ -2,8 +2,8 @@
 
 use super::Reader;
 use super::element::Element;
-use super::textures::{TextureValue, UvOrigin};
-use super::tree::{PluginId, Spectrum, Value};
+use super::textures::{Role, TextureValue, UvOrigin};
+use super::tree::{PluginId, Value};
 use super::values;
 use crate::desc::{
     DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc, TransformDesc, TransformStepDesc,
@@ -34,6 +34,14 @@ impl<'a> Reader<'a> {
                 })
             }
             "envmap" => self.environment(&mut element)?,
+            "sunsky" | "sky" | "sun" => {
+                let place = element.place().to_string();
+                for light in self.sunsky(&mut element)? {
+                    self.draft.add_light(&place, light);
+                }
+                element.finish(&mut self.draft);
+                return Ok(());
+            }
             "area" => return Err(element.place().error("an area emitter can only stand in a shape")),
             other => {
                 self.whole(id, &format!("there is no emitter {other}"));
@@ -59,7 +67,7 @@ impl<'a> Reader<'a> {
             Some(id) if self.document.plugins[id.0].class == "texture" => Some(id),
             _ => None,
         };
-        let emission = match texture.map(|id| self.texture(id, uv)).transpose()? {
+        let emission = match texture.map(|id| self.texture(id, Role::Color, uv)).transpose()? {
             Some(TextureValue::Named(texture)) => {
                 element.take("radiance");
                 EmissionDesc { radiance: [1.0; 3], texture: Some(texture), two_sided: false, group: None }
@@ -73,7 +81,7 @@ impl<'a> Reader<'a> {
     /// The colour of light; white if it is not given.
     fn emitted(&mut self, element: &mut Element<'a>, name: &str) -> Result<[f32; 3]> {
         let Some(property) = element.take(name) else {
-            return self.spectrum_color(&Spectrum::Uniform(1.0), element.place(), true);
+            return Ok([1.0; 3]);
         };
         let color = match (&property.value, self.document.plugin_of(property)?) {
             (Value::Spectrum(spectrum), _) => self.spectrum_color(spectrum, &property.place, true)?,
@@ -83,7 +91,7 @@ impl<'a> Reader<'a> {
                 inner.finish(&mut self.draft);
                 color
             }
-            _ => match self.texture_value(property, UvOrigin::Mitsuba)? {
+            _ => match self.texture_value(property, Role::Color, UvOrigin::Mitsuba)? {
                 TextureValue::Constant(color) => color,
                 TextureValue::Named(_) => {
                     element.approximated(name, "white in place of a texture");

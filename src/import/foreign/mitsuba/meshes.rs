@@ -1,9 +1,8 @@
-//! Meshes that are not read as they are: Mitsuba's cube and its serialized meshes.
+//! Mitsuba's cube, and what has to be known of mesh files before they are read.
 
 use std::path::Path;
 
 use crate::desc::{MeshDesc, MeshShadingDesc};
-use crate::import::{AssetError, MeshData};
 
 /// Mitsuba's cube `[-1, 1]³`, with its uv.
 pub fn cube() -> MeshDesc {
@@ -36,9 +35,4 @@ pub fn has_normals(path: &Path) -> bool {
     } else {
         lines.any(|line| has(line, b"vn "))
     }
-}
-
-/// Mesh `index` of a serialized file.
-pub fn serialized(_path: &Path, _index: u32) -> Result<MeshData, AssetError> {
-    Err(AssetError::Malformed("serialized meshes are not read yet".into()))
 }

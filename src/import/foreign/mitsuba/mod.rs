@@ -8,13 +8,20 @@ mod integrators;
 mod meshes;
 mod metals;
 mod names;
+mod plastics;
 mod sensor;
+mod serialized;
 mod shapes;
+mod sky;
+mod spectra;
 mod textures;
 mod transforms;
 mod tree;
 mod values;
 mod xml;
+
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -22,7 +29,8 @@ use std::path::Path;
 use super::{Draft, ImportOptions, Imported};
 use crate::error::Result;
 use bsdfs::Look;
-use textures::{TextureValue, UvOrigin};
+use plastics::Coat;
+use textures::{Role, TextureValue, UvOrigin};
 use tree::{Document, PluginId, Value};
 
 /// Reads a Mitsuba 3 XML file.
@@ -36,7 +44,8 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
         looks: BTreeMap::new(),
         surfaces: BTreeMap::new(),
         groups: BTreeMap::new(),
-        baked: BTreeMap::new(),
+        coats: BTreeMap::new(),
+        recolored: BTreeMap::new(),
         black: None,
         open: Vec::new(),
     };
@@ -50,15 +59,17 @@ struct Reader<'a> {
     scene: &'a Path,
     draft: Draft,
     /// What textures have become.
-    textures: BTreeMap<(PluginId, UvOrigin), TextureValue>,
+    textures: BTreeMap<(PluginId, Role, UvOrigin), TextureValue>,
     /// What BSDFs have become.
     looks: BTreeMap<(PluginId, UvOrigin), Look>,
     /// The materials of shapes with these BSDFs.
     surfaces: BTreeMap<(PluginId, UvOrigin), String>,
     /// Objects of shape groups; none where a group is empty.
     groups: BTreeMap<PluginId, Option<String>>,
-    /// Textures whose colours were changed, by their names and how.
-    baked: BTreeMap<(String, u64), String>,
+    /// Coats of plastics by index of refraction and alpha.
+    coats: BTreeMap<[u32; 2], Coat>,
+    /// Textures whose colours were changed for a coat, by their names, the coat and whether it is nonlinear.
+    recolored: BTreeMap<(String, [u32; 2], bool), String>,
     /// The material that reflects nothing.
     black: Option<String>,
     /// Plugins on the way to the one that is read.

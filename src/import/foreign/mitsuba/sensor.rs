@@ -45,11 +45,11 @@ impl Reader<'_> {
             }
         } else {
             camera.vertical_fov_degrees = Some(fov(&mut element, aspect)?);
-            // What is at this offset from the middle of the film is moved to the middle: to the left, and up.
+            // What would be seen at this offset from the middle, to the right and down, is seen in the middle.
             let offset =
                 [element.float("principal_point_offset_x")?.unwrap_or(0.0), element.float("principal_point_offset_y")?.unwrap_or(0.0)];
             if offset != [0.0; 2] {
-                camera.shift = Some([-offset[0], offset[1]]);
+                camera.shift = Some([offset[0], -offset[1]]);
             }
         }
         if kind == "thinlens" {

@@ -3,7 +3,7 @@
 use super::element::Element;
 use super::textures::UvOrigin;
 use super::tree::{PluginId, Value};
-use super::{Reader, meshes, values};
+use super::{Reader, meshes, serialized, values};
 use crate::desc::{
     CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, MeshShadingDesc, OpacityDesc, QuadDesc, ShapeDesc, SphereDesc, TransformDesc,
     TransformStepDesc,
@@ -121,9 +121,8 @@ impl<'a> Reader<'a> {
         element.ignored_plugins("sensor", "a sensor on a shape is no camera")?;
         // How often silhouettes are sampled for derivatives.
         element.float("silhouette_sampling_weight")?;
-        let swaps_uv = matches!(shape, ShapeDesc::Disk(_)) && bsdf.is_some_and(|bsdf| self.is_textured(bsdf, 0));
-        if swaps_uv {
-            element.approximated("", "u and v of a disk are swapped: its textures look different");
+        if uv == UvOrigin::Swapped && bsdf.is_some_and(|bsdf| self.has_direction(bsdf, 0)) {
+            element.approximated("", "u and v of a disk are swapped: what depends on their directions looks different");
         }
         let common = shape.common_mut();
         *common.name = Some(element.plugin.id.clone()).filter(|id| !id.is_empty());
@@ -136,16 +135,17 @@ impl<'a> Reader<'a> {
         Ok(Some((place, shape)))
     }
 
-    /// Whether a plugin has textures in it.
-    fn is_textured(&self, id: PluginId, depth: usize) -> bool {
+    /// Whether a BSDF or a part of it looks different along u and along v.
+    fn has_direction(&self, id: PluginId, depth: usize) -> bool {
         let plugin = &self.document.plugins[id.0];
-        plugin.class == "texture"
+        plugin.kind == "normalmap"
+            || plugin.properties.iter().any(|property| matches!(property.name.as_str(), "alpha_u" | "alpha_v" | "anisotropic"))
             || depth < super::MAX_REFERENCES
                 && plugin
                     .properties
                     .iter()
                     .filter_map(|property| self.document.plugin_of(property).ok().flatten())
-                    .any(|inner| self.is_textured(inner, depth + 1))
+                    .any(|inner| self.has_direction(inner, depth + 1))
     }
 
     /// The surface of a shape; none if it is one that does not exist here.
@@ -159,7 +159,7 @@ impl<'a> Reader<'a> {
                 form(ShapeDesc::Quad(quad), element.transform("to_world")?, UvOrigin::Mitsuba)
             }
             "cube" => form(ShapeDesc::Mesh(meshes::cube()), element.transform("to_world")?, UvOrigin::Mitsuba),
-            "disk" => form(ShapeDesc::Disk(DiskDesc::new(1.0, 0.0, 360.0)), element.transform("to_world")?, UvOrigin::Mitsuba),
+            "disk" => form(ShapeDesc::Disk(DiskDesc::new(1.0, 0.0, 360.0)), element.transform("to_world")?, UvOrigin::Swapped),
             "sphere" => {
                 let center = DVec3::from(element.vector("center")?.unwrap_or_default());
                 let radius = element.float("radius")?.unwrap_or(1.0);
@@ -201,7 +201,7 @@ impl<'a> Reader<'a> {
         let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(&file);
         let (file, has_normals) = if kind == "serialized" {
             let index = element.count("shape_index", 0)?.unwrap_or(0);
-            let mesh = meshes::serialized(&path, index).map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;
+            let mesh = serialized::read(&path, index).map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;
             let has_normals = mesh.normals.is_some();
             (self.draft.keep_mesh(&format!("{file}_{index}"), mesh), has_normals)
         } else {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::Reader;
 use super::element::Element;
-use super::tree::{Place, PluginId, Property, Spectrum, Value};
+use super::tree::{PluginId, Property, Value};
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, RangedDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
 use crate::import::{ImageData, Samples};
@@ -18,6 +18,17 @@ pub enum UvOrigin {
     Mitsuba,
     /// Our v is one minus Mitsuba's: v grows upward in images.
     Upward,
+    /// Our u is Mitsuba's v and the other way round, as on disks.
+    Swapped,
+}
+
+/// What a texture is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// A colour.
+    Color,
+    /// A number.
+    Number,
 }
 
 /// What a texture has become.
@@ -35,12 +46,16 @@ const MIRROR: DAffine3 = DAffine3 { matrix3: DMat3 { x_axis: DVec3::X, y_axis: D
 impl UvOrigin {
     /// Mitsuba's uv from ours.
     fn to_mitsuba(self) -> DAffine3 {
-        if self == Self::Mitsuba { DAffine3::IDENTITY } else { MIRROR }
+        match self {
+            Self::Mitsuba => DAffine3::IDENTITY,
+            Self::Upward => MIRROR,
+            Self::Swapped => DAffine3 { matrix3: DMat3::from_cols(DVec3::Y, DVec3::X, DVec3::Z), translation: DVec3::ZERO },
+        }
     }
 }
 
 /// The luminance of a linear colour.
-pub fn luminance([r, g, b]: [f32; 3]) -> f32 {
+fn luminance([r, g, b]: [f32; 3]) -> f32 {
     0.212671 * r + 0.715160 * g + 0.072169 * b
 }
 
@@ -55,7 +70,7 @@ impl<'a> Reader<'a> {
         let Some(property) = element.take(name) else {
             return Ok(ColorDesc::Grey(default));
         };
-        Ok(match self.texture_value(property, uv)? {
+        Ok(match self.texture_value(property, Role::Color, uv)? {
             TextureValue::Constant(color) => plain(color),
             TextureValue::Named(texture) => ColorDesc::Texture { texture },
         })
@@ -66,16 +81,25 @@ impl<'a> Reader<'a> {
         let Some(property) = element.take(name) else {
             return Ok(ScalarDesc::Constant(default * factor));
         };
-        Ok(match self.texture_value(property, uv)? {
+        Ok(match self.texture_value(property, Role::Number, uv)? {
             TextureValue::Constant(color) => ScalarDesc::Constant(luminance_of(color) * factor),
             TextureValue::Named(texture) if factor == 1.0 => ScalarDesc::Texture { texture },
             TextureValue::Named(texture) => {
-                let scaled = match self.draft.desc.textures.get(&texture) {
+                let grey = |color: [f32; 3]| color.map(|c| c * factor);
+                let product =
+                    || TextureDesc::Product { factors: vec![ColorDesc::Grey(factor), ColorDesc::Texture { texture: texture.clone() }] };
+                let (scaled, is_usable) = match self.draft.desc.textures.get(&texture) {
                     Some(TextureDesc::Checker { color0, color1, scale }) => {
-                        TextureDesc::Checker { color0: color0.map(|c| c * factor), color1: color1.map(|c| c * factor), scale: *scale }
+                        let scaled = TextureDesc::Checker { color0: grey(*color0), color1: grey(*color1), scale: *scale };
+                        (scaled, [color0, color1].iter().all(|color| color.iter().all(|&c| c <= 1.0)))
                     }
-                    _ => TextureDesc::Product { factors: vec![ColorDesc::Grey(factor), ColorDesc::Texture { texture: texture.clone() }] },
+                    _ => (product(), true),
                 };
+                // Colours above 1 are good for nothing else.
+                if !is_usable {
+                    self.draft.desc.textures.insert(texture.clone(), scaled);
+                    return Ok(ScalarDesc::Texture { texture });
+                }
                 ScalarDesc::Texture { texture: self.draft.add_texture(&texture, &property.place.to_string(), scaled) }
             }
         })
@@ -86,7 +110,7 @@ impl<'a> Reader<'a> {
         let Some(property) = element.take(name) else {
             return Ok(None);
         };
-        match self.texture_value(property, uv)? {
+        match self.texture_value(property, Role::Color, uv)? {
             TextureValue::Constant(color) => Ok(Some(color)),
             TextureValue::Named(_) => {
                 element.approximated(name, "one value in place of a texture: 1");
@@ -101,9 +125,9 @@ impl<'a> Reader<'a> {
     }
 
     /// A colour, a number, a spectrum or a texture.
-    pub(super) fn texture_value(&mut self, property: &Property, uv: UvOrigin) -> Result<TextureValue> {
+    pub(super) fn texture_value(&mut self, property: &Property, role: Role, uv: UvOrigin) -> Result<TextureValue> {
         if let Some(id) = self.document.plugin_of(property)? {
-            return self.texture(id, uv);
+            return self.texture(id, role, uv);
         }
         Ok(TextureValue::Constant(match &property.value {
             Value::Float(v) => [*v as f32; 3],
@@ -115,15 +139,18 @@ impl<'a> Reader<'a> {
     }
 
     /// What a texture becomes.
-    pub(super) fn texture(&mut self, id: PluginId, uv: UvOrigin) -> Result<TextureValue> {
-        if let Some(value) = self.textures.get(&(id, uv)) {
+    pub(super) fn texture(&mut self, id: PluginId, role: Role, uv: UvOrigin) -> Result<TextureValue> {
+        if let Some(value) = self.textures.get(&(id, role, uv)) {
             return Ok(value.clone());
+        }
+        if self.document.plugins[id.0].kind != "checkerboard" && role == Role::Number {
+            return self.texture(id, Role::Color, uv);
         }
         self.guard(id)?;
         let mut element = Element::new(self.document, id);
         let value = match (element.plugin.class.as_str(), element.kind()) {
             ("texture", "bitmap") => TextureValue::Named(self.bitmap(&mut element, uv)?),
-            ("texture", "checkerboard") => self.checkerboard(&mut element, uv)?,
+            ("texture", "checkerboard") => self.checkerboard(&mut element, role, uv)?,
             ("texture" | "spectrum", "rawconstant") => TextureValue::Constant(raw_constant(&mut element)?),
             ("spectrum", _) => TextureValue::Constant(self.spectrum_plugin(&mut element, false)?),
             ("texture", kind) => {
@@ -134,7 +161,7 @@ impl<'a> Reader<'a> {
         };
         element.finish(&mut self.draft);
         self.open.pop();
-        self.textures.insert((id, uv), value.clone());
+        self.textures.insert((id, role, uv), value.clone());
         Ok(value)
     }
 
@@ -175,10 +202,14 @@ impl<'a> Reader<'a> {
         Ok(self.draft.add_texture(&name, &element.place().to_string(), texture))
     }
 
-    fn checkerboard(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<TextureValue> {
+    fn checkerboard(&mut self, element: &mut Element<'a>, role: Role, uv: UvOrigin) -> Result<TextureValue> {
         let mut colors = [[0.4; 3], [0.2; 3]];
         for (color, name) in colors.iter_mut().zip(["color0", "color1"]) {
             *color = self.constant(element, name, uv)?.unwrap_or(*color);
+        }
+        if role == Role::Number {
+            // Where a number is asked for, Mitsuba (3.9) takes the other colour.
+            colors.swap(0, 1);
         }
         let map = element.transform("to_uv")? * uv.to_mitsuba();
         let [x, y] = [map.matrix3.x_axis, map.matrix3.y_axis];
@@ -210,21 +241,6 @@ impl<'a> Reader<'a> {
         };
         let name = if element.plugin.id.is_empty() { "checkerboard" } else { &element.plugin.id };
         Ok(TextureValue::Named(self.draft.add_texture(name, &element.place().to_string(), texture)))
-    }
-
-    /// The colour of `<spectrum>`; that of light if it is `emitted`.
-    pub(super) fn spectrum_color(&mut self, spectrum: &Spectrum, place: &Place, emitted: bool) -> Result<[f32; 3]> {
-        let _ = emitted;
-        match spectrum {
-            Spectrum::Uniform(value) => Ok([*value as f32; 3]),
-            Spectrum::Samples(_) | Spectrum::File(_) => Err(place.error("spectra are not read yet")),
-        }
-    }
-
-    /// The colour of a nested spectrum; that of light if it is `emitted`.
-    pub(super) fn spectrum_plugin(&mut self, element: &mut Element<'a>, emitted: bool) -> Result<[f32; 3]> {
-        let _ = emitted;
-        Ok([element.float("value")?.unwrap_or(1.0) as f32; 3])
     }
 }
 

@@ -1,0 +1,220 @@
+//! BSDFs and textures.
+
+use super::*;
+use crate::desc::{ColorDesc, ColorSpaceDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc, TextureFilterDesc};
+
+const BITMAP: &str = r#"<texture type="bitmap" name="NAME"><string name="filename" value="a.png"/>MORE</texture>"#;
+
+fn bitmap(name: &str, more: &str) -> String {
+    BITMAP.replace("NAME", name).replace("MORE", more)
+}
+
+#[track_caller]
+fn ior(ior: &RangedDesc) -> f64 {
+    if let RangedDesc::Constant(v) = ior { f64::from(*v) } else { panic!() }
+}
+
+#[test]
+fn backs_are_black_unless_both_sides_are_wanted() {
+    let back = |bsdf: &str| {
+        let desc = scene(&format!("<shape type=\"sphere\">{bsdf}</shape>"));
+        match &desc.materials[desc.shapes[0].common().material.unwrap()] {
+            MaterialDesc::TwoSided { back, .. } => Some(desc.materials[back].clone()),
+            _ => None,
+        }
+    };
+    let is_black = |m: Option<MaterialDesc>| matches!(m, Some(MaterialDesc::Diffuse { albedo: ColorDesc::Grey(v), .. }) if v == 0.0);
+    for kind in ["diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "principled"] {
+        assert!(is_black(back(&format!("<bsdf type=\"{kind}\"/>"))), "{kind}");
+        assert!(back(&format!("<bsdf type=\"twosided\"><bsdf type=\"{kind}\"/></bsdf>")).is_none(), "{kind}");
+    }
+    assert!(is_black(back("")), "a shape without a bsdf");
+    let glass = r#"<bsdf type="principled"><float name="spec_trans" value="0.5"/></bsdf>"#;
+    for bsdf in ["<bsdf type=\"dielectric\"/>", "<bsdf type=\"thindielectric\"/>", "<bsdf type=\"principledthin\"/>", glass] {
+        assert!(back(bsdf).is_none(), "{bsdf}");
+    }
+    let two = r#"<bsdf type="twosided"><bsdf type="plastic"/><bsdf type="diffuse"><rgb name="reflectance" value="1 0 0"/></bsdf></bsdf>"#;
+    assert!(matches!(back(two), Some(MaterialDesc::Diffuse { albedo: ColorDesc::Rgb([1.0, 0.0, 0.0]), .. })));
+    // Relief and holes keep the black back.
+    let wrapped = format!(
+        "<bsdf type=\"mask\">{}<bsdf type=\"bumpmap\">{}<bsdf type=\"diffuse\"/></bsdf></bsdf>",
+        bitmap("opacity", ""),
+        bitmap("b", "")
+    );
+    assert!(is_black(back(&wrapped)));
+}
+
+#[test]
+fn indices_of_refraction_are_relative() {
+    let glass = |inside: &str| match front(&format!("<bsdf type=\"dielectric\">{inside}</bsdf>")) {
+        MaterialDesc::Dielectric(glass) => ior(&glass.ior),
+        other => panic!("{other:?}"),
+    };
+    assert_near(glass(""), 1.5046 / 1.000277);
+    assert_near(glass(r#"<string name="int_ior" value="Diamond"/><float name="ext_ior" value="1"/>"#), 2.419);
+    assert_near(glass(r#"<float name="int_ior" value="1"/><string name="ext_ior" value="water"/>"#), 1.0 / 1.333);
+    let MaterialDesc::Plastic { ior: coat, .. } = front("<bsdf type=\"plastic\"/>") else { panic!() };
+    assert_near(ior(&coat), 1.49 / 1.000277);
+}
+
+#[test]
+fn metals_by_name_index_and_mirror() {
+    let metal = |inside: &str| match front(&format!("<bsdf type=\"roughconductor\">{inside}</bsdf>")) {
+        MaterialDesc::Conductor { eta, k, alpha, multiscatter, .. } => (eta.unwrap(), k.unwrap(), alpha.unwrap(), multiscatter),
+        other => panic!("{other:?}"),
+    };
+    let (eta, _, alpha, multiscatter) = metal(r#"<string name="material" value="Au"/>"#);
+    assert_eq!(eta[0], 0.143);
+    // Alpha is alpha itself, and light that is scattered twice is lost.
+    assert!(matches!(alpha, RoughnessDesc::Isotropic(a) if a == 0.1) && !multiscatter);
+    let (eta, k, alpha, _) = metal(
+        r#"<rgb name="eta" value="1 2 3"/><float name="k" value="4"/><float name="alpha_u" value="0.2"/><float name="alpha_v" value="0.3"/>"#,
+    );
+    assert_eq!((eta, k), ([1.0, 2.0, 3.0], [4.0; 3]));
+    assert!(matches!(alpha, RoughnessDesc::Anisotropic([0.2, 0.3])));
+    let mirror = r#"<bsdf type="conductor"><string name="material" value="none"/><float name="specular_reflectance" value="0.9"/></bsdf>"#;
+    assert!(matches!(front(mirror), MaterialDesc::Mirror { reflectance: ColorDesc::Grey(v) } if v == 0.9));
+    let MaterialDesc::Conductor { eta: Some(copper), .. } = front("<bsdf type=\"conductor\"/>") else { panic!() };
+    assert_eq!(copper[0], 0.201);
+}
+
+#[test]
+fn beckmann_is_said_to_be_approximated() {
+    let default = notes(r#"<shape type="sphere"><bsdf type="roughconductor"/></shape>"#);
+    assert!(default.iter().any(|(outcome, _, note)| *outcome == Outcome::Approximated && note.contains("Beckmann")), "{default:?}");
+    let ggx = r#"<shape type="sphere"><bsdf type="roughconductor"><string name="distribution" value="ggx"/></bsdf></shape>"#;
+    assert!(notes(ggx).is_empty());
+}
+
+#[test]
+fn plastics_deepen_their_colours_if_they_are_nonlinear() {
+    let base = |more: &str| {
+        let text = format!(r#"<bsdf type="plastic"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/>{more}</bsdf>"#);
+        match front(&text) {
+            MaterialDesc::Plastic { albedo: ColorDesc::Grey(v), .. } => f64::from(v),
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_near(base(""), 0.5);
+    // r (1 - F) / (1 - r F) with the internal reflectance F = 0.5963.
+    assert!((base(r#"<boolean name="nonlinear" value="true"/>"#) - 0.2876).abs() < 1e-3);
+    let textured = format!(
+        r#"<scene version="3.0.0">{SENSOR}<shape type="sphere"><bsdf type="plastic"><boolean name="nonlinear" value="true"/>{}</bsdf></shape></scene>"#,
+        bitmap("diffuse_reflectance", "")
+    );
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::DynamicImage::new_rgb8(2, 2).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let imported = read_with(&textured, &[], &[("a.png", png.get_ref())]).unwrap();
+    assert_eq!(imported.assets.images.len(), 1);
+    // An image that is missing is found out later.
+    assert!(read_with(&textured, &[], &[]).unwrap().assets.images.is_empty());
+}
+
+#[test]
+fn principled_surfaces_have_mitsubas_defaults() {
+    let MaterialDesc::Principled(p) = front("<bsdf type=\"principled\"/>") else { panic!() };
+    let zero = |s: &ScalarDesc| matches!(s, ScalarDesc::Constant(v) if *v == 0.0);
+    assert!(zero(&p.clearcoat_gloss) && zero(&p.sheen_tint) && zero(&p.transmission) && !p.multiscatter && !p.thin);
+    assert!(matches!(p.specular, Some(ScalarDesc::Constant(v)) if v == 0.5) && p.ior.is_none());
+    let MaterialDesc::Principled(p) = front(r#"<bsdf type="principled"><float name="eta" value="1.4"/></bsdf>"#) else { panic!() };
+    assert!(p.specular.is_none() && (ior(p.ior.as_ref().unwrap()) - 1.4).abs() < 1e-6);
+    let thin = r#"<bsdf type="principledthin"><float name="diff_trans" value="1.5"/></bsdf>"#;
+    let MaterialDesc::Principled(p) = front(thin) else { panic!() };
+    // Mitsuba's go up to 2.
+    assert!(p.thin && matches!(p.diffuse_transmission, ScalarDesc::Constant(v) if v == 0.75));
+}
+
+#[test]
+fn masks_and_null_are_holes_of_the_shape() {
+    let opacity = |bsdf: &str| {
+        let desc = scene(&format!("<shape type=\"sphere\">{bsdf}</shape>"));
+        (desc.shapes[0].common().opacity.cloned(), desc.textures)
+    };
+    assert!(matches!(opacity(r#"<bsdf type="null"/>"#).0, Some(OpacityDesc::Number(v)) if v == 0.0));
+    let mask = r#"<bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="diffuse"/></bsdf>"#;
+    assert!(matches!(opacity(mask).0, Some(OpacityDesc::Number(v)) if v == 0.25));
+    let (textured, textures) = opacity(&format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("opacity", "")));
+    // The luminance counts, not the alpha that the image may have: the product of one factor is no image.
+    let Some(OpacityDesc::Texture { texture }) = textured else { panic!() };
+    assert!(matches!(textures[&texture], TextureDesc::Product { .. }));
+    // What gives off light has no holes here.
+    let lamp = r#"<shape type="sphere"><bsdf type="null"/><emitter type="area"/></shape>"#;
+    assert!(scene(lamp).shapes[0].common().opacity.is_none());
+    assert!(!notes(lamp).is_empty());
+}
+
+#[test]
+fn images_are_srgb_unless_raw_or_floats() {
+    let texture = |more: &str, file: &str| {
+        let text = bitmap("reflectance", more).replace("a.png", file);
+        let desc = scene(&format!("<shape type=\"sphere\"><bsdf type=\"diffuse\">{text}</bsdf></shape>"));
+        match desc.textures.into_values().next().unwrap() {
+            TextureDesc::Image { color_space, filter, .. } => (color_space, filter),
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(texture("", "a.png"), (ColorSpaceDesc::Srgb, TextureFilterDesc::Bilinear));
+    assert_eq!(texture(r#"<boolean name="raw" value="true"/>"#, "a.png").0, ColorSpaceDesc::Linear);
+    assert_eq!(texture("", "a.EXR").0, ColorSpaceDesc::Linear);
+    assert_eq!(texture(r#"<string name="filter_type" value="nearest"/>"#, "a.png").1, TextureFilterDesc::Nearest);
+    assert!(
+        message(&format!(
+            "<shape type=\"sphere\"><bsdf type=\"diffuse\">{}</bsdf></shape>",
+            bitmap("reflectance", r#"<string name="wrap_mode" value="fold"/>"#)
+        ))
+        .contains("neither repeat")
+    );
+}
+
+#[test]
+fn blends_and_reliefs_consist_of_others() {
+    let blend = r#"<bsdf type="blendbsdf"><float name="weight" value="0.3"/><bsdf type="diffuse"/><bsdf type="plastic"/></bsdf>"#;
+    let MaterialDesc::Mix { amount: ScalarDesc::Constant(v), .. } = front(blend) else { panic!() };
+    assert_eq!(v, 0.3);
+    assert!(message("<shape type=\"sphere\"><bsdf type=\"blendbsdf\"><bsdf type=\"diffuse\"/></bsdf></shape>").contains("needs 2 bsdfs"));
+    let bump = format!("<bsdf type=\"bumpmap\"><float name=\"scale\" value=\"0.5\"/>{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("x", ""));
+    let MaterialDesc::Relief { bump_map: Some(map), .. } = front(&bump) else { panic!() };
+    assert_eq!(map.height, 0.5);
+    let normal = format!("<bsdf type=\"normalmap\">{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("normalmap", ""));
+    assert!(matches!(front(&normal), MaterialDesc::Relief { normal_map: Some(_), .. }));
+    // Green is up on all shapes, whichever way their images are.
+    let flips = |shape: &str| match material(&scene(&format!("<shape type=\"{shape}\">{normal}</shape>")), 0) {
+        MaterialDesc::Relief { normal_map: Some(map), .. } => map.flip_y,
+        other => panic!("{other:?}"),
+    };
+    assert!(flips("rectangle") && !flips("sphere"));
+    // Normals are never sRGB.
+    assert_eq!(notes(&format!("<shape type=\"sphere\">{normal}</shape>"))[0].1, "raw");
+}
+
+#[test]
+fn where_a_number_is_asked_for_checkers_have_the_other_colour() {
+    // As in Mitsuba 3.9.
+    let checker =
+        r#"<texture type="checkerboard" name="NAME"><float name="color0" value="0.1"/><float name="color1" value="0.9"/></texture>"#;
+    let first = |bsdf: &str| match scene(&format!("<shape type=\"rectangle\">{bsdf}</shape>")).textures.into_values().next().unwrap() {
+        TextureDesc::Checker { color0, .. } => color0[0],
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(first(&format!("<bsdf type=\"diffuse\">{}</bsdf>", checker.replace("NAME", "reflectance"))), 0.1);
+    assert_eq!(first(&format!("<bsdf type=\"roughconductor\">{}</bsdf>", checker.replace("NAME", "alpha"))), 0.9);
+}
+
+#[test]
+fn spectra_become_colours() {
+    let color = |spectrum: &str| match front(&format!("<bsdf type=\"diffuse\">{spectrum}</bsdf>")) {
+        MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(color), .. } => color,
+        MaterialDesc::Diffuse { albedo: ColorDesc::Grey(v), .. } => [v; 3],
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(color(r#"<spectrum name="reflectance" value="0.3"/>"#), [0.3; 3]);
+    // As Mitsuba has it.
+    let expected = [0.648611, 0.369724, 0.12023];
+    let found = color(r#"<spectrum name="reflectance" value="400:0.1, 500:0.2, 600:0.6, 700:0.4"/>"#);
+    assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.003), "{found:?}");
+    let text = format!(
+        r#"<scene version="3.0.0">{SENSOR}<shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" filename="a.spd"/></bsdf></shape></scene>"#
+    );
+    assert!(read_with(&text, &[], &[("a.spd", b"400 0.5\n700 0.5\n")]).is_ok());
+    assert!(read_with(&text, &[], &[("a.spd", b"400\n")]).unwrap_err().to_string().contains("line 1"));
+}
