@@ -96,8 +96,18 @@ impl<'a> Reader<'a> {
     }
 
     fn add(&mut self, element: &Element, material: MaterialDesc, one_sided: bool) -> Look {
+        let has_relief = match &material {
+            MaterialDesc::Relief { .. } => true,
+            MaterialDesc::TwoSided { front, back } => self.reliefs.contains(front) || self.reliefs.contains(back),
+            MaterialDesc::Mix { materials, .. } => materials.iter().any(|part| self.reliefs.contains(part)),
+            _ => false,
+        };
         let name = if element.plugin.id.is_empty() { element.kind() } else { &element.plugin.id };
-        Look { material: self.draft.add_material(name, &element.place().to_string(), material), one_sided, opacity: None }
+        let name = self.draft.add_material(name, &element.place().to_string(), material);
+        if has_relief {
+            self.reliefs.insert(name.clone());
+        }
+        Look { material: name, one_sided, opacity: None }
     }
 
     /// A BSDF that does not consist of others, and whether its back is black.
@@ -350,7 +360,7 @@ impl<'a> Reader<'a> {
             // The same everywhere: no relief.
             return Ok(inner);
         };
-        if self.has_relief(&inner.material) {
+        if self.reliefs.contains(&inner.material) {
             element.ignored("", "a relief on a relief is left out");
             return Ok(inner);
         }
@@ -378,16 +388,6 @@ impl<'a> Reader<'a> {
         };
         let look = self.add(element, MaterialDesc::Relief { material: inner.material, normal_map, bump_map }, inner.one_sided);
         Ok(Look { opacity: inner.opacity, ..look })
-    }
-
-    /// Whether a material or a part of it has relief.
-    fn has_relief(&self, name: &str) -> bool {
-        match self.draft.desc.materials.get(name) {
-            Some(MaterialDesc::Relief { .. }) => true,
-            Some(MaterialDesc::TwoSided { front, back }) => self.has_relief(front) || self.has_relief(back),
-            Some(MaterialDesc::Mix { materials, .. }) => materials.iter().any(|part| self.has_relief(part)),
-            _ => false,
-        }
     }
 }
 

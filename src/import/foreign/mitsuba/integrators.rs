@@ -17,6 +17,13 @@ pub(super) fn unlimited_path() -> IntegratorDesc {
 impl Reader<'_> {
     /// Reads an integrator.
     pub(super) fn integrator(&mut self, id: PluginId) -> Result<()> {
+        self.guard(id)?;
+        self.integrator_within(id)?;
+        self.open.pop();
+        Ok(())
+    }
+
+    fn integrator_within(&mut self, id: PluginId) -> Result<()> {
         let mut element = Element::new(self.document, id);
         let path = |max_depth, rr_depth| IntegratorDesc::Path { max_depth, rr_depth, strategy: StrategyDesc::Mis, clamp: None };
         let kind = element.kind();

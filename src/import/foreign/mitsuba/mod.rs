@@ -23,7 +23,7 @@ mod xml;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::{Draft, ImportOptions, Imported};
@@ -46,6 +46,7 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
         groups: BTreeMap::new(),
         coats: BTreeMap::new(),
         recolored: BTreeMap::new(),
+        reliefs: BTreeSet::new(),
         black: None,
         open: Vec::new(),
     };
@@ -70,6 +71,8 @@ struct Reader<'a> {
     coats: BTreeMap<[u32; 2], Coat>,
     /// Textures whose colours were changed for a coat, by their names, the coat and whether it is nonlinear.
     recolored: BTreeMap<(String, [u32; 2], bool), String>,
+    /// Materials that have relief, or parts with it.
+    reliefs: BTreeSet<String>,
     /// The material that reflects nothing.
     black: Option<String>,
     /// Plugins on the way to the one that is read.

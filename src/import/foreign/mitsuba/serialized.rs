@@ -14,6 +14,9 @@ const HAS_UVS: u32 = 0x0002;
 const HAS_COLORS: u32 = 0x0008;
 const IS_DOUBLE: u32 = 0x2000;
 
+/// No mesh has so little in it that it takes this many times less when compressed.
+const MAX_EXPANSION: u64 = 100;
+
 /// Bytes of a mesh that are asked for at once: its counts are believed only as far as its data goes.
 const CHUNK: usize = 1 << 16;
 
@@ -40,8 +43,9 @@ fn parse(bytes: &[u8], index: u32) -> Result<MeshData, String> {
     let offset = number(bytes, table + index as usize * width, width).and_then(|offset| usize::try_from(offset).ok());
     let mesh = offset.and_then(|offset| bytes.get(offset..table)).ok_or("an offset in the serialized file lies outside of it")?;
     let version = header(mesh).ok_or("an offset in the serialized file does not lead to a mesh")?;
-    let stream = ZlibDecoder::new(mesh.get(4..).ok_or_else(short)?);
-    let mut stream = BufReader::new(stream);
+    let packed = mesh.get(4..).ok_or_else(short)?;
+    let limit = MAX_EXPANSION.saturating_mul(packed.len() as u64).saturating_add(CHUNK as u64);
+    let mut stream = BufReader::new(ZlibDecoder::new(packed).take(limit));
     decode(&mut stream, version).map_err(|e| format!("the serialized mesh is damaged: {e}"))
 }
 

@@ -1,5 +1,7 @@
 //! Shapes, groups and instances.
 
+use std::collections::BTreeSet;
+
 use super::element::Element;
 use super::textures::UvOrigin;
 use super::tree::{PluginId, Value};
@@ -121,7 +123,7 @@ impl<'a> Reader<'a> {
         element.ignored_plugins("sensor", "a sensor on a shape is no camera")?;
         // How often silhouettes are sampled for derivatives.
         element.float("silhouette_sampling_weight")?;
-        if uv == UvOrigin::Swapped && bsdf.is_some_and(|bsdf| self.has_direction(bsdf, 0)) {
+        if uv == UvOrigin::Swapped && bsdf.is_some_and(|bsdf| self.has_direction(bsdf, &mut BTreeSet::new())) {
             element.approximated("", "u and v of a disk are swapped: what depends on their directions looks different");
         }
         let common = shape.common_mut();
@@ -135,17 +137,17 @@ impl<'a> Reader<'a> {
         Ok(Some((place, shape)))
     }
 
-    /// Whether a BSDF or a part of it looks different along u and along v.
-    fn has_direction(&self, id: PluginId, depth: usize) -> bool {
+    /// Whether a BSDF or a part of it looks different along u and along v; `seen` are parts that do not.
+    fn has_direction(&self, id: PluginId, seen: &mut BTreeSet<PluginId>) -> bool {
         let plugin = &self.document.plugins[id.0];
+        if !seen.insert(id) || seen.len() > super::MAX_REFERENCES {
+            return false;
+        }
+        let directed = |name: &str| matches!(name, "alpha_u" | "alpha_v" | "anisotropic");
+        let mut parts = plugin.properties.iter().filter_map(|property| self.document.plugin_of(property).ok().flatten());
         plugin.kind == "normalmap"
-            || plugin.properties.iter().any(|property| matches!(property.name.as_str(), "alpha_u" | "alpha_v" | "anisotropic"))
-            || depth < super::MAX_REFERENCES
-                && plugin
-                    .properties
-                    .iter()
-                    .filter_map(|property| self.document.plugin_of(property).ok().flatten())
-                    .any(|inner| self.has_direction(inner, depth + 1))
+            || plugin.properties.iter().any(|property| directed(&property.name))
+            || parts.any(|part| self.has_direction(part, seen))
     }
 
     /// The surface of a shape; none if it is one that does not exist here.

@@ -109,6 +109,16 @@ fn what_refers_to_itself_is_an_error() {
     let group = r#"<shape type="shapegroup" id="g"><ref id="m"/></shape><shape type="merge" id="m"><ref id="m"/></shape>
         <shape type="instance"><ref id="g"/></shape>"#;
     assert!(message(group).contains("refers to itself"));
+    assert!(message(r#"<integrator type="moment" id="i"><ref id="i"/></integrator>"#).contains("refers to itself"));
+    // Each is twice a part of the next one.
+    let mut doubled = "<bsdf type=\"diffuse\" id=\"b0\"/><shape type=\"disk\"><ref id=\"b60\"/></shape>".to_owned();
+    for i in 1..=60 {
+        doubled += &format!(
+            "<bsdf type=\"blendbsdf\" id=\"b{i}\"><float name=\"weight\" value=\"0.5\"/><ref id=\"b{0}\"/><ref id=\"b{0}\"/></bsdf>",
+            i - 1
+        );
+    }
+    assert!(try_scene(&doubled).is_ok());
 }
 
 #[test]
