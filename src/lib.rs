@@ -29,6 +29,7 @@ pub mod bsdf;
 pub mod camera;
 pub mod color;
 pub mod compile;
+pub mod convert;
 pub mod desc;
 pub mod error;
 pub mod film;

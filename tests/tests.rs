@@ -12,6 +12,8 @@ mod bench_accel;
 mod cameras;
 /// The program as a user runs it: exit codes, what it writes, what it says.
 mod cli;
+/// Scenes written anew.
+mod conversion;
 /// Surfaces with holes, the same ones for every accelerator and every kind of query.
 mod cutouts;
 /// Rays and instances at the end of what is one.

@@ -10,7 +10,7 @@ const LAYERS: &[(u32, &[&str])] = &[
     (2, &["color", "sampling", "import"]),
     (3, &["geometry", "texture", "bsdf", "camera", "film"]),
     (4, &["accel", "material", "medium", "opacity", "relief", "light", "output"]),
-    (5, &["scene"]),
+    (5, &["scene", "convert"]),
     (6, &["integrator", "compile"]),
     (7, &["render"]),
     (8, &["bench"]),

@@ -32,7 +32,7 @@ use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::id::TextureId;
-use crate::import::{AssetError, Assets};
+use crate::import::{AssetError, Assets, Imported};
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::scene::{Features, Scene, Surface};
@@ -40,6 +40,7 @@ use crate::texture::Texture;
 
 use lights::LightTable;
 use materials::MaterialTable;
+use meshes::MeshStore;
 use transforms::Shutter;
 
 /// Compiles a scene; the files it names are looked up beside `scene_file`.
@@ -50,17 +51,26 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
     compile_with(desc, scene_file, Arc::default())
 }
 
+/// Compiles a scene that was read from a file of any kind; errors name the places in that file.
+///
+/// # Errors
+/// As [`compile`].
+pub fn compile_imported(imported: &Imported, scene_file: &Path) -> Result<Scene> {
+    compile_with(&imported.desc, scene_file, Arc::clone(&imported.assets)).map_err(|e| imported.locate(e))
+}
+
 /// Compiles a scene that a reader made: what it names is looked up among `assets` first, then beside `scene_file`.
 ///
 /// # Errors
 /// As [`compile`].
-pub fn compile_with(desc: &SceneDesc, scene_file: &Path, assets: Arc<Assets>) -> Result<Scene> {
+fn compile_with(desc: &SceneDesc, scene_file: &Path, assets: Arc<Assets>) -> Result<Scene> {
     check_settings(desc, scene_file)?;
     let files = Files { scene: scene_file.into(), assets };
     let camera = camera::compile(&files, &desc.camera)?;
     let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
     let mut builder = Builder {
+        meshes: MeshStore::read(&files, desc),
         files,
         shutter,
         materials,
@@ -121,6 +131,8 @@ impl Files {
 /// A scene under construction.
 struct Builder {
     files: Files,
+    /// Read, and not placed yet.
+    meshes: MeshStore,
     shutter: Shutter,
     materials: MaterialTable,
     geometry: Geometry,

@@ -40,7 +40,7 @@ macro_rules! shapes {
 
             impl $name {
                 /// The shape with its own parameters and every other default.
-                #[allow(clippy::too_many_arguments)]
+                #[allow(clippy::too_many_arguments, clippy::new_without_default)]
                 pub fn new($($field: $type,)*) -> Self {
                     Self {
                         $($field,)*

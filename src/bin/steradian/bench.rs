@@ -9,11 +9,11 @@ use steradian::bench::report::Report;
 use steradian::bench::stability::{self, Effort, StabilityReport};
 use steradian::bench::{Machine, Options, ReportsOptions, SceneReport, Watch, bench_reports, bench_scaling, bench_scene, record};
 use steradian::render::{Overrides, Settings};
-use steradian::{Error, Result, compile, import};
+use steradian::{Error, Result, compile};
 
-use crate::args::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
+use crate::args::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs, Verbosity};
 use crate::interrupt::Interrupt;
-use crate::text;
+use crate::{scene, text};
 
 /// Runs a benchmark; the result is the exit code.
 pub fn run(command: &BenchCommand) -> Result<u8> {
@@ -46,9 +46,9 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
             break;
         }
         watch.step(&format!("{}: loading", path.display()));
-        let desc = import::load_scene(path)?;
-        let settings = Settings::new(&desc, &Overrides { default_outputs: vec!["unused.exr".into()], ..Overrides::default() })?;
-        let scene = compile::compile(&desc, path)?;
+        let imported = scene::load(path, &arguments.import, Verbosity { quiet: arguments.quiet, verbose: 0 })?;
+        let settings = Settings::new(&imported.desc, &Overrides { default_outputs: vec!["unused.exr".into()], ..Overrides::default() })?;
+        let scene = compile::compile_imported(&imported, path)?;
         watch.step(&format!("{}: recording rays", path.display()));
         let recorder = accel::build(AccelKind::EMBREE, &scene.geometry, 0)?;
         let rays = record(&scene, &*recorder, &settings, arguments.rays as usize)?;
@@ -142,7 +142,8 @@ fn options(arguments: &BenchAccelArgs) -> Options {
 fn replay(arguments: &BenchAccelArgs, ray: &str) -> Result<()> {
     let ray = parse_ray(ray).map_err(|message| Error::Usage(format!("--ray: {message}")))?;
     for path in &arguments.scenes {
-        let scene = compile::compile(&import::load_scene(path)?, path)?;
+        let scene =
+            compile::compile_imported(&scene::load(path, &arguments.import, Verbosity { quiet: arguments.quiet, verbose: 0 })?, path)?;
         for kind in options(arguments).accels {
             let accel = accel::build(kind, &scene.geometry, 0)?;
             let any = if accel.occluded(&ray) { "occluded" } else { "free" };

@@ -3,11 +3,13 @@
 mod args;
 mod bench;
 mod compare;
+mod convert;
 mod info;
 mod interrupt;
 mod names;
 mod progress;
 mod render;
+mod scene;
 mod stats;
 mod text;
 
@@ -39,6 +41,7 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Render(arguments) => render::run(&arguments),
         Command::Info(arguments) => info::run(&arguments).map(|()| 0),
         Command::Bench(command) => bench::run(&command),
+        Command::Convert(arguments) => convert::run(&arguments).map(|()| 0),
         Command::Schema => text::print(&import::schema()).map(|()| 0),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
         Command::Completions { shell } => {

@@ -9,12 +9,13 @@ use steradian::film::{LayerSet, PixelSample};
 use steradian::math::Vec3;
 use steradian::output::{self, RenderInfo};
 use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Settings, Stats};
-use steradian::{Result, compile, import};
+use steradian::{Result, compile};
 use tracing_subscriber::filter::LevelFilter;
 
 use crate::args::{RenderArgs, Verbosity};
 use crate::interrupt::Interrupt;
 use crate::progress::Reporter;
+use crate::scene;
 use crate::stats::{self, Run};
 use crate::text;
 
@@ -22,12 +23,13 @@ use crate::text;
 pub fn run(arguments: &RenderArgs) -> Result<u8> {
     log_to_stderr(arguments.verbosity);
     let start = Instant::now();
-    let desc = import::load_scene(&arguments.scene)?;
-    let mut settings = Settings::new(&desc, &arguments.overrides(default_outputs(&arguments.scene)))?;
+    let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
+    let mut settings = Settings::new(&imported.desc, &arguments.overrides(default_outputs(&arguments.scene)))?;
     if arguments.pixel.is_none() {
         check_outputs(&settings, arguments.json.as_deref())?;
     }
-    let scene = compile::compile(&desc, &arguments.scene)?;
+    let scene = compile::compile_imported(&imported, &arguments.scene)?;
+    drop(imported);
     let load_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();

@@ -1,6 +1,7 @@
 //! A scene of our own format while a reader fills it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::{ImportReport, Imported, Outcome, ReportEntry};
 use crate::desc::{CameraDesc, InstanceDesc, LightDesc, MaterialDesc, ObjectDesc, SceneDesc, ShapeDesc, TextureDesc};
@@ -114,7 +115,7 @@ impl Draft {
 
     /// The scene.
     pub fn finish(self) -> Imported {
-        Imported { desc: self.desc, assets: self.assets, report: self.report, places: self.places }
+        Imported { desc: self.desc, assets: Arc::new(self.assets), report: self.report, places: self.places }
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod draft;
 mod gltf;
+mod missing;
 mod mitsuba;
 mod pbrt;
 mod report;
@@ -11,6 +12,7 @@ pub use report::{ImportReport, Outcome, ReportEntry};
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::{Assets, load_scene};
 use crate::desc::SceneDesc;
@@ -31,7 +33,7 @@ pub struct Imported {
     /// The scene.
     pub desc: SceneDesc,
     /// What it names that is no file.
-    pub assets: Assets,
+    pub assets: Arc<Assets>,
     /// What became of the file's parameters; empty for our own format.
     pub report: ImportReport,
     /// Where the file says what became `shapes[0]`, `materials.floor` and so on; empty for our own format.
@@ -69,7 +71,7 @@ pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
         "gltf" | "glb" => gltf::read(path, options),
         _ => {
             let desc = load_scene(path)?;
-            Ok(Imported { desc, assets: Assets::default(), report: ImportReport::default(), places: BTreeMap::new() })
+            Ok(Imported { desc, assets: Arc::default(), report: ImportReport::default(), places: BTreeMap::new() })
         }
     }
 }

@@ -1,5 +1,8 @@
 //! The command line.
 
+mod bench;
+mod import;
+
 use std::path::PathBuf;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
@@ -9,11 +12,15 @@ use steradian::desc::{IntegratorDesc, LayerDesc, SamplerKindDesc, StrategyDesc};
 use steradian::render::Overrides;
 
 use crate::names;
+pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
+pub use import::{ConvertArgs, ImportArgs};
 
 const EXAMPLES: &str = "\
 Examples:
   steradian render scene.json                      Writes what the scene's \"outputs\" name
   steradian render scene.json -o a.exr -o a.png    Writes these instead
+  steradian render scene.xml                       A Mitsuba 3 scene; .pbrt, .gltf and .glb files are read as well
+  steradian convert scene.xml scene.json           The same as a scene of ours, to be changed
   steradian info scene.json                        What is in the scene
   steradian compare reference.exr test.exr         How far two pictures differ
 
@@ -60,6 +67,9 @@ pub enum Command {
     /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info without an error
     /// renders without an error.
     Info(InfoArgs),
+    /// Turn a scene of another renderer into one of ours, with its meshes and images beside it
+    #[command(after_help = import::CONVERT_EXAMPLES)]
+    Convert(ConvertArgs),
     /// Print the JSON Schema of scene files
     ///
     /// Editors check and complete scenes with it: save it and name it in the scene's "$schema".
@@ -82,138 +92,10 @@ pub enum Command {
     },
 }
 
-const BENCH_REPORTS_ABOUT: &str = "\
-Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
-
-Three pictures of normals on one thread: a head of 968 triangles (\"120 s linear, 3.5 s octree, 0.5 s Embree\"), a mesh of 1,000 triangles (\"kd-tree \
-about 10 times faster\"), one of 70,000 (\"BVH 17.61 times faster\"). Each is drawn with the accelerators as the reports wrote them, with ours and with \
-Embree. Where every triangle is tested, a smaller picture is timed and its time scaled up, unless --full is given.";
-
-const BENCH_ACCEL_EXAMPLES: &str = "\
-Examples:
-  steradian bench accel scenes/cornell.json
-      All accelerators on the scene's own rays, as tables on stdout.
-  steradian bench accel scenes/*.json --accel embree,embree:high,bvh,kdtree --out report
-      Several scenes; report/accel.html has plots, .md, .csv and .json the same figures.
-  steradian bench accel --scaling 1e3..1e7 --accel embree,bvh,kdtree,octree --out growth
-      Cost over the number of triangles of a generated mesh.
-  steradian bench accel scene.json --accel linear,embree --ray=0,0,5,0,0,-1
-      What each accelerator says of one ray: origin, direction, and optionally t_min, t_max, time.
-
-Rays are recorded once from a render of the scene with one sample a pixel: camera, shadow (any hit), first bounce, deep bounce, ambient occlusion
-(any hit). Every accelerator traces the very same rays, in turn, round after round. Answers are compared with those of linear.
-Ctrl-C ends after the present step and reports what there is.";
-
-/// What to measure.
-#[derive(Debug, Subcommand)]
-pub enum BenchCommand {
-    /// Compare accelerators on the same rays
-    #[command(after_help = BENCH_ACCEL_EXAMPLES)]
-    Accel(BenchAccelArgs),
-    /// Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
-    #[command(long_about = BENCH_REPORTS_ABOUT)]
-    Reports(BenchReportsArgs),
-    /// Check numerical stability: every check with its criterion and what was measured
-    #[command(long_about = BENCH_STABILITY_ABOUT, after_help = BENCH_STABILITY_EXAMPLES)]
-    Stability(BenchStabilityArgs),
-}
-
-const BENCH_STABILITY_ABOUT: &str = "\
-Check numerical stability: every check with its criterion and what was measured.
-
-Shapes from a thousandth to a million radii away, rays that leave surfaces of every size anywhere, closed meshes that must not leak, accelerators \
-against testing everything, sampled directions against their densities, lights, cameras and films against closed forms. A check that falls short says \
-why; one that fails ends the run with exit code 1 and leaves pictures of what it found in DIR/evidence.";
-
-const BENCH_STABILITY_EXAMPLES: &str = "\
-Examples:
-  steradian bench stability --out stability      All checks: stability.html with plots, stability.md, stability.json
-  steradian bench stability --quick              The same checks with fewer samples, as the tests run them
-  steradian bench stability A3 B                 One check and one group
-
-Ctrl-C ends after the present check and reports what there is.";
-
-/// Arguments of `bench stability`.
-#[derive(Debug, Args)]
-pub struct BenchStabilityArgs {
-    /// Checks (A3) or groups of checks (B). Default: all
-    #[arg(value_name = "ID")]
-    pub checks: Vec<String>,
-    /// Fewer rays and samples: about a second a check
-    #[arg(long)]
-    pub quick: bool,
-    /// List the checks and run none
-    #[arg(long)]
-    pub list: bool,
-    /// Folder for stability.html, stability.md and stability.json; without it the table goes to stdout
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Without --out: print JSON instead of a table
-    #[arg(long)]
-    pub json: bool,
-    /// Say nothing but results and errors
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
-/// Arguments of `bench reports`.
-#[derive(Debug, Args)]
-pub struct BenchReportsArgs {
-    /// Width and height of the pictures
-    #[arg(long, value_name = "WxH", default_value = "1200x800", value_parser = parse_size)]
-    pub size: [u32; 2],
-    /// Frames of each accelerator
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub rounds: u32,
-    /// Render full frames even where every triangle is tested: minutes in place of seconds
-    #[arg(long)]
-    pub full: bool,
-    /// JSON instead of tables
-    #[arg(long)]
-    pub json: bool,
-    /// Say nothing but results and errors
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
-/// Arguments of `bench accel`.
-#[derive(Debug, Args)]
-pub struct BenchAccelArgs {
-    /// Scene files
-    pub scenes: Vec<PathBuf>,
-    /// Accelerators, with options such as embree:high. Default: embree,bvh,kdtree,octree,linear
-    #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help())]
-    pub accel: Vec<AccelKind>,
-    /// Rays of each kind, about
-    #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = clap::value_parser!(u32).range(16..=100_000_000))]
-    pub rays: u32,
-    /// Numbers of threads. Default: 1 and all
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub threads: Vec<u32>,
-    /// Rounds after the one that warms up
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub rounds: u32,
-    /// Also measure a generated mesh with growing numbers of triangles, such as 1e3..1e7
-    #[arg(long, value_name = "FROM..TO", value_parser = parse_range)]
-    pub scaling: Option<[usize; 2]>,
-    /// Folder for accel.html, accel.md, accel.csv and accel.json; without it tables go to stdout
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Without --out: print JSON instead of tables
-    #[arg(long)]
-    pub json: bool,
-    /// Trace only this ray and print each accelerator's answer
-    #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN[,TMAX[,TIME]]]", allow_hyphen_values = true)]
-    pub ray: Option<String>,
-    /// Say nothing but results and errors
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// The scene file
+    /// The scene file: .json, .xml (Mitsuba 3), .pbrt (pbrt-v4), .gltf or .glb
     pub scene: PathBuf,
 
     /// File to write, .exr or .png; repeat for several. Replaces the scene's "outputs"
@@ -277,6 +159,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "I", requires = "pixel", help_heading = "Run")]
     pub sample: Option<u32>,
     #[command(flatten)]
+    pub import: ImportArgs,
+    #[command(flatten)]
     pub verbosity: Verbosity,
 }
 
@@ -294,11 +178,13 @@ pub struct Verbosity {
 /// Arguments of `info`.
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    /// The scene file
+    /// The scene file: .json, .xml (Mitsuba 3), .pbrt (pbrt-v4), .gltf or .glb
     pub scene: PathBuf,
     /// As JSON
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub import: ImportArgs,
 }
 
 /// Arguments of `compare`.
@@ -338,18 +224,6 @@ impl RenderArgs {
     }
 }
 
-fn accel_help() -> String {
-    let line = |(name, what): &(&str, &str)| format!("  {name:<16}{what}");
-    let lines: Vec<_> = AccelKind::CHOICES.iter().map(line).collect();
-    format!("What finds hits; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}", lines.join("\n"))
-}
-
-fn parse_range(text: &str) -> Result<[usize; 2], String> {
-    let number = |word: &str| word.trim().parse::<f64>().ok().filter(|n| (100.0..=1e9).contains(n)).map(|n| n as usize);
-    let ends = text.split_once("..").and_then(|(from, to)| Some([number(from)?, number(to)?]));
-    ends.filter(|[from, to]| from <= to).ok_or_else(|| "expected two numbers of triangles from 100 to 1e9, such as 1e3..1e7".to_owned())
-}
-
 fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let parse = || {
         let (width, height) = text.split_once(['x', 'X'])?;
@@ -361,6 +235,12 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
 fn parse_list<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N], String> {
     let numbers: Option<Vec<T>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
     numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| format!("expected {N} whole numbers, separated by commas"))
+}
+
+fn accel_help() -> String {
+    let line = |(name, what): &(&str, &str)| format!("  {name:<16}{what}");
+    let lines: Vec<_> = AccelKind::CHOICES.iter().map(line).collect();
+    format!("What finds hits; all give the same picture within rounding. Options combine, as in embree:low+compact\n\n{}", lines.join("\n"))
 }
 
 #[cfg(test)]

@@ -1,0 +1,20 @@
+//! `steradian convert`.
+
+use steradian::Result;
+use steradian::convert::{self, Originals};
+
+use crate::args::{ConvertArgs, Verbosity};
+use crate::scene;
+
+/// Reads a scene of any kind and writes one of ours.
+pub fn run(arguments: &ConvertArgs) -> Result<()> {
+    let verbosity = Verbosity { quiet: arguments.quiet, verbose: arguments.verbose };
+    let imported = scene::load(&arguments.input, &arguments.import, verbosity)?;
+    let originals = if arguments.link { Originals::Link } else { Originals::Copy };
+    let count = convert::write_scene(&imported, &arguments.input, &arguments.output, originals)?;
+    if !arguments.quiet {
+        let files = if count == 1 { "1 file".to_owned() } else { format!("{count} files") };
+        eprintln!("wrote {} and {files} beside it", arguments.output.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,58 @@
+//! Scenes written anew are the same scenes.
+
+use std::path::Path;
+
+use steradian::accel::AccelKind;
+use steradian::convert::{Originals, write_scene};
+use steradian::import::{ImportOptions, read_scene};
+use steradian::render::{Overrides, Settings};
+use steradian::{ErrorKind, compile};
+
+use crate::util::render::{Prepared, pixels, render_with};
+
+fn picture(path: &Path) -> Vec<[u32; 3]> {
+    let overrides = Overrides { spp: Some(2), size: Some([24, 16]), threads: Some(2), ..Overrides::default() };
+    let imported = read_scene(path, &ImportOptions::default()).unwrap();
+    let settings = Settings::new(&imported.desc, &overrides).unwrap();
+    let scene = compile::compile_imported(&imported, path).unwrap();
+    pixels(&render_with(&Prepared { scene, settings }, AccelKind::EMBREE).image).map(|pixel| pixel.map(f32::to_bits)).collect()
+}
+
+fn convert(path: &Path, target: &Path, originals: Originals) -> steradian::Result<usize> {
+    write_scene(&read_scene(path, &ImportOptions::default())?, path, target, originals)
+}
+
+#[test]
+fn converted_scenes_give_the_same_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["glassware", "motion", "nee", "shapes", "textures", "tree"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("json");
+        let expected = picture(&path);
+        for (kind, originals) in [("copy", Originals::Copy), ("link", Originals::Link)] {
+            let target = folder.path().join(kind).join(format!("{name}.json"));
+            std::fs::create_dir_all(target.parent().unwrap()).unwrap();
+            convert(&path, &target, originals).unwrap();
+            assert!(picture(&target) == expected, "{name}, {kind}");
+            // A second time changes nothing: what is there is written over.
+            convert(&target, &target, originals).unwrap();
+            assert!(picture(&target) == expected, "{name}, {kind}, twice");
+        }
+    }
+    assert!(!folder.path().join("link/textures_files").exists());
+}
+
+#[test]
+fn what_cannot_be_written_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.json");
+    std::fs::write(&path, r#"{ "camera": {}, "shapes": [{ "type": "mesh", "file": "gone.ply" }] }"#).unwrap();
+    let target = folder.path().join("t.json");
+    let error = convert(&path, &target, Originals::Copy).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::AssetMissing);
+    assert!(error.to_string().contains("gone.ply") && error.to_string().contains("shapes[0].file"), "{error}");
+    assert!(!target.exists());
+    let error = convert(&path, &folder.path().join("t.xml"), Originals::Copy).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Usage);
+    let error = convert(&path, &folder.path().join("none/t.json"), Originals::Copy).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Output);
+}
