@@ -1,6 +1,6 @@
 //! A camera and a light for files that have none.
 
-use super::meshes::{Placed, corners};
+use super::meshes::Placed;
 use crate::desc::{CameraDesc, DirectionalLightDesc, EnvironmentLightDesc, LightDesc};
 use crate::import::{Draft, RgbImage};
 use crate::math::DVec3;
@@ -15,8 +15,10 @@ const BACKWARD: DVec3 = DVec3::new(0.55, 0.38, 0.75);
 pub fn add_camera(placed: &Placed, draft: &mut Draft) {
     let how = "the file has no camera: one sees all of the scene from the front, the right and slightly above";
     draft.approximated("nodes", "file", "camera", how);
-    let bounds = placed.bounds.unwrap_or([DVec3::NEG_ONE, DVec3::ONE]);
-    let middle = 0.5 * (bounds[0] + bounds[1]);
+    let alone = [DVec3::NEG_ONE, DVec3::ONE];
+    let corners = if placed.corners.is_empty() { &alone[..] } else { &placed.corners };
+    let [min, max] = corners.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[min, max], p| [min.min(*p), max.max(*p)]);
+    let middle = 0.5 * (min + max);
     let backward = BACKWARD.normalize();
     let right = DVec3::Y.cross(backward).normalize();
     let up = backward.cross(right);
@@ -24,11 +26,11 @@ pub fn add_camera(placed: &Placed, draft: &mut Draft) {
     let film = &draft.desc.film;
     let tangent = (0.5 * FOV).to_radians().tan();
     let aspect = f64::from(film.width) / f64::from(film.height.max(1));
-    let distance = corners(&bounds).into_iter().map(|p| {
+    let distance = corners.iter().map(|&p| {
         let p = p - middle;
         p.dot(backward) + (p.dot(up).abs() / tangent).max(p.dot(right).abs() / (tangent * aspect))
     });
-    let size = (bounds[1] - bounds[0]).length();
+    let size = (max - min).length();
     let distance = 1.05 * distance.fold(0.0, f64::max).max(1e-3 * size);
     let distance = if distance > 0.0 && distance.is_finite() { distance } else { 1.0 };
     let camera = CameraDesc {

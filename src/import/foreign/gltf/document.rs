@@ -58,7 +58,12 @@ pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
     let misread = |e: serde_json::Error| {
         let text = e.to_string();
         let message = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);
-        Error::Parse { file: file.into(), line: e.line().max(1), column: e.column().max(1), message: message.into() }
+        Error::Parse {
+            file: file.into(),
+            line: e.line().max(1),
+            column: e.column().max(1),
+            message: message.replace("index into child of root", "an index"),
+        }
     };
 
     let head: Head = serde_json::from_slice(json).map_err(misread)?;

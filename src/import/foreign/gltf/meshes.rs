@@ -21,8 +21,8 @@ use crate::math::{DAffine3, DQuat, DVec3, Transform};
 /// What has been placed.
 #[derive(Debug)]
 pub struct Placed {
-    /// Corners of a box around all of it, if there is anything.
-    pub bounds: Option<[DVec3; 2]>,
+    /// The corners of a box around each mesh.
+    pub corners: Vec<DVec3>,
     /// Whether a surface gives off more light than a white one reflects in the default light.
     pub gives_light: bool,
 }
@@ -87,17 +87,15 @@ pub fn add(source: Source, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Resul
 
     let budget = source.buffers.total().saturating_mul(EXPANSION).max(LEAST_BUDGET);
     let mut builder = Builder { source, draft, materials: MaterialSet::default(), budget, gives_light: false };
-    let mut bounds = None;
+    let mut all_corners = Vec::new();
     for (form, maps) in forms.into_iter().filter(|(_, maps)| !maps.is_empty()) {
         let shapes = builder.shapes(&form, pose)?;
         for (_, map) in &maps {
-            for p in shapes.bounds.iter().flat_map(corners) {
-                grow(&mut bounds, map.transform_point3(p));
-            }
+            all_corners.extend(shapes.bounds.iter().flat_map(corners).map(|p| map.transform_point3(p)));
         }
         builder.place(&form, shapes, &maps);
     }
-    Ok(Placed { bounds, gives_light: builder.gives_light })
+    Ok(Placed { corners: all_corners, gives_light: builder.gives_light })
 }
 
 /// What a node shows of a mesh.
@@ -255,7 +253,7 @@ fn grow(bounds: &mut Option<[DVec3; 2]>, p: DVec3) {
 }
 
 /// The corners of a box.
-pub fn corners([min, max]: &[DVec3; 2]) -> [DVec3; 8] {
+fn corners([min, max]: &[DVec3; 2]) -> [DVec3; 8] {
     std::array::from_fn(|i| {
         let pick = |bit: usize, low: f64, high: f64| if i >> bit & 1 == 0 { low } else { high };
         DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
