@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Scenes of other renderers, each rendered by Steradian and by Mitsuba 3, and by Steradian from its other formats: ratios of means.
 
-usage: PYTHON benches/real_scenes.py [FOLDER] [--spp 64] [--scale 0.25] [--steradian target/release/steradian] [--only NAME,...]
+usage: PYTHON benches/real_scenes.py [FOLDER] [--spp 64] [--scale 0.25] [--steradian target/release/steradian] [--only NAME,...] [--plain]
 
 FOLDER (default ../shared/scenes/real) has a folder for each scene with scene_mitsuba3.xml, scene-v4.pbrt or *.gltf, and perhaps
-reference/*.exr. PYTHON has numpy and mitsuba (DRJIT_LIBLLVM_PATH set if need be). Prints a table in Markdown: for each scene the ratio of the
+reference/*.exr. With --plain both get the XML with smooth metals in place of rough ones and diffuse surfaces in place of plastics, whose models
+differ: what remains must agree. PYTHON has numpy and mitsuba (DRJIT_LIBLLVM_PATH set if need be). Prints a table in Markdown: for each scene the ratio of the
 means (red, green, blue) to Mitsuba's picture of the same XML, with its standard error from blocks, and the time of each.
 """
-import argparse, json, os, subprocess, sys, tempfile, time
+import argparse, json, os, re, subprocess, sys, tempfile, time
 import numpy as np
 import mitsuba as mi
 
@@ -47,6 +48,20 @@ def mitsuba(scene, spp, scale):
     return image, small, time.time() - start
 
 
+def plain(xml, folder):
+    """The scene without rough metals and plastics, its files by their full names."""
+    text = open(xml).read()
+    here = os.path.dirname(os.path.abspath(xml))
+    text = re.sub(r'(name="filename"\s+value=")([^"/][^"]*)"', lambda m: m[1] + os.path.join(here, m[2]) + '"', text)
+    text = text.replace('type="roughconductor"', 'type="conductor"').replace('name="diffuse_reflectance"', 'name="reflectance"')
+    text = re.sub(r'type="(rough)?plastic"', 'type="diffuse"', text)
+    # What the new types do not know would be errors in Mitsuba.
+    text = re.sub(r'<(float|string|boolean|rgb) name="(alpha|distribution|nonlinear|int_ior|ext_ior|specular_reflectance)"[^>]*/>', "", text)
+    out = os.path.join(folder, "plain.xml")
+    open(out, "w").write(text)
+    return out
+
+
 def ratio(test, reference, block=16):
     """Ratio of means, and its standard error from blocks."""
     h, w = (n // block * block for n in reference.shape[:2])
@@ -71,6 +86,7 @@ def main():
     parser.add_argument("--scale", type=float, default=0.25)
     parser.add_argument("--steradian", default="target/release/steradian")
     parser.add_argument("--only", default="")
+    parser.add_argument("--plain", action="store_true")
     arguments = parser.parse_args()
     print("| scene | XML against Mitsuba, r g b | other format against our XML | Mitsuba against the reference | XML against the reference | seconds: ours, Mitsuba |")
     print("|---|---|---|---|---|---|")
@@ -80,16 +96,18 @@ def main():
         if not os.path.isfile(xml) or (arguments.only and not any(part in name for part in arguments.only.split(","))):
             continue
         with tempfile.TemporaryDirectory() as temporary:
+            if arguments.plain:
+                xml = plain(xml, temporary)
             theirs, size, seconds = mitsuba(xml, arguments.spp, arguments.scale)
             image, stats = ours(arguments.steradian, xml, arguments.spp, size, temporary)
             if image is None:
                 print(f"| {name} | {stats} | | | | |", flush=True)
                 continue
-            other = next((f for f in sorted(os.listdir(folder)) if f.endswith((".pbrt", ".gltf", ".glb"))), None)
+            other = next((f for f in sorted(os.listdir(folder)) if f.endswith((".pbrt", ".gltf", ".glb"))), None) if not arguments.plain else None
             second = ours(arguments.steradian, os.path.join(folder, other), arguments.spp, size, temporary) if other else (None, "")
             other_text = "-" if other is None else second[1] if second[0] is None else f"{os.path.splitext(other)[1]}: {text(second[0], image)}"
             references = os.path.join(folder, "reference")
-            exr = next((f for f in sorted(os.listdir(references)) if f.endswith(".exr")), None) if os.path.isdir(references) else None
+            exr = next((f for f in sorted(os.listdir(references)) if f.endswith(".exr")), None) if os.path.isdir(references) and not arguments.plain else None
             reference = read(os.path.join(references, exr), size) if exr else None
             against = ["-", "-"] if reference is None else [text(theirs, reference), text(image, reference)]
             print(f"| {name} | {text(image, theirs)} | {other_text} | {against[0]} | {against[1]} | {stats['render_seconds']:.1f}, {seconds:.1f} |", flush=True)
