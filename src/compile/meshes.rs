@@ -1,8 +1,12 @@
 //! Meshes: buffers from files or the scene itself to placed, checked [`Mesh`]es.
 
+use std::collections::HashMap;
+
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+
 use super::Files;
 use super::normals::{self, Smoothing};
-use crate::desc::{MeshDesc, MeshShadingDesc};
+use crate::desc::{MeshDesc, MeshShadingDesc, SceneDesc, ShapeDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, MeshError, MeshStep};
 use crate::import::{self, AssetError, MeshData, ObjMaterial};
@@ -16,8 +20,28 @@ pub struct LoadedMesh {
     pub material: Option<ObjMaterial>,
 }
 
-/// The meshes of a shape: several where an OBJ has several materials.
-pub fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
+/// The meshes of a scene's files, read in parallel before the shapes are placed one after another.
+#[derive(Default)]
+pub struct MeshStore(HashMap<String, Result<Vec<LoadedMesh>>>);
+
+impl MeshStore {
+    /// Reads the files of all meshes.
+    pub fn read(files: &Files, desc: &SceneDesc) -> Self {
+        let meshes = desc.all_shapes().filter_map(|(path, shape)| match shape {
+            ShapeDesc::Mesh(mesh) if mesh.file.is_some() => Some((path, mesh)),
+            _ => None,
+        });
+        let meshes: Vec<(String, &MeshDesc)> = meshes.collect();
+        Self(meshes.into_par_iter().map(|(path, mesh)| (path.clone(), load(files, &path, mesh))).collect())
+    }
+
+    /// The meshes of the shape at `path`: several where an OBJ has several materials.
+    pub fn take(&mut self, files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
+        self.0.remove(path).unwrap_or_else(|| load(files, path, desc))
+    }
+}
+
+fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
     match (&desc.file, &desc.positions, &desc.triangles) {
         (Some(file), None, None) if desc.normals.is_none() && desc.uvs.is_none() && desc.deform_positions.is_empty() => {
             let mut meshes = load_file(files, &format!("{path}.file"), file, desc.material.is_none())?;

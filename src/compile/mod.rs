@@ -40,6 +40,7 @@ use crate::texture::Texture;
 
 use lights::LightTable;
 use materials::MaterialTable;
+use meshes::MeshStore;
 use transforms::Shutter;
 
 /// Compiles a scene; the files it names are looked up beside `scene_file`.
@@ -69,6 +70,7 @@ fn compile_with(desc: &SceneDesc, scene_file: &Path, assets: Arc<Assets>) -> Res
     let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
     let mut builder = Builder {
+        meshes: MeshStore::read(&files, desc),
         files,
         shutter,
         materials,
@@ -129,6 +131,8 @@ impl Files {
 /// A scene under construction.
 struct Builder {
     files: Files,
+    /// Read, and not placed yet.
+    meshes: MeshStore,
     shutter: Shutter,
     materials: MaterialTable,
     geometry: Geometry,

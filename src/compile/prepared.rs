@@ -94,7 +94,7 @@ impl Builder {
     ) -> Result<Vec<PreparedShape>> {
         let smoothing = self.smoothing(path, desc)?;
         let mut prepared = Vec::new();
-        for loaded in meshes::load(&self.files, path, desc)? {
+        for loaded in self.meshes.take(&self.files, path, desc)? {
             let moves = motion.is_some() || !loaded.later.is_empty();
             let (mut look, mut emission) = (look, emission);
             let has_uvs = loaded.data.uvs.is_some();

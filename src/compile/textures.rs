@@ -1,8 +1,10 @@
 //! Textures: names to ids, files to images. Each file is read once, however many textures show it.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::Files;
 use crate::color::Rgb;
@@ -40,7 +42,7 @@ struct Entry {
 impl TextureTable {
     pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
         let mut table = Self::default();
-        let mut loader = Loader { files, descs: &desc.textures, images: HashMap::new(), open: Vec::new() };
+        let mut loader = Loader { files, descs: &desc.textures, images: read_all(files, desc), open: Vec::new() };
         for name in desc.textures.keys() {
             let place = format!("textures.{name}");
             let color = table.push(loader.named(&place, name, TextureUse::Color)?);
@@ -216,6 +218,20 @@ fn wrap_mode(desc: WrapModeDesc) -> Wrap {
         WrapModeDesc::Clamp => Wrap::Clamp,
         WrapModeDesc::Mirror => Wrap::Mirror,
     }
+}
+
+/// The images of all files that can be read, in parallel; what is wrong with the others is found when they are asked for.
+fn read_all(files: &Files, desc: &SceneDesc) -> HashMap<PathBuf, Arc<Image>> {
+    let file = |texture: &TextureDesc| match texture {
+        TextureDesc::Image { file, .. } if !files.assets.images.contains_key(file) => files.asset(file).canonicalize().ok(),
+        _ => None,
+    };
+    let names: BTreeSet<PathBuf> = desc.textures.values().filter_map(file).collect();
+    let read = |asset: PathBuf| {
+        let image = Image::new(read_image(&asset).ok()?).ok()?;
+        Some((asset, Arc::new(image)))
+    };
+    names.into_par_iter().filter_map(read).collect()
 }
 
 /// An image that has no file, from `images` if it has been asked for before.

@@ -81,6 +81,17 @@ pub struct SceneDesc {
     pub outputs: Vec<OutputDesc>,
 }
 
+impl SceneDesc {
+    /// The shapes of the world and of all objects, each with its place.
+    pub fn all_shapes(&self) -> impl Iterator<Item = (String, &ShapeDesc)> {
+        let world = self.shapes.iter().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape));
+        let objects = self.objects.iter().flat_map(|(name, object)| {
+            object.shapes.iter().enumerate().map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape))
+        });
+        world.chain(objects)
+    }
+}
+
 /// A map whose names differ; JSON itself would let the last of two win.
 fn unique_names<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<BTreeMap<String, T>, D::Error> {
     struct Names<T>(PhantomData<T>);
