@@ -6,8 +6,8 @@ use super::textures::{Role, TextureValue, UvOrigin};
 use super::tree::PluginId;
 use super::{Reader, names};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, MaterialDesc, NormalMapDesc, OpacityDesc, PrincipledDesc, RangedDesc,
-    RoughnessDesc, ScalarDesc, TextureDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, MaterialDesc, NormalMapDesc, OpacityDesc, RangedDesc, RoughnessDesc,
+    ScalarDesc, TextureDesc,
 };
 use crate::error::Result;
 use crate::import::closest_name;
@@ -81,6 +81,7 @@ impl<'a> Reader<'a> {
             "mask" => self.mask(&mut element, uv)?,
             "blendbsdf" => self.blend(&mut element, uv)?,
             "normalmap" | "bumpmap" => self.relief(&mut element, uv)?,
+            "principledthin" => self.principled_thin(&mut element, uv)?,
             "null" => {
                 Look { opacity: Some(OpacityDesc::Number(0.0)), material: self.black(&element.place().to_string()), one_sided: false }
             }
@@ -95,7 +96,7 @@ impl<'a> Reader<'a> {
         Ok(look)
     }
 
-    fn add(&mut self, element: &Element, material: MaterialDesc, one_sided: bool) -> Look {
+    pub(super) fn add(&mut self, element: &Element, material: MaterialDesc, one_sided: bool) -> Look {
         let has_relief = match &material {
             MaterialDesc::Relief { .. } => true,
             MaterialDesc::TwoSided { front, back } => self.reliefs.contains(front) || self.reliefs.contains(back),
@@ -158,7 +159,7 @@ impl<'a> Reader<'a> {
                 }
                 (MaterialDesc::Plastic { albedo, ior: RangedDesc::Constant(ior), roughness: None, alpha }, true)
             }
-            "principled" | "principledthin" => self.principled(element, uv)?,
+            "principled" => self.principled(element, uv)?,
             other => {
                 element.ignored("", format!("there is no bsdf {other}: a grey diffuse surface"));
                 (MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: ScalarDesc::Constant(0.0) }, true)
@@ -217,62 +218,6 @@ impl<'a> Reader<'a> {
                 RoughnessDesc::Texture { texture }
             }
         }))
-    }
-
-    fn principled(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<(MaterialDesc, bool)> {
-        let thin = element.kind() == "principledthin";
-        let mut scalar = |element: &mut Element<'a>, name: &str, default: f32| self.scalar(element, name, default, 1.0, uv);
-        let (metallic, clearcoat, clearcoat_gloss) = if thin {
-            (ScalarDesc::Constant(0.0), ScalarDesc::Constant(0.0), ScalarDesc::Constant(0.0))
-        } else {
-            (scalar(element, "metallic", 0.0)?, scalar(element, "clearcoat", 0.0)?, scalar(element, "clearcoat_gloss", 0.0)?)
-        };
-        let roughness = scalar(element, "roughness", 0.5)?;
-        let anisotropic = scalar(element, "anisotropic", 0.0)?;
-        let specular_tint = scalar(element, "spec_tint", 0.0)?;
-        let (sheen, sheen_tint) = (scalar(element, "sheen", 0.0)?, scalar(element, "sheen_tint", 0.0)?);
-        let subsurface = scalar(element, "flatness", 0.0)?;
-        let transmission = scalar(element, "spec_trans", 0.0)?;
-        let mut ior = self.ranged(element, "eta", uv)?;
-        let mut specular = None;
-        if thin {
-            ior.get_or_insert(RangedDesc::Constant(1.5));
-        } else if ior.is_none() {
-            specular = Some(self.scalar(element, "specular", 0.5, 1.0, uv)?);
-        }
-        // Two of Mitsuba's are all of the light: half of it on each side are one.
-        let diffuse_transmission = if thin { self.scalar(element, "diff_trans", 0.0, 0.5, uv)? } else { ScalarDesc::Constant(0.0) };
-        for name in [
-            "diffuse_reflectance_sampling_rate",
-            "main_specular_sampling_rate",
-            "clearcoat_sampling_rate",
-            "spec_reflection_sampling_rate",
-            "spec_trans_sampling_rate",
-            "diff_trans_sampling_rate",
-            "spec_reflect_sampling_rate",
-        ] {
-            element.float(name)?;
-        }
-        let one_sided = !thin && matches!(transmission, ScalarDesc::Constant(t) if t == 0.0);
-        let desc = PrincipledDesc {
-            base_color: self.color(element, "base_color", 0.5, uv)?,
-            metallic,
-            roughness,
-            anisotropic,
-            specular,
-            ior,
-            specular_tint,
-            sheen,
-            sheen_tint,
-            clearcoat,
-            clearcoat_gloss,
-            subsurface,
-            transmission,
-            thin,
-            diffuse_transmission,
-            multiscatter: false,
-        };
-        Ok((MaterialDesc::Principled(Box::new(desc)), one_sided))
     }
 
     /// The BSDFs inside of one.

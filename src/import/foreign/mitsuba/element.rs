@@ -179,9 +179,9 @@ impl<'a> Element<'a> {
         for (outcome, note) in self.notes {
             let place = self.plugin.place.to_string();
             if outcome == Outcome::Approximated {
-                draft.approximated(&place, &title, "", note)
+                draft.approximated(&place, &title, "", note);
             } else {
-                draft.ignored(&place, &title, "", note)
+                draft.ignored(&place, &title, "", note);
             }
         }
         for (property, outcome) in self.plugin.properties.iter().zip(self.outcomes) {

@@ -9,6 +9,7 @@ mod meshes;
 mod metals;
 mod names;
 mod plastics;
+mod principled;
 mod sensor;
 mod serialized;
 mod shapes;

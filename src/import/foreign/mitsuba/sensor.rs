@@ -28,8 +28,8 @@ impl Reader<'_> {
             }
         }
         let map = element.transform("to_world")?;
-        let mut camera = CameraDesc::default();
-        camera.near = element.float("near_clip")?.unwrap_or(1e-2);
+        let near = element.float("near_clip")?.unwrap_or(1e-2);
+        let mut camera = CameraDesc { near, ..CameraDesc::default() };
         let far = element.float("far_clip")?;
         if far.is_some() {
             element.ignored("far_clip", "nothing is cut far away");
@@ -76,10 +76,8 @@ impl Reader<'_> {
                 element.ignored(name, "nothing moves");
             }
         }
-        for name in ["srf"] {
-            if element.take(name).is_some() {
-                element.ignored(name, "the camera sees red, green and blue");
-            }
+        if element.take("srf").is_some() {
+            element.ignored("srf", "the camera sees red, green and blue");
         }
         camera.transform = Some(placement(&mut element, &map)?);
         element.ignored_plugins("medium", "there are no participating media")?;

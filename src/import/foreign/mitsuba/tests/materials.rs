@@ -120,8 +120,11 @@ fn principled_surfaces_have_mitsubas_defaults() {
     assert!(p.specular.is_none() && (ior(p.ior.as_ref().unwrap()) - 1.4).abs() < 1e-6);
     let thin = r#"<bsdf type="principledthin"><float name="diff_trans" value="1.5"/></bsdf>"#;
     let MaterialDesc::Principled(p) = front(thin) else { panic!() };
-    // Mitsuba's go up to 2.
+    // Mitsuba's go up to 2; without specular transmission it has no highlights.
     assert!(p.thin && matches!(p.diffuse_transmission, ScalarDesc::Constant(v) if v == 0.75));
+    assert_eq!(ior(p.ior.as_ref().unwrap()), 1.0);
+    let mixed = r#"<bsdf type="principledthin"><float name="spec_trans" value="0.25"/></bsdf>"#;
+    assert!(matches!(front(mixed), MaterialDesc::Mix { amount: ScalarDesc::Constant(v), .. } if v == 0.25));
 }
 
 #[test]

@@ -94,7 +94,7 @@ fn assert_point(a: [f64; 3], b: [f64; 3]) {
     a.into_iter().zip(b).for_each(|(a, b)| assert_near(a, b));
 }
 
-/// The shapes' types and materials' names, for a look.
-fn shape<'a>(desc: &'a SceneDesc, i: usize) -> &'a ShapeDesc {
+/// A shape of the world.
+fn shape(desc: &SceneDesc, i: usize) -> &ShapeDesc {
     &desc.shapes[i]
 }

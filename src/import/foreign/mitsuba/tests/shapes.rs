@@ -62,11 +62,9 @@ fn transforms_of_uv_act_before_the_image_is_looked_up() {
     assert_near(f64::from(scale[0]), 2.0);
     assert_near(f64::from(scale[1]), -3.0);
     assert_near(degrees, -30.0);
-    let sheared = format!(
-        r#"<shape type="rectangle"><bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="a.png"/>
-<transform name="to_uv"><rotate z="1" angle="30"/><scale x="2" y="3"/></transform></texture></bsdf></shape>"#
-    );
-    assert!(notes(&sheared).iter().any(|(_, _, note)| note.contains("shears")));
+    let sheared = r#"<shape type="rectangle"><bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="a.png"/>
+<transform name="to_uv"><rotate z="1" angle="30"/><scale x="2" y="3"/></transform></texture></bsdf></shape>"#;
+    assert!(notes(sheared).iter().any(|(_, _, note)| note.contains("shears")));
 }
 
 #[test]
