@@ -70,10 +70,7 @@ impl Shapes<'_> {
         let opacity = if light.is_none() { alpha.opacity(draft, &params.place) } else { None };
         let needs = self.needs(graphics, light, matches!(&opacity, Some(crate::desc::OpacityDesc::Texture { .. })));
 
-        let Some(form) = self.form(draft, kind, params, needs)? else {
-            params.report(draft);
-            return Ok(None);
-        };
+        let Some(form) = self.form(draft, kind, params, needs)? else { return Ok(None) };
         let mut reverse = graphics.reverse_orientation;
         let map = graphics.ctm.0[0];
         let (mut shape, inner, extent) = match form {
@@ -146,6 +143,9 @@ impl Shapes<'_> {
                 params.string("scheme")?;
                 let positions = params.groups("P")?.ok_or_else(|| params.error("needs positions P"))?;
                 let indices = params.indices("indices", positions.len())?.ok_or_else(|| params.error("needs indices"))?;
+                if loop_subdivision::possible_levels(indices.len(), levels) < levels {
+                    params.approximate("levels", "fewer, for there would be too many triangles");
+                }
                 loop_subdivision::subdivide(&positions, &indices, levels).map_err(|message| params.error(message))?
             }
             "curve" => {
