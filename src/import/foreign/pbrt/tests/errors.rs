@@ -6,7 +6,7 @@ use super::*;
 fn errors_have_a_line_and_a_column() {
     for (text, place) in [
         ("WorldBegin\n  Shap \"sphere\"", (2, 3)),
-        ("WorldBegin\nShape \"sphere\" \"float radius\" [ 1 x ]", (2, 34)),
+        ("WorldBegin\nShape \"sphere\" \"float radius\" [ 1 x ]", (2, 35)),
         ("WorldBegin\nShape \"sphere\" \"float radius\" -1", (2, 16)),
         ("WorldBegin\nShape \"sphere\" \"float radius\"", (2, 16)),
         ("WorldBegin\nShape \"sphere\" \"flat radius\" 1", (2, 16)),
@@ -14,7 +14,7 @@ fn errors_have_a_line_and_a_column() {
         ("WorldBegin\nNamedMaterial \"x\"", (2, 1)),
         ("WorldBegin\nMaterial \"diffuse\" \"texture reflectance\" \"x\"", (2, 20)),
         ("WorldBegin\nMaterial \"diffuse\" \"rgb reflectance\" [1 1]", (2, 20)),
-        ("WorldBegin\nShape \"trianglemesh\" \"point3 P\" [0 0 0 1 1 1 2 2 2] \"integer indices\" [0 1 3]", (2, 55)),
+        ("WorldBegin\nShape \"trianglemesh\" \"point3 P\" [0 0 0 1 1 1 2 2 2] \"integer indices\" [0 1 3]", (2, 53)),
         ("WorldBegin\nAttributeEnd", (2, 1)),
         ("WorldBegin\nAttributeBegin", (2, 15)),
         ("WorldBegin\nTransform [1 2 3]", (2, 1)),

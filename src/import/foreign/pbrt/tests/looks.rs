@@ -229,7 +229,7 @@ fn skies_are_turned_with_their_transform() {
         pfm.extend([value; 3].iter().flat_map(|x| x.to_le_bytes()));
     }
     let imported = read_with(
-        "Scale -1 1 1 WorldBegin LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"float scale\" 2",
+        "Scale -1 1 1 Camera \"perspective\" WorldBegin LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"float scale\" 2",
         &[("sky.pfm", &pfm)],
     )
     .unwrap();
