@@ -51,15 +51,26 @@ pub(super) const MAX_PIXELS: u64 = 1 << 28;
 /// If the file is missing, malformed, cut short, of another kind, or has more than 2^28 pixels or none.
 pub fn read_image(path: &Path) -> Result<ImageData, AssetError> {
     let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    read_bytes(&bytes, path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tga")))
+}
+
+/// As [`read_image`], for a file that is a part of another: PNG, JPEG, HDR or EXR.
+///
+/// # Errors
+/// As [`read_image`].
+pub fn read_image_bytes(bytes: &[u8]) -> Result<ImageData, AssetError> {
+    read_bytes(bytes, false)
+}
+
+fn read_bytes(bytes: &[u8], is_tga: bool) -> Result<ImageData, AssetError> {
     if bytes.is_empty() {
         return Err(AssetError::Malformed("the file is empty".into()));
     }
-    let is_tga = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tga"));
-    match image::guess_format(&bytes) {
-        Ok(ImageFormat::OpenExr) => read_exr(&bytes),
-        Ok(ImageFormat::Jpeg) if !is_whole_jpeg(&bytes) => Err(AssetError::Malformed("the JPEG file is cut short".into())),
-        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr)) => read_with(&bytes, format),
-        _ if is_tga => read_with(&bytes, ImageFormat::Tga),
+    match image::guess_format(bytes) {
+        Ok(ImageFormat::OpenExr) => read_exr(bytes),
+        Ok(ImageFormat::Jpeg) if !is_whole_jpeg(bytes) => Err(AssetError::Malformed("the JPEG file is cut short".into())),
+        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr)) => read_with(bytes, format),
+        _ if is_tga => read_with(bytes, ImageFormat::Tga),
         _ => Err(AssetError::Malformed("not a PNG, JPEG, TGA, HDR or EXR image".into())),
     }
 }

@@ -20,7 +20,7 @@ pub use assets::Assets;
 pub use environment_image::{RgbImage, read_rgb_image};
 pub use foreign::{Draft, ImportOptions, ImportReport, Imported, Outcome, ReportEntry, read_scene};
 pub use ies::{IesData, read_ies};
-pub use image_file::{ImageData, Samples, read_image};
+pub use image_file::{ImageData, Samples, read_image, read_image_bytes};
 pub use mesh_data::MeshData;
 pub use mtl_maps::{ObjMap, ObjMaps};
 pub use obj::{ObjMaterial, ObjMesh, read_obj};

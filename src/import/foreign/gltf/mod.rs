@@ -1,11 +1,72 @@
-//! glTF 2.0 scenes.
+//! glTF 2.0 scenes, `.gltf` and `.glb`.
+//!
+//! The JSON and the indices in it are checked by the crate `gltf`; buffers, images and all that extensions say are read here. A path tracer
+//! shows both sides of every surface, whatever `doubleSided` says; only light is given off by one side of what is not double-sided.
+
+mod accessors;
+mod animation;
+mod buffers;
+mod camera;
+mod defaults;
+mod document;
+mod extensions;
+mod geometry;
+mod lights;
+mod materials;
+mod meshes;
+mod nodes;
+mod skins;
+#[cfg(test)]
+mod tests;
+mod textures;
 
 use std::path::Path;
 
-use super::{ImportOptions, Imported};
+use gltf::json::Root;
+
+use self::buffers::Buffers;
+use self::nodes::Tree;
+use super::{Draft, ImportOptions, Imported};
 use crate::error::{Error, Result};
 
-/// Reads a gltf file.
-pub fn read(path: &Path, _options: &ImportOptions) -> Result<Imported> {
-    Err(Error::Usage(format!("{}: not read yet", path.display())))
+/// What is read: the JSON and the bytes that it speaks of.
+#[derive(Clone, Copy, Debug)]
+struct Source<'a> {
+    file: &'a Path,
+    root: &'a Root,
+    buffers: &'a Buffers<'a>,
+}
+
+impl Source<'_> {
+    /// An error at a place in the JSON.
+    fn fault(&self, path: &str, message: impl Into<String>) -> Error {
+        Error::Scene { file: self.file.into(), path: path.into(), message: message.into() }
+    }
+}
+
+/// Reads a `.gltf` or `.glb` file.
+///
+/// # Errors
+/// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for what it says.
+pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
+    let bytes = std::fs::read(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+    let document = document::parse(path, &bytes)?;
+    let buffers = Buffers::load(path, &document.root, document.bin)?;
+    let source = Source { file: path, root: &document.root, buffers: &buffers };
+
+    let mut draft = Draft::default();
+    document::report_extensions(source.root, &mut draft);
+    let tree = Tree::new(source, &mut draft)?;
+    let motion = animation::evaluate(source, options.time, &mut draft)?;
+    let pose = tree.pose(source, &motion)?;
+    let placed = meshes::add(source, &tree, &pose, &mut draft)?;
+    let has_light = lights::add(source, &tree, &pose, &mut draft)?;
+    let has_camera = camera::add(source, &tree, &pose, &mut draft)?;
+    if !has_camera {
+        defaults::add_camera(&placed, &mut draft);
+    }
+    if !has_light && !placed.gives_light {
+        defaults::add_light(&mut draft);
+    }
+    Ok(draft.finish())
 }

@@ -1,0 +1,275 @@
+//! Textures, samplers and images, and how an extension moves them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
+use gltf::json::validation::Checked;
+use serde_json::{Map, Value};
+
+use super::Source;
+use super::buffers::Uri;
+use super::extensions::{TextureInfo, TextureTransform};
+use crate::desc::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
+use crate::error::Result;
+use crate::import::{Draft, ImageData, Samples, read_image, read_image_bytes};
+
+/// A texture as a material names it.
+#[derive(Clone, Debug)]
+pub struct TextureRef {
+    /// Where the material names it.
+    pub place: String,
+    index: usize,
+    /// The set of uv that it uses.
+    pub uv_set: u32,
+    transform: TextureTransform,
+}
+
+/// The parts of a texture that make a difference to what is seen.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum ImageKind {
+    Plain,
+    /// Its alpha, times a factor, cut off: bits of both numbers.
+    Cut {
+        factor: u32,
+        cutoff: u32,
+    },
+}
+
+/// Textures and images that have been added.
+#[derive(Debug, Default)]
+pub struct TextureSet {
+    files: BTreeMap<(usize, ImageKind), String>,
+    names: BTreeMap<String, String>,
+}
+
+impl TextureRef {
+    /// A texture with what extensions say about it.
+    pub fn new(source: Source, place: &str, index: usize, uv_set: u32, extensions: Option<&Map<String, Value>>) -> Result<Self> {
+        let transform: TextureTransform = source.extension(place, extensions, "KHR_texture_transform")?.unwrap_or_default();
+        let numbers = [transform.offset, transform.scale].concat();
+        if !numbers.iter().all(|x| x.is_finite()) || !transform.rotation.is_finite() {
+            return Err(source.fault(&format!("{place}.extensions.KHR_texture_transform"), "is not finite"));
+        }
+        Ok(Self { place: place.into(), index, uv_set: transform.tex_coord.unwrap_or(uv_set), transform })
+    }
+
+    /// A texture that an extension names.
+    pub fn of_extension(source: Source, place: &str, info: Option<&TextureInfo>) -> Result<Option<Self>> {
+        info.map(|info| Self::new(source, place, info.index, info.tex_coord, info.extensions.as_ref())).transpose()
+    }
+}
+
+impl TextureSet {
+    /// Adds a texture: one channel of it, or its colour. `None` if there is no image that can be read, which the report says.
+    pub fn add(
+        &mut self,
+        source: Source,
+        draft: &mut Draft,
+        texture: &TextureRef,
+        color_space: ColorSpaceDesc,
+        channel: Option<ChannelDesc>,
+    ) -> Result<Option<String>> {
+        self.add_kind(source, draft, texture, ImageKind::Plain, color_space, channel)
+    }
+
+    /// Adds a texture that is 1 where alpha times `factor` reaches `cutoff`, else 0.
+    pub fn add_cut(&mut self, source: Source, draft: &mut Draft, texture: &TextureRef, factor: f32, cutoff: f32) -> Result<Option<String>> {
+        let kind = ImageKind::Cut { factor: factor.to_bits(), cutoff: cutoff.to_bits() };
+        self.add_kind(source, draft, texture, kind, ColorSpaceDesc::Linear, Some(ChannelDesc::R))
+    }
+
+    fn add_kind(
+        &mut self,
+        source: Source,
+        draft: &mut Draft,
+        texture: &TextureRef,
+        kind: ImageKind,
+        color_space: ColorSpaceDesc,
+        channel: Option<ChannelDesc>,
+    ) -> Result<Option<String>> {
+        let json = source.root.textures.get(texture.index);
+        let json = json.ok_or_else(|| source.fault(&texture.place, format!("there is no textures[{}]", texture.index)))?;
+        let path = format!("textures[{}]", texture.index);
+        // An index of all ones stands for none.
+        let Some(image) = source.root.images.get(json.source.value()).map(|_| json.source.value()) else {
+            draft.ignored(&path, "texture", "source", "the image is in a format of an extension that is not read");
+            return Ok(None);
+        };
+        let file = self.image(source, draft, image, &kind)?;
+        let sampler = json.sampler.and_then(|index| source.root.samplers.get(index.value()));
+        let (filter, wrap) = sampler.map_or((TextureFilterDesc::Trilinear, WrapDesc::default()), lookup);
+        let (offset, scale, rotation) = flipped(&texture.transform);
+        let desc = TextureDesc::Image {
+            file,
+            color_space,
+            filter,
+            wrap,
+            scale,
+            rotation_degrees: rotation.to_degrees(),
+            offset,
+            channel,
+            invert: false,
+        };
+        let key = format!("{desc:?}");
+        if let Some(name) = self.names.get(&key) {
+            return Ok(Some(name.clone()));
+        }
+        let label = json.name.as_deref().or(source.root.images.get(image).and_then(|image| image.name.as_deref()));
+        let label = label.map_or_else(|| format!("texture {}", texture.index), str::to_owned);
+        let label = match channel {
+            Some(channel) => format!("{label} {channel:?}").to_lowercase(),
+            None => label,
+        };
+        draft.mapped(&path, "texture", "source");
+        if json.sampler.is_some() {
+            draft.mapped(&path, "texture", "sampler");
+        }
+        let name = draft.add_texture(&label, &path, desc);
+        self.names.insert(key, name.clone());
+        Ok(Some(name))
+    }
+
+    /// The file of an image, or what stands for it.
+    fn image(&mut self, source: Source, draft: &mut Draft, index: usize, kind: &ImageKind) -> Result<String> {
+        let key = (index, kind.clone());
+        if let Some(file) = self.files.get(&key) {
+            return Ok(file.clone());
+        }
+        let name = format!("image_{index}");
+        let file = match kind {
+            ImageKind::Plain => match location(source, index)? {
+                Location::File(file) => file,
+                Location::Bytes(bytes) => draft.keep_image(&name, decode(source, index, &bytes)?),
+            },
+            ImageKind::Cut { factor, cutoff } => {
+                let plain = self.image(source, draft, index, &ImageKind::Plain)?;
+                let cut = match draft.assets.images.get(&plain) {
+                    Some(image) => cut(image, f32::from_bits(*factor), f32::from_bits(*cutoff)),
+                    None => {
+                        let path = source.file.parent().unwrap_or(Path::new("")).join(&plain);
+                        let image = read_image(&path).map_err(|e| e.at(source.file, &format!("images[{index}]"), &path))?;
+                        cut(&image, f32::from_bits(*factor), f32::from_bits(*cutoff))
+                    }
+                };
+                draft.keep_image(&format!("{name}_cut"), cut)
+            }
+        };
+        self.files.insert(key, file.clone());
+        Ok(file)
+    }
+}
+
+enum Location {
+    File(String),
+    Bytes(Vec<u8>),
+}
+
+fn location(source: Source, index: usize) -> Result<Location> {
+    let path = format!("images[{index}]");
+    let image = source.root.images.get(index).ok_or_else(|| source.fault(&path, "there is no such image"))?;
+    match (&image.uri, image.buffer_view) {
+        (Some(uri), _) => match Uri::parse(uri).map_err(|message| source.fault(&path, message))? {
+            Uri::File(file) => Ok(Location::File(file)),
+            Uri::Data(bytes) => Ok(Location::Bytes(bytes)),
+        },
+        (None, Some(view)) => {
+            let json = source.root.get(view).ok_or_else(|| source.fault(&path, "there is no such view"))?;
+            let view = source.buffers.view(json).map_err(|message| source.fault(&path, message))?;
+            Ok(Location::Bytes(view.bytes.to_vec()))
+        }
+        (None, None) => Err(source.fault(&path, "has neither `uri` nor `bufferView`")),
+    }
+}
+
+fn decode(source: Source, index: usize, bytes: &[u8]) -> Result<ImageData> {
+    read_image_bytes(bytes).map_err(|e| source.fault(&format!("images[{index}]"), e.to_string()))
+}
+
+/// Filter and wrap modes of a sampler. A viewer that shows pixels enlarged with `NEAREST` shows them as they are.
+fn lookup(sampler: &Sampler) -> (TextureFilterDesc, WrapDesc) {
+    let filter = match (sampler.mag_filter, sampler.min_filter) {
+        (Some(Checked::Valid(MagFilter::Nearest)), _) => TextureFilterDesc::Nearest,
+        (_, Some(Checked::Valid(MinFilter::Nearest | MinFilter::Linear))) => TextureFilterDesc::Bilinear,
+        _ => TextureFilterDesc::Trilinear,
+    };
+    let mode = |mode: Checked<WrappingMode>| match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => WrapModeDesc::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => WrapModeDesc::Mirror,
+        _ => WrapModeDesc::Repeat,
+    };
+    let (u, v) = (mode(sampler.wrap_s), mode(sampler.wrap_t));
+    (filter, if u == v { WrapDesc::Both(u) } else { WrapDesc::Each([u, v]) })
+}
+
+/// A transform of uv whose v runs down, for uv whose v runs up: offset, scale and rotation (radians).
+///
+/// With v down the lookup is `offset + M (scale * uv)`, where M turns counter-clockwise as the image is seen: from u against v. Putting
+/// `1 - v` for v before and after turns that rotation into one from u towards v by the same angle and moves the offset.
+fn flipped(transform: &TextureTransform) -> ([f32; 2], [f32; 2], f64) {
+    let rotation = f64::from(transform.rotation);
+    let (sin, cos) = rotation.sin_cos();
+    let ([offset_u, offset_v], [scale_u, scale_v]) = (transform.offset.map(f64::from), transform.scale.map(f64::from));
+    let offset = [offset_u + sin * scale_v, 1.0 - offset_v - cos * scale_v];
+    (offset.map(|x| x as f32), [scale_u as f32, scale_v as f32], rotation)
+}
+
+/// One channel that is 255 where alpha times `factor` reaches `cutoff`, else 0.
+fn cut(image: &ImageData, factor: f32, cutoff: f32) -> ImageData {
+    let (channels, pixels) = (image.channels, image.width * image.height);
+    let alpha = |i: usize| -> f32 {
+        if channels != 2 && channels != 4 {
+            return 1.0;
+        }
+        let at = i * channels + channels - 1;
+        match &image.samples {
+            Samples::U8(samples) => samples.get(at).map_or(1.0, |&a| f32::from(a) / 255.0),
+            Samples::U16(samples) => samples.get(at).map_or(1.0, |&a| f32::from(a) / 65_535.0),
+            Samples::F16(samples) => samples.get(at).map_or(1.0, |a| a.to_f32()),
+            Samples::F32(samples) => samples.get(at).copied().unwrap_or(1.0),
+        }
+    };
+    let samples = (0..pixels).map(|i| if alpha(i) * factor >= cutoff { 255 } else { 0 }).collect();
+    ImageData { width: image.width, height: image.height, channels: 1, samples: Samples::U8(samples) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What our image lookup does.
+    fn ours([u, v]: [f64; 2], (offset, scale, rotation): ([f32; 2], [f32; 2], f64)) -> [f64; 2] {
+        let (sin, cos) = rotation.sin_cos();
+        let [u, v] = [u * f64::from(scale[0]), v * f64::from(scale[1])];
+        [f64::from(offset[0]) + cos * u - sin * v, f64::from(offset[1]) + sin * u + cos * v]
+    }
+
+    #[test]
+    fn transforms_mean_the_same_with_v_upward() {
+        let quarter = std::f32::consts::FRAC_PI_2;
+        // Points of uv with v down, by hand: the first is looked up where the second is without a transform.
+        let cases = [
+            (TextureTransform::default(), [0.25, 0.75], [0.25, 0.75]),
+            (TextureTransform { offset: [0.5, 0.25], ..TextureTransform::default() }, [0.1, 0.2], [0.6, 0.45]),
+            (TextureTransform { scale: [2.0, 3.0], ..TextureTransform::default() }, [0.1, 0.2], [0.2, 0.6]),
+            // A quarter turn counter-clockwise as the image is seen takes the u axis up, where v is negative.
+            (TextureTransform { rotation: quarter, ..TextureTransform::default() }, [1.0, 0.0], [0.0, -1.0]),
+            (TextureTransform { rotation: quarter, ..TextureTransform::default() }, [0.0, 1.0], [1.0, 0.0]),
+            (TextureTransform { offset: [0.5, 0.25], rotation: quarter, scale: [2.0, 4.0], tex_coord: None }, [1.0, 0.5], [2.5, -1.75]),
+        ];
+        for (transform, [u, v], [to_u, to_v]) in cases {
+            let found = ours([u, 1.0 - v], flipped(&transform));
+            let error = (found[0] - to_u).abs() + (1.0 - found[1] - to_v).abs();
+            assert!(error < 1e-6, "{transform:?}: {u} {v} to {found:?}");
+        }
+    }
+
+    #[test]
+    fn alpha_is_cut_off_after_its_factor() {
+        let image = ImageData { width: 4, height: 1, channels: 2, samples: Samples::U8(vec![9, 0, 9, 127, 9, 128, 9, 255]) };
+        assert_eq!(cut(&image, 1.0, 0.5).samples, Samples::U8(vec![0, 0, 255, 255]));
+        assert_eq!(cut(&image, 0.9, 0.5).samples, Samples::U8(vec![0, 0, 0, 255]));
+        let opaque = ImageData { width: 1, height: 1, channels: 3, samples: Samples::U8(vec![0; 3]) };
+        assert_eq!(cut(&opaque, 1.0, 0.5).samples, Samples::U8(vec![255]));
+    }
+}
