@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::import::foreign::Draft;
 use crate::import::foreign::coat::Coat;
 use crate::import::foreign::recolor::recolored;
-use crate::import::named;
+use crate::import::{Named, named};
 
 /// A surface is smooth below this alpha, along both axes.
 const SMOOTH_ALPHA: f32 = 1e-3;
@@ -189,7 +189,7 @@ impl Materials<'_> {
                 ([1.0; 3], [100.0; 3], texture.color(self.draft, &params.place))
             }
             None => {
-                let copper = |part: &str| named(&format!("metal-Cu-{part}")).map_or([1.0; 3], |metal| metal.rgb());
+                let copper = |part: &str| named(&format!("metal-Cu-{part}")).map_or([1.0; 3], Named::rgb);
                 let part = |name: &str| -> Result<[f32; 3]> {
                     let key = format!("{prefix}{name}");
                     match self.textures.get(params, &self.colors, &key, Meaning::Number, false)? {

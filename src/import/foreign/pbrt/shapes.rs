@@ -36,7 +36,7 @@ pub struct Shapes<'a> {
 /// A shape's form.
 enum Form {
     /// A shape of ours, after a transform of its own; pbrt turns its normals inside out where the transform mirrors.
-    Analytic { shape: ShapeDesc, inner: DAffine3, area: f64 },
+    Analytic { shape: Box<ShapeDesc>, inner: DAffine3, area: f64 },
     /// Triangles.
     Mesh(MeshData),
     /// Triangles of a file that can stay there.
@@ -78,7 +78,7 @@ impl Shapes<'_> {
                 if graphics.ctm.swaps_handedness() {
                     reverse = !reverse;
                 }
-                (shape, inner, Some(Extent { count: 1, area }))
+                (*shape, inner, Some(Extent { count: 1, area }))
             }
             Form::Mesh(mesh) => {
                 let extent = Extent::of_mesh(&mesh, &map);
@@ -214,20 +214,20 @@ fn analytic(kind: &str, params: &Params) -> Result<Form> {
         "disk" => {
             let inner_radius = params.number_or("innerradius", 0.0)?;
             let area = 0.5 * turn * (radius * radius - inner_radius * inner_radius);
-            let shape = ShapeDesc::Disk(DiskDesc::new(radius, inner_radius, phi_max));
+            let shape = Box::new(ShapeDesc::Disk(DiskDesc::new(radius, inner_radius, phi_max)));
             Form::Analytic { shape, inner: raised(params.number_or("height", 0.0)?), area }
         }
         "cylinder" => {
             let (a, b) = (params.number_or("zmin", -1.0)?, params.number_or("zmax", 1.0)?);
             let height = (b - a).abs();
-            let shape = ShapeDesc::Cylinder(CylinderDesc::new(radius, height, phi_max));
+            let shape = Box::new(ShapeDesc::Cylinder(CylinderDesc::new(radius, height, phi_max)));
             Form::Analytic { shape, inner: raised(a.min(b)), area: turn * radius * height }
         }
         _ => {
             let (a, b) = (params.number_or("zmin", -radius)?, params.number_or("zmax", radius)?);
             let (low, high) = (a.min(b).clamp(-radius, radius), a.max(b).clamp(-radius, radius));
             let (z_min, z_max) = ((low > -radius).then_some(low), (high < radius).then_some(high));
-            let shape = ShapeDesc::Sphere(SphereDesc::new(radius, z_min, z_max, phi_max));
+            let shape = Box::new(ShapeDesc::Sphere(SphereDesc::new(radius, z_min, z_max, phi_max)));
             Form::Analytic { shape, inner: DAffine3::IDENTITY, area: turn * radius * (high - low) }
         }
     })

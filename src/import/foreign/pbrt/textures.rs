@@ -240,7 +240,7 @@ fn checkerboard(draft: &mut Draft, name: &str, params: &Params, first: &Texture,
 
 /// The channel that pbrt takes for a number: alpha if not all of the image is opaque, else the mean of the colours.
 fn number_channel(image: &ImageData, params: &Params) -> Option<ChannelDesc> {
-    let has_alpha = image.channels % 2 == 0;
+    let has_alpha = image.channels.is_multiple_of(2);
     let pixels = image.width * image.height;
     let opaque = |i: usize| match &image.samples {
         Samples::U8(v) => v.get(i) == Some(&u8::MAX),
