@@ -37,8 +37,8 @@ pub struct Shapes<'a> {
 enum Form {
     /// A shape of ours, after a transform of its own; pbrt turns its normals inside out where the transform mirrors.
     Analytic { shape: Box<ShapeDesc>, inner: DAffine3, area: f64 },
-    /// Triangles.
-    Mesh(MeshData),
+    /// Triangles, and as how many shapes pbrt counts them.
+    Mesh(MeshData, usize),
     /// Triangles of a file that can stay there.
     File(String),
 }
@@ -80,8 +80,8 @@ impl Shapes<'_> {
                 }
                 (*shape, inner, Some(Extent { count: 1, area }))
             }
-            Form::Mesh(mesh) => {
-                let extent = Extent::of_mesh(&mesh, &map);
+            Form::Mesh(mesh, count) => {
+                let extent = Extent { count, area: triangles::area(&mesh, &map) };
                 (self.mesh_shape(draft, kind, mesh), DAffine3::IDENTITY, Some(extent))
             }
             Form::File(file) => (ShapeDesc::Mesh(MeshDesc::from_file(file)), DAffine3::IDENTITY, None),
@@ -133,11 +133,16 @@ impl Shapes<'_> {
     }
 
     fn form(&self, draft: &mut Draft, kind: &str, params: &Params, needs: Needs) -> Result<Option<Form>> {
+        let mut patches = None;
         let mesh = match kind {
             "sphere" | "disk" | "cylinder" => return Ok(Some(analytic(kind, params)?)),
             "plymesh" => return self.ply(params, needs).map(Some),
             "trianglemesh" => triangle_mesh(params)?,
-            "bilinearmesh" => bilinear_mesh(draft, params)?,
+            "bilinearmesh" => {
+                let (mesh, count) = bilinear_mesh(draft, params)?;
+                patches = Some(count);
+                mesh
+            }
             "loopsubdiv" => {
                 let levels = params.integer_or("levels", 3)?.clamp(0, 64) as u32;
                 params.string("scheme")?;
@@ -163,7 +168,8 @@ impl Shapes<'_> {
         if needs.uvs {
             triangles::give_uvs(&mut mesh);
         }
-        Ok(Some(Form::Mesh(mesh)))
+        let count = patches.unwrap_or(mesh.triangles.len());
+        Ok(Some(Form::Mesh(mesh, count)))
     }
 
     /// A PLY stays a file where nothing has to be known of it or changed.
@@ -181,7 +187,8 @@ impl Shapes<'_> {
             triangles::give_uvs(&mut mesh);
             changed = true;
         }
-        Ok(if changed || needs.extent { Form::Mesh(mesh) } else { Form::File(file.into()) })
+        let count = mesh.triangles.len();
+        Ok(if changed || needs.extent { Form::Mesh(mesh, count) } else { Form::File(file.into()) })
     }
 }
 
@@ -260,7 +267,8 @@ fn triangle_mesh(params: &Params) -> Result<MeshData> {
     Ok(MeshData { positions, triangles, normals, uvs })
 }
 
-fn bilinear_mesh(draft: &mut Draft, params: &Params) -> Result<MeshData> {
+/// The triangles, and how many patches they are.
+fn bilinear_mesh(draft: &mut Draft, params: &Params) -> Result<(MeshData, usize)> {
     let Some(positions) = params.groups::<3>("P")? else { return Err(params.error("needs positions P")) };
     let count = positions.len();
     let corners = match params.indices("indices", count)? {
@@ -280,5 +288,5 @@ fn bilinear_mesh(draft: &mut Draft, params: &Params) -> Result<MeshData> {
     if curved > 0 {
         draft.approximated(&params.place, &params.element, "", "curved patches become a grid of triangles");
     }
-    Ok(mesh)
+    Ok((mesh, patches.corners.len()))
 }

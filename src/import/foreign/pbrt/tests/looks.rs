@@ -42,8 +42,11 @@ fn power_is_that_of_each_shape() {
     assert!(close(sphere, [10.0 / (16.0 * pi * pi); 3]), "{sphere:?}");
     let quad = "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0]";
     let both = emission(&format!("WorldBegin AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" true {quad}"));
-    // Two triangles of area 2, each of which has the power (pbrt's one patch is two of ours).
-    assert!(close(both, [10.0 * 2.0 / (2.0 * pi * 4.0); 3]), "{both:?}");
+    // One patch of area 4 with two sides, though it is two triangles of ours.
+    assert!(close(both, [10.0 / (2.0 * pi * 4.0); 3]), "{both:?}");
+    let triangles = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0] \"integer indices\" [0 1 2 2 1 3]";
+    let each = emission(&format!("WorldBegin AreaLightSource \"diffuse\" \"float power\" 10 {triangles}"));
+    assert!(close(each, [10.0 / (pi * 2.0); 3]), "{each:?}");
 }
 
 #[test]
