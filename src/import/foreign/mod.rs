@@ -1,10 +1,12 @@
 //! Scenes of other renderers, read into our own description.
 
+mod coat;
 mod draft;
 mod gltf;
 mod missing;
 mod mitsuba;
 mod pbrt;
+mod recolor;
 mod report;
 
 pub use draft::Draft;

@@ -2,12 +2,9 @@
 
 use super::colors::{Colors, Meaning};
 use super::params::Params;
-use super::triangles::area;
 use crate::desc::{ColorSpaceDesc, EmissionDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
-use crate::import::MeshData;
 use crate::import::foreign::Draft;
-use crate::math::DAffine3;
 
 /// An `AreaLightSource`.
 ///
@@ -29,13 +26,6 @@ pub struct Extent {
     pub count: usize,
     /// Their area together.
     pub area: f64,
-}
-
-impl Extent {
-    /// Of the triangles of a mesh in the world.
-    pub fn of_mesh(mesh: &MeshData, map: &DAffine3) -> Self {
-        Self { count: mesh.triangles.len(), area: area(mesh, map) }
-    }
 }
 
 impl AreaLight {

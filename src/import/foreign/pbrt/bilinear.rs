@@ -3,8 +3,11 @@
 use crate::import::MeshData;
 use crate::math::Vec3;
 
-/// Quads along a side of a curved patch.
+/// Quads along a side of a curved patch, where there are few.
 const GRID: u32 = 16;
+
+/// Triangles of all curved patches together, above which each has fewer.
+const MANY: usize = 1 << 18;
 
 /// A patch counts as flat if no corner is further from the plane of the others than this share of its size.
 const FLATNESS: f32 = 1e-4;
@@ -38,11 +41,10 @@ impl Patches {
     /// As triangles, and how many patches are curved.
     pub fn triangulate(&self) -> (MeshData, usize) {
         let mut mesh = MeshData { normals: self.normals.as_ref().map(|_| Vec::new()), uvs: Some(Vec::new()), ..MeshData::default() };
-        let mut curved = 0;
+        let curved = self.corners.iter().filter(|corners| !self.is_flat(**corners)).count();
+        let grid = ((MANY / 2 / curved.max(1)) as f64).sqrt().clamp(2.0, f64::from(GRID)) as u32;
         for &corners in &self.corners {
-            let flat = self.is_flat(corners);
-            curved += usize::from(!flat);
-            let n = if flat { 1 } else { GRID };
+            let n = if self.is_flat(corners) { 1 } else { grid };
             let first = mesh.positions.len() as u32;
             for j in 0..=n {
                 for i in 0..=n {

@@ -8,7 +8,7 @@ use crate::import::MeshData;
 use crate::math::DVec3;
 
 /// More triangles than this are not made.
-const MAX_TRIANGLES: u64 = 1 << 22;
+const MAX_TRIANGLES: u64 = 1 << 20;
 
 /// A mesh whose edges belong to one triangle or two, as seen from its vertices.
 struct Surface {
@@ -25,13 +25,15 @@ struct Ring {
     is_boundary: bool,
 }
 
-/// Subdivides a mesh. The result says what is wrong with it if it is no surface.
+/// As many of these levels as do not make too many triangles.
+pub fn possible_levels(triangles: usize, levels: u32) -> u32 {
+    let made = |levels: u32| (triangles as u64).saturating_mul(1 << (2 * levels));
+    (0..=levels.min(30)).rev().find(|&levels| made(levels) <= MAX_TRIANGLES).unwrap_or(0)
+}
+
+/// Subdivides a mesh, by at most [`possible_levels`]. The error says why it is no surface.
 pub fn subdivide(positions: &[[f32; 3]], triangles: &[[u32; 3]], levels: u32) -> Result<MeshData, String> {
-    let made =
-        (triangles.len() as u64).checked_shl(2 * levels.min(31)).filter(|&count| count >> (2 * levels.min(31)) == triangles.len() as u64);
-    if levels > 31 || made.is_none_or(|made| made > MAX_TRIANGLES) {
-        return Err(format!("{levels} levels make more than {MAX_TRIANGLES} triangles"));
-    }
+    let levels = possible_levels(triangles.len(), levels);
     let positions = positions.iter().map(|p| DVec3::from(p.map(f64::from))).collect();
     let mut surface = Surface::new(positions, triangles.to_vec())?;
     for _ in 0..levels {
@@ -226,8 +228,8 @@ mod tests {
     #[test]
     fn what_is_no_surface_or_too_much_is_refused() {
         let (positions, triangles) = octahedron();
-        assert!(subdivide(&positions, &triangles, 12).is_err());
-        assert!(subdivide(&positions, &triangles, u32::MAX).is_err());
+        assert_eq!([0, 3, 8, 9, u32::MAX].map(|levels| possible_levels(triangles.len(), levels)), [0, 3, 8, 8, 8]);
+        assert_eq!(possible_levels(1 << 21, 3), 0);
         assert!(subdivide(&positions, &[[0, 1, 2], [0, 1, 3]], 1).is_err());
         assert!(subdivide(&positions, &[[0, 0, 1]], 1).is_err());
         assert!(subdivide(&positions, &[[0, 1, 9]], 1).is_err());

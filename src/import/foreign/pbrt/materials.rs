@@ -9,7 +9,9 @@ use crate::desc::{
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
-use crate::import::named;
+use crate::import::foreign::coat::Coat;
+use crate::import::foreign::recolor::recolored;
+use crate::import::{Named, named};
 
 /// A surface is smooth below this alpha, along both axes.
 const SMOOTH_ALPHA: f32 = 1e-3;
@@ -37,9 +39,8 @@ impl Materials<'_> {
         Ok(match kind {
             "diffuse" => MaterialDesc::Diffuse { albedo: self.color(params, "reflectance", 0.5)?, roughness: zero() },
             "coateddiffuse" => {
-                let (ior, alpha) = (self.coat_index(params, "eta")?, self.alpha(params, "", 0.0)?);
                 self.note_layers(params);
-                MaterialDesc::Plastic { albedo: self.color(params, "reflectance", 0.5)?, ior, roughness: None, alpha }
+                self.plastic(params, 1.5)?
             }
             "conductor" => self.conductor(params, "", 0.0, 1.0)?,
             "coatedconductor" => {
@@ -79,10 +80,7 @@ impl Materials<'_> {
                 for parameter in ["mfp", "mfreepath", "sigma_a", "sigma_s", "g", "scale", "name"] {
                     params.ignore(parameter, "light does not travel below surfaces");
                 }
-                let (ior, _) = self.colors.index(params, "eta", 1.33)?;
-                let ior = RangedDesc::Constant(ior.clamp(1.0 + 1e-4, 10.0));
-                let alpha = self.alpha(params, "", 0.0)?;
-                MaterialDesc::Plastic { albedo: self.color(params, "reflectance", 0.5)?, ior, roughness: None, alpha }
+                self.plastic(params, 1.33)?
             }
             "hair" => {
                 self.draft.approximated(&params.place, &params.element, "", "diffuse");
@@ -103,9 +101,31 @@ impl Materials<'_> {
         Ok(self.textures.reflectance(params, &self.colors, name, default)?.color(self.draft, &params.place))
     }
 
-    fn coat_index(&self, params: &Params, name: &str) -> Result<RangedDesc> {
-        let (ior, _) = self.colors.index(params, name, 1.5)?;
-        Ok(RangedDesc::Constant(ior.clamp(1.0 + 1e-4, 10.0)))
+    /// A diffuse base below a coat.
+    fn plastic(&mut self, params: &Params, index: f32) -> Result<MaterialDesc> {
+        let (ior, _) = self.colors.index(params, "eta", index)?;
+        let ior = ior.clamp(1.0 + 1e-4, 10.0);
+        let alpha = self.alpha(params, "", 0.0)?;
+        let mean_alpha = match alpha {
+            Some(RoughnessDesc::Isotropic(alpha)) => alpha,
+            Some(RoughnessDesc::Anisotropic([u, v])) => (u * v).sqrt(),
+            Some(RoughnessDesc::Texture { .. }) => 0.1,
+            None => 0.0,
+        };
+        // pbrt's base reflects within the coat; ours is what is left of that outside.
+        let coat = Coat::new(f64::from(ior), f64::from(mean_alpha));
+        let base = |r: f32| coat.base(r.clamp(0.0, 1.0), true);
+        let albedo = match self.textures.reflectance(params, &self.colors, "reflectance", 0.5)? {
+            Texture::Constant(color) => ColorDesc::Rgb(color.map(base)),
+            Texture::Named { name, factor } => match recolored(self.draft, self.colors.folder, &name, factor, &base) {
+                Some(texture) => ColorDesc::Texture { texture },
+                None => {
+                    params.approximate("reflectance", "lighter than below a coat");
+                    Texture::Named { name, factor }.color(self.draft, &params.place)
+                }
+            },
+        };
+        Ok(MaterialDesc::Plastic { albedo, ior: RangedDesc::Constant(ior), roughness: None, alpha })
     }
 
     /// What pbrt's walk through layers has and ours has not.
@@ -133,15 +153,24 @@ impl Materials<'_> {
                 _ => Some(RoughnessDesc::Anisotropic(alpha)),
             });
         }
-        for name in ["roughness", "uroughness", "vroughness"] {
-            if remap {
-                params.approximate(&key(name), "the texture itself is alpha, not its root");
-            }
-        }
         if u != v {
             params.approximate(&key("vroughness"), "that along u in both directions");
         }
         let textured = if u.is_constant() { v } else { u };
+        let textured = match textured {
+            Texture::Named { name, factor } if remap => {
+                match recolored(self.draft, self.colors.folder, &name, factor, &|x| x.max(0.0).sqrt()) {
+                    Some(name) => Texture::Named { name, factor: [1.0; 3] },
+                    None => {
+                        for name in ["roughness", "uroughness", "vroughness"].map(key) {
+                            params.approximate(&name, "the texture itself is alpha, not its root");
+                        }
+                        Texture::Named { name, factor }
+                    }
+                }
+            }
+            other => other,
+        };
         Ok(Some(textured.alpha(self.draft, &params.place)))
     }
 
@@ -160,7 +189,7 @@ impl Materials<'_> {
                 ([1.0; 3], [100.0; 3], texture.color(self.draft, &params.place))
             }
             None => {
-                let copper = |part: &str| named(&format!("metal-Cu-{part}")).map_or([1.0; 3], |metal| metal.rgb());
+                let copper = |part: &str| named(&format!("metal-Cu-{part}")).map_or([1.0; 3], Named::rgb);
                 let part = |name: &str| -> Result<[f32; 3]> {
                     let key = format!("{prefix}{name}");
                     match self.textures.get(params, &self.colors, &key, Meaning::Number, false)? {

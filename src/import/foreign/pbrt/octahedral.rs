@@ -7,7 +7,7 @@ use crate::import::RgbImage;
 use crate::math::DVec3;
 
 /// Rows of the lat-long image at most.
-const MAX_ROWS: usize = 4096;
+const MAX_ROWS: f64 = 4096.0;
 
 /// Lookups along each side of a pixel of the lat-long image.
 const SUBSAMPLES: usize = 4;
@@ -40,7 +40,8 @@ pub fn direction_from_square([s, t]: [f64; 2]) -> DVec3 {
 /// A square equal-area image as a lat-long image of our convention, in which pbrt's z is up (our y) and its x stays. With `mirrored`, x is
 /// negated.
 pub fn lat_long(image: &RgbImage, mirrored: bool) -> RgbImage {
-    let height = image.height.clamp(1, MAX_ROWS);
+    // Twice as many pixels as the square has, whatever its shape.
+    let height = (image.width as f64 * image.height as f64).sqrt().round().clamp(1.0, MAX_ROWS) as usize;
     let width = 2 * height;
     let mut pixels = Vec::with_capacity(width * height);
     for row in 0..height {

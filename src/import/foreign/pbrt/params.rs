@@ -263,10 +263,7 @@ fn read_values(lexer: &mut Lexer, declaration: &Token, kind: &str) -> Result<Val
         lexer.take()?;
     }
     loop {
-        let token = match lexer.take()? {
-            Some(token) => token,
-            None => return Err(lexer.error(declaration.at, "the file ends within a parameter")),
-        };
+        let Some(token) = lexer.take()? else { return Err(lexer.error(declaration.at, "the file ends within a parameter")) };
         if open && token.kind == TokenKind::Close {
             break;
         }

@@ -36,9 +36,9 @@ pub struct Shapes<'a> {
 /// A shape's form.
 enum Form {
     /// A shape of ours, after a transform of its own; pbrt turns its normals inside out where the transform mirrors.
-    Analytic { shape: ShapeDesc, inner: DAffine3, area: f64 },
-    /// Triangles.
-    Mesh(MeshData),
+    Analytic { shape: Box<ShapeDesc>, inner: DAffine3, area: f64 },
+    /// Triangles, and as how many shapes pbrt counts them.
+    Mesh(MeshData, usize),
     /// Triangles of a file that can stay there.
     File(String),
 }
@@ -70,10 +70,7 @@ impl Shapes<'_> {
         let opacity = if light.is_none() { alpha.opacity(draft, &params.place) } else { None };
         let needs = self.needs(graphics, light, matches!(&opacity, Some(crate::desc::OpacityDesc::Texture { .. })));
 
-        let Some(form) = self.form(draft, kind, params, needs)? else {
-            params.report(draft);
-            return Ok(None);
-        };
+        let Some(form) = self.form(draft, kind, params, needs)? else { return Ok(None) };
         let mut reverse = graphics.reverse_orientation;
         let map = graphics.ctm.0[0];
         let (mut shape, inner, extent) = match form {
@@ -81,10 +78,10 @@ impl Shapes<'_> {
                 if graphics.ctm.swaps_handedness() {
                     reverse = !reverse;
                 }
-                (shape, inner, Some(Extent { count: 1, area }))
+                (*shape, inner, Some(Extent { count: 1, area }))
             }
-            Form::Mesh(mesh) => {
-                let extent = Extent::of_mesh(&mesh, &map);
+            Form::Mesh(mesh, count) => {
+                let extent = Extent { count, area: triangles::area(&mesh, &map) };
                 (self.mesh_shape(draft, kind, mesh), DAffine3::IDENTITY, Some(extent))
             }
             Form::File(file) => (ShapeDesc::Mesh(MeshDesc::from_file(file)), DAffine3::IDENTITY, None),
@@ -136,16 +133,24 @@ impl Shapes<'_> {
     }
 
     fn form(&self, draft: &mut Draft, kind: &str, params: &Params, needs: Needs) -> Result<Option<Form>> {
+        let mut patches = None;
         let mesh = match kind {
             "sphere" | "disk" | "cylinder" => return Ok(Some(analytic(kind, params)?)),
             "plymesh" => return self.ply(params, needs).map(Some),
             "trianglemesh" => triangle_mesh(params)?,
-            "bilinearmesh" => bilinear_mesh(draft, params)?,
+            "bilinearmesh" => {
+                let (mesh, count) = bilinear_mesh(draft, params)?;
+                patches = Some(count);
+                mesh
+            }
             "loopsubdiv" => {
                 let levels = params.integer_or("levels", 3)?.clamp(0, 64) as u32;
                 params.string("scheme")?;
                 let positions = params.groups("P")?.ok_or_else(|| params.error("needs positions P"))?;
                 let indices = params.indices("indices", positions.len())?.ok_or_else(|| params.error("needs indices"))?;
+                if loop_subdivision::possible_levels(indices.len(), levels) < levels {
+                    params.approximate("levels", "fewer, for there would be too many triangles");
+                }
                 loop_subdivision::subdivide(&positions, &indices, levels).map_err(|message| params.error(message))?
             }
             "curve" => {
@@ -163,7 +168,8 @@ impl Shapes<'_> {
         if needs.uvs {
             triangles::give_uvs(&mut mesh);
         }
-        Ok(Some(Form::Mesh(mesh)))
+        let count = patches.unwrap_or(mesh.triangles.len());
+        Ok(Some(Form::Mesh(mesh, count)))
     }
 
     /// A PLY stays a file where nothing has to be known of it or changed.
@@ -181,7 +187,8 @@ impl Shapes<'_> {
             triangles::give_uvs(&mut mesh);
             changed = true;
         }
-        Ok(if changed || needs.extent { Form::Mesh(mesh) } else { Form::File(file.into()) })
+        let count = mesh.triangles.len();
+        Ok(if changed || needs.extent { Form::Mesh(mesh, count) } else { Form::File(file.into()) })
     }
 }
 
@@ -214,20 +221,20 @@ fn analytic(kind: &str, params: &Params) -> Result<Form> {
         "disk" => {
             let inner_radius = params.number_or("innerradius", 0.0)?;
             let area = 0.5 * turn * (radius * radius - inner_radius * inner_radius);
-            let shape = ShapeDesc::Disk(DiskDesc::new(radius, inner_radius, phi_max));
+            let shape = Box::new(ShapeDesc::Disk(DiskDesc::new(radius, inner_radius, phi_max)));
             Form::Analytic { shape, inner: raised(params.number_or("height", 0.0)?), area }
         }
         "cylinder" => {
             let (a, b) = (params.number_or("zmin", -1.0)?, params.number_or("zmax", 1.0)?);
             let height = (b - a).abs();
-            let shape = ShapeDesc::Cylinder(CylinderDesc::new(radius, height, phi_max));
+            let shape = Box::new(ShapeDesc::Cylinder(CylinderDesc::new(radius, height, phi_max)));
             Form::Analytic { shape, inner: raised(a.min(b)), area: turn * radius * height }
         }
         _ => {
             let (a, b) = (params.number_or("zmin", -radius)?, params.number_or("zmax", radius)?);
             let (low, high) = (a.min(b).clamp(-radius, radius), a.max(b).clamp(-radius, radius));
             let (z_min, z_max) = ((low > -radius).then_some(low), (high < radius).then_some(high));
-            let shape = ShapeDesc::Sphere(SphereDesc::new(radius, z_min, z_max, phi_max));
+            let shape = Box::new(ShapeDesc::Sphere(SphereDesc::new(radius, z_min, z_max, phi_max)));
             Form::Analytic { shape, inner: DAffine3::IDENTITY, area: turn * radius * (high - low) }
         }
     })
@@ -260,7 +267,8 @@ fn triangle_mesh(params: &Params) -> Result<MeshData> {
     Ok(MeshData { positions, triangles, normals, uvs })
 }
 
-fn bilinear_mesh(draft: &mut Draft, params: &Params) -> Result<MeshData> {
+/// The triangles, and how many patches they are.
+fn bilinear_mesh(draft: &mut Draft, params: &Params) -> Result<(MeshData, usize)> {
     let Some(positions) = params.groups::<3>("P")? else { return Err(params.error("needs positions P")) };
     let count = positions.len();
     let corners = match params.indices("indices", count)? {
@@ -280,5 +288,5 @@ fn bilinear_mesh(draft: &mut Draft, params: &Params) -> Result<MeshData> {
     if curved > 0 {
         draft.approximated(&params.place, &params.element, "", "curved patches become a grid of triangles");
     }
-    Ok(mesh)
+    Ok((mesh, patches.corners.len()))
 }

@@ -9,6 +9,7 @@ use crate::desc::{
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
+use crate::import::{ImageData, Samples, read_image};
 
 /// A texture, or a colour or number in its place.
 #[derive(Clone, Debug, PartialEq)]
@@ -157,7 +158,7 @@ impl Textures {
                 params.approximate("dir", "the mean of both");
                 mix(params, read("tex1", 0.0)?, read("tex2", 1.0)?, &Texture::grey(0.5))
             }
-            "imagemap" => image(draft, name, of_numbers, params)?,
+            "imagemap" => image(draft, name, of_numbers, params, colors)?,
             "checkerboard" => {
                 let (first, second) = (read("tex1", 1.0)?, read("tex2", 0.0)?);
                 checkerboard(draft, name, params, &first, &second)?
@@ -237,6 +238,35 @@ fn checkerboard(draft: &mut Draft, name: &str, params: &Params, first: &Texture,
     Ok(Texture::Named { name, factor: [1.0; 3] })
 }
 
+/// The channel that pbrt takes for a number: alpha if not all of the image is opaque, else the mean of the colours.
+fn number_channel(image: &ImageData, params: &Params) -> Option<ChannelDesc> {
+    let has_alpha = image.channels.is_multiple_of(2);
+    let pixels = image.width * image.height;
+    let opaque = |i: usize| match &image.samples {
+        Samples::U8(v) => v.get(i) == Some(&u8::MAX),
+        Samples::U16(v) => v.get(i) == Some(&u16::MAX),
+        Samples::F16(v) => v.get(i).is_some_and(|x| x.to_f32() == 1.0),
+        Samples::F32(v) => v.get(i) == Some(&1.0),
+    };
+    if has_alpha && !(0..pixels).all(|i| opaque(i * image.channels + image.channels - 1)) {
+        params.approximate("filename", "alpha as it is stored, not through a curve");
+        return Some(ChannelDesc::A);
+    }
+    let same = |i: usize, j: usize| match &image.samples {
+        Samples::U8(v) => v.get(i) == v.get(j),
+        Samples::U16(v) => v.get(i) == v.get(j),
+        Samples::F16(v) => v.get(i) == v.get(j),
+        Samples::F32(v) => v.get(i) == v.get(j),
+    };
+    let is_grey = image.channels < 3 || (0..pixels).map(|i| i * image.channels).all(|i| same(i, i + 1) && same(i, i + 2));
+    if is_grey {
+        return Some(ChannelDesc::R);
+    }
+    let how = if has_alpha { "the green channel" } else { "the luminance" };
+    params.approximate("filename", format!("{how} in place of the mean of the channels"));
+    has_alpha.then_some(ChannelDesc::G)
+}
+
 fn note_mapping(params: &Params) -> Result<()> {
     if params.string("mapping")?.is_some_and(|mapping| mapping != "uv") {
         params.approximate("mapping", "by the uv of the surface");
@@ -244,7 +274,7 @@ fn note_mapping(params: &Params) -> Result<()> {
     Ok(())
 }
 
-fn image(draft: &mut Draft, name: &str, of_numbers: bool, params: &Params) -> Result<Texture> {
+fn image(draft: &mut Draft, name: &str, of_numbers: bool, params: &Params, colors: &Colors) -> Result<Texture> {
     let Some(file) = params.string("filename")? else { return Err(params.error("needs a filename")) };
     note_mapping(params)?;
     let filter = match params.string("filter")?.unwrap_or("bilinear") {
@@ -274,10 +304,9 @@ fn image(draft: &mut Draft, name: &str, of_numbers: bool, params: &Params) -> Re
     if invert && scale != 1.0 {
         params.approximate("scale", "after the inversion, not before it");
     }
-    if of_numbers {
-        // The mean of the channels, which for grey is each of them.
-        params.approximate("filename", "the red channel, which is all of it where the image is grey");
-    }
+    // What cannot be read is found out when the scene is compiled.
+    let data = if of_numbers { read_image(&colors.folder.join(file)).ok() } else { None };
+    let channel = data.and_then(|data| number_channel(&data, params));
     let at = |u: &str, v: &str, default: f64| -> Result<[f32; 2]> {
         Ok([params.number_or(u, default)? as f32, params.number_or(v, default)? as f32])
     };
@@ -289,7 +318,7 @@ fn image(draft: &mut Draft, name: &str, of_numbers: bool, params: &Params) -> Re
         scale: at("uscale", "vscale", 1.0)?,
         rotation_degrees: 0.0,
         offset: at("udelta", "vdelta", 0.0)?,
-        channel: of_numbers.then_some(ChannelDesc::R),
+        channel,
         invert,
     };
     let name = draft.add_texture(name, &params.place, texture);

@@ -24,12 +24,15 @@ pub fn give_uvs(mesh: &mut MeshData) {
     if mesh.uvs.is_some() {
         return;
     }
-    let corners: Vec<u32> = mesh.triangles.as_flattened().to_vec();
-    let split = |values: &[[f32; 3]]| corners.iter().map(|&i| values.get(i as usize).copied().unwrap_or_default()).collect::<Vec<_>>();
-    mesh.positions = split(&mesh.positions);
-    mesh.normals = mesh.normals.as_deref().map(split);
+    mesh.positions = at_corners(&mesh.triangles, &mesh.positions);
+    mesh.normals = mesh.normals.as_deref().map(|normals| at_corners(&mesh.triangles, normals));
     mesh.uvs = Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]].repeat(mesh.triangles.len()));
     mesh.triangles = (0..mesh.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+}
+
+/// What belongs to the vertices of a mesh, for each corner of its triangles.
+fn at_corners(triangles: &[[u32; 3]], values: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    triangles.as_flattened().iter().map(|&i| values.get(i as usize).copied().unwrap_or_default()).collect()
 }
 
 /// The area of a placed mesh.
