@@ -30,6 +30,8 @@ mod flaws_of_glass;
 mod flaws_of_light;
 /// Known flaws of renderers in textures and surfaces, beyond those of [`textures`] and [`relief`]: each test fails on the flawed formula.
 mod flaws_of_textures;
+/// What fuzzing found, read again.
+mod fuzz_corpus;
 /// The scenes that come with the program.
 mod gallery;
 /// Bottles and glasses of revolution, filled.

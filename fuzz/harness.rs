@@ -1,0 +1,69 @@
+//! What is done with bytes that claim to be a file: they are read as one, and what comes out is looked at. Used by the fuzz targets and by
+//! the test that replays their corpus.
+
+use std::path::Path;
+
+use steradian::import::{self, ImportOptions, MeshData};
+
+/// The kinds of files that are read.
+pub const KINDS: [&str; 7] = ["scene_json", "obj", "ply", "image", "mitsuba_xml", "pbrt", "gltf"];
+
+/// Reads `data` as a file of `kind` in `folder`, which only this caller writes to. Malformed files are errors; anything else is a finding.
+pub fn read(kind: &str, data: &[u8], folder: &Path) {
+    let write = |name: &str, data: &[u8]| {
+        let path = folder.join(name);
+        std::fs::write(&path, data).expect("the folder can be written");
+        path
+    };
+    match kind {
+        "scene_json" => {
+            if let Ok(text) = std::str::from_utf8(data) {
+                let _ = import::parse_scene(text, Path::new("scene.json"));
+            }
+        }
+        "obj" => {
+            // Behind a zero byte stands the MTL.
+            let cut = data.iter().position(|&byte| byte == 0).unwrap_or(data.len());
+            let (obj, mtl) = data.split_at(cut);
+            write("m.mtl", mtl.get(1..).unwrap_or_default());
+            if let Ok(meshes) = import::read_obj(&write("m.obj", obj), true) {
+                meshes.iter().for_each(|mesh| look_at(&mesh.mesh));
+            }
+        }
+        "ply" => {
+            if let Ok(mesh) = import::read_ply(&write("m.ply", data)) {
+                look_at(&mesh);
+            }
+        }
+        "image" => {
+            for name in ["i.png", "i.tga"] {
+                if let Ok(image) = import::read_image(&write(name, data)) {
+                    assert!(image.width > 0 && image.height > 0 && (1..=4).contains(&image.channels));
+                }
+            }
+            let extension = if data.starts_with(b"P") { "pfm" } else { "hdr" };
+            let _ = import::read_rgb_image(&write(&format!("i.{extension}"), data));
+        }
+        "mitsuba_xml" => read_scene(&write("s.xml", data)),
+        "pbrt" => read_scene(&write("s.pbrt", data)),
+        "gltf" => {
+            let name = if data.starts_with(b"glTF") { "s.glb" } else { "s.gltf" };
+            read_scene(&write(name, data));
+        }
+        _ => panic!("no kind {kind}"),
+    }
+}
+
+fn read_scene(path: &Path) {
+    if let Ok(imported) = import::read_scene(path, &ImportOptions::default()) {
+        let _ = imported.report.summary();
+        imported.assets.meshes.values().for_each(look_at);
+    }
+}
+
+/// Every buffer is as long as the reader says.
+fn look_at(mesh: &MeshData) {
+    let count = mesh.positions.len();
+    assert!(mesh.normals.as_ref().is_none_or(|normals| normals.len() == count));
+    assert!(mesh.uvs.as_ref().is_none_or(|uvs| uvs.len() == count));
+}
