@@ -121,8 +121,8 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
         };
         match kind {
             b"JSON" if json.is_none() => json = Some(chunk),
-            b"BIN\0" if bin.is_none() => bin = Some(chunk),
             _ if json.is_none() => return Err("the first chunk is not the JSON".into()),
+            b"BIN\0" if bin.is_none() => bin = Some(chunk),
             _ => {}
         }
         at += 8 + chunk.len();
