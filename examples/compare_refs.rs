@@ -1,7 +1,7 @@
 //! Compares renders of `scenes/` and `benches/scenes/` with independent reference images of the same scenes, block by block.
 //!
 //! `cargo run --release --example compare_refs -- [REFS] [--spp N] [SCENE...]`: `REFS` (default `../shared/refs`) holds `SCENE.exr` for each
-//! scene (default: cornell, glass, analytic) and, of some, two independent halves `SCENE.half0.exr` and `SCENE.half1.exr`. Two renders of N
+//! scene (default: cornell, glass, analytic; the file of a scene of any kind stands for itself) and, of some, two independent halves `SCENE.half0.exr` and `SCENE.half1.exr`. Two renders of N
 //! samples with different seeds give our variance, the halves give the reference's; without halves the differences between the two pictures,
 //! from pixel to pixel of a block, give both together. Over blocks of 16 x 16 pixels, z = (ours - reference) / sqrt(variances).
 //!
@@ -14,8 +14,9 @@ use std::sync::atomic::AtomicBool;
 
 use steradian::accel::{self, AccelKind};
 use steradian::film::Image;
+use steradian::import::{self, ImportOptions};
 use steradian::render::{self, Overrides, Settings, Silent};
-use steradian::{Error, Result, compile, import, output};
+use steradian::{Error, Result, compile, output};
 
 const BLOCK: u32 = 16;
 
@@ -61,13 +62,14 @@ fn parse_arguments() -> Result<Arguments> {
 }
 
 /// Renders one scene twice and compares; whether it agrees.
-fn compare_scene(name: &str, arguments: &Arguments, out: &Path) -> Result<bool> {
+fn compare_scene(scene: &str, arguments: &Arguments, out: &Path) -> Result<bool> {
+    let name = &*Path::new(scene).file_stem().unwrap_or_default().to_string_lossy();
     let file = |suffix: &str| arguments.references.join(format!("{name}{suffix}.exr"));
     let reference = output::read_exr(&file(""))?;
     let has_halves = file(".half0").exists();
     let halves = if has_halves { Some([output::read_exr(&file(".half0"))?, output::read_exr(&file(".half1"))?]) } else { None };
-    let (first, has_sky) = render_scene(name, arguments.spp, 1)?;
-    let ours = [first, render_scene(name, arguments.spp, 2)?.0];
+    let (first, has_sky) = render_scene(scene, arguments.spp, 1)?;
+    let ours = [first, render_scene(scene, arguments.spp, 2)?.0];
     let allowance = if has_sky { SKY_CONVENTIONS } else { 0.0 };
 
     let [width, height] = reference.size;
@@ -118,10 +120,11 @@ fn compare_scene(name: &str, arguments: &Arguments, out: &Path) -> Result<bool> 
 /// The picture, and whether there is a sky.
 fn render_scene(name: &str, spp: u32, seed: u64) -> Result<(Image, bool)> {
     let folders = ["scenes", "benches/scenes"].map(|folder| Path::new(folder).join(format!("{name}.json")));
-    let path = folders.iter().find(|path| path.exists()).unwrap_or(&folders[0]);
-    let desc = import::load_scene(path)?;
-    let settings = Settings::new(&desc, &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() })?;
-    let scene = compile::compile(&desc, path)?;
+    let own = Path::new(name);
+    let path = if own.is_file() { own } else { folders.iter().find(|path| path.exists()).unwrap_or(&folders[0]) };
+    let imported = import::read_scene(path, &ImportOptions::default())?;
+    let settings = Settings::new(&imported.desc, &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() })?;
+    let scene = compile::compile_imported(&imported, path)?;
     let accel = accel::build(AccelKind::EMBREE, &scene.geometry, settings.threads)?;
     let image = render::render(&scene, &*accel, &settings, &Silent, &AtomicBool::new(false))?.image;
     Ok((image, scene.features.environment))

@@ -77,6 +77,7 @@ fn without_outputs_the_files_are_named_after_the_scene() {
     for key in [
         "load_seconds",
         "build_seconds",
+        "first_pass_seconds",
         "render_seconds",
         "mrays_per_second",
         "msamples_per_second",

@@ -8,6 +8,8 @@ mod bad_input;
 mod bad_materials;
 /// Accelerators compared from the command line.
 mod bench_accel;
+/// The catalogue of checks from the command line.
+mod bench_stability;
 /// What the cameras of the scene file see.
 mod cameras;
 /// The program as a user runs it: exit codes, what it writes, what it says.

@@ -1,4 +1,6 @@
-//! Linear RGB images, OpenEXR and Radiance HDR, for environments.
+//! Linear RGB images, OpenEXR, Radiance HDR and PFM, for environments.
+
+mod pfm;
 
 use std::path::Path;
 
@@ -15,7 +17,7 @@ pub struct RgbImage {
     pub pixels: Vec<[f32; 3]>,
 }
 
-/// Reads an `.exr` or `.hdr` file.
+/// Reads an `.exr`, `.hdr` or `.pfm` file.
 ///
 /// # Errors
 /// If the file is missing, malformed, or of another kind.
@@ -25,7 +27,8 @@ pub fn read_rgb_image(path: &Path) -> Result<RgbImage, AssetError> {
     match extension.as_deref() {
         Some("exr") => read_exr(path),
         Some("hdr") => read_hdr(path),
-        _ => Err(AssetError::Malformed("only .exr and .hdr files can be environments".into())),
+        Some("pfm") => pfm::read(path),
+        _ => Err(AssetError::Malformed("only .exr, .hdr and .pfm files can be environments".into())),
     }
 }
 

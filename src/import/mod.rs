@@ -14,6 +14,7 @@ mod obj;
 mod obj_check;
 mod ply;
 mod scene_file;
+mod spectrum;
 
 pub use assets::Assets;
 pub use environment_image::{RgbImage, read_rgb_image};
@@ -25,6 +26,7 @@ pub use mtl_maps::{ObjMap, ObjMaps};
 pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::read_ply;
 pub use scene_file::{closest_name, load_scene, parse_scene};
+pub use spectrum::{Named, Spectrum, named};
 
 use std::path::{Path, PathBuf};
 

@@ -37,6 +37,8 @@ const PASS_TIME: Duration = Duration::from_millis(500);
 pub struct Stats {
     /// Wall-clock seconds of the render loop.
     pub render_seconds: f64,
+    /// Wall-clock time until every pixel had its first sample, in seconds.
+    pub first_pass_seconds: f64,
     /// Samples in the picture: pixels times samples per pixel.
     pub samples: u64,
     /// Samples per pixel done.
@@ -194,6 +196,9 @@ pub fn render(
         let pass_start = Instant::now();
         stats.rays.add(&render_pass(&job, &pool, &mut film, stats.spp_done, count, progress));
         stats.spp_done += count;
+        if stats.first_pass_seconds == 0.0 {
+            stats.first_pass_seconds = start.elapsed().as_secs_f64();
+        }
         let remaining = settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed()));
         pass_samples = next_pass(count, pass_start.elapsed(), remaining);
     }

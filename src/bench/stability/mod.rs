@@ -152,28 +152,40 @@ impl Check {
     pub fn run(&self, effort: Effort) -> CheckReport {
         let start = Instant::now();
         let outcome = (self.run)(effort);
-        CheckReport {
-            id: self.id,
-            name: self.name,
-            setup: self.setup,
-            status: outcome.status(),
-            outcome,
-            seconds: start.elapsed().as_secs_f64(),
-        }
+        self.report(outcome, start.elapsed().as_secs_f64())
+    }
+
+    fn report(&self, outcome: Outcome, seconds: f64) -> CheckReport {
+        CheckReport { id: self.id, name: self.name, setup: self.setup, status: outcome.status(), outcome, seconds }
     }
 }
 
-/// Runs checks one after the other; ends early if `watch` says so.
-pub fn run(checks: &[&Check], effort: Effort, watch: &dyn Watch) -> Vec<CheckReport> {
+/// Runs checks one after the other, all but those in `kept`, which stand for themselves; ends early if `watch` says so. `after` is given
+/// what there is after each.
+///
+/// # Errors
+/// Those of `after`.
+pub fn run(
+    checks: &[&Check],
+    effort: Effort,
+    mut kept: Vec<CheckReport>,
+    watch: &dyn Watch,
+    mut after: impl FnMut(&[CheckReport]) -> Result<()>,
+) -> Result<Vec<CheckReport>> {
     let mut reports = Vec::with_capacity(checks.len());
     for (i, check) in checks.iter().enumerate() {
         if watch.is_stopped() {
             break;
         }
+        if let Some(k) = kept.iter().position(|report| report.id == check.id) {
+            reports.push(kept.swap_remove(k));
+            continue;
+        }
         watch.step(&format!("{} of {}: {} {}", i + 1, checks.len(), check.id, check.name));
         reports.push(check.run(effort));
+        after(&reports)?;
     }
-    reports
+    Ok(reports)
 }
 
 /// The probability that a correct program fails a check: what each of `tests` independent p-values must reach for the whole to stay below one

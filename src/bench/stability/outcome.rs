@@ -1,11 +1,11 @@
 //! What a check has measured, and whether that is good enough.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::film::{Crop, Image, Layer, LayerKind};
 
 /// What a number must be.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bound {
     /// No larger than this.
@@ -31,7 +31,7 @@ impl Bound {
 }
 
 /// One number with its bound.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measure {
     /// What was measured, with its unit.
     pub what: String,
@@ -42,7 +42,7 @@ pub struct Measure {
 }
 
 /// How a check ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// Every number keeps its bound.
@@ -54,7 +54,7 @@ pub enum Status {
 }
 
 /// Curves on logarithmic axes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plot {
     /// What it shows.
     pub caption: String,
@@ -69,7 +69,7 @@ pub struct Plot {
 }
 
 /// What a check has found.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Outcome {
     /// The numbers.
     pub measures: Vec<Measure>,

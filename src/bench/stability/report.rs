@@ -3,9 +3,10 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use super::{Bound, CheckReport, Effort, Measure, Plot, Status, group};
+use super::{Bound, CheckReport, Effort, Measure, Outcome, Plot, Status, catalogue, group};
 use crate::bench::Machine;
 use crate::bench::report::html;
 use crate::bench::report::markdown::{self, Table};
@@ -14,6 +15,9 @@ use crate::bench::report::write_files;
 use crate::desc::{OutputDesc, PixelTypeDesc};
 use crate::error::{Error, Result};
 use crate::output::{RenderInfo, write_exr};
+
+/// Name of the file that a run can be taken up from.
+const JSON: &str = "stability.json";
 
 /// Everything a run of the catalogue has found.
 #[derive(Clone, Debug, Serialize)]
@@ -86,11 +90,27 @@ impl StabilityReport {
     /// # Errors
     /// [`Error::Output`] naming the file.
     pub fn write_to(&self, folder: &Path) -> Result<()> {
-        write_files(folder, &[("stability.json", self.json()?), ("stability.md", self.markdown()), ("stability.html", self.html()?)])?;
+        write_files(folder, &[(JSON, self.json()?), ("stability.md", self.markdown()), ("stability.html", self.html()?)])?;
         for failure in self.failures() {
             write_evidence(&folder.join("evidence"), failure)?;
         }
         Ok(())
+    }
+
+    /// The checks of an earlier run of this version that left `stability.json` in a folder, those that failed excepted; none if there is no
+    /// such file.
+    pub fn kept(folder: &Path, effort: Effort) -> Vec<CheckReport> {
+        let report = std::fs::read(folder.join(JSON)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let Some(report) = report else { return Vec::new() };
+        let is_same = report["machine"]["version"] == env!("CARGO_PKG_VERSION")
+            && serde_json::to_value(effort).is_ok_and(|effort| report["effort"] == effort);
+        let checks = report["checks"].as_array().filter(|_| is_same).map_or(&[][..], Vec::as_slice);
+        let kept = |check: &Value| {
+            let known = catalogue().find(|known| check["id"] == known.id)?;
+            let outcome = Outcome::deserialize(&check["outcome"]).ok().filter(|outcome| outcome.status() != Status::Failed)?;
+            Some(known.report(outcome, check["seconds"].as_f64()?))
+        };
+        checks.iter().filter_map(kept).collect()
     }
 
     fn header(&self) -> String {

@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use steradian::accel::{self, AccelKind};
 use steradian::bench::agreement::{describe, parse_ray};
 use steradian::bench::report::Report;
-use steradian::bench::stability::{self, Effort, StabilityReport};
+use steradian::bench::stability::{self, CheckReport, Effort, StabilityReport};
 use steradian::bench::{Machine, Options, ReportsOptions, SceneReport, Watch, bench_reports, bench_scaling, bench_scene, record};
 use steradian::render::{Overrides, Settings};
 use steradian::{Error, Result, compile};
@@ -102,10 +102,22 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
     let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
     let machine = Machine::here();
     let effort = if arguments.quick { Effort::Quick } else { Effort::Full };
-    let results = stability::run(&checks, effort, &watch);
+    let kept = match &arguments.out {
+        Some(folder) if arguments.resume => StabilityReport::kept(folder, effort),
+        _ => Vec::new(),
+    };
+    let report = |checks: Vec<CheckReport>, interrupted| {
+        let (machine, command) = (machine.clone(), command_line());
+        StabilityReport { machine, command, effort, interrupted, checks }
+    };
+    // A run that is killed leaves what there was after its last check.
+    let results = stability::run(&checks, effort, kept, &watch, |results| match &arguments.out {
+        Some(folder) => report(results.to_vec(), true).write_to(folder),
+        None => Ok(()),
+    })?;
     watch.bar.finish_and_clear();
     let interrupted = results.len() < checks.len();
-    let report = StabilityReport { machine, command: command_line(), effort, interrupted, checks: results };
+    let report = report(results, interrupted);
     match &arguments.out {
         Some(folder) => {
             report.write_to(folder)?;

@@ -47,6 +47,8 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
     let reporter = Reporter::new(arguments.verbosity.quiet, interrupt.stop.clone(), settings.time_limit);
     let result = render::render(&scene, &*accel, &settings, &reporter, &interrupt.stop)?;
     let stats = &result.stats;
+    let first = load_seconds + build_seconds + stats.first_pass_seconds;
+    tracing::info!("{first:.3} s until every pixel had its first sample");
     warn_of_dropped(stats, &reporter);
 
     let info = RenderInfo {

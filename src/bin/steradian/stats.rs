@@ -35,6 +35,7 @@ pub fn value(run: &Run, settings: &Settings, accel: &dyn Accelerator, stats: &St
         "embree": embree(&description),
         "load_seconds": run.load_seconds,
         "build_seconds": run.build_seconds,
+        "first_pass_seconds": run.load_seconds + run.build_seconds + stats.first_pass_seconds,
         "render_seconds": stats.render_seconds,
         "samples": stats.samples,
         "rays": { "camera": rays.camera, "indirect": rays.indirect, "shadow": rays.shadow },

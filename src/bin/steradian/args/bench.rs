@@ -57,7 +57,7 @@ Examples:
   steradian bench stability --quick              The same checks with fewer samples, as the tests run them
   steradian bench stability A3 B                 One check and one group
 
-Ctrl-C ends after the present check and reports what there is.";
+Ctrl-C ends after the present check and reports what there is; with --resume the next run takes it up.";
 
 /// Arguments of `bench stability`.
 #[derive(Debug, Args)]
@@ -74,6 +74,9 @@ pub struct BenchStabilityArgs {
     /// Folder for stability.html, stability.md and stability.json; without it the table goes to stdout
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Keep what an earlier, interrupted run of the same program left in DIR
+    #[arg(long, requires = "out")]
+    pub resume: bool,
     /// Without --out: print JSON instead of a table
     #[arg(long)]
     pub json: bool,

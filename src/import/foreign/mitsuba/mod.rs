@@ -1,11 +1,132 @@
 //! Mitsuba 3 scenes.
 
+mod bsdfs;
+mod coats;
+mod element;
+mod emitters;
+mod integrators;
+mod meshes;
+mod metals;
+mod names;
+mod sensor;
+mod shapes;
+mod textures;
+mod transforms;
+mod tree;
+mod values;
+mod xml;
+
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{ImportOptions, Imported};
-use crate::error::{Error, Result};
+use super::{Draft, ImportOptions, Imported};
+use crate::error::Result;
+use bsdfs::Look;
+use textures::{TextureValue, UvOrigin};
+use tree::{Document, PluginId, Value};
 
 /// Reads a Mitsuba 3 XML file.
-pub fn read(path: &Path, _options: &ImportOptions) -> Result<Imported> {
-    Err(Error::Usage(format!("{}: not read yet", path.display())))
+pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
+    let document = xml::read(path, &options.defines)?;
+    let mut reader = Reader {
+        document: &document,
+        scene: path,
+        draft: Draft::default(),
+        textures: BTreeMap::new(),
+        looks: BTreeMap::new(),
+        surfaces: BTreeMap::new(),
+        groups: BTreeMap::new(),
+        baked: BTreeMap::new(),
+        black: None,
+        open: Vec::new(),
+    };
+    reader.scene()?;
+    Ok(reader.draft.finish())
+}
+
+/// A scene while it is read.
+struct Reader<'a> {
+    document: &'a Document,
+    scene: &'a Path,
+    draft: Draft,
+    /// What textures have become.
+    textures: BTreeMap<(PluginId, UvOrigin), TextureValue>,
+    /// What BSDFs have become.
+    looks: BTreeMap<(PluginId, UvOrigin), Look>,
+    /// The materials of shapes with these BSDFs.
+    surfaces: BTreeMap<(PluginId, UvOrigin), String>,
+    /// Objects of shape groups; none where a group is empty.
+    groups: BTreeMap<PluginId, Option<String>>,
+    /// Textures whose colours were changed, by their names and how.
+    baked: BTreeMap<(String, u64), String>,
+    /// The material that reflects nothing.
+    black: Option<String>,
+    /// Plugins on the way to the one that is read.
+    open: Vec<PluginId>,
+}
+
+/// Plugins that refer to each other deeper than this are a mistake.
+const MAX_REFERENCES: usize = 100;
+
+impl Reader<'_> {
+    /// Reads everything.
+    fn scene(&mut self) -> Result<()> {
+        let Some(scene) = self.document.plugins.last() else {
+            return Ok(());
+        };
+        let (mut has_sensor, mut has_integrator) = (false, false);
+        for property in &scene.properties {
+            let Some(id) = self.document.plugin_of(property)? else {
+                self.draft.ignored(&property.place.to_string(), "scene", &property.name, "a scene has no parameters");
+                continue;
+            };
+            let is_reference = matches!(property.value, Value::Reference(_));
+            let plugin = &self.document.plugins[id.0];
+            match (plugin.class.as_str(), plugin.kind.as_str()) {
+                _ if is_reference => {}
+                ("sensor", _) if has_sensor => self.whole(id, "only the first sensor is used"),
+                ("sensor", "perspective" | "thinlens" | "orthographic") => {
+                    has_sensor = true;
+                    self.sensor(id)?;
+                }
+                ("sensor", kind) => self.whole(id, &format!("there is no sensor {kind}")),
+                ("integrator", _) if has_integrator => self.whole(id, "only the first integrator is used"),
+                ("integrator", _) => {
+                    has_integrator = true;
+                    self.integrator(id)?;
+                }
+                ("shape", _) => self.world_shape(id)?,
+                ("emitter", _) => self.emitter(id)?,
+                ("medium" | "phase" | "volume", _) => self.whole(id, "there are no participating media"),
+                // What others refer to is read when they do.
+                _ => {}
+            }
+        }
+        if !has_sensor {
+            return Err(scene.place.error("the scene has no sensor of type perspective, thinlens or orthographic"));
+        }
+        if !has_integrator {
+            self.draft.desc.integrator = integrators::unlimited_path();
+        }
+        Ok(())
+    }
+
+    /// Says that a plugin is ignored with all that is in it.
+    fn whole(&mut self, id: PluginId, why: &str) {
+        let plugin = &self.document.plugins[id.0];
+        self.draft.ignored(&plugin.place.to_string(), &plugin.title(), "", why);
+    }
+
+    /// Refuses a plugin that is a part of itself, or lies too deep. `open.pop()` ends what this begins.
+    fn guard(&mut self, id: PluginId) -> Result<()> {
+        let plugin = &self.document.plugins[id.0];
+        if self.open.contains(&id) {
+            return Err(plugin.place.error(format!("{} refers to itself", plugin.title())));
+        }
+        if self.open.len() >= MAX_REFERENCES {
+            return Err(plugin.place.error(format!("references are nested more than {MAX_REFERENCES} deep")));
+        }
+        self.open.push(id);
+        Ok(())
+    }
 }

@@ -1,11 +1,32 @@
 //! pbrt-v4 scenes.
 
+mod area_light;
+mod bilinear;
+mod camera;
+mod colors;
+mod directives;
+mod lights;
+mod loop_subdivision;
+mod materials;
+mod octahedral;
+mod options;
+mod params;
+mod shapes;
+mod state;
+mod textures;
+mod tokens;
+mod transforms;
+mod triangles;
+
+#[cfg(test)]
+mod tests;
+
 use std::path::Path;
 
 use super::{ImportOptions, Imported};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// Reads a pbrt file.
 pub fn read(path: &Path, _options: &ImportOptions) -> Result<Imported> {
-    Err(Error::Usage(format!("{}: not read yet", path.display())))
+    directives::Reader::new(path).read()
 }

@@ -1,0 +1,398 @@
+//! BSDFs to materials.
+
+use super::element::Element;
+use super::metals;
+use super::textures::{UvOrigin, luminance};
+use super::tree::PluginId;
+use super::{Reader, names};
+use crate::desc::{
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, MaterialDesc, NormalMapDesc, OpacityDesc, PrincipledDesc, RangedDesc,
+    RoughnessDesc, ScalarDesc, TextureDesc,
+};
+use crate::error::Result;
+use crate::import::closest_name;
+
+/// What a BSDF has become.
+#[derive(Clone, Debug)]
+pub struct Look {
+    /// The material by name.
+    pub material: String,
+    /// Whether Mitsuba's is black from behind, and ours not.
+    pub one_sided: bool,
+    /// How much of a surface with it is there.
+    pub opacity: Option<OpacityDesc>,
+}
+
+impl<'a> Reader<'a> {
+    /// The material of a shape, and its opacity. Without a BSDF, Mitsuba's default: a grey diffuse front.
+    pub(super) fn surface(&mut self, id: Option<PluginId>, place: &str, uv: UvOrigin) -> Result<(String, Option<OpacityDesc>)> {
+        let Some(id) = id else {
+            let name = "default_front_only";
+            if !self.draft.desc.materials.contains_key(name) {
+                let front = MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: ScalarDesc::Constant(0.0) };
+                let front = self.draft.add_material("default", place, front);
+                let back = self.black(place);
+                self.draft.add_material(name, place, MaterialDesc::TwoSided { front, back });
+            }
+            return Ok((name.into(), None));
+        };
+        let look = self.look(id, uv)?;
+        if !look.one_sided {
+            return Ok((look.material, look.opacity));
+        }
+        if let Some(name) = self.surfaces.get(&(id, uv)) {
+            return Ok((name.clone(), look.opacity));
+        }
+        let name = self.front_only(&look, place);
+        self.surfaces.insert((id, uv), name.clone());
+        Ok((name, look.opacity))
+    }
+
+    /// A material with a black back.
+    fn front_only(&mut self, look: &Look, place: &str) -> String {
+        let back = self.black(place);
+        let sides = MaterialDesc::TwoSided { front: look.material.clone(), back };
+        self.draft.add_material(&format!("{}_front_only", look.material), place, sides)
+    }
+
+    /// The material that reflects nothing.
+    fn black(&mut self, place: &str) -> String {
+        if let Some(name) = &self.black {
+            return name.clone();
+        }
+        let black = MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.0), roughness: ScalarDesc::Constant(0.0) };
+        let name = self.draft.add_material("black_back", place, black);
+        self.black = Some(name.clone());
+        name
+    }
+
+    /// What a BSDF becomes.
+    pub(super) fn look(&mut self, id: PluginId, uv: UvOrigin) -> Result<Look> {
+        if let Some(look) = self.looks.get(&(id, uv)) {
+            return Ok(look.clone());
+        }
+        self.guard(id)?;
+        let mut element = Element::new(self.document, id);
+        if element.plugin.class != "bsdf" {
+            return Err(element.place().error(format!("a {} is no bsdf", element.plugin.class)));
+        }
+        let look = match element.kind() {
+            "twosided" => self.two_sided(&mut element, uv)?,
+            "mask" => self.mask(&mut element, uv)?,
+            "blendbsdf" => self.blend(&mut element, uv)?,
+            "normalmap" | "bumpmap" => self.relief(&mut element, uv)?,
+            "null" => {
+                Look { opacity: Some(OpacityDesc::Number(0.0)), material: self.black(&element.place().to_string()), one_sided: false }
+            }
+            _ => {
+                let (material, one_sided) = self.material(&mut element, uv)?;
+                self.add(&element, material, one_sided)
+            }
+        };
+        element.finish(&mut self.draft);
+        self.open.pop();
+        self.looks.insert((id, uv), look.clone());
+        Ok(look)
+    }
+
+    fn add(&mut self, element: &Element, material: MaterialDesc, one_sided: bool) -> Look {
+        let name = if element.plugin.id.is_empty() { element.kind() } else { &element.plugin.id };
+        Look { material: self.draft.add_material(name, &element.place().to_string(), material), one_sided, opacity: None }
+    }
+
+    /// A BSDF that does not consist of others, and whether its back is black.
+    fn material(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<(MaterialDesc, bool)> {
+        Ok(match element.kind() {
+            "diffuse" => {
+                let albedo = self.color(element, "reflectance", 0.5, uv)?;
+                (MaterialDesc::Diffuse { albedo, roughness: ScalarDesc::Constant(0.0) }, true)
+            }
+            "conductor" | "roughconductor" => (self.conductor(element, uv)?, true),
+            "dielectric" | "roughdielectric" => {
+                let ior = relative_index(element, "bk7")?;
+                let alpha = if element.kind() == "roughdielectric" { self.alpha(element, uv)? } else { None };
+                lossless(element);
+                let glass = DielectricDesc {
+                    ior: RangedDesc::Constant(ior),
+                    roughness: None,
+                    alpha,
+                    multiscatter: false,
+                    priority: None,
+                    absorption: None,
+                    abbe: None,
+                };
+                (MaterialDesc::Dielectric(Box::new(glass)), false)
+            }
+            "thindielectric" => {
+                let ior = RangedDesc::Constant(relative_index(element, "bk7")?);
+                lossless(element);
+                (MaterialDesc::ThinDielectric { ior }, false)
+            }
+            "plastic" | "roughplastic" => {
+                let ior = relative_index(element, "polypropylene")?;
+                let alpha = if element.kind() == "roughplastic" { self.alpha(element, uv)? } else { None };
+                let mut albedo = self.color(element, "diffuse_reflectance", 0.5, uv)?;
+                if element.boolean("nonlinear", false)? {
+                    albedo = self.nonlinear(albedo, f64::from(ior));
+                }
+                if element.take("specular_reflectance").is_some() {
+                    element.ignored("specular_reflectance", "the coat is clear");
+                }
+                (MaterialDesc::Plastic { albedo, ior: RangedDesc::Constant(ior), roughness: None, alpha }, true)
+            }
+            "principled" | "principledthin" => self.principled(element, uv)?,
+            other => {
+                element.ignored("", format!("there is no bsdf {other}: a grey diffuse surface"));
+                (MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: ScalarDesc::Constant(0.0) }, true)
+            }
+        })
+    }
+
+    fn conductor(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<MaterialDesc> {
+        let alpha = if element.kind() == "roughconductor" { self.alpha(element, uv)? } else { None };
+        let tint = self.color(element, "specular_reflectance", 1.0, uv)?;
+        let (eta, k) = (self.constant(element, "eta", uv)?, self.constant(element, "k", uv)?);
+        let name = element.text("material")?;
+        let (eta, k) = match (name, eta, k) {
+            (None, Some(eta), k) => (eta, k.unwrap_or([0.0; 3])),
+            (None, None, Some(k)) => ([0.0; 3], k),
+            (Some("none"), None, None) if alpha.is_none() => return Ok(MaterialDesc::Mirror { reflectance: tint }),
+            (Some("none"), None, None) => ([0.0; 3], [1.0; 3]),
+            (name, None, None) => {
+                let name = name.unwrap_or("Cu");
+                let unknown = || {
+                    let hint = closest_name(name, metals::names()).map(|near| format!(" (did you mean \"{near}\"?)"));
+                    element.place_of("material").error(format!("no material named \"{name}\"{}", hint.unwrap_or_default()))
+                };
+                metals::find(name).ok_or_else(unknown)?
+            }
+            (Some(_), ..) => return Err(element.place_of("material").error("give either \"material\" or \"eta\" and \"k\"")),
+        };
+        // An index of zero is that of an ideal mirror, which the smallest one comes to.
+        let eta = eta.map(|eta| eta.max(1e-6));
+        Ok(MaterialDesc::Conductor { metal: None, eta: Some(eta), k: Some(k), roughness: None, alpha, tint, multiscatter: false })
+    }
+
+    /// The width of the distribution of normals. Ours is GGX.
+    fn alpha(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Option<RoughnessDesc>> {
+        match element.text("distribution")?.unwrap_or("beckmann") {
+            "ggx" => {}
+            "beckmann" => element.approximated("distribution", "GGX of the same alpha in place of Beckmann's distribution"),
+            other => return Err(element.place_of("distribution").error(format!("\"{other}\" is neither beckmann nor ggx"))),
+        }
+        element.boolean("sample_visible", true)?;
+        if element.take("alpha_u").is_none() && element.take("alpha_v").is_none() {
+            return Ok(Some(match self.scalar(element, "alpha", 0.1, 1.0, uv)? {
+                ScalarDesc::Constant(alpha) => RoughnessDesc::Isotropic(unit(element, "alpha", alpha)),
+                ScalarDesc::Texture { texture } => RoughnessDesc::Texture { texture },
+            }));
+        }
+        let (u, v) = (self.scalar(element, "alpha_u", 0.1, 1.0, uv)?, self.scalar(element, "alpha_v", 0.1, 1.0, uv)?);
+        Ok(Some(match (u, v) {
+            (ScalarDesc::Constant(u), ScalarDesc::Constant(v)) => {
+                RoughnessDesc::Anisotropic([unit(element, "alpha_u", u), unit(element, "alpha_v", v)])
+            }
+            (ScalarDesc::Texture { texture }, _) | (_, ScalarDesc::Texture { texture }) => {
+                for name in ["alpha_u", "alpha_v"] {
+                    element.approximated(name, "one texture for both directions");
+                }
+                RoughnessDesc::Texture { texture }
+            }
+        }))
+    }
+
+    fn principled(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<(MaterialDesc, bool)> {
+        let thin = element.kind() == "principledthin";
+        let mut scalar = |element: &mut Element<'a>, name: &str, default: f32| self.scalar(element, name, default, 1.0, uv);
+        let (metallic, clearcoat, clearcoat_gloss) = if thin {
+            (ScalarDesc::Constant(0.0), ScalarDesc::Constant(0.0), ScalarDesc::Constant(0.0))
+        } else {
+            (scalar(element, "metallic", 0.0)?, scalar(element, "clearcoat", 0.0)?, scalar(element, "clearcoat_gloss", 0.0)?)
+        };
+        let roughness = scalar(element, "roughness", 0.5)?;
+        let anisotropic = scalar(element, "anisotropic", 0.0)?;
+        let specular_tint = scalar(element, "spec_tint", 0.0)?;
+        let (sheen, sheen_tint) = (scalar(element, "sheen", 0.0)?, scalar(element, "sheen_tint", 0.0)?);
+        let subsurface = scalar(element, "flatness", 0.0)?;
+        let transmission = scalar(element, "spec_trans", 0.0)?;
+        let mut ior = self.ranged(element, "eta", uv)?;
+        let mut specular = None;
+        if thin {
+            ior.get_or_insert(RangedDesc::Constant(1.5));
+        } else if ior.is_none() {
+            specular = Some(self.scalar(element, "specular", 0.5, 1.0, uv)?);
+        }
+        // Two of Mitsuba's are all of the light: half of it on each side are one.
+        let diffuse_transmission = if thin { self.scalar(element, "diff_trans", 0.0, 0.5, uv)? } else { ScalarDesc::Constant(0.0) };
+        for name in [
+            "diffuse_reflectance_sampling_rate",
+            "main_specular_sampling_rate",
+            "clearcoat_sampling_rate",
+            "spec_reflection_sampling_rate",
+            "spec_trans_sampling_rate",
+            "diff_trans_sampling_rate",
+            "spec_reflect_sampling_rate",
+        ] {
+            element.float(name)?;
+        }
+        let one_sided = !thin && matches!(transmission, ScalarDesc::Constant(t) if t == 0.0);
+        let desc = PrincipledDesc {
+            base_color: self.color(element, "base_color", 0.5, uv)?,
+            metallic,
+            roughness,
+            anisotropic,
+            specular,
+            ior,
+            specular_tint,
+            sheen,
+            sheen_tint,
+            clearcoat,
+            clearcoat_gloss,
+            subsurface,
+            transmission,
+            thin,
+            diffuse_transmission,
+            multiscatter: false,
+        };
+        Ok((MaterialDesc::Principled(Box::new(desc)), one_sided))
+    }
+
+    /// The BSDFs inside of one.
+    fn parts(&mut self, element: &mut Element<'a>, counts: std::ops::RangeInclusive<usize>, uv: UvOrigin) -> Result<Vec<Look>> {
+        let parts = element.all("bsdf")?;
+        if !counts.contains(&parts.len()) {
+            let message = format!("{} needs {} bsdfs inside, not {}", element.kind(), counts.end(), parts.len());
+            return Err(element.place().error(message));
+        }
+        parts.into_iter().map(|(id, _)| self.look(id, uv)).collect()
+    }
+
+    fn two_sided(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+        let parts = self.parts(element, 1..=2, uv)?;
+        let [front, back] = match &parts[..] {
+            [one] => return Ok(Look { one_sided: false, ..one.clone() }),
+            [front, back] => [front.clone(), back.clone()],
+            _ => return Err(element.place().error("twosided needs one or two bsdfs inside")),
+        };
+        if front.opacity.is_some() || back.opacity.is_some() {
+            element.ignored("", "holes of one side are left out");
+        }
+        Ok(self.add(element, MaterialDesc::TwoSided { front: front.material, back: back.material }, false))
+    }
+
+    fn mask(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+        let inner = self.one_part(element, uv)?;
+        let opacity = match self.color(element, "opacity", 0.5, uv)? {
+            ColorDesc::Grey(v) => OpacityDesc::Number(v),
+            ColorDesc::Rgb(color) => OpacityDesc::Number(luminance(color)),
+            ColorDesc::Texture { texture } => OpacityDesc::Texture { texture: self.without_alpha(&texture, element) },
+        };
+        if inner.opacity.is_some() {
+            element.ignored("", "the holes of the bsdf inside are left out");
+        }
+        Ok(Look { opacity: Some(opacity), ..inner })
+    }
+
+    fn one_part(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+        let parts = self.parts(element, 1..=1, uv)?;
+        parts.into_iter().next().ok_or_else(|| element.place().error(format!("{} needs a bsdf inside", element.kind())))
+    }
+
+    /// A texture whose luminance counts as opacity, even where it is an image with alpha.
+    fn without_alpha(&mut self, name: &str, element: &Element) -> String {
+        let has_none = |file: &str| [".jpg", ".jpeg", ".hdr"].iter().any(|end| file.to_lowercase().ends_with(end));
+        match self.draft.desc.textures.get(name) {
+            Some(TextureDesc::Image { file, .. }) if !has_none(file) => {
+                let colors = TextureDesc::Product { factors: vec![ColorDesc::Texture { texture: name.into() }] };
+                self.draft.add_texture(&format!("{name}_colors"), &element.place().to_string(), colors)
+            }
+            _ => name.into(),
+        }
+    }
+
+    fn blend(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+        let parts = self.parts(element, 2..=2, uv)?;
+        let amount = self.scalar(element, "weight", 0.5, 1.0, uv)?;
+        let place = element.place().to_string();
+        let one_sided = parts.iter().all(|part| part.one_sided);
+        if parts.iter().any(|part| part.opacity.is_some()) {
+            element.ignored("", "holes of a part are left out");
+        }
+        let materials =
+            parts.iter().map(|part| if part.one_sided && !one_sided { self.front_only(part, &place) } else { part.material.clone() });
+        let materials: Vec<String> = materials.collect();
+        let Ok(materials) = <[String; 2]>::try_from(materials) else {
+            return Err(element.place().error("blendbsdf needs two bsdfs inside"));
+        };
+        Ok(self.add(element, MaterialDesc::Mix { materials, amount }, one_sided))
+    }
+
+    fn relief(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+        let inner = self.one_part(element, uv)?;
+        let is_normal_map = element.kind() == "normalmap";
+        let textures = element.all("texture")?;
+        let Some(&(texture, texture_place)) = textures.first() else {
+            return Err(element.place().error(format!("{} needs a texture inside", element.kind())));
+        };
+        let height = if is_normal_map { 1.0 } else { element.float("scale")?.unwrap_or(1.0) };
+        if is_normal_map {
+            element.boolean("flip_invalid_normals", true)?;
+            element.boolean("use_shadowing_function", true)?;
+        }
+        let super::textures::TextureValue::Named(texture) = self.texture(texture, uv)? else {
+            // The same everywhere: no relief.
+            return Ok(inner);
+        };
+        if self.has_relief(&inner.material) {
+            element.ignored("", "a relief on a relief is left out");
+            return Ok(inner);
+        }
+        if is_normal_map
+            && let Some(TextureDesc::Image { color_space: color_space @ ColorSpaceDesc::Srgb, .. }) =
+                self.draft.desc.textures.get_mut(&texture)
+        {
+            *color_space = ColorSpaceDesc::Linear;
+            self.draft.approximated(&texture_place.to_string(), &element.plugin.title(), "raw", "normals are taken as they are stored");
+        }
+        let (normal_map, bump_map) = if is_normal_map {
+            (Some(NormalMapDesc { texture, strength: 1.0, flip_y: false }), None)
+        } else {
+            (None, Some(BumpMapDesc { texture, height: height as f32 }))
+        };
+        let look = self.add(element, MaterialDesc::Relief { material: inner.material, normal_map, bump_map }, inner.one_sided);
+        Ok(Look { opacity: inner.opacity, ..look })
+    }
+
+    /// Whether a material or a part of it has relief.
+    fn has_relief(&self, name: &str) -> bool {
+        match self.draft.desc.materials.get(name) {
+            Some(MaterialDesc::Relief { .. }) => true,
+            Some(MaterialDesc::TwoSided { front, back }) => self.has_relief(front) || self.has_relief(back),
+            Some(MaterialDesc::Mix { materials, .. }) => materials.iter().any(|part| self.has_relief(part)),
+            _ => false,
+        }
+    }
+}
+
+/// The index of the inside over that of the outside.
+fn relative_index(element: &mut Element, inside: &str) -> Result<f32> {
+    debug_assert!(names::index(inside).is_ok());
+    Ok((element.index("int_ior", inside)? / element.index("ext_ior", "air")?) as f32)
+}
+
+/// A number that cannot exceed 1 here.
+fn unit(element: &mut Element, name: &str, value: f32) -> f32 {
+    if value > 1.0 {
+        element.approximated(name, "1, the largest alpha");
+    }
+    value.min(1.0)
+}
+
+/// Our glass has no colours at its surface.
+fn lossless(element: &mut Element) {
+    for name in ["specular_reflectance", "specular_transmittance"] {
+        if element.take(name).is_some() {
+            element.ignored(name, "glass reflects and lets through all of the light");
+        }
+    }
+}

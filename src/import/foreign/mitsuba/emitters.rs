@@ -1,0 +1,181 @@
+//! Emitters to lights.
+
+use super::Reader;
+use super::element::Element;
+use super::textures::{TextureValue, UvOrigin};
+use super::tree::{PluginId, Spectrum, Value};
+use super::values;
+use crate::desc::{
+    DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc, TransformDesc, TransformStepDesc,
+};
+use crate::error::Result;
+use crate::import::{ImageData, RgbImage, Samples, read_image};
+use crate::math::{DAffine3, DMat3, DVec3};
+
+impl<'a> Reader<'a> {
+    /// Reads an emitter that is no shape.
+    pub(super) fn emitter(&mut self, id: PluginId) -> Result<()> {
+        let mut element = Element::new(self.document, id);
+        element.ignored_plugins("medium", "there are no participating media")?;
+        // Which light is sampled how often does not change the picture.
+        element.float("sampling_weight")?;
+        let light = match element.kind() {
+            "point" => self.point(&mut element)?,
+            "spot" => self.spot(&mut element)?,
+            "directional" => self.directional(&mut element)?,
+            "constant" => {
+                let radiance = self.emitted(&mut element, "radiance")?;
+                LightDesc::Environment(EnvironmentLightDesc {
+                    radiance: Some(radiance),
+                    file: None,
+                    scale: 1.0,
+                    transform: None,
+                    group: None,
+                })
+            }
+            "envmap" => self.environment(&mut element)?,
+            "area" => return Err(element.place().error("an area emitter can only stand in a shape")),
+            other => {
+                self.whole(id, &format!("there is no emitter {other}"));
+                return Ok(());
+            }
+        };
+        let place = element.place().to_string();
+        element.finish(&mut self.draft);
+        self.draft.add_light(&place, light);
+        Ok(())
+    }
+
+    /// The light that a shape gives off.
+    pub(super) fn emission(&mut self, id: PluginId, uv: UvOrigin) -> Result<Option<EmissionDesc>> {
+        let mut element = Element::new(self.document, id);
+        if element.kind() != "area" {
+            self.whole(id, "only an area emitter can stand in a shape");
+            return Ok(None);
+        }
+        element.float("sampling_weight")?;
+        let property = element.plugin.properties.iter().find(|property| property.name == "radiance");
+        let texture = match property.map(|property| self.document.plugin_of(property)).transpose()?.flatten() {
+            Some(id) if self.document.plugins[id.0].class == "texture" => Some(id),
+            _ => None,
+        };
+        let emission = match texture.map(|id| self.texture(id, uv)).transpose()? {
+            Some(TextureValue::Named(texture)) => {
+                element.take("radiance");
+                EmissionDesc { radiance: [1.0; 3], texture: Some(texture), two_sided: false, group: None }
+            }
+            _ => EmissionDesc { radiance: self.emitted(&mut element, "radiance")?, texture: None, two_sided: false, group: None },
+        };
+        element.finish(&mut self.draft);
+        Ok(Some(emission))
+    }
+
+    /// The colour of light; white if it is not given.
+    fn emitted(&mut self, element: &mut Element<'a>, name: &str) -> Result<[f32; 3]> {
+        let Some(property) = element.take(name) else {
+            return self.spectrum_color(&Spectrum::Uniform(1.0), element.place(), true);
+        };
+        let color = match (&property.value, self.document.plugin_of(property)?) {
+            (Value::Spectrum(spectrum), _) => self.spectrum_color(spectrum, &property.place, true)?,
+            (_, Some(id)) if self.document.plugins[id.0].class == "spectrum" => {
+                let mut inner = Element::new(self.document, id);
+                let color = self.spectrum_plugin(&mut inner, true)?;
+                inner.finish(&mut self.draft);
+                color
+            }
+            _ => match self.texture_value(property, UvOrigin::Mitsuba)? {
+                TextureValue::Constant(color) => color,
+                TextureValue::Named(_) => {
+                    element.approximated(name, "white in place of a texture");
+                    [1.0; 3]
+                }
+            },
+        };
+        Ok(color)
+    }
+
+    fn point(&mut self, element: &mut Element<'a>) -> Result<LightDesc> {
+        let intensity = self.emitted(element, "intensity")?;
+        let position = match element.vector("position")? {
+            Some(position) => position,
+            None => element.transform("to_world")?.translation.to_array(),
+        };
+        Ok(LightDesc::Point(PointLightDesc { position, intensity, group: None }))
+    }
+
+    fn spot(&mut self, element: &mut Element<'a>) -> Result<LightDesc> {
+        let intensity = self.emitted(element, "intensity")?;
+        let map = element.transform("to_world")?;
+        let cutoff = element.float("cutoff_angle")?.unwrap_or(20.0);
+        let beam = element.float("beam_width")?.unwrap_or(0.75 * cutoff);
+        if element.take("texture").is_some() {
+            element.ignored("texture", "a spot light has one colour");
+        }
+        Ok(LightDesc::Spot(SpotLightDesc {
+            position: map.translation.to_array(),
+            look_at: (map.translation + map.matrix3.z_axis.normalize_or_zero()).to_array(),
+            intensity,
+            cutoff_angle_degrees: cutoff,
+            beam_angle_degrees: Some(beam),
+            group: None,
+        }))
+    }
+
+    fn directional(&mut self, element: &mut Element<'a>) -> Result<LightDesc> {
+        let irradiance = self.emitted(element, "irradiance")?;
+        let direction = match element.vector("direction")? {
+            Some(direction) => direction,
+            None => element.transform("to_world")?.matrix3.z_axis.to_array(),
+        };
+        Ok(LightDesc::Directional(DirectionalLightDesc { direction, irradiance, angular_diameter_degrees: 0.0, group: None }))
+    }
+
+    fn environment(&mut self, element: &mut Element<'a>) -> Result<LightDesc> {
+        let name = element.file("filename", self.scene)?;
+        let name = name.ok_or_else(|| element.place().error("an envmap needs \"filename\""))?;
+        let scale = element.float("scale")?.unwrap_or(1.0) as f32;
+        element.boolean("mis_compensation", true)?;
+        let map = element.transform("to_world")?;
+        let transform = rotation(element, &map);
+        let extension = name.rsplit('.').next().unwrap_or_default().to_lowercase();
+        let file = if matches!(extension.as_str(), "exr" | "hdr") { name } else { self.converted_environment(element, &name)? };
+        Ok(LightDesc::Environment(EnvironmentLightDesc { radiance: None, file: Some(file), scale, transform, group: None }))
+    }
+
+    /// An image of whole numbers as an environment.
+    fn converted_environment(&mut self, element: &Element<'a>, name: &str) -> Result<String> {
+        let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(name);
+        let image = read_image(&path).map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;
+        Ok(self.draft.keep_environment(name.rsplit('/').next().unwrap_or(name), as_environment(&image)))
+    }
+}
+
+/// Turns Mitsuba's environment, whose first column is -Z, into ours, whose middle is.
+fn rotation(element: &mut Element, map: &DAffine3) -> Option<TransformDesc> {
+    let m = map.matrix3;
+    let x = m.x_axis.normalize_or(DVec3::X);
+    let y = (m.y_axis - x * m.y_axis.dot(x)).normalize_or(x.any_orthonormal_vector());
+    let z = x.cross(y);
+    if z.dot(m.z_axis) <= 0.0 {
+        element.approximated("to_world", "the environment is not mirrored");
+    } else if (x - m.x_axis).length() + (y - m.y_axis).length() + (z - m.z_axis).length() > 1e-3 {
+        element.approximated("to_world", "only the rotation of the environment is kept");
+    }
+    let half_turn = DMat3::from_cols(DVec3::NEG_X, DVec3::Y, DVec3::NEG_Z);
+    let placed = DAffine3 { matrix3: DMat3::from_cols(x, y, z) * half_turn, translation: DVec3::ZERO };
+    Some(TransformDesc(vec![TransformStepDesc::Matrix(values::rows(&placed))]))
+}
+
+/// The linear colours of an image.
+fn as_environment(image: &ImageData) -> RgbImage {
+    let curve = |x: f32| if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
+    let at = |i: usize| match &image.samples {
+        Samples::U8(v) => curve(f32::from(v[i]) / 255.0),
+        Samples::U16(v) => curve(f32::from(v[i]) / 65535.0),
+        Samples::F16(v) => v[i].to_f32(),
+        Samples::F32(v) => v[i],
+    };
+    let channels = image.channels;
+    let pixel = |p: usize| [0, 1, 2].map(|c| at(p * channels + if channels < 3 { 0 } else { c }));
+    RgbImage { width: image.width, height: image.height, pixels: (0..image.width * image.height).map(pixel).collect() }
+}

@@ -1,0 +1,80 @@
+//! Integrators.
+
+use super::Reader;
+use super::element::Element;
+use super::tree::PluginId;
+use crate::desc::{IntegratorDesc, StrategyDesc};
+use crate::error::Result;
+
+/// Stands for paths of any length.
+const UNLIMITED: u32 = 65_536;
+
+/// What a scene without an integrator is rendered with.
+pub(super) fn unlimited_path() -> IntegratorDesc {
+    IntegratorDesc::Path { max_depth: UNLIMITED, rr_depth: 5, strategy: StrategyDesc::Mis, clamp: None }
+}
+
+impl Reader<'_> {
+    /// Reads an integrator.
+    pub(super) fn integrator(&mut self, id: PluginId) -> Result<()> {
+        let mut element = Element::new(self.document, id);
+        let path = |max_depth, rr_depth| IntegratorDesc::Path { max_depth, rr_depth, strategy: StrategyDesc::Mis, clamp: None };
+        let kind = element.kind();
+        let ends = |element: &mut Element| -> Result<(u32, u32)> {
+            let max_depth = element.integer("max_depth")?.unwrap_or(-1);
+            // A path of no segments sees nothing; the shortest one here sees what gives off light.
+            let max_depth = u32::try_from(max_depth).unwrap_or(UNLIMITED);
+            if max_depth == 0 {
+                element.approximated("max_depth", "1 in place of 0: what gives off light is seen");
+            }
+            let rr_depth = element.count("rr_depth", 1)?.unwrap_or(5);
+            Ok((max_depth.max(1), rr_depth))
+        };
+        match kind {
+            "moment" | "aov" | "stokes" => {
+                match element.one("integrator")? {
+                    Some(inner) => self.integrator(inner)?,
+                    None => return Err(element.place().error(format!("the integrator {kind} needs another one inside"))),
+                }
+                element.approximated("", "only the integrator inside counts; layers are asked for by outputs");
+                element.finish(&mut self.draft);
+                return Ok(());
+            }
+            "path" | "prb" | "prb_basic" | "direct_projective" | "prb_projective" => {
+                let (max_depth, rr_depth) = ends(&mut element)?;
+                self.draft.desc.integrator = path(max_depth, rr_depth);
+                if kind != "path" {
+                    element.approximated("", "path tracing, without derivatives");
+                }
+            }
+            "volpath" | "volpathmis" | "prbvolpath" => {
+                let (max_depth, rr_depth) = ends(&mut element)?;
+                self.draft.desc.integrator = path(max_depth, rr_depth);
+                element.approximated("", "path tracing: there are no participating media");
+            }
+            "ptracer" => {
+                let (max_depth, rr_depth) = ends(&mut element)?;
+                self.draft.desc.integrator = path(max_depth, rr_depth);
+                element.approximated("", "path tracing from the camera, which has the same mean, in place of light tracing");
+            }
+            "direct" | "emission_direct" => {
+                self.draft.desc.integrator = path(2, 5);
+                for name in ["shading_samples", "emitter_samples", "bsdf_samples"] {
+                    if element.take(name).is_some() {
+                        element.approximated(name, "one sample of each, more samples per pixel have the same mean");
+                    }
+                }
+            }
+            "depth" => {
+                self.draft.desc.integrator = IntegratorDesc::Depth;
+                element.approximated("", "depth along the view axis in place of the length of the ray");
+            }
+            other => element.ignored("", format!("there is no integrator {other}: path tracing")),
+        }
+        if element.boolean("hide_emitters", false)? {
+            element.ignored("hide_emitters", "what gives off light is seen by the camera");
+        }
+        element.finish(&mut self.draft);
+        Ok(())
+    }
+}

@@ -1,0 +1,149 @@
+//! Lights that are no shapes.
+
+use super::colors::{Colors, Meaning};
+use super::octahedral;
+use super::params::Params;
+use super::state::{Ctm, World, matrix, rotation_and_scale};
+use crate::desc::{DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
+use crate::error::Result;
+use crate::import::foreign::Draft;
+use crate::import::{RgbImage, read_rgb_image};
+use crate::math::{DMat3, DVec3};
+
+/// Reads a `LightSource`. pbrt divides each light by what its spectrum measures in nits, and the film takes a nit as 1.
+pub struct Lights<'a> {
+    /// How colours are read.
+    pub colors: Colors<'a>,
+    /// How the world becomes ours.
+    pub world: World,
+    /// The film's.
+    pub exposure: f64,
+    /// The scene file.
+    pub scene: &'a std::path::Path,
+}
+
+impl Lights<'_> {
+    /// Adds a light.
+    pub fn add(&self, draft: &mut Draft, kind: &str, params: &Params, ctm: &Ctm) -> Result<()> {
+        if ctm.is_moving() {
+            draft.approximated(&params.place, &params.element, "transform", "stands still where it is at first");
+        }
+        let map = self.world.mirror() * ctm.0[0];
+        let point = |name: &str, default: [f64; 3]| -> Result<DVec3> {
+            Ok(map.transform_point3(DVec3::from(params.array(name)?.unwrap_or(default))))
+        };
+        let light = match kind {
+            "point" => {
+                let intensity = self.emitted(params, "I", 4.0 * std::f64::consts::PI)?;
+                LightDesc::Point(PointLightDesc { position: point("from", [0.0; 3])?.to_array(), intensity, group: None })
+            }
+            "goniometric" => {
+                params.ignore("filename", "the same intensity in all directions");
+                draft.approximated(&params.place, &params.element, "", "a point light, the same in all directions");
+                let intensity = self.emitted(params, "I", 4.0 * std::f64::consts::PI)?;
+                LightDesc::Point(PointLightDesc { position: map.translation.to_array(), intensity, group: None })
+            }
+            "spot" => {
+                let (from, to) = (point("from", [0.0; 3])?, point("to", [0.0, 0.0, 1.0])?);
+                let (outer, delta) = (params.positive_or("coneangle", 30.0)?, params.number_or("conedeltaangle", 5.0)?);
+                let (cutoff, beam) = (outer.min(180.0), (outer - delta).clamp(0.0, outer.min(180.0)));
+                params.approximate("conedeltaangle", "the fall is even with the angle, not smooth with its cosine");
+                let [cos_outer, cos_beam] = [cutoff, beam].map(|angle| angle.to_radians().cos());
+                let whole = 2.0 * std::f64::consts::PI * ((1.0 - cos_beam) + (cos_beam - cos_outer) / 2.0);
+                LightDesc::Spot(SpotLightDesc {
+                    position: from.to_array(),
+                    look_at: to.to_array(),
+                    intensity: self.emitted(params, "I", whole)?,
+                    cutoff_angle_degrees: cutoff,
+                    beam_angle_degrees: Some(beam),
+                    group: None,
+                })
+            }
+            "distant" => {
+                let direction = point("to", [0.0, 0.0, 1.0])? - point("from", [0.0; 3])?;
+                let mut scale = params.number_or("scale", 1.0)? * self.exposure;
+                scale *= params.number("illuminance")?.filter(|lux| *lux > 0.0).unwrap_or(1.0);
+                let color = self.colors.get(params, "L", Meaning::Emission)?.unwrap_or([1.0; 3]);
+                let irradiance = color.map(|x| x * scale.max(0.0) as f32);
+                LightDesc::Directional(DirectionalLightDesc {
+                    direction: direction.to_array(),
+                    irradiance,
+                    angular_diameter_degrees: 0.0,
+                    group: None,
+                })
+            }
+            "infinite" => LightDesc::Environment(self.environment(draft, params, &map.matrix3)?),
+            "projection" => {
+                draft.ignored(&params.place, &params.element, "", "there are no projection lights");
+                return Ok(());
+            }
+            other => return Err(params.error(format!("there is no light \"{other}\""))),
+        };
+        params.report(draft);
+        draft.add_light(&params.place, light);
+        Ok(())
+    }
+
+    /// The intensity of a light that gives `whole` of power for each unit of it.
+    fn emitted(&self, params: &Params, name: &str, whole: f64) -> Result<[f32; 3]> {
+        let color = self.colors.get(params, name, Meaning::Emission)?.unwrap_or([1.0; 3]);
+        let mut scale = params.number_or("scale", 1.0)? * self.exposure;
+        if let Some(power) = params.number("power")?.filter(|power| *power > 0.0) {
+            scale *= power / whole;
+        }
+        Ok(color.map(|x| x * scale.max(0.0) as f32))
+    }
+
+    fn environment(&self, draft: &mut Draft, params: &Params, map: &DMat3) -> Result<EnvironmentLightDesc> {
+        let mut scale = params.number_or("scale", 1.0)? * self.exposure;
+        let lux = params.number("illuminance")?.filter(|lux| *lux > 0.0);
+        params.ignore("portal", "it changes the noise only");
+        let mut light = EnvironmentLightDesc { radiance: None, file: None, scale: 1.0, transform: None, group: None };
+        let Some(file) = params.string("filename")? else {
+            let color = self.colors.get(params, "L", Meaning::Emission)?.unwrap_or([1.0; 3]);
+            scale *= lux.map_or(1.0, |lux| lux / std::f64::consts::PI);
+            light.radiance = Some(color.map(|x| x * scale.max(0.0) as f32));
+            return Ok(light);
+        };
+        let asset = self.colors.folder.join(file);
+        let image =
+            read_rgb_image(&asset).map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
+        if let Some(lux) = lux {
+            let found = octahedral::illuminance(&image);
+            scale *= if found > 0.0 { lux / found } else { 1.0 };
+        }
+        let Some((rotation, _)) = rotation_and_scale(map) else { return Err(params.error("the transform is singular")) };
+        // A mirror goes into the image: environments are rotated only.
+        let mirrored = rotation.determinant() < 0.0;
+        let pbrt_from_ours = DMat3::from_cols(
+            octahedral::pbrt_from_ours(DVec3::X, mirrored),
+            octahedral::pbrt_from_ours(DVec3::Y, mirrored),
+            octahedral::pbrt_from_ours(DVec3::Z, mirrored),
+        );
+        let sky = self.lat_long(params, &image, mirrored);
+        let name = std::path::Path::new(file).file_stem().map_or_else(|| "sky".into(), |stem| stem.to_string_lossy());
+        light.file = Some(draft.keep_environment(&name, sky));
+        light.scale = scale.max(0.0) as f32;
+        light.transform = Some(matrix(&crate::math::DAffine3::from_mat3(rotation * pbrt_from_ours)));
+        Ok(light)
+    }
+
+    fn lat_long(&self, params: &Params, image: &RgbImage, mirrored: bool) -> RgbImage {
+        if image.width != 2 * image.height {
+            if image.width != image.height {
+                params.approximate("filename", "not square: taken as if it were");
+            }
+            return octahedral::lat_long(image, mirrored);
+        }
+        // Not pbrt-v4's: as its forerunner has it, columns are the angle from x towards y.
+        params.approximate("filename", "a lat-long image with z up");
+        let (width, height) = (image.width, image.height);
+        let pixel = |i: usize| {
+            let d = octahedral::pbrt_from_ours(octahedral::direction(((i % width) as f64 + 0.5) / width as f64, 0.5), mirrored);
+            let share = (d.y.atan2(d.x) / std::f64::consts::TAU).rem_euclid(1.0);
+            let column = ((share * width as f64) as usize).min(width - 1);
+            image.pixels.get((i / width) * width + column).copied().unwrap_or_default()
+        };
+        RgbImage { width, height, pixels: (0..width * height).map(pixel).collect() }
+    }
+}

@@ -1,0 +1,256 @@
+//! Materials.
+
+use super::colors::{Colors, Meaning};
+use super::params::Params;
+use super::textures::{Texture, Textures};
+use crate::desc::{
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc, TextureDesc,
+    TextureFilterDesc, WrapDesc,
+};
+use crate::error::Result;
+use crate::import::foreign::Draft;
+use crate::import::named;
+
+/// A surface is smooth below this alpha, along both axes.
+const SMOOTH_ALPHA: f32 = 1e-3;
+
+/// Reads a material.
+pub struct Materials<'a> {
+    /// Textures that it may name.
+    pub textures: &'a Textures,
+    /// How colours are read.
+    pub colors: Colors<'a>,
+    /// The scene.
+    pub draft: &'a mut Draft,
+}
+
+impl Materials<'_> {
+    /// Adds a material of a kind under a name like `name`; the result is its name. `find` gives materials by pbrt's names.
+    pub fn add(&mut self, name: &str, kind: &str, params: &Params, find: impl Fn(&str) -> Option<String>) -> Result<String> {
+        let desc = self.desc(name, kind, params, find)?;
+        let desc = self.with_relief(name, params, desc)?;
+        params.report(self.draft);
+        Ok(self.draft.add_material(name, &params.place, desc))
+    }
+
+    fn desc(&mut self, name: &str, kind: &str, params: &Params, find: impl Fn(&str) -> Option<String>) -> Result<MaterialDesc> {
+        Ok(match kind {
+            "diffuse" => MaterialDesc::Diffuse { albedo: self.color(params, "reflectance", 0.5)?, roughness: zero() },
+            "coateddiffuse" => {
+                let (ior, alpha) = (self.coat_index(params, "eta")?, self.alpha(params, "", 0.0)?);
+                self.note_layers(params);
+                MaterialDesc::Plastic { albedo: self.color(params, "reflectance", 0.5)?, ior, roughness: None, alpha }
+            }
+            "conductor" => self.conductor(params, "", 0.0, 1.0)?,
+            "coatedconductor" => {
+                let (ior, _) = self.colors.index(params, "interface.eta", 1.5)?;
+                let base = self.conductor(params, "conductor.", 0.0, ior)?;
+                let base = self.draft.add_material(&format!("{name}_base"), &params.place, base);
+                let alpha = self.alpha(params, "interface.", 0.0)?;
+                self.note_layers(params);
+                MaterialDesc::Coated {
+                    base,
+                    ior: RangedDesc::Constant(ior.clamp(1.0, 10.0)),
+                    roughness: None,
+                    alpha,
+                    tint: ColorDesc::Grey(1.0),
+                }
+            }
+            "dielectric" => {
+                let (ior, abbe) = self.colors.index(params, "eta", 1.5)?;
+                MaterialDesc::Dielectric(Box::new(DielectricDesc {
+                    ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)),
+                    roughness: None,
+                    alpha: self.alpha(params, "", 0.0)?,
+                    multiscatter: false,
+                    priority: None,
+                    absorption: None,
+                    abbe,
+                }))
+            }
+            "thindielectric" => {
+                let (ior, _) = self.colors.index(params, "eta", 1.5)?;
+                MaterialDesc::ThinDielectric { ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)) }
+            }
+            "diffusetransmission" => self.diffuse_transmission(params)?,
+            "mix" => self.mix(params, find)?,
+            "subsurface" => {
+                self.draft.approximated(&params.place, &params.element, "", "plastic, for light does not travel below surfaces");
+                for parameter in ["mfp", "mfreepath", "sigma_a", "sigma_s", "g", "scale", "name"] {
+                    params.ignore(parameter, "light does not travel below surfaces");
+                }
+                let (ior, _) = self.colors.index(params, "eta", 1.33)?;
+                let ior = RangedDesc::Constant(ior.clamp(1.0 + 1e-4, 10.0));
+                let alpha = self.alpha(params, "", 0.0)?;
+                MaterialDesc::Plastic { albedo: self.color(params, "reflectance", 0.5)?, ior, roughness: None, alpha }
+            }
+            "hair" => {
+                self.draft.approximated(&params.place, &params.element, "", "diffuse");
+                let brown = Texture::Constant([0.2, 0.1, 0.05]);
+                let color = self.textures.get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?.unwrap_or(brown);
+                MaterialDesc::Diffuse { albedo: color.color(self.draft, &params.place), roughness: zero() }
+            }
+            "measured" => {
+                params.ignore("filename", "measured materials are not known");
+                self.draft.approximated(&params.place, &params.element, "", "diffuse of 0.5");
+                MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: zero() }
+            }
+            other => return Err(params.error(format!("there is no material \"{other}\""))),
+        })
+    }
+
+    fn color(&mut self, params: &Params, name: &str, default: f32) -> Result<ColorDesc> {
+        Ok(self.textures.reflectance(params, &self.colors, name, default)?.color(self.draft, &params.place))
+    }
+
+    fn coat_index(&self, params: &Params, name: &str) -> Result<RangedDesc> {
+        let (ior, _) = self.colors.index(params, name, 1.5)?;
+        Ok(RangedDesc::Constant(ior.clamp(1.0 + 1e-4, 10.0)))
+    }
+
+    /// What pbrt's walk through layers has and ours has not.
+    fn note_layers(&mut self, params: &Params) {
+        self.draft.approximated(&params.place, &params.element, "", "a closed form in place of a random walk between layers");
+        for parameter in ["thickness", "albedo", "g", "maxdepth", "nsamples"] {
+            params.ignore(parameter, "there is nothing between the layers");
+        }
+    }
+
+    /// The GGX alpha of the parameters with a prefix; `None` if the surface is smooth.
+    fn alpha(&mut self, params: &Params, prefix: &str, default: f32) -> Result<Option<RoughnessDesc>> {
+        let remap = params.bool_or("remaproughness", true)?;
+        let key = |name: &str| format!("{prefix}{name}");
+        let both = self.textures.number(params, &self.colors, &key("roughness"), default)?;
+        let along = |name: &str| -> Result<Texture> {
+            Ok(self.textures.get(params, &self.colors, name, Meaning::Number, true)?.unwrap_or(both.clone()))
+        };
+        let (u, v) = (along(&key("uroughness"))?, along(&key("vroughness"))?);
+        if let (Texture::Constant(u), Texture::Constant(v)) = (&u, &v) {
+            let alpha = [u[0], v[0]].map(|x| if remap { x.max(0.0).sqrt() } else { x }).map(|x| x.clamp(0.0, 1.0));
+            return Ok(match alpha {
+                _ if alpha[0].max(alpha[1]) < SMOOTH_ALPHA => None,
+                [u, v] if u == v => Some(RoughnessDesc::Isotropic(u)),
+                _ => Some(RoughnessDesc::Anisotropic(alpha)),
+            });
+        }
+        for name in ["roughness", "uroughness", "vroughness"] {
+            if remap {
+                params.approximate(&key(name), "the texture itself is alpha, not its root");
+            }
+        }
+        if u != v {
+            params.approximate(&key("vroughness"), "that along u in both directions");
+        }
+        let textured = if u.is_constant() { v } else { u };
+        Ok(Some(textured.alpha(self.draft, &params.place)))
+    }
+
+    /// A metal in a medium of index `outside`.
+    fn conductor(&mut self, params: &Params, prefix: &str, default: f32, outside: f32) -> Result<MaterialDesc> {
+        let alpha = self.alpha(params, prefix, default)?;
+        let reflectance = self.textures.get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?;
+        let (eta, k, tint) = match reflectance {
+            // Of all metals with this reflectance, that whose index is 1.
+            Some(Texture::Constant(color)) => {
+                let k = color.map(|r| 2.0 * r.clamp(0.0, 0.9999).sqrt() / (1.0 - r.clamp(0.0, 0.9999)).sqrt());
+                ([1.0; 3], k, ColorDesc::Grey(1.0))
+            }
+            Some(texture) => {
+                params.approximate("reflectance", "the same at all angles");
+                ([1.0; 3], [100.0; 3], texture.color(self.draft, &params.place))
+            }
+            None => {
+                let copper = |part: &str| named(&format!("metal-Cu-{part}")).map_or([1.0; 3], |metal| metal.rgb());
+                let part = |name: &str| -> Result<[f32; 3]> {
+                    let key = format!("{prefix}{name}");
+                    match self.textures.get(params, &self.colors, &key, Meaning::Number, false)? {
+                        Some(Texture::Constant(value)) => Ok(value),
+                        Some(Texture::Named { .. }) => {
+                            params.approximate(&key, "copper, for the index can have no texture");
+                            Ok(copper(name))
+                        }
+                        None => Ok(copper(name)),
+                    }
+                };
+                (part("eta")?.map(|x| x / outside), part("k")?.map(|x| x / outside), ColorDesc::Grey(1.0))
+            }
+        };
+        Ok(MaterialDesc::Conductor { metal: None, eta: Some(eta), k: Some(k), roughness: None, alpha, tint, multiscatter: false })
+    }
+
+    fn diffuse_transmission(&mut self, params: &Params) -> Result<MaterialDesc> {
+        let scale = params.number_or("scale", 1.0)? as f32;
+        let part = |name: &str| -> Result<Texture> { Ok(self.textures.reflectance(params, &self.colors, name, 0.25)?.times([scale; 3])) };
+        let (mut reflectance, mut transmittance) = (part("reflectance")?, part("transmittance")?);
+        if let (Texture::Constant(r), Texture::Constant(t)) = (&mut reflectance, &mut transmittance) {
+            let sum = (0..3).map(|i| r[i] + t[i]).fold(0.0, f32::max);
+            if sum > 1.0 {
+                params.approximate("transmittance", "both are scaled so that no light is gained");
+                params.approximate("reflectance", "both are scaled so that no light is gained");
+                (*r, *t) = (r.map(|x| x / sum), t.map(|x| x / sum));
+            }
+        }
+        let reflectance = reflectance.color(self.draft, &params.place);
+        let transmittance = transmittance.color(self.draft, &params.place);
+        Ok(MaterialDesc::DiffuseTransmission { reflectance, transmittance })
+    }
+
+    fn mix(&mut self, params: &Params, find: impl Fn(&str) -> Option<String>) -> Result<MaterialDesc> {
+        let names = params.get("materials").map(|param| (param, &param.values));
+        let Some((param, super::params::Values::Strings(names))) = names else {
+            return Err(params.error("needs the names of two materials"));
+        };
+        let [first, second] = names.as_slice() else {
+            return Err(param.error(format!("needs the names of two materials, not {}", names.len())));
+        };
+        let known = |name: &str| find(name).ok_or_else(|| param.error(format!("no material named \"{name}\"")));
+        let materials = [known(first)?, known(second)?];
+        let amount = self.textures.number(params, &self.colors, "amount", 0.5)?.scalar(self.draft, &params.place);
+        Ok(MaterialDesc::Mix { materials, amount })
+    }
+
+    /// The material under its normal or displacement map, if it has one.
+    fn with_relief(&mut self, name: &str, params: &Params, desc: MaterialDesc) -> Result<MaterialDesc> {
+        let normal_map = match params.string("normalmap")? {
+            None => None,
+            Some(file) => {
+                params.approximate("normalmap", "in the frame of MikkTSpace on meshes");
+                let image = TextureDesc::Image {
+                    file: file.into(),
+                    color_space: ColorSpaceDesc::Linear,
+                    filter: TextureFilterDesc::Bilinear,
+                    wrap: WrapDesc::default(),
+                    scale: [1.0; 2],
+                    rotation_degrees: 0.0,
+                    offset: [0.0; 2],
+                    channel: None,
+                    invert: false,
+                };
+                let texture = self.draft.add_texture(&format!("{name}_normals"), &params.place, image);
+                Some(NormalMapDesc { texture, strength: 1.0, flip_y: false })
+            }
+        };
+        let heights = self.textures.get(params, &self.colors, "displacement", Meaning::Number, true)?;
+        let bump_map = match heights {
+            Some(Texture::Named { name: texture, factor }) if normal_map.is_none() => {
+                params.approximate("displacement", "heights are cut off at 0 and 1 before they are scaled");
+                Some(BumpMapDesc { texture, height: factor[0] })
+            }
+            // Level ground, or one relief too many.
+            Some(Texture::Named { .. }) => {
+                params.ignore("displacement", "there is a normal map");
+                None
+            }
+            _ => None,
+        };
+        if normal_map.is_none() && bump_map.is_none() {
+            return Ok(desc);
+        }
+        let material = self.draft.add_material(&format!("{name}_flat"), &params.place, desc);
+        Ok(MaterialDesc::Relief { material, normal_map, bump_map })
+    }
+}
+
+fn zero() -> crate::desc::ScalarDesc {
+    crate::desc::ScalarDesc::Constant(0.0)
+}

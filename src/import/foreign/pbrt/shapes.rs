@@ -1,0 +1,284 @@
+//! Shapes.
+
+use std::path::Path;
+
+use super::area_light::{AreaLight, Extent};
+use super::bilinear::Patches;
+use super::colors::Colors;
+use super::loop_subdivision;
+use super::params::Params;
+use super::state::{Graphics, Look, World};
+use super::textures::Textures;
+use super::triangles;
+use crate::desc::{CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SphereDesc};
+use crate::error::Result;
+use crate::import::foreign::Draft;
+use crate::import::{MeshData, read_ply};
+use crate::math::{DAffine3, DVec3};
+
+/// Meshes of more triangles are kept apart from the scene's text.
+const MAX_INLINE: usize = 64;
+
+/// What a shape is made from.
+pub struct Shapes<'a> {
+    /// Textures of opacities.
+    pub textures: &'a Textures,
+    /// How colours are read.
+    pub colors: Colors<'a>,
+    /// How the world becomes ours; not mirrored within an object.
+    pub world: World,
+    /// The scene file.
+    pub scene: &'a Path,
+    /// Whether it is part of an object, where nothing can give off light.
+    pub in_object: bool,
+}
+
+/// A shape's form.
+enum Form {
+    /// A shape of ours, after a transform of its own; pbrt turns its normals inside out where the transform mirrors.
+    Analytic { shape: ShapeDesc, inner: DAffine3, area: f64 },
+    /// Triangles.
+    Mesh(MeshData),
+    /// Triangles of a file that can stay there.
+    File(String),
+}
+
+impl Shapes<'_> {
+    /// Reads a shape; `None` if nothing of it can be seen.
+    pub fn read(&self, draft: &mut Draft, kind: &str, params: &Params, graphics: &Graphics) -> Result<Option<ShapeDesc>> {
+        let mut light = graphics.area_light.as_deref();
+        if light.is_some() && self.in_object {
+            draft.ignored(&params.place, &params.element, "AreaLightSource", "instances give off no light, as in pbrt");
+            light = None;
+        }
+        let material = match graphics.look.as_deref() {
+            Some(Look::Interface) if light.is_none() => {
+                params.report(draft);
+                return Ok(None);
+            }
+            Some(Look::Interface) => {
+                draft.approximated(&params.place, &params.element, "Material", "black, for what gives off light is no mere boundary");
+                Some(black(draft, &params.place))
+            }
+            Some(Look::Material(material)) => Some(material.name.clone()),
+            None => None,
+        };
+        let alpha = self.textures.number(params, &self.colors, "alpha", 1.0)?;
+        if light.is_some() && params.has("alpha") {
+            params.ignore("alpha", "what gives off light has no holes");
+        }
+        let opacity = if light.is_none() { alpha.opacity(draft, &params.place) } else { None };
+        let needs = self.needs(graphics, light, matches!(&opacity, Some(crate::desc::OpacityDesc::Texture { .. })));
+
+        let Some(form) = self.form(draft, kind, params, needs)? else {
+            params.report(draft);
+            return Ok(None);
+        };
+        let mut reverse = graphics.reverse_orientation;
+        let map = graphics.ctm.0[0];
+        let (mut shape, inner, extent) = match form {
+            Form::Analytic { shape, inner, area } => {
+                if graphics.ctm.swaps_handedness() {
+                    reverse = !reverse;
+                }
+                (shape, inner, Some(Extent { count: 1, area }))
+            }
+            Form::Mesh(mesh) => {
+                let extent = Extent::of_mesh(&mesh, &map);
+                (self.mesh_shape(draft, kind, mesh), DAffine3::IDENTITY, Some(extent))
+            }
+            Form::File(file) => (ShapeDesc::Mesh(MeshDesc::from_file(file)), DAffine3::IDENTITY, None),
+        };
+        let mut ctm = graphics.ctm;
+        if light.is_some() && ctm.is_moving() {
+            draft.approximated(&params.place, &params.element, "transform", "what gives off light stands still where it is at first");
+            ctm.0[1] = ctm.0[0];
+        }
+        let common = shape.common_mut();
+        (*common.transform, *common.motion) = self.world.place(&ctm, inner);
+        *common.material = material;
+        *common.opacity = opacity;
+        *common.emission = light.and_then(|light| light.emission(extent));
+        *common.reverse_normal = reverse;
+        params.report(draft);
+        Ok(Some(shape))
+    }
+
+    fn needs(&self, graphics: &Graphics, light: Option<&AreaLight>, cut_out: bool) -> Needs {
+        let material = match graphics.look.as_deref() {
+            Some(Look::Material(material)) => Some(material),
+            _ => None,
+        };
+        Needs {
+            uvs: cut_out || light.is_some_and(AreaLight::is_textured) || material.is_some_and(|material| material.is_textured),
+            sides: light.is_some() || material.is_some_and(|material| material.has_inside),
+            extent: light.is_some_and(AreaLight::needs_extent),
+        }
+    }
+
+    fn mesh_shape(&self, draft: &mut Draft, kind: &str, mesh: MeshData) -> ShapeDesc {
+        if mesh.triangles.len() > MAX_INLINE {
+            return ShapeDesc::Mesh(MeshDesc::from_file(draft.keep_mesh(&format!("{kind}_{}", draft.assets.meshes.len()), mesh)));
+        }
+        let shading = MeshShadingDesc::default();
+        ShapeDesc::Mesh(MeshDesc::new(
+            None,
+            Some(mesh.positions),
+            Some(mesh.triangles),
+            mesh.normals,
+            mesh.uvs,
+            Vec::new(),
+            Vec::new(),
+            shading,
+            None,
+            NormalWeightDesc::default(),
+        ))
+    }
+
+    fn form(&self, draft: &mut Draft, kind: &str, params: &Params, needs: Needs) -> Result<Option<Form>> {
+        let mesh = match kind {
+            "sphere" | "disk" | "cylinder" => return Ok(Some(analytic(kind, params)?)),
+            "plymesh" => return self.ply(params, needs).map(Some),
+            "trianglemesh" => triangle_mesh(params)?,
+            "bilinearmesh" => bilinear_mesh(draft, params)?,
+            "loopsubdiv" => {
+                let levels = params.integer_or("levels", 3)?.clamp(0, 64) as u32;
+                params.string("scheme")?;
+                let positions = params.groups("P")?.ok_or_else(|| params.error("needs positions P"))?;
+                let indices = params.indices("indices", positions.len())?.ok_or_else(|| params.error("needs indices"))?;
+                loop_subdivision::subdivide(&positions, &indices, levels).map_err(|message| params.error(message))?
+            }
+            "curve" => {
+                draft.ignored(&params.place, &params.element, "", "there are no curves");
+                return Ok(None);
+            }
+            other => return Err(params.error(format!("there is no shape \"{other}\""))),
+        };
+        let mut mesh = mesh;
+        if mesh.triangles.is_empty() {
+            draft.ignored(&params.place, &params.element, "", "it has no triangles");
+            return Ok(None);
+        }
+        triangles::orient(&mut mesh);
+        if needs.uvs {
+            triangles::give_uvs(&mut mesh);
+        }
+        Ok(Some(Form::Mesh(mesh)))
+    }
+
+    /// A PLY stays a file where nothing has to be known of it or changed.
+    fn ply(&self, params: &Params, needs: Needs) -> Result<Form> {
+        let Some(file) = params.string("filename")? else { return Err(params.error("needs a filename")) };
+        params.ignore("displacement", "surfaces are not displaced");
+        params.ignore("edgelength", "surfaces are not displaced");
+        if !(needs.uvs || needs.sides || needs.extent) {
+            return Ok(Form::File(file.into()));
+        }
+        let asset = self.colors.folder.join(file);
+        let mut mesh = read_ply(&asset).map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
+        let mut changed = needs.sides && triangles::orient(&mut mesh);
+        if needs.uvs && mesh.uvs.is_none() {
+            triangles::give_uvs(&mut mesh);
+            changed = true;
+        }
+        Ok(if changed || needs.extent { Form::Mesh(mesh) } else { Form::File(file.into()) })
+    }
+}
+
+/// What has to be known of a mesh.
+#[derive(Clone, Copy, Debug)]
+struct Needs {
+    /// Its uv.
+    uvs: bool,
+    /// Which side is its front.
+    sides: bool,
+    /// How large it is.
+    extent: bool,
+}
+
+/// A material for shapes that only shine.
+fn black(draft: &mut Draft, place: &str) -> String {
+    let roughness = crate::desc::ScalarDesc::Constant(0.0);
+    draft.add_material("black", place, MaterialDesc::Diffuse { albedo: crate::desc::ColorDesc::Grey(0.0), roughness })
+}
+
+fn analytic(kind: &str, params: &Params) -> Result<Form> {
+    let radius = params.positive_or("radius", 1.0)?;
+    let phi_max = params.number_or("phimax", 360.0)?.clamp(0.0, 360.0);
+    if phi_max == 0.0 {
+        return Err(params.error("nothing is left of it at a phimax of 0"));
+    }
+    let raised = |z: f64| DAffine3::from_translation(DVec3::new(0.0, 0.0, z));
+    let turn = phi_max.to_radians();
+    Ok(match kind {
+        "disk" => {
+            let inner_radius = params.number_or("innerradius", 0.0)?;
+            let area = 0.5 * turn * (radius * radius - inner_radius * inner_radius);
+            let shape = ShapeDesc::Disk(DiskDesc::new(radius, inner_radius, phi_max));
+            Form::Analytic { shape, inner: raised(params.number_or("height", 0.0)?), area }
+        }
+        "cylinder" => {
+            let (a, b) = (params.number_or("zmin", -1.0)?, params.number_or("zmax", 1.0)?);
+            let height = (b - a).abs();
+            let shape = ShapeDesc::Cylinder(CylinderDesc::new(radius, height, phi_max));
+            Form::Analytic { shape, inner: raised(a.min(b)), area: turn * radius * height }
+        }
+        _ => {
+            let (a, b) = (params.number_or("zmin", -radius)?, params.number_or("zmax", radius)?);
+            let (low, high) = (a.min(b).clamp(-radius, radius), a.max(b).clamp(-radius, radius));
+            let (z_min, z_max) = ((low > -radius).then_some(low), (high < radius).then_some(high));
+            let shape = ShapeDesc::Sphere(SphereDesc::new(radius, z_min, z_max, phi_max));
+            Form::Analytic { shape, inner: DAffine3::IDENTITY, area: turn * radius * (high - low) }
+        }
+    })
+}
+
+fn triangle_mesh(params: &Params) -> Result<MeshData> {
+    let Some(positions) = params.groups::<3>("P")? else { return Err(params.error("needs positions P")) };
+    let count = positions.len();
+    let triangles = match params.indices("indices", count)? {
+        Some(triangles) => triangles,
+        None if count == 3 => vec![[0, 1, 2]],
+        None => return Err(params.error("needs indices")),
+    };
+    params.ignore("S", "tangents follow from uv");
+    params.ignore("faceIndices", "faces have no numbers");
+    let normals = match params.groups::<3>("N")? {
+        Some(normals) if normals.len() != count => {
+            params.ignore("N", "there is not one for each vertex");
+            None
+        }
+        normals => normals,
+    };
+    let uvs = match params.groups::<2>("uv")? {
+        Some(uvs) if uvs.len() != count => {
+            params.ignore("uv", "there is not one for each vertex");
+            None
+        }
+        uvs => uvs,
+    };
+    Ok(MeshData { positions, triangles, normals, uvs })
+}
+
+fn bilinear_mesh(draft: &mut Draft, params: &Params) -> Result<MeshData> {
+    let Some(positions) = params.groups::<3>("P")? else { return Err(params.error("needs positions P")) };
+    let count = positions.len();
+    let corners = match params.indices("indices", count)? {
+        Some(corners) => corners,
+        None if count == 4 => vec![[0, 1, 2, 3]],
+        None => return Err(params.error("needs indices")),
+    };
+    params.ignore("emissionfilename", "images of emission belong to the light");
+    params.ignore("faceIndices", "faces have no numbers");
+    let patches = Patches {
+        normals: params.groups("N")?.filter(|normals: &Vec<[f32; 3]>| normals.len() == count),
+        uvs: params.groups("uv")?.filter(|uvs: &Vec<[f32; 2]>| uvs.len() == count),
+        positions,
+        corners,
+    };
+    let (mesh, curved) = patches.triangulate();
+    if curved > 0 {
+        draft.approximated(&params.place, &params.element, "", "curved patches become a grid of triangles");
+    }
+    Ok(mesh)
+}
