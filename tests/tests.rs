@@ -36,6 +36,8 @@ mod fuzz_corpus;
 mod gallery;
 /// Bottles and glasses of revolution, filled.
 mod glassware;
+/// glTF files as they look: which way up images, normals and glass are.
+mod gltf_looks;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
 /// Measured and textured lights, lamps in objects, groups, clamping.

@@ -66,7 +66,9 @@ fn lens(source: Source, place: &str, camera: &Camera, draft: &mut Draft) -> Resu
         return Err(source.fault(&format!("{place}.znear"), format!("cannot be {near}")));
     }
     desc.near = f64::from(near);
-    draft.ignored(place, "camera", "zfar", "what is far away is seen");
+    if camera.orthographic.is_some() || camera.perspective.as_ref().is_some_and(|lens| lens.zfar.is_some()) {
+        draft.ignored(place, "camera", "zfar", "what is far away is seen");
+    }
     if let Some(aspect) = aspect {
         let height = (f64::from(WIDTH) / aspect).round().clamp(1.0, 16.0 * f64::from(WIDTH));
         draft.desc.film.height = height as u32;

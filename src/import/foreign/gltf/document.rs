@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use gltf::json::validation::{Error as Flaw, Validate};
+use gltf::json::mesh::Semantic;
+use gltf::json::validation::{Checked, Error as Flaw, Validate};
 use gltf::json::{Path as JsonPath, Root};
 use serde::Deserialize;
 
@@ -50,6 +51,8 @@ struct Asset {
     min_version: Option<String>,
 }
 
+const NO_ELEMENT: &str = "there is no element of this index";
+
 /// Splits and parses the bytes of a file.
 pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
     let fault = |path: &str, message: String| Error::Scene { file: file.into(), path: path.into(), message };
@@ -77,6 +80,7 @@ pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
     }
 
     let root: Root = serde_json::from_slice(json).map_err(misread)?;
+    check_positions(&root).map_err(|path| fault(&path, NO_ELEMENT.into()))?;
     let mut flaws = Vec::new();
     root.validate(&root, JsonPath::new, &mut |path, flaw| {
         // Bounds of accessors are not needed; required extensions have been looked at.
@@ -91,13 +95,26 @@ pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
         Some((path, flaw)) => Err(fault(
             &path,
             match flaw {
-                Flaw::IndexOutOfBounds => "there is no element of this index".into(),
+                Flaw::IndexOutOfBounds => NO_ELEMENT.into(),
                 Flaw::Missing => "is needed, but not there".into(),
                 Flaw::Oversize => "is too large".into(),
                 _ => "the value is not one that glTF knows".into(),
             },
         )),
     }
+}
+
+/// That the accessors of positions are there: validation looks into them before it knows. The error is the place.
+fn check_positions(root: &Root) -> Result<(), String> {
+    for (i, mesh) in root.meshes.iter().enumerate() {
+        for (k, primitive) in mesh.primitives.iter().enumerate() {
+            let index = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            if index.is_some_and(|index| index.value() >= root.accessors.len()) {
+                return Err(format!("meshes[{i}].primitives[{k}].attributes.POSITION"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The JSON and the binary chunk of a GLB file.
@@ -121,8 +138,8 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
         };
         match kind {
             b"JSON" if json.is_none() => json = Some(chunk),
-            b"BIN\0" if bin.is_none() => bin = Some(chunk),
             _ if json.is_none() => return Err("the first chunk is not the JSON".into()),
+            b"BIN\0" if bin.is_none() => bin = Some(chunk),
             _ => {}
         }
         at += 8 + chunk.len();

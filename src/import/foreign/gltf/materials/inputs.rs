@@ -36,7 +36,7 @@ impl<'b> Inputs<'b> {
     /// A factor within `[0, 1]`.
     pub fn share(&mut self, factor: f32) -> f32 {
         let share = if factor.is_nan() { 0.0 } else { factor.clamp(0.0, 1.0) };
-        self.clamped |= share.to_bits() != factor.to_bits() && share != factor;
+        self.clamped |= share != factor;
         share
     }
 

@@ -48,14 +48,12 @@ impl Builder<'_, '_> {
         let ahead = ((kept - 1.0) / (kept + 1.0)).powi(2);
         let mean = (ahead * (r + g + b) / 3.0).min(1.0) * self.inputs.share(specular.specular_factor);
         let texture = self.texture(SPECULAR, "specularTexture", specular.specular_texture.as_ref())?;
-        if texture.is_some() || mean <= 0.08 {
+        if texture.is_some() {
             // In units of 0.08.
-            let factor = mean / 0.08;
             desc.ior = None;
-            desc.specular = Some(self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::A, factor)?);
+            desc.specular = Some(self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::A, mean / 0.08)?);
         } else {
-            let root = mean.min(0.66).sqrt();
-            desc.ior = Some(RangedDesc::Constant(((1.0 + root) / (1.0 - root)).clamp(1.0, 10.0)));
+            reflect_ahead(desc, mean);
         }
         let is_plain =
             specular.specular_factor == 1.0 && texture.is_none() && specular.specular_color_texture.is_none() && r == g && g == b;
@@ -250,6 +248,13 @@ impl Builder<'_, '_> {
         }
         self.draft.add_material(&self.name, &self.path, base)
     }
+}
+
+/// Gives the layer above the base this reflectance ahead, at most 0.66.
+pub(super) fn reflect_ahead(desc: &mut PrincipledDesc, reflectance: f32) {
+    let root = if reflectance.is_nan() { 0.0 } else { reflectance.clamp(0.0, 0.66).sqrt() };
+    desc.specular = None;
+    desc.ior = Some(RangedDesc::Constant(((1.0 + root) / (1.0 - root)).clamp(1.0, 10.0)));
 }
 
 /// What a volume absorbs, if anything.

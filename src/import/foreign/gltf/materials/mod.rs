@@ -89,6 +89,14 @@ impl MaterialSet {
     }
 }
 
+/// The factors of the older model.
+#[derive(Clone, Copy)]
+struct Glossy {
+    glossiness: f32,
+    /// The mean of the specular colour.
+    specular: f32,
+}
+
 /// A texture that the core of the format names.
 fn texture_of(source: Source, place: &str, info: &gltf::json::texture::Info) -> Result<TextureRef> {
     TextureRef::new(source, place, info.index.value(), info.tex_coord, info.extensions.as_ref().map(|e| &e.others))
@@ -120,10 +128,10 @@ impl<'a> Builder<'a, '_> {
         if self.tint != [1.0; 4] {
             self.approximated("COLOR_0", "the mean of the vertices' colours is a factor on the base colour");
         }
-        let glossiness = self.specular_glossiness()?;
+        let glossy = self.specular_glossiness()?;
         self.color_factor = std::array::from_fn(|k| self.color_factor[k] * self.tint[k]);
         let is_unlit = self.extensions().is_some_and(|all| all.contains_key("KHR_materials_unlit"));
-        let (material, mut emission) = if is_unlit { self.unlit()? } else { (self.surface(glossiness)?, self.emission()?) };
+        let (material, mut emission) = if is_unlit { self.unlit()? } else { (self.surface(glossy)?, self.emission()?) };
         let opacity = self.opacity()?;
         let (material, is_medium) = match material {
             Some(desc) => {
@@ -151,13 +159,13 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// The material of a surface without coat and relief.
-    fn surface(&mut self, glossiness: Option<f32>) -> Result<Option<MaterialDesc>> {
+    fn surface(&mut self, glossy: Option<Glossy>) -> Result<Option<MaterialDesc>> {
         let pbr = &self.json.pbr_metallic_roughness;
-        let texture = pbr.metallic_roughness_texture.as_ref().filter(|_| glossiness.is_none());
+        let texture = pbr.metallic_roughness_texture.as_ref().filter(|_| glossy.is_none());
         let place = format!("{}.pbrMetallicRoughness.metallicRoughnessTexture", self.path);
         let texture = texture.map(|t| texture_of(self.source, &place, t)).transpose()?;
-        let (metallic, roughness) = match glossiness {
-            Some(glossiness) => (0.0, 1.0 - glossiness),
+        let (metallic, roughness) = match glossy {
+            Some(Glossy { glossiness, .. }) => (0.0, 1.0 - glossiness),
             None => (pbr.metallic_factor.0, pbr.roughness_factor.0),
         };
         let color = self.base_color()?;
@@ -165,7 +173,7 @@ impl<'a> Builder<'a, '_> {
         desc.base_color = color;
         desc.metallic = self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::B, metallic)?;
         desc.roughness = self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::G, roughness)?;
-        if glossiness.is_none() {
+        if glossy.is_none() {
             self.mapped("metallicFactor");
             self.mapped("roughnessFactor");
             if texture.is_some() {
@@ -173,6 +181,9 @@ impl<'a> Builder<'a, '_> {
             }
         }
         self.specular(&mut desc)?;
+        if let Some(Glossy { specular, .. }) = glossy {
+            layers::reflect_ahead(&mut desc, specular);
+        }
         self.sheen(&mut desc)?;
         self.anisotropy(&mut desc, roughness)?;
         self.iridescence();
@@ -191,15 +202,19 @@ impl<'a> Builder<'a, '_> {
         Ok(color)
     }
 
-    /// The older model in place of metallic-roughness; the result is its glossiness.
-    fn specular_glossiness(&mut self) -> Result<Option<f32>> {
+    /// The older model in place of metallic-roughness.
+    fn specular_glossiness(&mut self) -> Result<Option<Glossy>> {
         const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
         let Some(ext) = self.extension::<ext::SpecularGlossiness>(NAME)? else { return Ok(None) };
         self.color_factor = ext.diffuse_factor;
         let place = format!("{}.extensions.{NAME}.diffuseTexture", self.path);
         self.color_texture = TextureRef::of_extension(self.source, &place, ext.diffuse_texture.as_ref())?;
-        self.approximated(NAME, "a principled material of the diffuse colour; the specular colour only if it is grey and constant");
-        Ok(Some(ext.glossiness_factor))
+        self.approximated(
+            NAME,
+            "a principled material of the diffuse colour, with the mean of the specular factor and without their texture",
+        );
+        let specular = ext.specular_factor.iter().map(|s| s.clamp(0.0, 1.0)).sum::<f32>() / 3.0;
+        Ok(Some(Glossy { glossiness: ext.glossiness_factor, specular }))
     }
 
     /// A surface that looks the same in any light: black, and it gives off its colour.
