@@ -49,7 +49,7 @@ fn recolored_image(image: &ImageData, is_srgb: bool, change: &dyn Fn([f32; 3]) -
 }
 
 /// A value of the sRGB curve as a linear one.
-fn linear(x: f32) -> f32 {
+pub fn linear(x: f32) -> f32 {
     if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 

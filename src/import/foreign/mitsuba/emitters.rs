@@ -9,6 +9,7 @@ use crate::desc::{
     DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc, TransformDesc, TransformStepDesc,
 };
 use crate::error::Result;
+use crate::import::foreign::recolor::linear;
 use crate::import::{ImageData, RgbImage, Samples, read_image};
 use crate::math::{DAffine3, DMat3, DVec3};
 
@@ -176,10 +177,9 @@ fn rotation(element: &mut Element, map: &DAffine3) -> Option<TransformDesc> {
 
 /// The linear colours of an image.
 fn as_environment(image: &ImageData) -> RgbImage {
-    let curve = |x: f32| if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
     let at = |i: usize| match &image.samples {
-        Samples::U8(v) => curve(f32::from(v[i]) / 255.0),
-        Samples::U16(v) => curve(f32::from(v[i]) / 65535.0),
+        Samples::U8(v) => linear(f32::from(v[i]) / 255.0),
+        Samples::U16(v) => linear(f32::from(v[i]) / 65535.0),
         Samples::F16(v) => v[i].to_f32(),
         Samples::F32(v) => v[i],
     };

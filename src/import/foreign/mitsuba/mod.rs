@@ -12,7 +12,6 @@ mod integrators;
 mod meshes;
 mod metals;
 mod names;
-mod plastics;
 mod principled;
 mod sensor;
 mod serialized;
@@ -31,10 +30,10 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use super::coat::Coat;
 use super::{Draft, ImportOptions, Imported};
 use crate::error::Result;
 use bsdfs::Look;
-use plastics::Coat;
 use textures::{Role, TextureValue, UvOrigin};
 use tree::{Document, PluginId, Value};
 
