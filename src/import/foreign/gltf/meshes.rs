@@ -214,7 +214,9 @@ impl Builder<'_, '_> {
     /// Says what became of the attributes.
     fn report(&mut self, path: &str, primitive: &Primitive) {
         self.draft.mapped(path, "primitive", "attributes");
-        if geometry::attribute(primitive, Semantic::Tangents).is_some() {
+        let material = primitive.material.and_then(|index| self.source.root.get(index));
+        let has_normal_map = material.is_some_and(|material| material.normal_texture.is_some());
+        if has_normal_map && geometry::attribute(primitive, Semantic::Tangents).is_some() {
             self.draft.ignored(path, "primitive", "TANGENT", "tangents are MikkTSpace's, from positions, normals and uv");
         }
     }
