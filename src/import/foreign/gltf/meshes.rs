@@ -7,7 +7,7 @@ use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mesh, Primitive, Semantic};
 
 use super::Source;
-use super::accessors::Wanted;
+use super::accessors::{Column, Wanted};
 use super::extensions::Instancing;
 use super::geometry::{self, Deformation};
 use super::materials::MaterialSet;
@@ -130,7 +130,7 @@ fn placements(source: Source, path: &str, node: usize, world: DAffine3, draft: &
     let (translations, rotations, scales) =
         (column("TRANSLATION", Type::Vec3)?, column("ROTATION", Type::Vec4)?, column("SCALE", Type::Vec3)?);
     let columns = [&translations, &rotations, &scales];
-    let count = columns.iter().find_map(|column| column.as_ref().map(|column| column.count())).unwrap_or(0);
+    let count = columns.iter().find_map(|column| column.as_ref().map(Column::count)).unwrap_or(0);
     if columns.iter().any(|column| column.as_ref().is_some_and(|column| column.count() != count)) {
         return Err(source.fault(&format!("{path}.extensions.{NAME}"), "the attributes differ in their count"));
     }
