@@ -7,7 +7,7 @@ use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mesh, Primitive, Semantic};
 
 use super::Source;
-use super::accessors::Wanted;
+use super::accessors::{Column, Wanted};
 use super::extensions::Instancing;
 use super::geometry::{self, Deformation};
 use super::materials::MaterialSet;
@@ -130,7 +130,7 @@ fn placements(source: Source, path: &str, node: usize, world: DAffine3, draft: &
     let (translations, rotations, scales) =
         (column("TRANSLATION", Type::Vec3)?, column("ROTATION", Type::Vec4)?, column("SCALE", Type::Vec3)?);
     let columns = [&translations, &rotations, &scales];
-    let count = columns.iter().find_map(|column| column.as_ref().map(|column| column.count())).unwrap_or(0);
+    let count = columns.iter().find_map(|column| column.as_ref().map(Column::count)).unwrap_or(0);
     if columns.iter().any(|column| column.as_ref().is_some_and(|column| column.count() != count)) {
         return Err(source.fault(&format!("{path}.extensions.{NAME}"), "the attributes differ in their count"));
     }
@@ -214,7 +214,9 @@ impl Builder<'_, '_> {
     /// Says what became of the attributes.
     fn report(&mut self, path: &str, primitive: &Primitive) {
         self.draft.mapped(path, "primitive", "attributes");
-        if geometry::attribute(primitive, Semantic::Tangents).is_some() {
+        let material = primitive.material.and_then(|index| self.source.root.get(index));
+        let has_normal_map = material.is_some_and(|material| material.normal_texture.is_some());
+        if has_normal_map && geometry::attribute(primitive, Semantic::Tangents).is_some() {
             self.draft.ignored(path, "primitive", "TANGENT", "tangents are MikkTSpace's, from positions, normals and uv");
         }
     }

@@ -1,6 +1,6 @@
 //! Nodes: the forest they form, and where each stands.
 
-use gltf::json::scene;
+use gltf::json::{Index, scene};
 
 use super::Source;
 use super::animation::Motion;
@@ -101,11 +101,11 @@ fn shown_roots(source: Source, parents: &[Option<usize>], roots: Vec<usize>, dra
         return Err(source.fault(&format!("scenes[{chosen}].nodes"), "a node is listed twice"));
     }
     // In the order of the file's own list.
-    Ok(scene.nodes.iter().map(|node| node.value()).collect())
+    Ok(scene.nodes.iter().map(Index::value).collect())
 }
 
 fn children(node: &scene::Node) -> impl DoubleEndedIterator<Item = usize> + '_ {
-    node.children.iter().flatten().map(|child| child.value())
+    node.children.iter().flatten().map(Index::value)
 }
 
 /// These nodes and all below them, parents first, each with what is below it before its siblings.

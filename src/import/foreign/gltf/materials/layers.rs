@@ -167,9 +167,9 @@ impl Builder<'_, '_> {
         }
         let is_white = matches!(desc.base_color, ColorDesc::Rgb([1.0, 1.0, 1.0]));
         if is_white {
-            self.mapped(VOLUME)
+            self.mapped(VOLUME);
         } else {
-            self.approximated(VOLUME, "absorbs within; its surface has no colour of its own")
+            self.approximated(VOLUME, "absorbs within; its surface has no colour of its own");
         }
         if abbe.is_some() {
             self.mapped(DISPERSION);
