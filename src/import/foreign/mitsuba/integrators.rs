@@ -43,7 +43,10 @@ impl Reader<'_> {
                     Some(inner) => self.integrator(inner)?,
                     None => return Err(element.place().error(format!("the integrator {kind} needs another one inside"))),
                 }
-                element.approximated("", "only the integrator inside counts; layers are asked for by outputs");
+                // Moments are beside the picture, which is that of the integrator inside.
+                if kind != "moment" {
+                    element.approximated("", "only the integrator inside counts; layers are asked for by outputs");
+                }
                 element.finish(&mut self.draft);
                 return Ok(());
             }
@@ -57,7 +60,9 @@ impl Reader<'_> {
             "volpath" | "volpathmis" | "prbvolpath" => {
                 let (max_depth, rr_depth) = ends(&mut element)?;
                 self.draft.desc.integrator = path(max_depth, rr_depth);
-                element.approximated("", "path tracing: there are no participating media");
+                if self.document.plugins.iter().any(|plugin| plugin.class == "medium") {
+                    element.approximated("", "path tracing: there are no participating media");
+                }
             }
             "ptracer" => {
                 let (max_depth, rr_depth) = ends(&mut element)?;
