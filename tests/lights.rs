@@ -63,6 +63,22 @@ fn lamps_inside_objects_light_from_every_place_they_are_put() {
 }
 
 #[test]
+fn a_flat_lamp_that_shines_on_both_sides_does_not_light_itself() {
+    for (material, edge) in
+        [(json!({ "type": "diffuse", "albedo": 0.9 }), [2.0, 0.0, 0.0]), (json!({ "type": "principled" }), [2.0, 0.3, 0.0])]
+    {
+        let quad = json!({ "type": "quad", "material": "m", "edge_u": edge, "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } },
+            { "translate": [10.1, 20.7, -3.3] }], "emission": { "radiance": [1, 1, 1], "two_sided": true } });
+        let camera = json!({ "position": [10.1, 20.7, 1.7], "look_at": [10.1, 20.7, -3.3], "vertical_fov_degrees": 5 });
+        let scene = json!({ "camera": camera, "film": { "width": 16, "height": 16 }, "sampler": { "spp": 64 }, "materials": { "m": material },
+            "shapes": [quad] });
+        for pixel in pixels(&Folder::new().render(&scene)) {
+            assert_eq!(pixel, [1.0; 3]);
+        }
+    }
+}
+
+#[test]
 fn groups_have_names_and_know_their_lights() {
     let folder = Folder::new();
     let mut scene = good_scene();

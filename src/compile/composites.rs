@@ -1,6 +1,6 @@
 //! Materials that consist of others.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::materials::{Compiler, MaterialTable};
 use crate::desc::{MaterialDesc, SceneDesc};
@@ -135,6 +135,14 @@ impl MaterialTable {
 
     /// Whether something is true of a material or of a part of it.
     pub(super) fn any_part(&self, id: MaterialId, is: &impl Fn(MaterialId) -> bool) -> bool {
-        is(id) || self.materials[id.index()].parts().is_some_and(|parts| parts.into_iter().any(|part| self.any_part(part, is)))
+        // Parts of several parts are looked at once.
+        let (mut open, mut seen) = (vec![id], HashSet::from([id]));
+        while let Some(id) = open.pop() {
+            if is(id) {
+                return true;
+            }
+            open.extend(self.materials[id.index()].parts().into_iter().flatten().filter(|&part| seen.insert(part)));
+        }
+        false
     }
 }

@@ -1,5 +1,7 @@
 //! Triangle meshes: positions, corners, and optionally normals and uv per vertex.
 
+use std::sync::OnceLock;
+
 use super::tangents::{self, CornerTangents};
 pub use super::triangle::TrianglePoints;
 use super::{Detail, Hit, SurfaceInteraction};
@@ -57,6 +59,8 @@ pub struct Mesh {
     /// For normal maps, those of each triangle at each time; else empty.
     pub(super) tangents: Vec<Vec<CornerTangents>>,
     has_slivers: bool,
+    /// Found when they are first asked for.
+    bounds: OnceLock<Aabb>,
 }
 
 /// The vertices of a deforming mesh at one time.
@@ -109,7 +113,16 @@ impl Mesh {
         }
         positions.push([0.0; 3]);
         positions.shrink_to_fit();
-        let mut mesh = Self { positions, triangles, normals, uvs, later: Vec::new(), tangents: Vec::new(), has_slivers: false };
+        let mut mesh = Self {
+            positions,
+            triangles,
+            normals,
+            uvs,
+            later: Vec::new(),
+            tangents: Vec::new(),
+            has_slivers: false,
+            bounds: OnceLock::new(),
+        };
         mesh.has_slivers = (0..mesh.triangles.len()).any(|i| mesh.triangle_points(PrimId::new(i)).is_sliver());
         Ok(mesh)
     }
@@ -135,7 +148,7 @@ impl Mesh {
             has_slivers |= step.has_slivers;
             checked.push(MeshStep { positions: step.positions, normals: step.normals });
         }
-        Ok(Self { later: checked, tangents: Vec::new(), has_slivers, ..self })
+        Ok(Self { later: checked, tangents: Vec::new(), has_slivers, bounds: OnceLock::new(), ..self })
     }
 
     /// Whether a triangle is so flat that [hits are to be confirmed](Self::confirms_hit).
@@ -256,10 +269,12 @@ impl Mesh {
 
     /// Bounds of all triangles.
     pub fn bounds(&self) -> Aabb {
-        if self.is_deforming() {
-            return (0..self.triangles.len()).fold(Aabb::EMPTY, |b, i| b.union(&self.triangle_bounds(PrimId::new(i))));
-        }
-        self.triangles.iter().flatten().fold(Aabb::EMPTY, |b, &i| b.extended(Vec3::from(self.positions[i as usize])))
+        *self.bounds.get_or_init(|| {
+            if self.is_deforming() {
+                return (0..self.triangles.len()).fold(Aabb::EMPTY, |b, i| b.union(&self.triangle_bounds(PrimId::new(i))));
+            }
+            self.triangles.iter().flatten().fold(Aabb::EMPTY, |b, &i| b.extended(Vec3::from(self.positions[i as usize])))
+        })
     }
 
     /// Bytes of the buffers.

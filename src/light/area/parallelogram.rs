@@ -2,6 +2,7 @@
 //! Spherical Rectangles"), all others by area.
 
 use super::SurfaceSample;
+use crate::math::float::F64_CHAIN_ERROR;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::Piecewise2d;
 
@@ -112,6 +113,9 @@ impl ParallelogramEmitter {
     #[inline(always)]
     pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
         let view = self.view(p);
+        if view.is_edge_on(self.corner) {
+            return None;
+        }
         let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };
         let Some(solid_angle) = by_solid_angle else {
             let q = self.point(f64::from(u[0]) * self.length_u, f64::from(u[1]) * self.length_v);
@@ -151,7 +155,11 @@ impl ParallelogramEmitter {
 
     #[inline]
     fn pdf_by_size(&self, p: DVec3, q: DVec3) -> f32 {
-        let by_solid_angle = if self.is_rectangle { self.view(p).usable_solid_angle() } else { None };
+        let view = self.view(p);
+        if view.is_edge_on(self.corner) {
+            return 0.0;
+        }
+        let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };
         match by_solid_angle {
             Some(solid_angle) => (1.0 / solid_angle) as f32,
             None => SurfaceSample::pdf_from_area(p, q, self.normal, 1.0 / self.area),
@@ -160,6 +168,13 @@ impl ParallelogramEmitter {
 }
 
 impl View {
+    /// Whether the point is in the plane, within the rounding of itself and of the rectangle, whose corner is `corner`: the surface does not shine on itself, and nothing is seen of it from there.
+    #[inline]
+    fn is_edge_on(&self, corner: DVec3) -> bool {
+        let reach = self.x1.max(-self.x0) + self.y1.max(-self.y0);
+        self.height <= F64_CHAIN_ERROR * (reach + corner.abs().max_element())
+    }
+
     /// Solid angle of the rectangle, to `f32` precision at any size: Van Oosterom and Strackee's formula for both of its triangles, whose
     /// half-angles add up as the arguments of complex numbers, so that nothing cancels.
     #[inline]
