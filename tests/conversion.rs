@@ -56,3 +56,21 @@ fn what_cannot_be_written_leaves_nothing_behind() {
     let error = convert(&path, &folder.path().join("none/t.json"), Originals::Copy).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Output);
 }
+
+#[test]
+fn errors_name_the_place_in_the_imported_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.xml");
+    let message = |shape: &str| {
+        let scene = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/>\n{shape}\n<emitter type=\"constant\"/></scene>");
+        std::fs::write(&path, scene).unwrap();
+        let imported = read_scene(&path, &ImportOptions::default()).unwrap();
+        compile::compile_imported(&imported, &path).err().unwrap().to_string()
+    };
+    let ply = |name: &str| format!("<shape type=\"ply\"><string name=\"filename\" value=\"{name}\"/></shape>");
+    let gone = message(&ply("gone.ply"));
+    assert!(gone.contains("gone.ply") && gone.contains("shapes[0].file (from") && gone.contains("s.xml:2:1"), "{gone}");
+    std::fs::write(folder.path().join("bad.ply"), "ply\nformat").unwrap();
+    let bad = message(&ply("bad.ply"));
+    assert!(bad.contains("bad.ply") && bad.contains("s.xml:2:1"), "{bad}");
+}

@@ -55,6 +55,14 @@ impl Imported {
         match error {
             Error::Scene { file, path, message } => Error::Scene { file, path: with_place(path), message },
             Error::Asset { scene, path, asset, message } => Error::Asset { scene, path: with_place(path), asset, message },
+            // The message ends with the place, in parentheses.
+            Error::Missing { file, message } => Error::Missing {
+                file,
+                message: match message.strip_suffix(')').and_then(|text| text.rsplit_once(": ")) {
+                    Some((start, path)) if path.starts_with(char::is_alphabetic) => format!("{start}: {})", with_place(path.into())),
+                    _ => message,
+                },
+            },
             other => other,
         }
     }
