@@ -25,6 +25,7 @@ mod transforms;
 pub use settings::check_settings;
 pub use summary::Summary;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -48,7 +49,7 @@ use transforms::Shutter;
 /// # Errors
 /// [`Error::Scene`], [`Error::Asset`] or [`Error::Missing`], each with the place in the scene.
 pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
-    compile_with(desc, scene_file, Arc::default())
+    compile_with(desc, Files::new(scene_file))
 }
 
 /// Compiles a scene that was read from a file of any kind; errors name the places in that file.
@@ -56,16 +57,12 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
 /// # Errors
 /// As [`compile`].
 pub fn compile_imported(imported: &Imported, scene_file: &Path) -> Result<Scene> {
-    compile_with(&imported.desc, scene_file, Arc::clone(&imported.assets)).map_err(|e| imported.locate(e))
+    let (assets, places) = (Arc::clone(&imported.assets), Arc::clone(&imported.places));
+    compile_with(&imported.desc, Files { scene: scene_file.into(), assets, places })
 }
 
-/// Compiles a scene that a reader made: what it names is looked up among `assets` first, then beside `scene_file`.
-///
-/// # Errors
-/// As [`compile`].
-fn compile_with(desc: &SceneDesc, scene_file: &Path, assets: Arc<Assets>) -> Result<Scene> {
-    check_settings(desc, scene_file)?;
-    let files = Files { scene: scene_file.into(), assets };
+fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
+    settings::check(desc, &files)?;
     let camera = camera::compile(&files, &desc.camera)?;
     let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
@@ -96,19 +93,30 @@ const SINGULAR: &str = "the transform is singular: it flattens the shape, or is 
 #[derive(Clone, Debug)]
 struct Files {
     scene: PathBuf,
-    /// What has no file.
+    /// What is named like a file and has none.
     assets: Arc<Assets>,
+    /// Where the file of another renderer says what became `shapes[0]` and so on.
+    places: Arc<BTreeMap<String, String>>,
 }
 
 impl Files {
     /// A scene whose assets are all files.
     fn new(scene: impl Into<PathBuf>) -> Self {
-        Self { scene: scene.into(), assets: Arc::default() }
+        Self { scene: scene.into(), assets: Arc::default(), places: Arc::default() }
     }
 
     /// An error at a place of the scene.
     fn error(&self, path: &str, message: impl Into<String>) -> Error {
-        Error::Scene { file: self.scene.clone(), path: path.into(), message: message.into() }
+        Error::Scene { file: self.scene.clone(), path: self.place(path), message: message.into() }
+    }
+
+    /// A place of the scene, with that of the file it was read from.
+    fn place(&self, path: &str) -> String {
+        let parts = self.places.iter().filter(|(part, _)| path.strip_prefix(part.as_str()).is_some_and(ends_a_name));
+        match parts.max_by_key(|(part, _)| part.len()) {
+            Some((_, place)) => format!("{path} (from {place})"),
+            None => path.into(),
+        }
     }
 
     /// Where an asset lies.
@@ -118,7 +126,7 @@ impl Files {
 
     /// An error about an asset that `path` names.
     fn asset_error(&self, path: &str, asset: &Path, error: AssetError) -> Error {
-        error.at(&self.scene, path, asset)
+        error.at(&self.scene, &self.place(path), asset)
     }
 
     /// The error for a name that does not exist, with a suggestion.
@@ -126,6 +134,11 @@ impl Files {
         let hint = crate::import::closest_name(name, known).map_or(String::new(), |near| format!(" (did you mean \"{near}\"?)"));
         self.error(path, format!("no {what} named \"{name}\"{hint}"))
     }
+}
+
+/// Whether what follows a name in a path does not belong to the name.
+fn ends_a_name(rest: &str) -> bool {
+    rest.is_empty() || rest.starts_with(['.', '['])
 }
 
 /// A scene under construction.

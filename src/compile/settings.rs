@@ -14,15 +14,19 @@ const MAX_SIZE: u32 = 65_536;
 /// # Errors
 /// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.
 pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
-    let files = Files::new(scene_file);
-    check_film(&files, &desc.film)?;
+    check(desc, &Files::new(scene_file))
+}
+
+/// As [`check_settings`], for the scene of `files`.
+pub(super) fn check(desc: &SceneDesc, files: &Files) -> Result<()> {
+    check_film(files, &desc.film)?;
     if desc.sampler.spp == 0 {
         return Err(files.error("sampler.spp", "must be at least 1"));
     }
-    camera::compile(&files, &desc.camera)?;
-    check_integrator(&files, &desc.integrator)?;
+    camera::compile(files, &desc.camera)?;
+    check_integrator(files, &desc.integrator)?;
     for (i, output) in desc.outputs.iter().enumerate() {
-        check_output(&files, &format!("outputs[{i}]"), output)?;
+        check_output(files, &format!("outputs[{i}]"), output)?;
     }
     Ok(())
 }

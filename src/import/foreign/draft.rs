@@ -115,7 +115,7 @@ impl Draft {
 
     /// The scene.
     pub fn finish(self) -> Imported {
-        Imported { desc: self.desc, assets: Arc::new(self.assets), report: self.report, places: self.places }
+        Imported { desc: self.desc, assets: Arc::new(self.assets), report: self.report, places: Arc::new(self.places) }
     }
 }
 

@@ -1,6 +1,8 @@
 //! Scenes some of whose files are not there: what remains of them without these files.
 
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::{Imported, Outcome, ReportEntry};
 use crate::desc::{LightDesc, MeshDesc, ShapeDesc, TextureDesc};
@@ -15,69 +17,61 @@ impl Imported {
         let folder = scene.parent().unwrap_or(Path::new("")).to_owned();
         let assets = &self.assets;
         let is_missing = |file: &str| !assets.contains(file) && !folder.join(file).is_file();
-        let mut found: Vec<(String, &str, String)> = Vec::new();
-
-        let mut keep = |path: String, shape: &ShapeDesc| match shape {
-            ShapeDesc::Mesh(mesh) => match files(mesh).find(|file| is_missing(file)) {
-                Some(file) => {
-                    found.push((path, "shape mesh", file.to_owned()));
-                    false
-                }
-                None => true,
-            },
-            _ => true,
+        let places = Arc::make_mut(&mut self.places);
+        let before = self.report.entries.len();
+        let mut report = |place: &str, element: &str, file: &str| {
+            let (place, element, note) = (place.to_owned(), element.to_owned(), format!("there is no file {file}"));
+            self.report.entries.push(ReportEntry { place, element, parameter: "file".into(), outcome: Outcome::Ignored, note });
         };
-        let mut i = 0;
-        self.desc.shapes.retain(|shape| {
-            i += 1;
-            keep(format!("shapes[{}]", i - 1), shape)
-        });
+
+        let mut is_whole = |place: &str, shape: &ShapeDesc| {
+            let ShapeDesc::Mesh(mesh) = shape else { return true };
+            let missing = files(mesh).find(|file| is_missing(file));
+            missing.inspect(|file| report(place, "shape mesh", file)).is_none()
+        };
+        retain("shapes", &mut self.desc.shapes, places, &mut is_whole);
         for (name, object) in &mut self.desc.objects {
-            let mut i = 0;
-            object.shapes.retain(|shape| {
-                i += 1;
-                keep(format!("objects.{name}.shapes[{}]", i - 1), shape)
-            });
+            retain(&format!("objects.{name}.shapes"), &mut object.shapes, places, &mut is_whole);
         }
-        for (name, texture) in &mut self.desc.textures {
-            if let TextureDesc::Image { file, .. } = texture
-                && is_missing(file)
-            {
-                found.push((format!("textures.{name}"), "texture image", file.clone()));
-                *texture = TextureDesc::Constant { color: GREY };
-            }
-        }
-        let mut i = 0;
-        self.desc.lights.retain(|light| {
-            i += 1;
+        retain("lights", &mut self.desc.lights, places, |place, light| {
             let file = match light {
                 LightDesc::Environment(light) => light.file.as_deref(),
                 LightDesc::Ies(light) => Some(light.file.as_str()),
                 LightDesc::Point(_) | LightDesc::Spot(_) | LightDesc::Directional(_) => None,
             };
-            let missing = file.filter(|file| is_missing(file));
-            found.extend(missing.map(|file| (format!("lights[{}]", i - 1), "light", file.to_owned())));
-            missing.is_none()
+            file.filter(|file| is_missing(file)).inspect(|file| report(place, "light", file)).is_none()
         });
+        for (name, texture) in &mut self.desc.textures {
+            if let TextureDesc::Image { file, .. } = texture
+                && is_missing(file)
+            {
+                let path = format!("textures.{name}");
+                report(places.get(&path).unwrap_or(&path), "texture image", file);
+                *texture = TextureDesc::Constant { color: GREY };
+            }
+        }
         // Objects that have nothing left take their instances with them.
         let objects = &self.desc.objects;
         let is_empty = |name: &str| objects.get(name).is_some_and(|object| object.shapes.is_empty() && object.instances.is_empty());
-        self.desc.instances.retain(|instance| !is_empty(&instance.object));
-
-        let count = found.len();
-        for (path, element, file) in found {
-            let place = self.places.get(&path).cloned().unwrap_or(path);
-            let note = format!("there is no file {file}");
-            self.report.entries.push(ReportEntry {
-                place,
-                element: element.into(),
-                parameter: "file".into(),
-                outcome: Outcome::Ignored,
-                note,
-            });
-        }
-        count
+        retain("instances", &mut self.desc.instances, places, |_, instance| !is_empty(&instance.object));
+        self.report.entries.len() - before
     }
+}
+
+/// Keeps what `keep` says of a list, and the places of what is kept in step with it. `keep` is given the place of each, or its path.
+fn retain<T>(path: &str, list: &mut Vec<T>, places: &mut BTreeMap<String, String>, mut keep: impl FnMut(&str, &T) -> bool) {
+    let (mut index, mut kept) = (0, 0);
+    list.retain(|item| {
+        let own_path = format!("{path}[{index}]");
+        let place = places.remove(&own_path);
+        let is_kept = keep(place.as_deref().unwrap_or(&own_path), item);
+        index += 1;
+        if is_kept {
+            places.extend(place.map(|place| (format!("{path}[{kept}]"), place)));
+            kept += 1;
+        }
+        is_kept
+    });
 }
 
 fn files(mesh: &MeshDesc) -> impl Iterator<Item = &str> {
@@ -105,5 +99,19 @@ mod tests {
         assert!(matches!(imported.desc.textures["t"], TextureDesc::Constant { color: GREY }));
         assert_eq!(imported.report.count(Outcome::Ignored), 4);
         assert_eq!(imported.leave_out_missing(&path), 0);
+    }
+
+    #[test]
+    fn places_stay_with_what_they_belong_to() {
+        let mut places: BTreeMap<String, String> = (0..4).map(|i| (format!("shapes[{i}]"), format!("line {i}"))).collect();
+        places.insert("lights[0]".into(), "line 9".into());
+        let mut list = vec![0, 1, 2, 3];
+        retain("shapes", &mut list, &mut places, |place, item| {
+            assert_eq!(place, format!("line {item}"));
+            item % 2 == 1
+        });
+        assert_eq!(list, [1, 3]);
+        let places: Vec<_> = places.iter().map(|(path, place)| (path.as_str(), place.as_str())).collect();
+        assert_eq!(places, [("lights[0]", "line 9"), ("shapes[0]", "line 1"), ("shapes[1]", "line 3")]);
     }
 }

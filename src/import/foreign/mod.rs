@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 use super::{Assets, load_scene};
 use crate::desc::SceneDesc;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// What the user says beside a scene file.
 #[derive(Clone, Debug, Default)]
@@ -39,40 +39,14 @@ pub struct Imported {
     /// What became of the file's parameters; empty for our own format.
     pub report: ImportReport,
     /// Where the file says what became `shapes[0]`, `materials.floor` and so on; empty for our own format.
-    pub places: BTreeMap<String, String>,
-}
-
-impl Imported {
-    /// The error about a part of the description, with the place in the file that the part comes from.
-    pub fn locate(&self, error: Error) -> Error {
-        let with_place = |path: String| {
-            let part = self.places.iter().filter(|(part, _)| path.starts_with(part.as_str())).max_by_key(|(part, _)| part.len());
-            match part {
-                Some((_, place)) => format!("{path} (from {place})"),
-                None => path,
-            }
-        };
-        match error {
-            Error::Scene { file, path, message } => Error::Scene { file, path: with_place(path), message },
-            Error::Asset { scene, path, asset, message } => Error::Asset { scene, path: with_place(path), asset, message },
-            // The message ends with the place, in parentheses.
-            Error::Missing { file, message } => Error::Missing {
-                file,
-                message: match message.strip_suffix(')').and_then(|text| text.rsplit_once(": ")) {
-                    Some((start, path)) if path.starts_with(char::is_alphabetic) => format!("{start}: {})", with_place(path.into())),
-                    _ => message,
-                },
-            },
-            other => other,
-        }
-    }
+    pub places: Arc<BTreeMap<String, String>>,
 }
 
 /// Reads a scene file of any kind that its extension names: `.json` (ours, and any other name), `.xml` (Mitsuba 3), `.pbrt` (pbrt-v4),
 /// `.gltf` and `.glb` (glTF 2.0). Files that the scene names are looked up beside it.
 ///
 /// # Errors
-/// [`Error::Missing`] if it cannot be read, [`Error::Parse`] or [`Error::Scene`] for what it says.
+/// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Parse`](crate::Error::Parse) or [`Error::Scene`](crate::Error::Scene) for what it says.
 pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     match extension.as_str() {
@@ -81,7 +55,7 @@ pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
         "gltf" | "glb" => gltf::read(path, options),
         _ => {
             let desc = load_scene(path)?;
-            Ok(Imported { desc, assets: Arc::default(), report: ImportReport::default(), places: BTreeMap::new() })
+            Ok(Imported { desc, assets: Arc::default(), report: ImportReport::default(), places: Arc::default() })
         }
     }
 }
