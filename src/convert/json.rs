@@ -6,10 +6,10 @@ use crate::error::{Error, Result};
 /// Longest list of numbers that stays on one line, in characters.
 const MAX_LINE: usize = 140;
 
-/// A scene as JSON, without what is empty, short lists on one line.
+/// A scene as JSON, short lists on one line.
 pub fn scene_text(desc: &SceneDesc) -> Result<String> {
     let text = serde_json::to_string_pretty(desc).map_err(|e| Error::Internal(e.to_string()))?;
-    let mut text = without_defaults(&joined(&text));
+    let mut text = joined(&text);
     text.push('\n');
     Ok(text)
 }
@@ -80,25 +80,6 @@ fn short_list(text: &str, start: usize) -> Option<(String, usize)> {
         }
     }
     None
-}
-
-/// Drops the lines of keys whose value is what their absence means.
-fn without_defaults(text: &str) -> String {
-    const EMPTY: [&str; 3] = ["\"transform\": []", "\"reverse_normal\": false", "\"two_sided\": false"];
-    let mut lines: Vec<String> = Vec::new();
-    for line in text.lines() {
-        let bare = line.trim().trim_end_matches(',');
-        if EMPTY.contains(&bare) {
-            // The last key of an object leaves a comma behind.
-            if let Some(last) = lines.last_mut().filter(|_| !line.ends_with(',')) {
-                let length = last.trim_end_matches(',').len();
-                last.truncate(length);
-            }
-            continue;
-        }
-        lines.push(line.to_owned());
-    }
-    lines.join("\n")
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ macro_rules! shapes {
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub material: Option<String>,
                 /// Where the shape stands.
-                #[serde(default)]
+                #[serde(default, skip_serializing_if = "TransformDesc::is_empty")]
                 pub transform: TransformDesc,
                 /// How the shape moves, after `transform`. Default: not at all.
                 #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -34,7 +34,7 @@ macro_rules! shapes {
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub emission: Option<EmissionDesc>,
                 /// Whether the front is the side against the shape's own normal.
-                #[serde(default)]
+                #[serde(default, skip_serializing_if = "std::ops::Not::not")]
                 pub reverse_normal: bool,
             }
 
@@ -342,7 +342,7 @@ pub struct EmissionDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub texture: Option<String>,
     /// Whether both sides emit; otherwise only the front does.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub two_sided: bool,
     /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -366,7 +366,7 @@ pub struct InstanceDesc {
     /// The object's name.
     pub object: String,
     /// Where it stands.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "TransformDesc::is_empty")]
     pub transform: TransformDesc,
     /// How it moves, after `transform`. Default: not at all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

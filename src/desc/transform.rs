@@ -8,6 +8,13 @@ use serde::{Deserialize, Serialize};
 #[serde(transparent)]
 pub struct TransformDesc(pub Vec<TransformStepDesc>);
 
+impl TransformDesc {
+    /// Whether there are no steps.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
 /// A transform at one time of a motion. Between two keyframes translation, rotation (the short way round, evenly) and stretch are
 /// interpolated each by itself; before the first and after the last the motion rests.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
