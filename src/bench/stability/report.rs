@@ -97,6 +97,20 @@ impl StabilityReport {
         Ok(())
     }
 
+    /// Writes `stability.json` alone into a folder: what [`kept`](Self::kept) needs.
+    ///
+    /// # Errors
+    /// [`Error::Output`] naming the file.
+    pub fn write_json_to(&self, folder: &Path) -> Result<()> {
+        write_files(folder, &[(JSON, self.json()?)])
+    }
+
+    /// A line for each check: id, how it ended, name.
+    pub fn lines(&self) -> Vec<String> {
+        let line = |check: &CheckReport| format!("{:<4} {:<7} {:7.1} s  {}", check.id, word(check.status), check.seconds, check.name);
+        self.checks.iter().map(line).collect()
+    }
+
     /// The checks of an earlier run of this version that left `stability.json` in a folder, those that failed excepted; none if there is no
     /// such file.
     pub fn kept(folder: &Path, effort: Effort) -> Vec<CheckReport> {

@@ -112,7 +112,7 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
     };
     // A run that is killed leaves what there was after its last check.
     let results = stability::run(&checks, effort, kept, &watch, |results| match &arguments.out {
-        Some(folder) => report(results.to_vec(), true).write_to(folder),
+        Some(folder) => report(results.to_vec(), true).write_json_to(folder),
         None => Ok(()),
     })?;
     watch.bar.finish_and_clear();
@@ -122,7 +122,8 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
         Some(folder) => {
             report.write_to(folder)?;
             if !arguments.quiet {
-                text::print(&format!("stability.html, stability.md and stability.json are in {}", folder.display()))?;
+                let place = format!("stability.html, stability.md and stability.json are in {}", folder.display());
+                text::print(&[report.lines(), vec![place]].concat().join("\n"))?;
             }
         }
         None if arguments.json => text::print(&report.json()?)?,
