@@ -5,10 +5,7 @@ use std::path::Path;
 
 use steradian::import::{self, ImportOptions, MeshData};
 
-/// The kinds of files that are read.
-pub const KINDS: [&str; 7] = ["scene_json", "obj", "ply", "image", "mitsuba_xml", "pbrt", "gltf"];
-
-/// Reads `data` as a file of `kind` in `folder`, which only this caller writes to. Malformed files are errors; anything else is a finding.
+/// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to. Malformed files are errors; anything else is a finding.
 pub fn read(kind: &str, data: &[u8], folder: &Path) {
     let write = |name: &str, data: &[u8]| {
         let path = folder.join(name);

@@ -1,5 +1,7 @@
 //! Mitsuba's cube, and what has to be known of mesh files before they are read.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use crate::desc::{MeshDesc, MeshShadingDesc};
@@ -27,12 +29,12 @@ pub fn cube() -> MeshDesc {
 
 /// Whether the header of a PLY file or a line of an OBJ file has normals; not if the file cannot be read.
 pub fn has_normals(path: &Path) -> bool {
-    let Ok(bytes) = std::fs::read(path) else { return false };
+    let Ok(file) = File::open(path) else { return false };
     let has = |line: &[u8], word: &[u8]| line.trim_ascii().starts_with(word);
-    let mut lines = bytes.split(|&b| b == b'\n');
-    if bytes.starts_with(b"ply") {
-        lines.take_while(|line| !has(line, b"end_header")).any(|line| has(line, b"property") && line.trim_ascii().ends_with(b" nx"))
+    let mut lines = BufReader::new(file).split(b'\n').map_while(std::io::Result::ok).peekable();
+    if lines.peek().is_some_and(|line| has(line, b"ply")) {
+        lines.take_while(|line| !has(line, b"end_header")).any(|line| has(&line, b"property") && line.trim_ascii().ends_with(b" nx"))
     } else {
-        lines.any(|line| has(line, b"vn "))
+        lines.any(|line| has(&line, b"vn "))
     }
 }
