@@ -85,6 +85,19 @@ pub(super) fn check_size(width: usize, height: usize) -> Result<(), String> {
     }
 }
 
+/// The most pixels that a byte of a file can stand for, where the format has a bound: memory is not asked for on a header's word alone.
+fn pixels_per_byte(format: ImageFormat) -> u64 {
+    match format {
+        // Deflate makes at most 1,032 bytes of one, and a byte may hold eight pixels.
+        ImageFormat::Png => 8 * 1032,
+        // A block of 8 x 8 pixels takes at least a bit.
+        ImageFormat::Jpeg => 8 * 64,
+        // A run of 128 pixels takes at least two bytes.
+        ImageFormat::Tga => 64,
+        _ => u64::MAX,
+    }
+}
+
 fn read_with(bytes: &[u8], format: ImageFormat) -> Result<ImageData, AssetError> {
     let name = format.extensions_str().first().unwrap_or(&"").to_uppercase();
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable {name} image: {e}"));
@@ -96,6 +109,10 @@ fn read_with(bytes: &[u8], format: ImageFormat) -> Result<ImageData, AssetError>
     let decoder = reader.into_decoder().map_err(|e| malformed(&e))?;
     let (width, height) = image::ImageDecoder::dimensions(&decoder);
     check_size(width as usize, height as usize).map_err(AssetError::Malformed)?;
+    if u64::from(width) * u64::from(height) > pixels_per_byte(format).saturating_mul(bytes.len() as u64) {
+        let message = format!("the image claims {width} x {height} pixels, more than {} bytes of {name} can hold", bytes.len());
+        return Err(AssetError::Malformed(message));
+    }
     let image = DynamicImage::from_decoder(decoder).map_err(|e| malformed(&e))?;
     let (channels, samples) = match image {
         DynamicImage::ImageLuma8(i) => (1, Samples::U8(i.into_raw())),

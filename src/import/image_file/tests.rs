@@ -145,3 +145,25 @@ fn what_is_no_image_is_named_so() {
     assert!(matches!(read_image(&folder.path().join("none.png")), Err(AssetError::Missing { .. })));
     assert!(matches!(read_image(folder.path()), Err(AssetError::Missing { .. })));
 }
+
+#[test]
+fn a_header_that_claims_more_than_the_file_can_hold_is_refused_and_flat_images_are_not() {
+    let folder = folder();
+    for name in ["flat.png", "flat.jpg", "flat.tga"] {
+        let path = save(DynamicImage::ImageLuma8(ImageBuffer::from_pixel(3000, 2000, image::Luma([40]))), &folder, name);
+        assert_eq!(read_image(&path).unwrap().width, 3000, "{name}");
+    }
+    let mut bytes = std::fs::read(folder.path().join("flat.png")).unwrap();
+    bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 0, 12, 0]);
+    // The checksum of the header: this is no damaged file.
+    let checksum = {
+        let mut crc = flate2::Crc::new();
+        crc.update(&bytes[12..29]);
+        crc.sum()
+    };
+    bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
+    let path = folder.path().join("claims.png");
+    std::fs::write(&path, &bytes).unwrap();
+    let error = format!("{:?}", read_image(&path).unwrap_err());
+    assert!(error.contains("65536 x 3072 pixels, more than"), "{error}");
+}
