@@ -195,7 +195,7 @@ fn erf_inv(x: f32) -> f32 {
         5.739_507_7e-3,
         -7.622_461_3e-3,
         9.438_87e-3,
-        1.001_674_1,
+        1.001_674,
         2.832_976_8,
     ];
     let x = x.clamp(-ONE_MINUS_EPSILON, ONE_MINUS_EPSILON);

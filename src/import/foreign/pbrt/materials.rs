@@ -155,11 +155,11 @@ impl Materials<'_> {
             });
         }
         if u == v {
-            let both = self.remapped(u, remap, params, &key);
+            let both = self.remapped(u, remap, params, key);
             return Ok(both.name(self.draft, &params.place).map(|texture| RoughnessDesc::Texture { texture }));
         }
         let [u, v] = [u, v].map(|along| {
-            let along = self.remapped(along, remap, params, &key);
+            let along = self.remapped(along, remap, params, key);
             along.scalar(self.draft, &params.place)
         });
         Ok(Some(RoughnessDesc::Axes { u, v }))
