@@ -2,11 +2,11 @@
 
 mod inputs;
 
-pub use inputs::{AlphaInput, CoatInput, ColorInput, RangedInput, ScalarInput};
+pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, RangedInput, ScalarInput};
 
 use crate::bsdf::{
-    Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Plastic, Principled, PrincipledParameters,
-    ThinDielectric,
+    BeckmannBsdf, Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Plastic, Principled,
+    PrincipledParameters, ThinDielectric,
 };
 use crate::color::Rgb;
 use crate::id::MaterialId;
@@ -68,8 +68,8 @@ pub enum Varying {
         tint: ColorInput,
         /// Roughness.
         alpha: AlphaInput,
-        /// Whether light scattered several times counts.
-        multiscatter: bool,
+        /// Its microfacets.
+        facets: Facets,
     },
     /// Glass.
     Dielectric {
@@ -77,8 +77,8 @@ pub enum Varying {
         ior: f32,
         /// Roughness.
         alpha: AlphaInput,
-        /// Whether light scattered several times counts.
-        multiscatter: bool,
+        /// Its microfacets.
+        facets: Facets,
     },
     /// Phong's model.
     Phong {
@@ -217,13 +217,21 @@ impl Varying {
                 transmittance.at(textures, footprint),
             )),
             Self::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: reflectance.at(textures, footprint) }),
-            Self::Conductor { metal, tint, alpha, multiscatter } => {
-                let metal = metal.with_surface(alpha.at(textures, footprint), tint.at(textures, footprint));
-                Bsdf::Conductor(if *multiscatter { metal } else { metal.single_scattering() })
+            Self::Conductor { metal, tint, alpha, facets } => {
+                let (alpha, tint) = (alpha.at(textures, footprint), tint.at(textures, footprint));
+                match facets {
+                    Facets::Ggx => Bsdf::Conductor(metal.with_surface(alpha, tint)),
+                    Facets::SingleGgx => Bsdf::Conductor(metal.with_surface(alpha, tint).single_scattering()),
+                    Facets::Beckmann => Bsdf::Beckmann(BeckmannBsdf::Conductor(metal.with_beckmann(alpha, tint))),
+                }
             }
-            Self::Dielectric { ior, alpha, multiscatter } => {
-                let glass = Dielectric::new(*ior, alpha.at(textures, footprint));
-                Bsdf::Dielectric(if *multiscatter { glass } else { glass.single_scattering() })
+            Self::Dielectric { ior, alpha, facets } => {
+                let alpha = alpha.at(textures, footprint);
+                match facets {
+                    Facets::Ggx => Bsdf::Dielectric(Dielectric::new(*ior, alpha)),
+                    Facets::SingleGgx => Bsdf::Dielectric(Dielectric::new(*ior, alpha).single_scattering()),
+                    Facets::Beckmann => Bsdf::Beckmann(BeckmannBsdf::Dielectric(Dielectric::beckmann(*ior, alpha))),
+                }
             }
             Self::Phong { diffuse, specular, exponent } => {
                 // What exceeds 1 together is taken from the diffuse part.
@@ -322,8 +330,8 @@ impl Material {
     pub fn boundary(&self, textures: &[Texture], uv: Vec2, ior: f32) -> Option<Bsdf> {
         match self {
             Self::Varying(varying) => match **varying {
-                Varying::Dielectric { alpha, multiscatter, .. } => {
-                    Some(Varying::Dielectric { ior, alpha, multiscatter }.bsdf(textures, &Footprint::point(uv)))
+                Varying::Dielectric { alpha, facets, .. } => {
+                    Some(Varying::Dielectric { ior, alpha, facets }.bsdf(textures, &Footprint::point(uv)))
                 }
                 _ => None,
             },

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
+use steradian::film::LayerKind;
 use steradian::id::{LightGroupId, LightId};
 
 use crate::util::folder::{Folder, good_scene, set};
@@ -213,5 +214,52 @@ fn wrong_cameras_are_refused_with_their_place() {
         (json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_height": -1 } }), "camera.lens.sensor_height", "-1"),
     ] {
         assert_fault(&folder, "camera", &camera(value), ErrorKind::Scene, place, word);
+    }
+}
+
+#[test]
+fn a_hidden_lamp_shows_what_is_behind_it() {
+    // A lamp before a wall under a grey sky. With the lamp hidden the wall looks as through a near plane behind the lamp, and there is no sky.
+    for kind in ["path", "whitted"] {
+        for turned in [false, true] {
+            let picture = |hide: bool, near: f64| {
+                render(&json!({
+                    "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
+                    "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "near": near },
+                    "sampler": { "spp": 16 },
+                    "integrator": { "type": kind, "hide_emitters": hide },
+                    "materials": { "white": { "type": "diffuse", "albedo": 0.8 } },
+                    "shapes": [
+                        { "type": "quad", "material": "white", "origin": [-1.2, -1.2, 0], "edge_u": [2.4, 0, 0], "edge_v": [0, 2.4, 0] },
+                        {
+                            "type": "quad", "origin": [-0.5, -0.5, 1], "edge_u": [1, 0, 0], "edge_v": [0, 1, 0], "reverse_normal": turned,
+                            "emission": { "radiance": [5, 5, 5] }
+                        },
+                        // Another lamp behind it.
+                        {
+                            "type": "sphere", "radius": 0.1, "transform": [{ "translate": [0, 0, 0.4] }],
+                            "emission": { "radiance": [1, 1, 1] }
+                        }
+                    ],
+                    "lights": [{ "type": "environment", "radiance": [0.3, 0.3, 0.3] }]
+                }))
+            };
+            let (shown, hidden, beyond) = (picture(false, 0.0), picture(true, 0.0), picture(false, 4.8));
+            let of = |image: &steradian::film::Image, x: u32, y: u32| image.pixel(LayerKind::Color, x, y).unwrap().to_vec();
+            assert_eq!((of(&shown, 12, 12)[0] == 5.0, of(&shown, 12, 12)[3]), (!turned, 1.0), "{kind}");
+            assert_eq!((of(&shown, 0, 0), of(&hidden, 0, 0)), (vec![0.3, 0.3, 0.3, 0.0], vec![0.0; 4]), "{kind}");
+            let (mut sums, mut covered) = ([0.0; 2], 0);
+            for (x, y) in (0..24).flat_map(|y| (0..24).map(move |x| (x, y))) {
+                let (a, b) = (of(&hidden, x, y), of(&beyond, x, y));
+                assert_eq!(a[3], b[3], "{kind} {x} {y}");
+                if a[3] == 1.0 {
+                    covered += 1;
+                    sums[0] += a[1];
+                    sums[1] += b[1];
+                }
+            }
+            // The same paths, but for rounding.
+            assert!((sums[0] - sums[1]).abs() < 1e-3 * sums[1] && covered > 100, "{kind} {turned}: {sums:?} {covered}");
+        }
     }
 }

@@ -201,3 +201,61 @@ fn a_coat_over_what_consists_of_others_coats_the_parts() {
         assert!(from_front == (a.mean > 0.3), "{a:?}");
     }
 }
+
+/// The square seen under a directional light from the right.
+fn lit_from_the_right(material: &Value) -> f64 {
+    let textures = json!({ "half": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0, 0, 0], "scale": [1, 1] } });
+    let mut scene = square(true, json!({ "textures": textures, "materials": { "m": material } }));
+    scene["camera"]["look_at"] = json!([0.5, 0.5, 0.0]);
+    scene["lights"] = json!([{ "type": "directional", "direction": [-0.5, 0, -1], "irradiance": [1, 1, 1] }]);
+    scene["sampler"]["spp"] = json!(4);
+    Estimate::of(&render(&scene), 0).mean
+}
+
+#[test]
+fn each_axis_of_a_roughness_can_be_a_texture() {
+    let half = json!({ "texture": "half" });
+    for distribution in ["ggx", "beckmann"] {
+        for key in ["alpha", "roughness"] {
+            for kind in [json!({ "type": "conductor", "metal": "gold" }), json!({ "type": "plastic", "albedo": 0 })] {
+                if kind["type"] == "plastic" && distribution != "ggx" {
+                    continue;
+                }
+                let lit = |axes: Value| {
+                    let mut material = kind.clone();
+                    material[key] = axes;
+                    if kind["type"] == "conductor" {
+                        material["distribution"] = json!(distribution);
+                    }
+                    lit_from_the_right(&material)
+                };
+                let [along, across] = [lit(json!([0.5, 0.2])), lit(json!([0.2, 0.5]))];
+                let close = |a: f64, b: f64| (a - b).abs() < 2e-3 * b;
+                assert!(!close(along, across), "{key} {kind}: {along} {across}");
+                assert!(
+                    close(lit(json!({ "u": half, "v": 0.2 })), along) && close(lit(json!({ "u": 0.2, "v": half })), across),
+                    "{key} {kind}"
+                );
+                assert!(close(lit(json!({ "u": half, "v": half })), lit(json!(0.5))), "{key} {kind}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_metal_with_beckmanns_microfacets_has_their_density() {
+    // Against GGX of the same alpha, the ratio of density and masking for the one half vector; Beckmann masks nothing at these angles.
+    let lit = |distribution: &str| {
+        lit_from_the_right(&json!({
+            "type": "conductor", "eta": [1e-6, 1e-6, 1e-6], "k": [1, 1, 1], "alpha": 0.3, "distribution": distribution, "multiscatter": false
+        }))
+    };
+    let unit = |v: [f64; 3]| v.map(|x| x / v.iter().map(|x| x * x).sum::<f64>().sqrt());
+    let (o, i) = (unit([-0.2, -0.1, 5.0]), unit([0.5, 0.0, 1.0]));
+    let tan2 = |v: [f64; 3]| 0.09f64.recip() * (v[0] * v[0] + v[1] * v[1]) / (v[2] * v[2]);
+    let slope2 = tan2([o[0] + i[0], o[1] + i[1], o[2] + i[2]]);
+    let lambda = |v: [f64; 3]| 0.5 * ((1.0 + 0.09 * 0.09 * tan2(v)).sqrt() - 1.0);
+    let expected = (-slope2).exp() * (1.0 + slope2).powi(2) * (1.0 + lambda(o) + lambda(i));
+    let ratio = lit("beckmann") / lit("ggx");
+    assert!((ratio - expected).abs() < 1e-3 * expected && (expected - 1.0).abs() > 0.05, "{ratio} {expected}");
+}

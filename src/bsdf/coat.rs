@@ -3,7 +3,7 @@
 use super::energy::table::COAT_NODES as NODES;
 use super::energy::{coat_albedo, coat_average};
 use super::fresnel;
-use super::microfacet::{FacetReflection, reflect};
+use super::microfacet::{FacetReflection, Microfacets, reflect};
 use super::{BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, sin_cos_turns, vec3};

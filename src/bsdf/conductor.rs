@@ -1,22 +1,22 @@
-//! Metals: reflection with the exact Fresnel equations of a complex index of refraction, by a plane or by GGX microfacets; light that meets
-//! several microfacets comes back as the lobe of [`energy`](super::energy), coloured by as many reflections.
+//! Metals: reflection with the exact Fresnel equations of a complex index of refraction, by a plane or by microfacets; light that meets
+//! several GGX microfacets comes back as the lobe of [`energy`](super::energy), coloured by as many reflections.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::energy::{Energy, multiple_color};
 use super::fresnel::ComplexIndex;
-use super::microfacet::{MIN_COSINE, reflect};
-use super::{BsdfEval, BsdfSample, Ggx};
+use super::microfacet::{MIN_COSINE, Microfacets, reflect};
+use super::{Beckmann, BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
 
-/// A metal on both sides.
+/// A metal on both sides, with microfacets distributed by `D`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Conductor {
+pub struct Conductor<D = Ggx> {
     index: [ComplexIndex; 3],
     tint: Rgb,
-    ggx: Ggx,
+    facets: D,
     /// Reflectance under diffuse light without the tint.
     average: Rgb,
     /// Colour of light scattered several times, over `pi (1 - E_avg)`.
@@ -25,13 +25,13 @@ pub struct Conductor {
     share: f32,
 }
 
-impl Conductor {
+impl Conductor<Ggx> {
     /// A metal with index of refraction `eta + i k` relative to the outside; smooth where [`Ggx::new`] says so. `tint` multiplies the
     /// reflectance.
     pub fn new(eta: Rgb, k: Rgb, alpha: [f32; 2], tint: Rgb) -> Self {
         let index = [ComplexIndex::new(eta.r, k.r), ComplexIndex::new(eta.g, k.g), ComplexIndex::new(eta.b, k.b)];
         let average = Rgb::from(index.map(ComplexIndex::average));
-        let metal = Self { index, tint, ggx: Ggx::new(alpha), average, multiple: Rgb::BLACK, share: 0.0 };
+        let metal = Self { index, tint, facets: Ggx::new(alpha), average, multiple: Rgb::BLACK, share: 0.0 };
         metal.with_multiple_scattering()
     }
 
@@ -43,10 +43,10 @@ impl Conductor {
 
     fn with_multiple_scattering(self) -> Self {
         let average = self.tint * self.average;
-        if self.ggx.is_smooth() || average.is_black() {
+        if self.facets.is_smooth() || average.is_black() {
             return self;
         }
-        let lost = Energy::new(&self.ggx).mirrors_lost();
+        let lost = Energy::new(&self.facets).mirrors_lost();
         let color = average.map(|f| multiple_color(f, 1.0 - lost));
         Self { multiple: color / (PI * lost), share: color.mean() / average.mean(), ..self }
     }
@@ -54,12 +54,27 @@ impl Conductor {
     /// The same metal with other roughness and tint.
     #[must_use]
     pub fn with_surface(self, alpha: [f32; 2], tint: Rgb) -> Self {
-        Self { tint, ggx: Ggx::new(alpha), ..self.single_scattering() }.with_multiple_scattering()
+        Self { tint, facets: Ggx::new(alpha), ..self.single_scattering() }.with_multiple_scattering()
     }
 
+    /// The same metal with microfacets distributed as Beckmann's, other roughness and tint, and without multiple scattering.
+    #[must_use]
+    pub fn with_beckmann(self, alpha: [f32; 2], tint: Rgb) -> Conductor<Beckmann> {
+        let Self { index, average, .. } = self;
+        Conductor { index, tint, facets: Beckmann::new(alpha), average, multiple: Rgb::BLACK, share: 0.0 }
+    }
+}
+
+impl<D: Microfacets> Conductor<D> {
     #[inline]
     fn reflectance(&self, cos: f32) -> Rgb {
         self.tint * Rgb::from(self.index.map(|index| index.reflectance(cos)))
+    }
+
+    /// What perfect mirrors would scatter at once, where multiple scattering is known.
+    #[inline]
+    fn at_once(&self, w: Vec3) -> f32 {
+        self.facets.energy().map_or(1.0, |energy| energy.mirrors(w))
     }
 
     /// Probability of sampling light scattered several times, for what microfacets scatter at once.
@@ -72,23 +87,23 @@ impl Conductor {
     /// `F D G2 / (4 |cos wo|)` and light scattered several times for directions on the same side of a rough metal, zero for a smooth one.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        if self.ggx.is_smooth() || wo.z * wi.z <= 0.0 {
+        if self.facets.is_smooth() || wo.z * wi.z <= 0.0 {
             return BsdfEval::default();
         }
         let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
         if self.share == 0.0 {
-            let facet = self.ggx.reflection(o, i);
+            let facet = self.facets.reflection(o, i);
             return BsdfEval { value: self.reflectance(facet.cos) * facet.value, pdf: facet.pdf };
         }
-        self.eval_upper(o, i, Energy::new(&self.ggx).mirrors(o))
+        self.eval_upper(o, i, self.at_once(o))
     }
 
     /// With multiple scattering, for what microfacets scatter at once of the light from `o`.
     #[inline]
     fn eval_upper(&self, o: Vec3, i: Vec3, at_once: f32) -> BsdfEval {
-        let facet = self.ggx.reflection(o, i);
+        let facet = self.facets.reflection(o, i);
         let probability = self.multiple_probability(at_once);
-        let lost = (1.0 - at_once) * (1.0 - Energy::new(&self.ggx).mirrors(i));
+        let lost = (1.0 - at_once) * (1.0 - self.at_once(i));
         BsdfEval {
             value: self.reflectance(facet.cos) * facet.value + self.multiple * (lost * i.z),
             pdf: (1.0 - probability) * facet.pdf + probability * FRAC_1_PI * i.z,
@@ -101,15 +116,15 @@ impl Conductor {
         if wo.z.abs() <= MIN_COSINE {
             return None;
         }
-        if self.ggx.is_smooth() {
+        if self.facets.is_smooth() {
             return Some(BsdfSample::mirrored(wo, self.reflectance(wo.z.abs().min(1.0)), 1.0));
         }
         let o = vec3(wo.x, wo.y, wo.z.abs());
-        let at_once = if self.share == 0.0 { 1.0 } else { Energy::new(&self.ggx).mirrors(o) };
+        let at_once = if self.share == 0.0 { 1.0 } else { self.at_once(o) };
         if self.share > 0.0 && u_lobe < self.multiple_probability(at_once) {
             return self.weigh(wo, o, warp::cosine_hemisphere(u), at_once);
         }
-        let m = self.ggx.sample_visible_normal(o, u);
+        let m = self.facets.sample_visible_normal(o, u);
         let cos = o.dot(m);
         let mut wi = reflect(o, m, cos);
         if !(cos > 0.0 && wi.z > 0.0) {
@@ -118,8 +133,8 @@ impl Conductor {
         if self.share > 0.0 {
             return self.weigh(wo, o, wi, at_once);
         }
-        let weight = self.reflectance(cos.min(1.0)) * self.ggx.sampled_shadowing(o, wi);
-        let pdf = self.ggx.reflection_pdf(o, m);
+        let weight = self.reflectance(cos.min(1.0)) * self.facets.sampled_shadowing(o, wi);
+        let pdf = self.facets.reflection_pdf(o, m);
         wi.z = wi.z.copysign(wo.z);
         Some(BsdfSample { wi, weight, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
     }
@@ -132,20 +147,20 @@ impl Conductor {
         (i.z > 0.0 && pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
     }
 
-    /// GGX alpha along both tangents.
+    /// Alpha along both tangents.
     pub fn alpha(&self) -> [f32; 2] {
-        self.ggx.alpha()
+        self.facets.alpha()
     }
 
     /// Whether the surface is rougher along one tangent than along the other.
     pub fn is_anisotropic(&self) -> bool {
-        self.ggx.alpha()[0] != self.ggx.alpha()[1]
+        self.facets.alpha()[0] != self.facets.alpha()[1]
     }
 
     /// Whether the metal is smooth.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        self.ggx.is_smooth()
+        self.facets.is_smooth()
     }
 
     /// The reflectance of the plane.

@@ -1,4 +1,4 @@
-//! Glass, water and the like: reflection and refraction with the exact Fresnel equations, by a plane or by GGX microfacets (Walter et al.,
+//! Glass, water and the like: reflection and refraction with the exact Fresnel equations, by a plane or by microfacets (Walter et al.,
 //! "Microfacet Models for Refraction through Rough Surfaces").
 //!
 //! Values are for radiance carried towards `wo`: what is refracted carries `1 / eta²`, with `eta` the index of refraction on the side of
@@ -10,30 +10,30 @@
 //! pdf   = (1 - F) (visible normals) eta² |wi·m| / |h|²
 //! ```
 //!
-//! What microfacets lose is shared out to both sides by two lobes as in [`energy`](super::energy): with `L` what is lost of diffuse light from
+//! What GGX microfacets lose is shared out to both sides by two lobes as in [`energy`](super::energy): with `L` what is lost of diffuse light from
 //! each side and `F` the mean reflectance from the thinner one, `(1 - F) min(L, L') / L` of what is lost on the thinner side crosses, and
 //! `1 / ior²` times that with `L'` on the denser one, so that nothing is lost and what crosses is reciprocal. What anisotropic microfacets
 //! lose is not known closely enough, and stays lost.
 //!
-//! Reflection and refraction share the height-correlated G2, as in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition.
+//! Reflection and refraction by GGX microfacets share the height-correlated G2, as in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition.
 
 use std::f32::consts::FRAC_1_PI;
 
 use super::energy::Energy;
 use super::fresnel;
-use super::microfacet::{MIN_COSINE, reflect};
-use super::{BsdfEval, BsdfSample, Ggx};
+use super::microfacet::{MIN_COSINE, Microfacets, reflect, usable};
+use super::{Beckmann, BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
 
-/// A boundary between two clear media. The outside is where the normal points.
+/// A boundary between two clear media, with microfacets distributed by `D`. The outside is where the normal points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dielectric {
+pub struct Dielectric<D = Ggx> {
     /// Index of refraction of the inside over that of the outside.
     ior: f32,
-    ggx: Ggx,
+    facets: D,
     /// What microfacets lose, for light from outside and from inside; `None` if it stays lost.
     multiple: Option<[Multiple; 2]>,
 }
@@ -62,14 +62,20 @@ fn multiple_scattering(ior: f32, ggx: &Ggx) -> [Multiple; 2] {
     ]
 }
 
-impl Dielectric {
-    /// A boundary with the index of refraction `ior` inside over outside, positive; smooth where [`Ggx::new`] says so. Since refraction
-    /// turns directions by about `|ior - 1|` times the slope, that also multiplies alpha before it is compared with the limit.
+/// Alpha as a boundary with this relative index of refraction uses it, zero for a smooth one. Since refraction turns directions by about
+/// `|ior - 1|` times the slope, that also multiplies alpha before it is compared with the limit.
+fn usable_across(ior: f32, alpha: [f32; 2]) -> [f32; 2] {
+    let turn = (ior - 1.0).abs().min(1.0);
+    let is_smooth = usable(alpha.map(|a| a * turn))[0] == 0.0;
+    if is_smooth { [0.0; 2] } else { alpha }
+}
+
+impl Dielectric<Ggx> {
+    /// A boundary with the index of refraction `ior` inside over outside, positive; smooth where the rays that cross it would hardly show its
+    /// roughness.
     pub fn new(ior: f32, alpha: [f32; 2]) -> Self {
-        let turn = (ior - 1.0).abs().min(1.0);
-        let ggx = Ggx::new(alpha);
-        let is_smooth = Ggx::new(alpha.map(|a| a * turn)).is_smooth();
-        if is_smooth { Self { ior, ggx: Ggx::new([0.0; 2]), multiple: None } } else { Self::rough(ior, ggx, true) }
+        let ggx = Ggx::new(usable_across(ior, alpha));
+        if ggx.is_smooth() { Self { ior, facets: ggx, multiple: None } } else { Self::rough(ior, ggx, true) }
     }
 
     /// A boundary of which the caller knows that it is rough.
@@ -77,7 +83,7 @@ impl Dielectric {
     pub(super) fn rough(ior: f32, ggx: Ggx, multiscatter: bool) -> Self {
         let [ax, ay] = ggx.alpha();
         let is_known = multiscatter && ax == ay;
-        Self { ior, ggx, multiple: is_known.then(|| multiple_scattering(ior, &ggx)) }
+        Self { ior, facets: ggx, multiple: is_known.then(|| multiple_scattering(ior, &ggx)) }
     }
 
     /// Without the light that microfacets scatter several times.
@@ -85,11 +91,20 @@ impl Dielectric {
     pub fn single_scattering(self) -> Self {
         Self { multiple: None, ..self }
     }
+}
 
+impl Dielectric<Beckmann> {
+    /// As [`Dielectric::new`], with microfacets distributed as Beckmann's and without multiple scattering.
+    pub fn beckmann(ior: f32, alpha: [f32; 2]) -> Self {
+        Self { ior, facets: Beckmann::new(usable_across(ior, alpha)), multiple: None }
+    }
+}
+
+impl<D: Microfacets> Dielectric<D> {
     /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over that on its side.
     #[inline]
     fn lost(&self, eta: f32, w: Vec3) -> f32 {
-        (1.0 - Energy::new(&self.ggx).glass(eta, w)).clamp(0.0, 1.0)
+        self.facets.energy().map_or(0.0, |energy| 1.0 - energy.glass(eta, w)).clamp(0.0, 1.0)
     }
 
     /// Index of refraction beyond the surface over that on the side of `wo`.
@@ -101,7 +116,7 @@ impl Dielectric {
     /// Reflection or refraction by microfacets, zero for a smooth boundary.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        if self.ggx.is_smooth() || wo.z.abs().min(wi.z.abs()) <= MIN_COSINE {
+        if self.facets.is_smooth() || wo.z.abs().min(wi.z.abs()) <= MIN_COSINE {
             return BsdfEval::default();
         }
         // Seen from the side of `wo`, which becomes the upper one.
@@ -135,7 +150,7 @@ impl Dielectric {
     #[inline]
     fn eval_once(&self, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
         if i.z > 0.0 {
-            let facet = self.ggx.reflection(o, i);
+            let facet = self.facets.reflection(o, i);
             let reflectance = fresnel::dielectric(facet.cos, eta).reflectance;
             return BsdfEval { value: Rgb::splat(reflectance * facet.value), pdf: reflectance * facet.pdf };
         }
@@ -159,9 +174,9 @@ impl Dielectric {
         }
         // The cosine of refraction is known: recomputing it by Snell's law would lose its digits near the critical angle.
         let transmittance = 1.0 - fresnel::dielectric_reflectance(cos_o, cos_i, eta);
-        let (length_o, length_i) = (self.ggx.stretched_length(o), self.ggx.stretched_length(i));
-        let common = 2.0 * transmittance * self.ggx.normal_density(half) * cos_o * cos_i / length_squared;
-        BsdfEval { value: Rgb::splat(common * -i.z / (length_o * -i.z + length_i * o.z)), pdf: common * eta * eta / (o.z + length_o) }
+        let common = 2.0 * transmittance * self.facets.normal_density(half) * cos_o * cos_i / length_squared;
+        let (value, pdf) = self.facets.refraction(o, vec3(i.x, i.y, -i.z), common);
+        BsdfEval { value: Rgb::splat(value), pdf: pdf * eta * eta }
     }
 
     /// Reflection if `u_lobe` is below the reflectance, else refraction.
@@ -170,7 +185,7 @@ impl Dielectric {
         if wo.z.abs() <= MIN_COSINE {
             return None;
         }
-        if self.ggx.is_smooth() {
+        if self.facets.is_smooth() {
             return Some(self.sample_smooth(wo, u_lobe));
         }
         match &self.multiple {
@@ -207,7 +222,7 @@ impl Dielectric {
     fn sample_once(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let eta = self.eta(wo);
         let o = vec3(wo.x, wo.y, wo.z.abs());
-        let m = self.ggx.sample_visible_normal(o, u);
+        let m = self.facets.sample_visible_normal(o, u);
         let cos = o.dot(m).min(1.0);
         if cos <= 0.0 {
             return None;
@@ -218,16 +233,16 @@ impl Dielectric {
             if i.z <= 0.0 {
                 return None;
             }
-            (i, self.ggx.sampled_shadowing(o, i), refraction.reflectance * self.ggx.reflection_pdf(o, m), false)
+            (i, self.facets.sampled_shadowing(o, i), refraction.reflectance * self.facets.reflection_pdf(o, m), false)
         } else {
             let i = refract(o, m, cos, refraction.cos_t, eta);
             if i.z >= 0.0 {
                 return None;
             }
-            let shadowing = self.ggx.sampled_shadowing(o, vec3(i.x, i.y, -i.z));
+            let shadowing = self.facets.sampled_shadowing(o, vec3(i.x, i.y, -i.z));
             // |h| = |cos - eta cos_t|; the reflection's density holds 1 / (4 cos), which the Jacobian of refraction replaces.
             let jacobian = eta * eta * refraction.cos_t / (cos - eta * refraction.cos_t).powi(2);
-            let pdf = (1.0 - refraction.reflectance) * 4.0 * cos * self.ggx.reflection_pdf(o, m) * jacobian;
+            let pdf = (1.0 - refraction.reflectance) * 4.0 * cos * self.facets.reflection_pdf(o, m) * jacobian;
             (i, shadowing / (eta * eta), pdf, true)
         };
         wi.z *= 1f32.copysign(wo.z);
@@ -256,13 +271,13 @@ impl Dielectric {
 
     /// Whether the surface is rougher along one tangent than along the other.
     pub fn is_anisotropic(&self) -> bool {
-        self.ggx.alpha()[0] != self.ggx.alpha()[1]
+        self.facets.alpha()[0] != self.facets.alpha()[1]
     }
 
     /// Whether the boundary is smooth.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        self.ggx.is_smooth()
+        self.facets.is_smooth()
     }
 
     /// One: nothing is absorbed.

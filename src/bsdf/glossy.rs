@@ -9,7 +9,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use super::energy::schlick_weight;
-use super::microfacet::{MIN_COSINE, reflect};
+use super::microfacet::{MIN_COSINE, Microfacets, reflect};
 use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};

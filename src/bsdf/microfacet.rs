@@ -1,6 +1,6 @@
-//! The GGX distribution of microfacet normals with Smith's shadowing.
+//! Distributions of microfacet normals with Smith's shadowing; GGX is the one that everything has unless it says otherwise.
 //!
-//! With the stretched length `s(w) = |(ax wx, ay wy, wz)|` of a direction, everything is algebra:
+//! Of GGX, with the stretched length `s(w) = |(ax wx, ay wy, wz)|` of a direction, everything is algebra:
 //!
 //! ```text
 //! G1(w)              = 2 wz / (wz + s(w))
@@ -13,7 +13,41 @@
 
 use std::f32::consts::FRAC_1_PI;
 
+use super::energy::Energy;
 use crate::math::{Vec3, sin_cos_turns, vec3};
+
+/// A distribution of microfacet normals with its shadowing.
+pub trait Microfacets: Copy {
+    /// Alpha along x and y.
+    fn alpha(&self) -> [f32; 2];
+
+    /// Density of microfacet normals: microfacet area per surface area and solid angle around `m`, which need not be unit.
+    fn normal_density(&self, m: Vec3) -> f32;
+
+    /// A normal among those visible from `o`. Unit; `o·m` is positive but for rounding.
+    fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3;
+
+    /// `G2(o, i) / G1(o)`: what is left to weigh a sample of visible normals with.
+    fn sampled_shadowing(&self, o: Vec3, i: Vec3) -> f32;
+
+    /// Reflection between two directions of the upper side.
+    fn reflection(&self, o: Vec3, i: Vec3) -> FacetReflection;
+
+    /// Density per solid angle of reflecting `o` at the unit normal `m`.
+    fn reflection_pdf(&self, o: Vec3, m: Vec3) -> f32;
+
+    /// `x G2(o, i) / (2 oz)` and `x G1(o) / (2 oz)`: value and density of refraction, but for their common factors.
+    fn refraction(&self, o: Vec3, i: Vec3, x: f32) -> (f32, f32);
+
+    /// How much of the light the microfacets scatter at once, where that is known.
+    fn energy(&self) -> Option<Energy>;
+
+    /// Whether the surface is a plane mirror; nothing else may then be asked.
+    #[inline]
+    fn is_smooth(&self) -> bool {
+        self.alpha()[0] == 0.0
+    }
+}
 
 /// A GGX distribution; alpha along x and y.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +65,7 @@ pub(super) const MIN_COSINE: f32 = 1e-30;
 
 /// Reflection by a microfacet between two directions, all but the Fresnel factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct FacetReflection {
+pub struct FacetReflection {
     /// `D G2 / (4 oz)`: the value with its cosine, for a reflectance of 1.
     pub value: f32,
     /// Density per solid angle of reflecting at a visible normal.
@@ -40,39 +74,16 @@ pub(super) struct FacetReflection {
     pub cos: f32,
 }
 
+/// Alphas within `[0, 1]` as they are used: both zero, or both within `[SMOOTH_ALPHA, 1]`.
+pub(super) fn usable(alpha: [f32; 2]) -> [f32; 2] {
+    let is_smooth = alpha[0].max(alpha[1]) < SMOOTH_ALPHA;
+    if is_smooth { [0.0; 2] } else { alpha.map(|a| a.clamp(SMOOTH_ALPHA, 1.0)) }
+}
+
 impl Ggx {
     /// The distribution for `alpha` within `[0, 1]`; smooth if both are below [`SMOOTH_ALPHA`].
     pub fn new(alpha: [f32; 2]) -> Self {
-        if alpha[0].max(alpha[1]) < SMOOTH_ALPHA {
-            return Self { alpha: [0.0; 2] };
-        }
-        Self { alpha: alpha.map(|a| a.clamp(SMOOTH_ALPHA, 1.0)) }
-    }
-
-    /// Alpha along x and y.
-    #[inline]
-    pub fn alpha(&self) -> [f32; 2] {
-        self.alpha
-    }
-
-    /// Whether the surface is a plane mirror; nothing else may then be asked.
-    #[inline]
-    pub fn is_smooth(&self) -> bool {
-        self.alpha[0] == 0.0
-    }
-
-    /// Density of microfacet normals: microfacet area per surface area and solid angle around `m`, which need not be unit.
-    #[inline]
-    pub fn normal_density(&self, m: Vec3) -> f32 {
-        let [ax, ay] = self.alpha;
-        let a = ax * ay;
-        let stretched = vec3(m.x * ay, m.y * ax, m.z * a).length_squared();
-        // Zero only where the squares underflow.
-        if stretched == 0.0 {
-            return 0.0;
-        }
-        let ratio = a * m.length_squared() / stretched;
-        FRAC_1_PI * a * ratio * ratio
+        Self { alpha: usable(alpha) }
     }
 
     /// Length of `w` stretched by alpha.
@@ -93,17 +104,38 @@ impl Ggx {
         2.0 * o.z * i.z / (self.stretched_length(o) * i.z + self.stretched_length(i) * o.z)
     }
 
-    /// `G2(o, i) / G1(o)`: what is left to weigh a sample of visible normals with.
+    /// Density per solid angle of [`Microfacets::sample_visible_normal`]; `m` unit.
     #[inline]
-    pub fn sampled_shadowing(&self, o: Vec3, i: Vec3) -> f32 {
-        let length = self.stretched_length(o);
-        i.z * (o.z + length) / (length * i.z + self.stretched_length(i) * o.z)
+    pub fn visible_normal_pdf(&self, o: Vec3, m: Vec3) -> f32 {
+        if m.z <= 0.0 {
+            return 0.0;
+        }
+        2.0 * self.normal_density(m) * o.dot(m).max(0.0) / (o.z + self.stretched_length(o))
+    }
+}
+
+impl Microfacets for Ggx {
+    #[inline]
+    fn alpha(&self) -> [f32; 2] {
+        self.alpha
     }
 
-    /// A normal among those visible from `o`, with density [`Ggx::visible_normal_pdf`] (Dupuy and Benyoub, "Sampling Visible GGX Normals
-    /// with Spherical Caps"). Unit; `o·m` is positive but for rounding.
     #[inline]
-    pub fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
+    fn normal_density(&self, m: Vec3) -> f32 {
+        let [ax, ay] = self.alpha;
+        let a = ax * ay;
+        let stretched = vec3(m.x * ay, m.y * ax, m.z * a).length_squared();
+        // Zero only where the squares underflow.
+        if stretched == 0.0 {
+            return 0.0;
+        }
+        let ratio = a * m.length_squared() / stretched;
+        FRAC_1_PI * a * ratio * ratio
+    }
+
+    /// With density [`Ggx::visible_normal_pdf`] (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps").
+    #[inline]
+    fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
         let [ax, ay] = self.alpha;
         // The hemisphere's configuration: there a reflected direction is uniform on the cap z > -w.z.
         let w = vec3(ax * o.x, ay * o.y, o.z).normalize();
@@ -114,18 +146,14 @@ impl Ggx {
         vec3(ax * (radius * cos + w.x), ay * (radius * sin + w.y), above).normalize()
     }
 
-    /// Density per solid angle of [`Ggx::sample_visible_normal`]; `m` unit.
     #[inline]
-    pub fn visible_normal_pdf(&self, o: Vec3, m: Vec3) -> f32 {
-        if m.z <= 0.0 {
-            return 0.0;
-        }
-        2.0 * self.normal_density(m) * o.dot(m).max(0.0) / (o.z + self.stretched_length(o))
+    fn sampled_shadowing(&self, o: Vec3, i: Vec3) -> f32 {
+        let length = self.stretched_length(o);
+        i.z * (o.z + length) / (length * i.z + self.stretched_length(i) * o.z)
     }
 
-    /// Reflection between two directions of the upper side.
     #[inline]
-    pub(super) fn reflection(&self, o: Vec3, i: Vec3) -> FacetReflection {
+    fn reflection(&self, o: Vec3, i: Vec3) -> FacetReflection {
         let half = o + i;
         let density = self.normal_density(half);
         let (length_o, length_i) = (self.stretched_length(o), self.stretched_length(i));
@@ -138,10 +166,20 @@ impl Ggx {
         }
     }
 
-    /// Density per solid angle of reflecting `o` at the unit normal `m`.
     #[inline]
-    pub(super) fn reflection_pdf(&self, o: Vec3, m: Vec3) -> f32 {
+    fn reflection_pdf(&self, o: Vec3, m: Vec3) -> f32 {
         0.5 * self.normal_density(m) / (o.z + self.stretched_length(o))
+    }
+
+    #[inline]
+    fn refraction(&self, o: Vec3, i: Vec3, x: f32) -> (f32, f32) {
+        let (length_o, length_i) = (self.stretched_length(o), self.stretched_length(i));
+        (x * i.z / (length_o * i.z + length_i * o.z), x / (o.z + length_o))
+    }
+
+    #[inline]
+    fn energy(&self) -> Option<Energy> {
+        Some(Energy::new(self))
     }
 }
 

@@ -3,6 +3,7 @@
 //! Every value carries the cosine: `f(wo, wi) |cos wi|`. Densities are per solid angle. Materials are two-sided: `wo.z < 0` sees the
 //! back, which an opaque BSDF treats as its front and a dielectric as its inside.
 
+mod beckmann;
 mod coat;
 mod coated;
 mod conductor;
@@ -20,6 +21,7 @@ mod principled;
 mod tests;
 mod thin;
 
+pub use beckmann::{Beckmann, BeckmannBsdf};
 pub use coat::Coat;
 pub use coated::Coated;
 pub use conductor::Conductor;
@@ -28,7 +30,7 @@ pub use energy::bake as bake_energy_tables;
 pub use eon::Eon;
 pub use glossy::Glossy;
 pub use lambert::Lambert;
-pub use microfacet::{Ggx, SMOOTH_ALPHA};
+pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA};
 pub use mirror::Mirror;
 pub use plastic::Plastic;
 pub use principled::{Principled, PrincipledParameters};
@@ -90,6 +92,8 @@ pub enum Bsdf {
     Principled(Principled),
     /// A clear coat over another opaque one.
     Coated(Box<Coated>),
+    /// One of the above with Beckmann's microfacets.
+    Beckmann(BeckmannBsdf),
 }
 
 // Made anew at every hit: no kind may make the others slower to pass around.
@@ -109,6 +113,7 @@ macro_rules! each {
             Bsdf::Plastic($bsdf) => $body,
             Bsdf::Principled($bsdf) => $body,
             Bsdf::Coated($bsdf) => $body,
+            Bsdf::Beckmann($bsdf) => $body,
         }
     };
 }
@@ -158,6 +163,7 @@ impl Bsdf {
             Self::Plastic(bsdf) => bsdf.is_anisotropic(),
             Self::Principled(bsdf) => bsdf.is_anisotropic(),
             Self::Coated(bsdf) => bsdf.is_anisotropic(),
+            Self::Beckmann(bsdf) => bsdf.is_anisotropic(),
         }
     }
 
@@ -167,6 +173,7 @@ impl Bsdf {
         match self {
             Self::Dielectric(_) | Self::ThinDielectric(_) | Self::DiffuseTransmission(_) => true,
             Self::Principled(bsdf) => bsdf.transmits(),
+            Self::Beckmann(bsdf) => bsdf.transmits(),
             Self::Lambert(_)
             | Self::Eon(_)
             | Self::Mirror(_)

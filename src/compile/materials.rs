@@ -7,11 +7,11 @@ use super::Files;
 use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, MaterialDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc};
+use crate::desc::{ColorDesc, DistributionDesc, MaterialDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc};
 use crate::error::Result;
 use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
-use crate::material::{AlphaInput, CoatInput, ColorInput, Material, RangedInput, ScalarInput, Varying};
+use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, RangedInput, ScalarInput, Varying};
 use crate::medium::{Media, Medium};
 use crate::relief::Relief;
 use crate::texture::Texture;
@@ -163,17 +163,17 @@ impl Compiler<'_> {
             MaterialDesc::Mirror { reflectance } => {
                 Varying::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
             }
-            MaterialDesc::Conductor { metal, eta, k, roughness, alpha, tint, multiscatter } => {
+            MaterialDesc::Conductor { metal, eta, k, roughness, alpha, distribution, tint, multiscatter } => {
                 let (eta, k) = self.metal(path, metal.as_deref(), *eta, *k)?;
                 let metal = Conductor::new(eta.into(), k.into(), [0.0; 2], Rgb::WHITE);
                 let tint = self.color(&format!("{path}.tint"), tint)?;
                 let alpha = self.alpha(path, roughness.as_ref(), alpha.as_ref())?;
-                Varying::Conductor { metal, tint, alpha, multiscatter: *multiscatter }.into()
+                Varying::Conductor { metal, tint, alpha, facets: facets(*distribution, *multiscatter) }.into()
             }
             MaterialDesc::Dielectric(glass) => {
                 let ior = self.glass_ior(path, &glass.ior)?;
                 let alpha = self.alpha(path, glass.roughness.as_ref(), glass.alpha.as_ref())?;
-                let boundary = Varying::Dielectric { ior, alpha, multiscatter: glass.multiscatter };
+                let boundary = Varying::Dielectric { ior, alpha, facets: facets(glass.distribution, glass.multiscatter) };
                 // The relative index at a medium's surface depends on what is around it.
                 if glass.is_medium() { Material::Varying(Box::new(boundary)) } else { boundary.into() }
             }
@@ -280,6 +280,7 @@ impl Compiler<'_> {
             RoughnessDesc::Isotropic(a) => [constant(*a)?; 2],
             RoughnessDesc::Anisotropic([u, v]) => [constant(*u)?, constant(*v)?],
             RoughnessDesc::Texture { texture } => [self.scalar(&path, &ScalarDesc::Texture { texture: texture.clone() })?; 2],
+            RoughnessDesc::Axes { u, v } => [self.scalar(&format!("{path}.u"), u)?, self.scalar(&format!("{path}.v"), v)?],
         };
         Ok(AlphaInput { axes, squared })
     }
@@ -317,6 +318,14 @@ impl Compiler<'_> {
                 }
             }
         })
+    }
+}
+
+fn facets(distribution: DistributionDesc, multiscatter: bool) -> Facets {
+    match distribution {
+        DistributionDesc::Beckmann => Facets::Beckmann,
+        DistributionDesc::Ggx if multiscatter => Facets::Ggx,
+        DistributionDesc::Ggx => Facets::SingleGgx,
     }
 }
 

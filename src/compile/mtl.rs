@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::id::TextureId;
 use crate::import::{ObjMap, ObjMaterial};
 use crate::light::Emission;
-use crate::material::{AlphaInput, CoatInput, ColorInput, Material, ScalarInput, Varying};
+use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, ScalarInput, Varying};
 use crate::math::Vec2;
 use crate::relief::Relief;
 use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
@@ -156,7 +156,7 @@ fn with_specular(material: Material, color: ColorInput) -> Material {
         Material::Constant(Bsdf::Mirror(_)) => Varying::Mirror { reflectance: color }.into(),
         Material::Constant(Bsdf::Conductor(metal)) => {
             let alpha = AlphaInput { axes: metal.alpha().map(ScalarInput::Constant), squared: false };
-            Varying::Conductor { metal, tint: color, alpha, multiscatter: true }.into()
+            Varying::Conductor { metal, tint: color, alpha, facets: Facets::Ggx }.into()
         }
         other => other,
     }

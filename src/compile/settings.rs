@@ -69,7 +69,7 @@ fn check_integrator(files: &Files, integrator: &IntegratorDesc) -> Result<()> {
         IntegratorDesc::Path { clamp: Some(clamp), .. } => {
             files.positive("integrator.clamp", f64::from(clamp))?;
         }
-        IntegratorDesc::Whitted { max_depth, ambient } => {
+        IntegratorDesc::Whitted { max_depth, ambient, .. } => {
             if max_depth == 0 || max_depth > 64 {
                 return Err(files.error("integrator.max_depth", format!("must be from 1 to 64, not {max_depth}")));
             }

@@ -49,10 +49,14 @@ pub enum RangedDesc {
     },
 }
 
-/// GGX roughness: a number, `[along u, along v]` for an anisotropic surface, or `{ "texture": "name" }`, of which the luminance counts, clamped to
-/// `[0, 1]`. The distribution's alpha is its square.
+/// Roughness of microfacets: a number, `[along u, along v]` for an anisotropic surface, `{ "texture": "name" }`, of which the luminance counts,
+/// clamped to `[0, 1]`, or `{ "u": ..., "v": ... }` with a number or a texture for each. The distribution's alpha is its square.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged, deny_unknown_fields, expecting = "expected a number, [along u, along v], or { \"texture\": name }")]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "expected a number, [along u, along v], { \"texture\": name }, or { \"u\": ..., \"v\": ... } of numbers and textures"
+)]
 pub enum RoughnessDesc {
     /// The same in all directions.
     Isotropic(f32),
@@ -63,6 +67,32 @@ pub enum RoughnessDesc {
         /// The texture's name.
         texture: String,
     },
+    /// Each axis by itself.
+    Axes {
+        /// Along u.
+        u: ScalarDesc,
+        /// Along v.
+        v: ScalarDesc,
+    },
+}
+
+/// How the normals of microfacets are distributed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DistributionDesc {
+    /// GGX, with long tails, as of most real surfaces.
+    #[default]
+    Ggx,
+    /// Beckmann's, for agreement with scenes of other renderers: both sides are masked independently of each other, and light that microfacets
+    /// scatter several times is lost, whatever `multiscatter` says.
+    Beckmann,
+}
+
+impl DistributionDesc {
+    /// Whether it is the default.
+    pub fn is_ggx(&self) -> bool {
+        *self == Self::Ggx
+    }
 }
 
 /// A material. All are two-sided unless composed by `two_sided`; a dielectric's inside is the side against the normal. Colours are within
@@ -105,12 +135,15 @@ pub enum MaterialDesc {
         /// Imaginary part (extinction) for red, green, blue.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         k: Option<[f32; 3]>,
-        /// GGX roughness within `[0, 1]`; alpha is its square.
+        /// Roughness within `[0, 1]`; alpha is its square.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         roughness: Option<RoughnessDesc>,
-        /// GGX alpha itself, in place of `roughness`.
+        /// Alpha itself, in place of `roughness`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         alpha: Option<RoughnessDesc>,
+        /// How the normals of its microfacets are distributed. Default: `ggx`.
+        #[serde(default, skip_serializing_if = "DistributionDesc::is_ggx")]
+        distribution: DistributionDesc,
         /// Factor on the reflectance, within `[0, 1]`. Default: 1.
         #[serde(default = "white")]
         tint: ColorDesc,
@@ -241,12 +274,15 @@ pub struct DielectricDesc {
     /// for what is inside has one index. Default: 1.5.
     #[serde(default = "glass_ior")]
     pub ior: RangedDesc,
-    /// GGX roughness within `[0, 1]`; alpha is its square.
+    /// Roughness within `[0, 1]`; alpha is its square.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub roughness: Option<RoughnessDesc>,
-    /// GGX alpha itself, in place of `roughness`.
+    /// Alpha itself, in place of `roughness`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha: Option<RoughnessDesc>,
+    /// How the normals of its microfacets are distributed. Default: `ggx`.
+    #[serde(default, skip_serializing_if = "DistributionDesc::is_ggx")]
+    pub distribution: DistributionDesc,
     /// Whether light that rough microfacets scatter several times is kept. Default: true.
     #[serde(default = "yes")]
     pub multiscatter: bool,

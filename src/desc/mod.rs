@@ -17,7 +17,8 @@ mod transform;
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
 pub use material::{
-    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc, ScalarDesc,
+    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc,
+    ScalarDesc,
 };
 pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
 pub use principled::PrincipledDesc;

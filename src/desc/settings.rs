@@ -148,6 +148,10 @@ pub enum IntegratorDesc {
         /// channel more than this, above 0. Default: no limit, no bias.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         clamp: Option<f32>,
+        /// Whether what gives off light is hidden from the camera: its rays pass through emitting shapes, both sides of them, and show no light from
+        /// infinity, where alpha is 0. Light, mirror images and what is seen through glass stay. Default: false.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        hide_emitters: bool,
     },
     /// Whitted's ray tracing: mirror reflection, refraction, hard shadows, and an ambient term.
     Whitted {
@@ -157,6 +161,9 @@ pub enum IntegratorDesc {
         /// Radiance of the ambient light that every diffuse surface reflects. Default: 0.
         #[serde(default)]
         ambient: [f32; 3],
+        /// As of `path`. Default: false.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        hide_emitters: bool,
     },
     /// The geometric normal as a colour, `(n + 1) / 2`.
     #[serde(deserialize_with = "no_keys")]
@@ -183,7 +190,13 @@ pub enum IntegratorDesc {
 
 impl Default for IntegratorDesc {
     fn default() -> Self {
-        Self::Path { max_depth: default_max_depth(), rr_depth: default_rr_depth(), strategy: StrategyDesc::default(), clamp: None }
+        Self::Path {
+            max_depth: default_max_depth(),
+            rr_depth: default_rr_depth(),
+            strategy: StrategyDesc::default(),
+            clamp: None,
+            hide_emitters: false,
+        }
     }
 }
 

@@ -102,15 +102,18 @@ pub trait Integrator: Send + Sync {
 pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Box<dyn Integrator> {
     let view = |view| Box::new(DebugView { view, needs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp } => Box::new(PathIntegrator {
+        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, hide_emitters } => Box::new(PathIntegrator {
             max_depth,
             rr_depth,
             strategy: strategy.into(),
             clamp: clamp.unwrap_or(f32::INFINITY),
+            hide_emitters,
             sampler,
             needs,
         }),
-        IntegratorDesc::Whitted { max_depth, ambient } => Box::new(Whitted { max_depth, ambient: ambient.into(), needs }),
+        IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
+            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, needs })
+        }
         IntegratorDesc::Normal => view(View::Normal),
         IntegratorDesc::ShadingNormal => view(View::ShadingNormal),
         IntegratorDesc::Uv => view(View::Uv),

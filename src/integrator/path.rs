@@ -42,6 +42,8 @@ pub struct PathIntegrator {
     pub strategy: Strategy,
     /// Largest channel that a single contribution of indirect light keeps: less noise for too little light. Infinite for no bias.
     pub clamp: f32,
+    /// Whether the camera does not see what gives off light.
+    pub hide_emitters: bool,
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
@@ -132,6 +134,9 @@ impl PathIntegrator {
             scratch.hits.clear();
             scratch.hits.resize(count, None);
             world.accel.intersect_batch(&scratch.rays, &mut scratch.hits, coherence);
+            if bounce == 0 && self.hide_emitters {
+                counts.camera += world.pass_all_emitters(&mut scratch.rays, &mut scratch.hits);
+            }
             if in_media {
                 counts.indirect += self.arrive_all(world, scratch);
             }
@@ -202,7 +207,9 @@ impl PathIntegrator {
             let sample = &mut out[path.slot as usize];
             let found = world.resolve(ray, hits[i]);
             let Some(at) = &found else {
-                sample.radiance += self.clamped(path.throughput * self.escaped(world, path, ray.direction), bounce);
+                if bounce > 0 || !self.hide_emitters {
+                    sample.radiance += self.clamped(path.throughput * self.escaped(world, path, ray.direction), bounce);
+                }
                 continue;
             };
             let cone = cones.get(i).copied();

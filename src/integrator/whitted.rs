@@ -20,6 +20,8 @@ pub struct Whitted {
     pub max_depth: u32,
     /// Radiance of the ambient light.
     pub ambient: Rgb,
+    /// Whether the camera does not see what gives off light.
+    pub hide_emitters: bool,
     /// What the layers need.
     pub needs: SurfaceNeeds,
 }
@@ -30,13 +32,19 @@ impl Integrator for Whitted {
         for (sample, out) in samples.iter().zip(out) {
             let in_media = world.scene.features.media;
             let here = if in_media { world.media_at_start(&sample.ray) } else { Interior::default() };
-            let segment = Segment::trace(world, sample.ray, world.camera_cone(&sample.ray), here, counts);
+            let mut ray = sample.ray;
+            if self.hide_emitters {
+                let mut hit = world.accel.intersect(&ray);
+                counts.camera += 1 + world.pass_emitters(&mut ray, &mut hit);
+            }
+            let segment = Segment::trace(world, ray, world.camera_cone(&ray), here, counts);
             *out = match &segment.end {
                 Some(at) => PixelSample {
                     radiance: self.shade(world, &segment, at, 1, counts) * segment.transmittance,
                     alpha: 1.0,
                     surface: surface_sample(world, self.needs, at, segment.ray.direction, || segment.footprint(world, at)),
                 },
+                None if self.hide_emitters => PixelSample::default(),
                 None => PixelSample { radiance: segment.escaped(world), ..PixelSample::default() },
             };
         }

@@ -12,6 +12,9 @@ use crate::scene::Scene;
 /// How often a ray looks again behind hits that turn out to be rounding artefacts. Stacks of so many coplanar surfaces do not occur.
 const MAX_RETRACES: u32 = 64;
 
+/// Emitters in a row that a ray passes at most: it must not go on for ever.
+const MAX_EMITTERS: u64 = 4096;
+
 /// A scene and the accelerator over its geometry.
 pub struct World<'a> {
     /// The scene.
@@ -55,6 +58,25 @@ impl<'a> World<'a> {
             at = at.map(|at| self.with_relief(ray, &hit, at));
         }
         at
+    }
+
+    /// Lets camera rays, which have found `hits`, pass all that gives off light; says how many rays that took.
+    #[cold]
+    pub(super) fn pass_all_emitters(&self, rays: &mut [Ray], hits: &mut [Option<Hit>]) -> u64 {
+        rays.iter_mut().zip(hits).map(|(ray, hit)| self.pass_emitters(ray, hit)).sum()
+    }
+
+    /// Lets `ray`, which has found `hit`, start behind the emitters that it meets first; says how many rays that took.
+    pub(super) fn pass_emitters(&self, ray: &mut Ray, hit: &mut Option<Hit>) -> u64 {
+        let emits = |at: &SurfaceInteraction| self.scene.surface(at.shape).light(at.prim).is_some();
+        for passed in 0..MAX_EMITTERS {
+            let Some(at) = self.resolve(ray, *hit).filter(emits) else {
+                return passed;
+            };
+            ray.t_min = step_past(at.t.max(ray.t_min));
+            *hit = self.accel.intersect(ray);
+        }
+        MAX_EMITTERS
     }
 
     /// With the shading normal that the surface's relief gives, if it has one.

@@ -88,7 +88,18 @@ impl RangedInput {
     }
 }
 
-/// GGX alpha along u and v from inputs.
+/// How the normals of microfacets are distributed, and what becomes of light that they scatter several times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Facets {
+    /// GGX; it is kept.
+    Ggx,
+    /// GGX; it is lost.
+    SingleGgx,
+    /// Beckmann's; it is lost.
+    Beckmann,
+}
+
+/// Alpha along u and v from inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AlphaInput {
     /// Along u and v.

@@ -266,7 +266,7 @@ mod tests {
         let s = Settings::new(&scene(SCENE), &Overrides::default()).unwrap();
         assert_eq!((s.size, s.crop), ([100, 50], Crop { x: 10, y: 20, width: 30, height: 30 }));
         assert_eq!((s.sampler, s.spp, s.seed), (SamplerKind::Independent, 16, 3));
-        assert!(matches!(s.integrator, IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis, clamp: None }));
+        assert!(matches!(s.integrator, IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis, clamp: None, .. }));
         assert_eq!(s.layers, [LayerKind::N].into_iter().collect());
         assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::EMBREE, None, 2));
         assert!(s.threads >= 1);
@@ -296,7 +296,9 @@ mod tests {
         assert_eq!((s.size, s.crop, s.threads), ([200, 80], Crop { x: 0, y: 0, width: 5, height: 6 }, 3));
         assert_eq!((s.sampler, s.spp, s.seed, s.accel), (SamplerKind::Sobol, 7, 1, AccelKind::Linear));
         // The same integrator: parameters that are not changed stay the scene's.
-        assert_eq!(s.integrator, IntegratorDesc::Path { max_depth: 4, rr_depth: 3, strategy: StrategyDesc::Light, clamp: Some(2.5) });
+        let changed =
+            IntegratorDesc::Path { max_depth: 4, rr_depth: 3, strategy: StrategyDesc::Light, clamp: Some(2.5), hide_emitters: false };
+        assert_eq!(s.integrator, changed);
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));
         assert_eq!(
             (s.outputs[0].layers.as_slice(), s.outputs[0].pixel_type),

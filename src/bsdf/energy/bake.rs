@@ -2,7 +2,7 @@
 
 use super::super::coat::integrate_albedo;
 use super::super::fresnel;
-use super::super::microfacet::reflect;
+use super::super::microfacet::{Microfacets, reflect};
 use super::super::principled::shapes::{self, ClearCoat};
 use super::super::{Ggx, SMOOTH_ALPHA};
 use super::table::{

@@ -17,7 +17,7 @@ pub(super) mod table;
 
 pub use bake::bake;
 
-use super::Ggx;
+use super::{Ggx, Microfacets};
 use crate::math::Vec3;
 pub(super) use table::schlick_weight;
 use table::{

@@ -27,7 +27,7 @@ pub(super) mod shapes;
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::energy::{Energy, principled_clear_coat, principled_diffuse, principled_sheen, schlick_weight};
-use super::microfacet::{MIN_COSINE, reflect};
+use super::microfacet::{MIN_COSINE, Microfacets, reflect};
 use super::thin::pane_reflectance;
 use super::{BsdfEval, BsdfSample, Dielectric, Ggx};
 use crate::color::Rgb;

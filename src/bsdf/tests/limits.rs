@@ -15,6 +15,8 @@ fn everything_is_finite_at_every_angle_and_alpha() {
         let mut all = vec![gold(alpha), perfect_metal(alpha), blue_plastic(alpha)];
         all.extend([1.5, 1.0, 1.000_1, 1.001, 0.1, 10.0, 1.0 / 1.5].map(|ior| Bsdf::Dielectric(Dielectric::new(ior, alpha))));
         all.push(Bsdf::Plastic(Plastic::new(Rgb::BLACK, 1.0, alpha)));
+        all.push(beckmann_gold(alpha));
+        all.extend([1.5, 1.0, 1.001, 0.1, 10.0].map(|ior| Bsdf::Beckmann(BeckmannBsdf::Dielectric(Dielectric::beckmann(ior, alpha)))));
         for bsdf in all {
             for cos in cosines.iter().flat_map(|&cos| [cos, -cos]) {
                 let wo = direction(cos, 0.2);
@@ -54,7 +56,8 @@ fn lobes_below_the_limit_are_deltas() {
     assert!(!gold([0.0, 0.1]).is_delta());
     // Hardly any refraction: straight, whatever the slopes.
     assert!(Bsdf::Dielectric(Dielectric::new(1.000_1, [0.5; 2])).is_delta());
-    for bsdf in [gold(below), glass(below)] {
+    assert!(beckmann_gold(below).is_delta() && beckmann_glass(below).is_delta() && !beckmann_gold([0.0, 0.1]).is_delta());
+    for bsdf in [gold(below), glass(below), beckmann_gold(below), beckmann_glass(below)] {
         assert_eq!(bsdf.eval(direction(0.5, 0.0), direction(0.5, 0.5)), BsdfEval::default());
     }
 }

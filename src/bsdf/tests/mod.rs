@@ -1,5 +1,6 @@
 //! Every BSDF against statistics and closed forms.
 
+mod beckmann;
 mod coated;
 mod diffuse;
 mod energy;
@@ -35,6 +36,16 @@ fn glass(alpha: [f32; 2]) -> Bsdf {
     Bsdf::Dielectric(Dielectric::new(1.5, alpha))
 }
 
+/// The same with Beckmann's microfacets.
+fn beckmann_gold(alpha: [f32; 2]) -> Bsdf {
+    let gold = Conductor::new(Rgb::new(0.18, 0.42, 1.37), Rgb::new(3.42, 2.35, 1.77), [0.0; 2], Rgb::WHITE);
+    Bsdf::Beckmann(BeckmannBsdf::Conductor(gold.with_beckmann(alpha, Rgb::WHITE)))
+}
+
+fn beckmann_glass(alpha: [f32; 2]) -> Bsdf {
+    Bsdf::Beckmann(BeckmannBsdf::Dielectric(Dielectric::beckmann(1.5, alpha)))
+}
+
 fn white_plastic(alpha: [f32; 2]) -> Bsdf {
     Bsdf::Plastic(Plastic::new(Rgb::WHITE, 1.5, alpha))
 }
@@ -50,6 +61,8 @@ fn rough_bsdfs() -> Vec<(String, Bsdf)> {
         all.push((format!("conductor {alpha:?}"), gold(alpha)));
         all.push((format!("dielectric {alpha:?}"), glass(alpha)));
         all.push((format!("plastic {alpha:?}"), blue_plastic(alpha)));
+        all.push((format!("beckmann conductor {alpha:?}"), beckmann_gold(alpha)));
+        all.push((format!("beckmann dielectric {alpha:?}"), beckmann_glass(alpha)));
     }
     all
 }

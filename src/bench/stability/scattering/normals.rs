@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::super::{Effort, Outcome, sidak_level};
 use super::materials::{ALPHAS, direction};
-use crate::bsdf::Ggx;
+use crate::bsdf::{Ggx, Microfacets};
 use crate::math::{Vec3, sin_cos_turns, vec3};
 use crate::sampling::statistics::{compare_directions, random_points};
 

@@ -6,8 +6,8 @@ use super::textures::{Role, TextureValue, UvOrigin};
 use super::tree::PluginId;
 use super::{Reader, names};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, MaterialDesc, NormalMapDesc, OpacityDesc, RangedDesc, RoughnessDesc,
-    ScalarDesc, TextureDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, OpacityDesc, RangedDesc,
+    RoughnessDesc, ScalarDesc, TextureDesc,
 };
 use crate::error::Result;
 use crate::import::closest_name;
@@ -121,12 +121,13 @@ impl<'a> Reader<'a> {
             "conductor" | "roughconductor" => (self.conductor(element, uv)?, true),
             "dielectric" | "roughdielectric" => {
                 let ior = relative_index(element, "bk7")?;
-                let alpha = if element.kind() == "roughdielectric" { self.alpha(element, uv)? } else { None };
+                let (alpha, distribution) = self.microfacets(element, "roughdielectric", uv)?;
                 lossless(element);
                 let glass = DielectricDesc {
                     ior: RangedDesc::Constant(ior),
                     roughness: None,
                     alpha,
+                    distribution,
                     multiscatter: false,
                     priority: None,
                     absorption: None,
@@ -141,7 +142,10 @@ impl<'a> Reader<'a> {
             }
             "plastic" | "roughplastic" => {
                 let ior = relative_index(element, "polypropylene")?;
-                let alpha = if element.kind() == "roughplastic" { self.alpha(element, uv)? } else { None };
+                let (alpha, distribution) = self.microfacets(element, "roughplastic", uv)?;
+                if distribution == DistributionDesc::Beckmann {
+                    element.approximated("distribution", "GGX of the same alpha in place of Beckmann's distribution");
+                }
                 let color = self.color(element, "diffuse_reflectance", 0.5, uv)?;
                 let rough = match alpha {
                     Some(RoughnessDesc::Isotropic(alpha)) => alpha,
@@ -168,7 +172,7 @@ impl<'a> Reader<'a> {
     }
 
     fn conductor(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<MaterialDesc> {
-        let alpha = if element.kind() == "roughconductor" { self.alpha(element, uv)? } else { None };
+        let (alpha, distribution) = self.microfacets(element, "roughconductor", uv)?;
         let tint = self.color(element, "specular_reflectance", 1.0, uv)?;
         let (eta, k) = (self.constant(element, "eta", uv)?, self.constant(element, "k", uv)?);
         let name = element.text("material")?;
@@ -189,35 +193,50 @@ impl<'a> Reader<'a> {
         };
         // An index of zero is that of an ideal mirror, which the smallest one comes to.
         let eta = eta.map(|eta| eta.max(1e-6));
-        Ok(MaterialDesc::Conductor { metal: None, eta: Some(eta), k: Some(k), roughness: None, alpha, tint, multiscatter: false })
+        Ok(MaterialDesc::Conductor {
+            metal: None,
+            eta: Some(eta),
+            k: Some(k),
+            roughness: None,
+            alpha,
+            distribution,
+            tint,
+            multiscatter: false,
+        })
     }
 
-    /// The width of the distribution of normals. Ours is GGX.
-    fn alpha(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Option<RoughnessDesc>> {
-        match element.text("distribution")?.unwrap_or("beckmann") {
-            "ggx" => {}
-            "beckmann" => element.approximated("distribution", "GGX of the same alpha in place of Beckmann's distribution"),
-            other => return Err(element.place_of("distribution").error(format!("\"{other}\" is neither beckmann nor ggx"))),
+    /// The distribution of the normals of a surface's microfacets and its width, if the surface is of a `rough` kind.
+    fn microfacets(&mut self, element: &mut Element<'a>, rough: &str, uv: UvOrigin) -> Result<(Option<RoughnessDesc>, DistributionDesc)> {
+        if element.kind() != rough {
+            return Ok((None, DistributionDesc::default()));
         }
+        let distribution = match element.text("distribution")?.unwrap_or("beckmann") {
+            "ggx" => DistributionDesc::Ggx,
+            "beckmann" => DistributionDesc::Beckmann,
+            other => return Err(element.place_of("distribution").error(format!("\"{other}\" is neither beckmann nor ggx"))),
+        };
         element.boolean("sample_visible", true)?;
+        Ok((Some(self.alpha(element, uv)?), distribution))
+    }
+
+    /// The width of the distribution of normals.
+    fn alpha(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<RoughnessDesc> {
         if element.take("alpha_u").is_none() && element.take("alpha_v").is_none() {
-            return Ok(Some(match self.scalar(element, "alpha", 0.1, 1.0, uv)? {
+            return Ok(match self.scalar(element, "alpha", 0.1, 1.0, uv)? {
                 ScalarDesc::Constant(alpha) => RoughnessDesc::Isotropic(unit(element, "alpha", alpha)),
                 ScalarDesc::Texture { texture } => RoughnessDesc::Texture { texture },
-            }));
+            });
         }
-        let (u, v) = (self.scalar(element, "alpha_u", 0.1, 1.0, uv)?, self.scalar(element, "alpha_v", 0.1, 1.0, uv)?);
-        Ok(Some(match (u, v) {
-            (ScalarDesc::Constant(u), ScalarDesc::Constant(v)) => {
-                RoughnessDesc::Anisotropic([unit(element, "alpha_u", u), unit(element, "alpha_v", v)])
-            }
-            (ScalarDesc::Texture { texture }, _) | (_, ScalarDesc::Texture { texture }) => {
-                for name in ["alpha_u", "alpha_v"] {
-                    element.approximated(name, "one texture for both directions");
-                }
-                RoughnessDesc::Texture { texture }
-            }
-        }))
+        let mut along = |name: &str| -> Result<ScalarDesc> {
+            Ok(match self.scalar(element, name, 0.1, 1.0, uv)? {
+                ScalarDesc::Constant(alpha) => ScalarDesc::Constant(unit(element, name, alpha)),
+                texture => texture,
+            })
+        };
+        Ok(match (along("alpha_u")?, along("alpha_v")?) {
+            (ScalarDesc::Constant(u), ScalarDesc::Constant(v)) => RoughnessDesc::Anisotropic([u, v]),
+            (u, v) => RoughnessDesc::Axes { u, v },
+        })
     }
 
     /// The BSDFs inside of one.

@@ -11,7 +11,11 @@ const UNLIMITED: u32 = 65_536;
 
 /// What a scene without an integrator is rendered with.
 pub(super) fn unlimited_path() -> IntegratorDesc {
-    IntegratorDesc::Path { max_depth: UNLIMITED, rr_depth: 5, strategy: StrategyDesc::Mis, clamp: None }
+    path(UNLIMITED, 5)
+}
+
+fn path(max_depth: u32, rr_depth: u32) -> IntegratorDesc {
+    IntegratorDesc::Path { max_depth, rr_depth, strategy: StrategyDesc::Mis, clamp: None, hide_emitters: false }
 }
 
 impl Reader<'_> {
@@ -25,7 +29,6 @@ impl Reader<'_> {
 
     fn integrator_within(&mut self, id: PluginId) -> Result<()> {
         let mut element = Element::new(self.document, id);
-        let path = |max_depth, rr_depth| IntegratorDesc::Path { max_depth, rr_depth, strategy: StrategyDesc::Mis, clamp: None };
         let kind = element.kind();
         let ends = |element: &mut Element| -> Result<(u32, u32)> {
             let max_depth = element.integer("max_depth")?.unwrap_or(-1);
@@ -84,7 +87,10 @@ impl Reader<'_> {
             other => element.ignored("", format!("there is no integrator {other}: path tracing")),
         }
         if element.boolean("hide_emitters", false)? {
-            element.ignored("hide_emitters", "what gives off light is seen by the camera");
+            match &mut self.draft.desc.integrator {
+                IntegratorDesc::Path { hide_emitters, .. } => *hide_emitters = true,
+                _ => element.ignored("hide_emitters", "surfaces are shown whether or not they give off light"),
+            }
         }
         element.finish(&mut self.draft);
         Ok(())

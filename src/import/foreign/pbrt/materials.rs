@@ -4,8 +4,8 @@ use super::colors::{Colors, Meaning};
 use super::params::Params;
 use super::textures::{Texture, Textures};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc, TextureDesc,
-    TextureFilterDesc, WrapDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc,
+    TextureDesc, TextureFilterDesc, WrapDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
@@ -63,6 +63,7 @@ impl Materials<'_> {
                     ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)),
                     roughness: None,
                     alpha: self.alpha(params, "", 0.0)?,
+                    distribution: DistributionDesc::default(),
                     multiscatter: false,
                     priority: None,
                     absorption: None,
@@ -109,7 +110,7 @@ impl Materials<'_> {
         let mean_alpha = match alpha {
             Some(RoughnessDesc::Isotropic(alpha)) => alpha,
             Some(RoughnessDesc::Anisotropic([u, v])) => (u * v).sqrt(),
-            Some(RoughnessDesc::Texture { .. }) => 0.1,
+            Some(RoughnessDesc::Texture { .. } | RoughnessDesc::Axes { .. }) => 0.1,
             None => 0.0,
         };
         // pbrt's base reflects within the coat; ours is what is left of that outside.
@@ -153,25 +154,33 @@ impl Materials<'_> {
                 _ => Some(RoughnessDesc::Anisotropic(alpha)),
             });
         }
-        if u != v {
-            params.approximate(&key("vroughness"), "that along u in both directions");
+        if u == v {
+            let both = self.remapped(u, remap, params, key);
+            return Ok(both.name(self.draft, &params.place).map(|texture| RoughnessDesc::Texture { texture }));
         }
-        let textured = if u.is_constant() { v } else { u };
-        let textured = match textured {
-            Texture::Named { name, factor } if remap => {
-                match recolored(self.draft, self.colors.folder, &name, factor, &|x| x.max(0.0).sqrt()) {
-                    Some(name) => Texture::Named { name, factor: [1.0; 3] },
-                    None => {
-                        for name in ["roughness", "uroughness", "vroughness"].map(key) {
-                            params.approximate(&name, "the texture itself is alpha, not its root");
-                        }
-                        Texture::Named { name, factor }
+        let [u, v] = [u, v].map(|along| {
+            let along = self.remapped(along, remap, params, key);
+            along.scalar(self.draft, &params.place)
+        });
+        Ok(Some(RoughnessDesc::Axes { u, v }))
+    }
+
+    /// The alpha of a roughness, which is its root if it is to be remapped.
+    fn remapped(&mut self, roughness: Texture, remap: bool, params: &Params, key: impl Fn(&str) -> String) -> Texture {
+        let root = |x: f32| x.max(0.0).sqrt();
+        match roughness {
+            roughness if !remap => roughness,
+            Texture::Constant(value) => Texture::Constant(value.map(root)),
+            Texture::Named { name, factor } => match recolored(self.draft, self.colors.folder, &name, factor, &root) {
+                Some(name) => Texture::Named { name, factor: [1.0; 3] },
+                None => {
+                    for name in ["roughness", "uroughness", "vroughness"].map(key) {
+                        params.approximate(&name, "the texture itself is alpha, not its root");
                     }
+                    Texture::Named { name, factor }
                 }
-            }
-            other => other,
-        };
-        Ok(Some(textured.alpha(self.draft, &params.place)))
+            },
+        }
     }
 
     /// A metal in a medium of index `outside`.
@@ -204,7 +213,17 @@ impl Materials<'_> {
                 (part("eta")?.map(|x| x / outside), part("k")?.map(|x| x / outside), ColorDesc::Grey(1.0))
             }
         };
-        Ok(MaterialDesc::Conductor { metal: None, eta: Some(eta), k: Some(k), roughness: None, alpha, tint, multiscatter: false })
+        let distribution = DistributionDesc::default();
+        Ok(MaterialDesc::Conductor {
+            metal: None,
+            eta: Some(eta),
+            k: Some(k),
+            roughness: None,
+            alpha,
+            distribution,
+            tint,
+            multiscatter: false,
+        })
     }
 
     fn diffuse_transmission(&mut self, params: &Params) -> Result<MaterialDesc> {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::colors::{Colors, Meaning};
 use super::params::Params;
 use crate::desc::{
-    ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, RoughnessDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc,
+    ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
@@ -29,11 +29,6 @@ impl Texture {
     /// The same everywhere, grey.
     pub fn grey(value: f32) -> Self {
         Self::Constant([value; 3])
-    }
-
-    /// Whether it is a constant.
-    pub fn is_constant(&self) -> bool {
-        matches!(self, Self::Constant(_))
     }
 
     /// Times a factor.
@@ -81,14 +76,6 @@ impl Texture {
             Self::Constant(value) if value[0] >= 1.0 => None,
             Self::Constant(value) => Some(OpacityDesc::Number(value[0].max(0.0))),
             named => named.name(draft, place).map(|texture| OpacityDesc::Texture { texture }),
-        }
-    }
-
-    /// As a GGX alpha.
-    pub fn alpha(self, draft: &mut Draft, place: &str) -> RoughnessDesc {
-        match self {
-            Self::Constant(value) => RoughnessDesc::Isotropic(value[0].clamp(0.0, 1.0)),
-            named => named.name(draft, place).map_or(RoughnessDesc::Isotropic(0.1), |texture| RoughnessDesc::Texture { texture }),
         }
     }
 }

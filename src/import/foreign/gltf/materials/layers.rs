@@ -4,7 +4,8 @@ use super::super::extensions as ext;
 use super::super::textures::TextureRef;
 use super::Builder;
 use crate::desc::{
-    AbsorptionDesc, ChannelDesc, ColorDesc, DielectricDesc, MaterialDesc, PrincipledDesc, RangedDesc, RoughnessDesc, ScalarDesc,
+    AbsorptionDesc, ChannelDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PrincipledDesc, RangedDesc, RoughnessDesc,
+    ScalarDesc,
 };
 use crate::error::Result;
 
@@ -183,6 +184,7 @@ impl Builder<'_, '_> {
             ior: RangedDesc::Constant(ior),
             roughness,
             alpha: None,
+            distribution: DistributionDesc::default(),
             multiscatter: true,
             priority: None,
             absorption,

@@ -1,7 +1,9 @@
 //! BSDFs and textures.
 
 use super::*;
-use crate::desc::{ColorDesc, ColorSpaceDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc, TextureFilterDesc};
+use crate::desc::{
+    ColorDesc, ColorSpaceDesc, DistributionDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc, TextureFilterDesc,
+};
 
 const BITMAP: &str = r#"<texture type="bitmap" name="NAME"><string name="filename" value="a.png"/>MORE</texture>"#;
 
@@ -79,11 +81,27 @@ fn metals_by_name_index_and_mirror() {
 }
 
 #[test]
-fn beckmann_is_said_to_be_approximated() {
-    let default = notes(r#"<shape type="sphere"><bsdf type="roughconductor"/></shape>"#);
-    assert!(default.iter().any(|(outcome, _, note)| *outcome == Outcome::Approximated && note.contains("Beckmann")), "{default:?}");
-    let ggx = r#"<shape type="sphere"><bsdf type="roughconductor"><string name="distribution" value="ggx"/></bsdf></shape>"#;
-    assert!(notes(ggx).is_empty());
+fn beckmann_is_the_default_of_rough_surfaces_and_approximated_on_plastic_alone() {
+    let rough = |kind: &str, more: &str| format!(r#"<bsdf type="{kind}">{more}</bsdf>"#);
+    let of = |bsdf: &str| match front(bsdf) {
+        MaterialDesc::Conductor { distribution, .. } => distribution,
+        MaterialDesc::Dielectric(glass) => glass.distribution,
+        other => panic!("{other:?}"),
+    };
+    let ggx = r#"<string name="distribution" value="ggx"/>"#;
+    for kind in ["roughconductor", "roughdielectric"] {
+        assert_eq!((of(&rough(kind, "")), of(&rough(kind, ggx))), (DistributionDesc::Beckmann, DistributionDesc::Ggx), "{kind}");
+        assert!(notes(&format!("<shape type=\"sphere\">{}</shape>", rough(kind, ""))).is_empty(), "{kind}");
+    }
+    let plastic = notes(&format!("<shape type=\"sphere\">{}</shape>", rough("roughplastic", "")));
+    assert!(plastic.iter().any(|(outcome, _, note)| *outcome == Outcome::Approximated && note.contains("Beckmann")), "{plastic:?}");
+}
+
+#[test]
+fn each_alpha_has_its_texture() {
+    let text = format!(r#"<bsdf type="roughconductor">{}<float name="alpha_v" value="0.3"/></bsdf>"#, bitmap("alpha_u", ""));
+    let MaterialDesc::Conductor { alpha: Some(RoughnessDesc::Axes { u, v }), .. } = front(&text) else { panic!() };
+    assert!(matches!((u, v), (ScalarDesc::Texture { .. }, ScalarDesc::Constant(v)) if v == 0.3));
 }
 
 #[test]

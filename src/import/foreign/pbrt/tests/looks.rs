@@ -1,7 +1,9 @@
 //! Materials, textures and light.
 
 use super::*;
-use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, LightDesc, MaterialDesc, OpacityDesc, RangedDesc, RoughnessDesc, TextureDesc};
+use crate::desc::{
+    ChannelDesc, ColorDesc, ColorSpaceDesc, LightDesc, MaterialDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
+};
 
 /// The material of a scene with one sphere of it.
 fn material(text: &str) -> MaterialDesc {
@@ -79,6 +81,9 @@ fn alpha_is_the_root_of_the_roughness_unless_it_is_not_remapped() {
     assert!(matches!(alpha("\"float roughness\" 0.25 \"bool remaproughness\" false"), Some(RoughnessDesc::Isotropic(a)) if a == 0.25));
     let uneven = alpha("\"float uroughness\" 0.25 \"float vroughness\" 0.04");
     assert!(matches!(uneven, Some(RoughnessDesc::Anisotropic([u, v])) if u == 0.5 && v == 0.2));
+    let textured = "Texture \"t\" \"float\" \"checkerboard\" Material \"conductor\" \"texture uroughness\" \"t\" \"float vroughness\" 0.04";
+    let MaterialDesc::Conductor { alpha: Some(RoughnessDesc::Axes { u, v }), .. } = material(textured) else { panic!() };
+    assert!(matches!((u, v), (ScalarDesc::Texture { .. }, ScalarDesc::Constant(v)) if (v - 0.2).abs() < 1e-6));
     // Smooth below 0.001, of alpha.
     assert!(alpha("\"float roughness\" 0.0009 \"bool remaproughness\" false").is_none());
     assert!(alpha("\"float roughness\" 0.0009").is_some());
