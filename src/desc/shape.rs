@@ -154,6 +154,9 @@ shapes! {
         /// Inline: a uv for each vertex.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         uvs: Option<Vec<[f32; 2]>>,
+        /// Inline: a linear colour from 0 to 1 for each vertex, for textures of type `vertex_color`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        colors: Option<Vec<[f32; 3]>>,
         /// A mesh that deforms: the files with its vertices at further times, evenly spaced until the shutter closes, as many and in the same
         /// order as in `file`, which has those at its opening. Between them vertices move along straight lines.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -295,7 +298,7 @@ impl MeshDesc {
     /// The mesh of a file, with every other default.
     pub fn from_file(file: impl Into<String>) -> Self {
         let shading = MeshShadingDesc::default();
-        Self::new(Some(file.into()), None, None, None, None, Vec::new(), Vec::new(), shading, None, NormalWeightDesc::default())
+        Self::new(Some(file.into()), None, None, None, None, None, Vec::new(), Vec::new(), shading, None, NormalWeightDesc::default())
     }
 }
 

@@ -13,6 +13,8 @@ pub struct MeshData {
     pub normals: Option<Vec<[f32; 3]>>,
     /// A uv for each vertex, with the origin at the bottom left.
     pub uvs: Option<Vec<[f32; 2]>>,
+    /// A linear colour for each vertex.
+    pub colors: Option<Vec<[f32; 3]>>,
 }
 
 impl MeshData {
@@ -27,6 +29,9 @@ impl MeshData {
         }
         if let (Some(uvs), Some(others)) = (&mut self.uvs, &mut other.uvs) {
             uvs.append(others);
+        }
+        if let (Some(colors), Some(others)) = (&mut self.colors, &mut other.colors) {
+            colors.append(others);
         }
         Ok(())
     }

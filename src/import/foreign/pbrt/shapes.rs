@@ -124,6 +124,7 @@ impl Shapes<'_> {
             Some(mesh.triangles),
             mesh.normals,
             mesh.uvs,
+            mesh.colors,
             Vec::new(),
             Vec::new(),
             shading,
@@ -264,7 +265,7 @@ fn triangle_mesh(params: &Params) -> Result<MeshData> {
         }
         uvs => uvs,
     };
-    Ok(MeshData { positions, triangles, normals, uvs })
+    Ok(MeshData { positions, triangles, normals, uvs, colors: None })
 }
 
 /// The triangles, and how many patches they are.

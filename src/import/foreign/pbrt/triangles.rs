@@ -55,6 +55,7 @@ mod tests {
             triangles: vec![[0, 1, 2]],
             normals: Some(vec![normal; 3]),
             uvs: None,
+            colors: None,
         }
     }
 
