@@ -268,7 +268,7 @@ impl Varying {
             Self::Diffuse { albedo, roughness } => found.extend(albedo.texture().into_iter().chain(roughness.texture())),
             Self::DiffuseTransmission { reflectance: a, transmittance: b } => found.extend(a.texture().into_iter().chain(b.texture())),
             Self::Phong { diffuse, specular, exponent } => {
-                found.extend([diffuse.texture(), specular.texture(), exponent.texture()].into_iter().flatten())
+                found.extend([diffuse.texture(), specular.texture(), exponent.texture()].into_iter().flatten());
             }
             Self::CookTorrance { albedo, d, s, m, f0 } => {
                 found.extend([albedo, f0].into_iter().filter_map(ColorInput::texture));

@@ -21,7 +21,7 @@ fn linear() -> [[f32; 3]; 4] {
 fn scene_of(shape: Value) -> Value {
     json!({
         "film": { "width": 16, "height": 16, "filter": { "type": "box" } },
-        "camera": { "type": "orthographic", "height": 2, "position": [0, 0, 5], "look_at": [0, 0, 0] },
+        "camera": { "type": "orthographic", "view_height": 2, "position": [0, 0, 5], "look_at": [0, 0, 0] },
         "integrator": { "type": "whitted", "ambient": [1, 1, 1] },
         "sampler": { "spp": 16 },
         "textures": { "colors": { "type": "vertex_color" } },

@@ -183,11 +183,11 @@ fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement
         MeshShadingDesc::Computed => true,
         MeshShadingDesc::Auto | MeshShadingDesc::Flat => false,
     };
-    let Smoothing { weight, crease_cosine } = placement.smoothing;
+    let Smoothing { weight, crease_cosine, by } = placement.smoothing;
     match crease_cosine.filter(|_| computed) {
         Some(cosine) => {
             let positions: Vec<&[[f32; 3]]> = steps.iter().map(|step| step.positions.as_slice()).collect();
-            let split = normals::split(&positions, triangles, weight, cosine);
+            let split = normals::split(&positions, triangles, weight, by, cosine);
             for (step, normals) in steps.iter_mut().zip(split.normals) {
                 let positions = split.vertices.iter().map(|&v| step.positions[v as usize]).collect();
                 *step = MeshStep { positions, normals: Some(normals) };
@@ -199,7 +199,7 @@ fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement
             for step in steps {
                 let given = step.normals.take();
                 step.normals = match placement.shading {
-                    _ if computed => Some(normals::smooth(&step.positions, triangles, weight)),
+                    _ if computed => Some(normals::smooth(&step.positions, triangles, weight, by)),
                     MeshShadingDesc::Flat => None,
                     _ => given.map(|normals| place_normals(normals, placement.transform, placement.reverse_normal)),
                 };

@@ -149,7 +149,7 @@ impl Builder {
         let crease = crease.map(|angle| self.files.within(&format!("{path}.crease_angle_degrees"), angle, 0.0, 180.0)).transpose()?;
         // A rounding must not make creases where triangles are coplanar or the angle is that of all edges.
         let crease_cosine = crease.filter(|&angle| angle < 180.0).map(|angle| angle.to_radians().cos() - 1e-6);
-        Ok(Smoothing { weight: desc.normal_weight, crease_cosine })
+        Ok(Smoothing { weight: desc.normal_weight, crease_cosine, by: desc.smooth_by })
     }
 
     fn emission(&mut self, path: &str, common: &ShapeCommon) -> Result<Option<PreparedEmission>> {

@@ -10,7 +10,7 @@ use super::params::Params;
 use super::state::{Graphics, Look, World};
 use super::textures::Textures;
 use super::triangles;
-use crate::desc::{CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SphereDesc};
+use crate::desc::{CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SmoothByDesc, SphereDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
 use crate::import::{MeshData, read_ply};
@@ -130,6 +130,7 @@ impl Shapes<'_> {
             shading,
             None,
             NormalWeightDesc::default(),
+            SmoothByDesc::default(),
         ))
     }
 
