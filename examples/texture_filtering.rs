@@ -82,7 +82,7 @@ impl Way {
     /// What a sample at a point of the picture sees; `u` are two more random numbers.
     fn look(self, image: &Bitmap, [x, y]: [f32; 2], u: [f32; 2], samples: u32) -> f32 {
         let uv = uv_at(x, y);
-        let over = |area: f32, samples: u32| image.scalar_over(&Footprint { uv, area: area / samples as f32 });
+        let over = |area: f32, samples: u32| image.scalar_over(&Footprint { area: area / samples as f32, ..Footprint::point(uv) });
         let [shorter, longer] = cone_axes(x, y);
         match self {
             Self::Point => image.scalar(uv),

@@ -9,7 +9,7 @@ use crate::bsdf::{
     PrincipledParameters, ThinDielectric,
 };
 use crate::color::Rgb;
-use crate::id::MaterialId;
+use crate::id::{MaterialId, TextureId};
 use crate::math::Vec2;
 use crate::texture::{Footprint, Texture};
 
@@ -186,7 +186,7 @@ impl PrincipledInputs {
         }
     }
 
-    fn is_constant(&self) -> bool {
+    fn textures(&self) -> Vec<TextureId> {
         let scalars = [
             &self.metallic,
             &self.roughness,
@@ -200,7 +200,8 @@ impl PrincipledInputs {
             &self.transmission,
             &self.diffuse_transmission,
         ];
-        self.base_color.is_constant() && self.ior.is_constant() && scalars.into_iter().chain(&self.specular).all(ScalarInput::is_constant)
+        let scalars = scalars.into_iter().chain(&self.specular).filter_map(ScalarInput::texture);
+        self.base_color.texture().into_iter().chain(self.ior.texture()).chain(scalars).collect()
     }
 }
 
@@ -265,21 +266,34 @@ impl Varying {
     }
 
     fn is_constant(&self) -> bool {
+        self.textures().is_empty()
+    }
+
+    /// The textures of all inputs.
+    fn textures(&self) -> Vec<TextureId> {
+        let mut found = Vec::new();
         match self {
-            Self::Diffuse { albedo, roughness } => albedo.is_constant() && roughness.is_constant(),
-            Self::DiffuseTransmission { reflectance: a, transmittance: b } => a.is_constant() && b.is_constant(),
-            Self::Phong { diffuse, specular, exponent } => diffuse.is_constant() && specular.is_constant() && exponent.is_constant(),
-            Self::CookTorrance { albedo, d, s, m, f0 } => {
-                albedo.is_constant() && f0.is_constant() && [d, s, m].into_iter().all(ScalarInput::is_constant)
+            Self::Diffuse { albedo, roughness } => found.extend(albedo.texture().into_iter().chain(roughness.texture())),
+            Self::DiffuseTransmission { reflectance: a, transmittance: b } => found.extend(a.texture().into_iter().chain(b.texture())),
+            Self::Phong { diffuse, specular, exponent } => {
+                found.extend([diffuse.texture(), specular.texture(), exponent.texture()].into_iter().flatten());
             }
-            Self::ThinDielectric { ior } => ior.is_constant(),
-            Self::Conductor { tint, alpha, .. } => tint.is_constant() && alpha.is_constant(),
-            Self::Dielectric { alpha, .. } => alpha.is_constant(),
-            Self::Mirror { reflectance } => reflectance.is_constant(),
-            Self::Plastic { coat, albedo } => coat.is_constant() && albedo.is_constant(),
-            Self::Coated { coat, tint, base } => coat.is_constant() && tint.is_constant() && matches!(base, Material::Constant(_)),
-            Self::Principled(inputs) => inputs.is_constant(),
+            Self::CookTorrance { albedo, d, s, m, f0 } => {
+                found.extend([albedo, f0].into_iter().filter_map(ColorInput::texture));
+                found.extend([d, s, m].into_iter().filter_map(ScalarInput::texture));
+            }
+            Self::ThinDielectric { ior } => found.extend(ior.texture()),
+            Self::Conductor { tint, alpha, .. } => found.extend(tint.texture().into_iter().chain(alpha.textures())),
+            Self::Dielectric { alpha, .. } => found.extend(alpha.textures()),
+            Self::Mirror { reflectance } => found.extend(reflectance.texture()),
+            Self::Plastic { coat, albedo } => found.extend(coat.textures().into_iter().chain(albedo.texture())),
+            Self::Coated { coat, tint, base } => {
+                found.extend(coat.textures().into_iter().chain(tint.texture()));
+                found.extend(base.textures());
+            }
+            Self::Principled(inputs) => found = inputs.textures(),
         }
+        found
     }
 
     /// Whether light may cross the surface.
@@ -325,26 +339,30 @@ impl Material {
         }
     }
 
-    /// The scattering at `uv` of a dielectric as a boundary with another relative index of refraction, inside over outside; `None` for all
-    /// other materials.
-    pub fn boundary(&self, textures: &[Texture], uv: Vec2, ior: f32) -> Option<Bsdf> {
+    /// The scattering over a footprint of a dielectric as a boundary with another relative index of refraction, inside over outside; `None`
+    /// for all other materials.
+    pub fn boundary(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint, ior: f32) -> Option<Bsdf> {
         match self {
             Self::Varying(varying) => match **varying {
-                Varying::Dielectric { alpha, facets, .. } => {
-                    Some(Varying::Dielectric { ior, alpha, facets }.bsdf(textures, &Footprint::point(uv)))
-                }
+                Varying::Dielectric { alpha, facets, .. } => Some(Varying::Dielectric { ior, alpha, facets }.bsdf(textures, &footprint())),
                 _ => None,
             },
             Self::Constant(_) | Self::Mix { .. } | Self::TwoSided { .. } => None,
         }
     }
 
-    /// The material that this one stands for on one side at `uv`, if it consists of others; `u` within `[0, 1)` chooses.
+    /// The material that this one stands for on one side at a point, if it consists of others; `u` within `[0, 1)` chooses.
     #[inline]
-    pub fn part(&self, textures: &[Texture], uv: Vec2, is_front: bool, u: impl FnOnce() -> f32) -> Option<MaterialId> {
+    pub fn part(
+        &self,
+        textures: &[Texture],
+        point: impl FnOnce() -> Footprint,
+        is_front: bool,
+        u: impl FnOnce() -> f32,
+    ) -> Option<MaterialId> {
         match self {
             Self::Constant(_) | Self::Varying(_) => None,
-            Self::Mix { first, second, amount } => Some(if u() < amount.at(textures, &Footprint::point(uv)) { *second } else { *first }),
+            Self::Mix { first, second, amount } => Some(if u() < amount.at(textures, &point()) { *second } else { *first }),
             Self::TwoSided { front, back } => Some(if is_front { *front } else { *back }),
         }
     }
@@ -369,10 +387,15 @@ impl Material {
 
     /// Whether a texture has a say in it.
     pub fn is_textured(&self) -> bool {
+        !self.textures().is_empty()
+    }
+
+    /// The textures that have a say in it; of what consists of others, the parts tell of theirs.
+    pub fn textures(&self) -> Vec<TextureId> {
         match self {
-            Self::Constant(_) | Self::TwoSided { .. } => false,
-            Self::Varying(varying) => !varying.is_constant(),
-            Self::Mix { amount, .. } => !amount.is_constant(),
+            Self::Constant(_) | Self::TwoSided { .. } => Vec::new(),
+            Self::Varying(varying) => varying.textures(),
+            Self::Mix { amount, .. } => amount.texture().into_iter().collect(),
         }
     }
 

@@ -49,6 +49,8 @@ pub struct Features {
     pub instances: bool,
     /// Some material is textured.
     pub textures: bool,
+    /// Some mesh has colours, which a material uses.
+    pub vertex_colors: bool,
     /// Some material has an image that is looked up over what a ray stands for.
     pub filtered_textures: bool,
     /// Some surface has a normal map or a bump map.
@@ -109,6 +111,18 @@ impl Scene {
         &self.materials[self.surface(shape).material.index()]
     }
 
+    /// A point of a surface for textures.
+    #[inline]
+    pub fn texture_point(&self, at: &SurfaceInteraction) -> Footprint {
+        self.colored(at, Footprint::point(at.uv))
+    }
+
+    /// A footprint at a point of a surface, with the colour that the surface has there.
+    #[inline]
+    pub fn colored(&self, at: &SurfaceInteraction, footprint: Footprint) -> Footprint {
+        if self.features.vertex_colors { Footprint { color: self.geometry.vertex_color(at), ..footprint } } else { footprint }
+    }
+
     /// The scattering at a point for a ray that arrives in `direction` and stands for `footprint`.
     /// What is not the same everywhere is made in `place`.
     #[inline(always)]
@@ -148,7 +162,7 @@ impl Scene {
         let is_front = direction.dot(at.n_g) < 0.0;
         loop {
             let material = &self.materials[id.index()];
-            match material.part(&self.textures, at.uv, is_front, || choice(at, direction, id)) {
+            match material.part(&self.textures, || self.texture_point(at), is_front, || choice(at, direction, id)) {
                 Some(part) => id = part,
                 None => return material,
             }

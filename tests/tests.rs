@@ -70,3 +70,5 @@ mod textures;
 mod tidy;
 /// Shared helpers.
 mod util;
+/// Colours of vertices: in pictures, from every kind of file, and what is refused.
+mod vertex_colors;

@@ -122,8 +122,17 @@ impl MaterialTable {
     /// Whether a surface without uv cannot look so.
     pub fn needs_uv(&self, look: &Look) -> bool {
         let cut_out = look.opacity.is_some_and(|id| !matches!(self.textures.get(id), Texture::Constant(_)));
-        let needs = |id: MaterialId| self.materials[id.index()].is_textured() || self.relief_of(id).is_some();
+        let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.relief_of(id).is_some();
         cut_out || look.relief.is_some() || self.any_part(look.material, &needs)
+    }
+
+    /// Whether a surface whose vertices have no colours cannot look so.
+    pub fn needs_colors(&self, look: &Look) -> bool {
+        self.any_part(look.material, &|id| self.has_texture(id, Texture::uses_vertex_colors))
+    }
+
+    fn has_texture(&self, id: MaterialId, is: impl Fn(&Texture) -> bool) -> bool {
+        self.materials[id.index()].textures().into_iter().any(|texture| is(self.textures.get(texture)))
     }
 
     /// Whether a surface's normals come from a normal map.

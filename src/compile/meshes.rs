@@ -43,7 +43,9 @@ impl MeshStore {
 
 fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
     match (&desc.file, &desc.positions, &desc.triangles) {
-        (Some(file), None, None) if desc.normals.is_none() && desc.uvs.is_none() && desc.deform_positions.is_empty() => {
+        (Some(file), None, None)
+            if desc.normals.is_none() && desc.uvs.is_none() && desc.colors.is_none() && desc.deform_positions.is_empty() =>
+        {
             let mut meshes = load_file(files, &format!("{path}.file"), file, desc.material.is_none())?;
             for (i, file) in desc.deform_files.iter().enumerate() {
                 let place = format!("{path}.deform_files[{i}]");
@@ -63,12 +65,16 @@ fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
                 triangles: triangles.clone(),
                 normals: desc.normals.clone(),
                 uvs: desc.uvs.clone(),
+                colors: desc.colors.clone(),
             };
             let at = |positions: &Vec<[f32; 3]>| MeshData { positions: positions.clone(), ..data.clone() };
             let later = desc.deform_positions.iter().map(at).collect();
             Ok(vec![LoadedMesh { data, later, material: None }])
         }
-        _ => Err(files.error(path, "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals` and `uvs`)")),
+        _ => {
+            Err(files
+                .error(path, "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs` and `colors`)"))
+        }
     }
 }
 
@@ -117,6 +123,9 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, late
     if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
         return Err(refuse(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }));
     }
+    if let Some(colors) = data.colors.as_ref().filter(|colors| colors.len() != count) {
+        return Err(refuse(MeshError::Count { what: "colors", count: colors.len(), vertices: count }));
+    }
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
     let place_positions = |mut positions: Vec<[f32; 3]>| {
@@ -150,49 +159,52 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, late
         }
         steps.push(MeshStep { positions: place_positions(step.positions), normals: step.normals });
     }
-    let uvs = find_normals(&mut steps, &mut triangles, data.uvs, placement);
+    let (mut uvs, mut colors) = (data.uvs, data.colors);
+    if let Some(vertices) = find_normals(&mut steps, &mut triangles, placement) {
+        uvs = uvs.map(|uvs| vertices.iter().map(|&v| uvs[v as usize]).collect());
+        colors = colors.map(|colors| vertices.iter().map(|&v| colors[v as usize]).collect());
+    }
     let mut steps = steps.into_iter();
     let MeshStep { positions, normals } = steps.next().unwrap_or_default();
-    let mesh = Mesh::new(positions, triangles, normals, uvs).map_err(refuse)?;
+    let mut mesh = Mesh::new(positions, triangles, normals, uvs).map_err(refuse)?;
+    if let Some(colors) = colors {
+        mesh = mesh.with_colors(colors).map_err(refuse)?;
+    }
     let later: Vec<MeshStep> = steps.collect();
     if later.is_empty() { Ok(mesh) } else { mesh.deforming(later).map_err(refuse) }
 }
 
-/// Gives a placed mesh the normals that its shading asks for, at each of its times; splits vertices where there are creases. Returns the uvs.
-fn find_normals(
-    steps: &mut [MeshStep],
-    triangles: &mut Vec<[u32; 3]>,
-    uvs: Option<Vec<[f32; 2]>>,
-    placement: Placement,
-) -> Option<Vec<[f32; 2]>> {
+/// Gives a placed mesh the normals that its shading asks for, at each of its times; splits vertices where there are creases, and then
+/// says what each was.
+fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement: Placement) -> Option<Vec<u32>> {
     let given = steps.iter().all(|step| step.normals.is_some());
     let computed = match placement.shading {
         MeshShadingDesc::Smooth => !given,
         MeshShadingDesc::Computed => true,
         MeshShadingDesc::Auto | MeshShadingDesc::Flat => false,
     };
-    let Smoothing { weight, crease_cosine } = placement.smoothing;
+    let Smoothing { weight, crease_cosine, by } = placement.smoothing;
     match crease_cosine.filter(|_| computed) {
         Some(cosine) => {
             let positions: Vec<&[[f32; 3]]> = steps.iter().map(|step| step.positions.as_slice()).collect();
-            let split = normals::split(&positions, triangles, weight, cosine);
+            let split = normals::split(&positions, triangles, weight, by, cosine);
             for (step, normals) in steps.iter_mut().zip(split.normals) {
                 let positions = split.vertices.iter().map(|&v| step.positions[v as usize]).collect();
                 *step = MeshStep { positions, normals: Some(normals) };
             }
             *triangles = split.triangles;
-            uvs.map(|uvs| split.vertices.iter().map(|&v| uvs[v as usize]).collect())
+            Some(split.vertices)
         }
         None => {
             for step in steps {
                 let given = step.normals.take();
                 step.normals = match placement.shading {
-                    _ if computed => Some(normals::smooth(&step.positions, triangles, weight)),
+                    _ if computed => Some(normals::smooth(&step.positions, triangles, weight, by)),
                     MeshShadingDesc::Flat => None,
                     _ => given.map(|normals| place_normals(normals, placement.transform, placement.reverse_normal)),
                 };
             }
-            uvs
+            None
         }
     }
 }

@@ -181,6 +181,7 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
+            vertex_colors: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Mesh(mesh) if mesh.has_colors())),
             filtered_textures: materials.iter().any(Material::is_textured)
                 && self.materials.textures.textures.iter().any(Texture::is_filtered),
             reliefs,

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::desc::NormalWeightDesc;
+use crate::desc::{NormalWeightDesc, SmoothByDesc};
 use crate::math::DVec3;
 
 /// How normals are averaged.
@@ -11,6 +11,7 @@ pub struct Smoothing {
     pub weight: NormalWeightDesc,
     /// Cosine of the largest angle between two triangles that are smoothed together; `None` smooths all.
     pub crease_cosine: Option<f64>,
+    pub by: SmoothByDesc,
 }
 
 /// A mesh with its vertices split at creases.
@@ -52,17 +53,20 @@ fn facets(positions: &[[f32; 3]], triangles: &[[u32; 3]], weight: NormalWeightDe
     triangles.iter().map(|triangle| Facet::new(triangle.map(at), weight)).collect()
 }
 
-/// For each vertex the first one at the same position.
-fn shared_positions(positions: &[[f32; 3]]) -> Vec<usize> {
+/// For each vertex the first one that counts as the same.
+fn shared_vertices(positions: &[[f32; 3]], by: SmoothByDesc) -> Vec<usize> {
+    if by == SmoothByDesc::Index {
+        return (0..positions.len()).collect();
+    }
     let mut first_at = HashMap::with_capacity(positions.len());
     // Adding zero makes -0 and 0 the same.
     let key = |p: &[f32; 3]| p.map(|x| (x + 0.0).to_bits());
     positions.iter().enumerate().map(|(i, p)| *first_at.entry(key(p)).or_insert(i)).collect()
 }
 
-/// Normals of the vertices, without creases. Vertices at one position share their normal.
-pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]], weight: NormalWeightDesc) -> Vec<[f32; 3]> {
-    let shared = shared_positions(positions);
+/// Normals of the vertices, without creases. Vertices that count as the same share their normal.
+pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]], weight: NormalWeightDesc, by: SmoothByDesc) -> Vec<[f32; 3]> {
+    let shared = shared_vertices(positions, by);
     let mut sums = vec![DVec3::ZERO; positions.len()];
     for (triangle, facet) in triangles.iter().zip(facets(positions, triangles, weight)) {
         for k in 0..3 {
@@ -72,10 +76,10 @@ pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]], weight: NormalWeig
     shared.iter().map(|&i| sums[i].normalize_or_zero().as_vec3().to_array()).collect()
 }
 
-/// Splits a mesh at creases: at each corner the normal is averaged over the triangles at its position that differ from the corner's own by no
+/// Splits a mesh at creases: at each corner the normal is averaged over the triangles around its vertex that differ from the corner's own by no
 /// more than the crease. `steps` has the positions at each time; the first ones decide where creases are.
-pub fn split(steps: &[&[[f32; 3]]], triangles: &[[u32; 3]], weight: NormalWeightDesc, crease_cosine: f64) -> Split {
-    let shared = shared_positions(steps[0]);
+pub fn split(steps: &[&[[f32; 3]]], triangles: &[[u32; 3]], weight: NormalWeightDesc, by: SmoothByDesc, crease_cosine: f64) -> Split {
+    let shared = shared_vertices(steps[0], by);
     let by_step: Vec<Vec<Facet>> = steps.iter().map(|positions| facets(positions, triangles, weight)).collect();
     let mut around: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
     for (t, triangle) in triangles.iter().enumerate() {
@@ -120,7 +124,7 @@ mod tests {
     fn smooth_normals_of_a_cube_point_along_its_diagonals() {
         let cube = cube();
         for weight in [NormalWeightDesc::Angle, NormalWeightDesc::Area] {
-            let normals = smooth(&cube.positions, &cube.triangles, weight);
+            let normals = smooth(&cube.positions, &cube.triangles, weight, SmoothByDesc::Position);
             // By angle the two triangles of a face count as one; by area a face with both at a corner counts twice.
             let exact = weight == NormalWeightDesc::Angle;
             for (p, n) in cube.positions.iter().zip(normals) {
@@ -131,17 +135,28 @@ mod tests {
     }
 
     #[test]
+    fn by_index_the_faces_of_a_cube_whose_corners_are_three_vertices_stay_flat() {
+        let cube = cube();
+        let normals = smooth(&cube.positions, &cube.triangles, NormalWeightDesc::Angle, SmoothByDesc::Index);
+        for triangle in &cube.triangles {
+            let [a, b, c] = triangle.map(|i| Vec3::from(cube.positions[i as usize]));
+            let n = (b - a).cross(c - a).normalize();
+            assert!(triangle.iter().all(|&i| (Vec3::from(normals[i as usize]) - n).length() < 1e-6));
+        }
+    }
+
+    #[test]
     fn a_crease_keeps_the_edges_of_a_cube_and_not_those_within_its_faces() {
         let cube = cube();
-        let flat = split(&[&cube.positions], &cube.triangles, NormalWeightDesc::Angle, 60f64.to_radians().cos());
+        let flat = split(&[&cube.positions], &cube.triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, 60f64.to_radians().cos());
         assert_eq!((flat.vertices.len(), flat.triangles.len()), (24, 12));
         for triangle in &flat.triangles {
             let corners = triangle.map(|i| Vec3::from(cube.positions[flat.vertices[i as usize] as usize]));
             let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
             assert!(triangle.iter().all(|&i| (Vec3::from(flat.normals[0][i as usize]) - n).length() < 1e-6));
         }
-        let round = split(&[&cube.positions], &cube.triangles, NormalWeightDesc::Angle, 100f64.to_radians().cos());
-        let smooth = smooth(&cube.positions, &cube.triangles, NormalWeightDesc::Angle);
+        let round = split(&[&cube.positions], &cube.triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, 100f64.to_radians().cos());
+        let smooth = smooth(&cube.positions, &cube.triangles, NormalWeightDesc::Angle, SmoothByDesc::Position);
         for (vertex, n) in round.vertices.iter().zip(&round.normals[0]) {
             assert!((Vec3::from(*n) - Vec3::from(smooth[*vertex as usize])).length() < 1e-6);
         }
@@ -154,8 +169,8 @@ mod tests {
         let (open, steep) = (roof(0.1), roof(2.0));
         let triangles = [[0, 1, 2], [3, 2, 1]];
         let cos = 30f64.to_radians().cos();
-        let split_roof = split(&[&open, &steep], &triangles, NormalWeightDesc::Angle, cos);
+        let split_roof = split(&[&open, &steep], &triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, cos);
         assert_eq!((split_roof.vertices.len(), split_roof.normals.len()), (4, 2));
-        assert_eq!(split(&[&steep], &triangles, NormalWeightDesc::Angle, cos).vertices.len(), 6);
+        assert_eq!(split(&[&steep], &triangles, NormalWeightDesc::Angle, SmoothByDesc::Position, cos).vertices.len(), 6);
     }
 }

@@ -5,7 +5,7 @@ use super::normals::Smoothing;
 use super::{Builder, meshes, shapes};
 use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::{Analytic, Placed, Shape};
 use crate::id::{LightGroupId, ShapeId};
 use crate::import::MeshData;
@@ -65,6 +65,9 @@ impl Builder {
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
         }
+        if !matches!(desc, ShapeDesc::Mesh(_)) && self.materials.needs_colors(&look) {
+            return Err(self.without_colors(path, None, common.material));
+        }
         let form = match desc {
             ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), look, emission),
             ShapeDesc::Cube(_) => Form::Mesh {
@@ -94,7 +97,7 @@ impl Builder {
     ) -> Result<Vec<PreparedShape>> {
         let smoothing = self.smoothing(path, desc)?;
         let mut prepared = Vec::new();
-        for loaded in self.meshes.take(&self.files, path, desc)? {
+        for mut loaded in self.meshes.take(&self.files, path, desc)? {
             let moves = motion.is_some() || !loaded.later.is_empty();
             let (mut look, mut emission) = (look, emission);
             let has_uvs = loaded.data.uvs.is_some();
@@ -113,6 +116,11 @@ impl Builder {
                     "the material or the opacity has textures, but the mesh has no uv".into(),
                 ));
             }
+            if !self.materials.needs_colors(&look) {
+                loaded.data.colors = None;
+            } else if loaded.data.colors.is_none() {
+                return Err(self.without_colors(path, desc.file.as_deref(), desc.material.as_deref()));
+            }
             if moves && emission.is_some() {
                 return Err(self.files.error(path, "a shape that gives off light cannot move"));
             }
@@ -129,12 +137,19 @@ impl Builder {
         Ok(prepared)
     }
 
+    /// The error about a shape whose material asks for colours that it does not have.
+    fn without_colors(&self, path: &str, file: Option<&str>, material: Option<&str>) -> Error {
+        let material = material.unwrap_or_default();
+        let message = format!("the material \"{material}\" takes the colours of vertices, but the shape has none");
+        meshes::refusal(&self.files, path, file, message)
+    }
+
     fn smoothing(&self, path: &str, desc: &MeshDesc) -> Result<Smoothing> {
         let crease = desc.crease_angle_degrees;
         let crease = crease.map(|angle| self.files.within(&format!("{path}.crease_angle_degrees"), angle, 0.0, 180.0)).transpose()?;
         // A rounding must not make creases where triangles are coplanar or the angle is that of all edges.
         let crease_cosine = crease.filter(|&angle| angle < 180.0).map(|angle| angle.to_radians().cos() - 1e-6);
-        Ok(Smoothing { weight: desc.normal_weight, crease_cosine })
+        Ok(Smoothing { weight: desc.normal_weight, crease_cosine, by: desc.smooth_by })
     }
 
     fn emission(&mut self, path: &str, common: &ShapeCommon) -> Result<Option<PreparedEmission>> {

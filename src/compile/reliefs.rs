@@ -43,7 +43,7 @@ impl Compiler<'_> {
 
     fn normal_map(&self, desc: &SceneDesc, path: &str, map: &NormalMapDesc) -> Result<Relief> {
         let place = format!("{path}.texture");
-        let texture = self.textures.find(self.files, &place, &map.texture, TextureUse::Data)?;
+        let texture = self.textures.find_by_uv(self.files, &place, &map.texture, TextureUse::Data)?;
         if let Some(TextureDesc::Image { color_space: ColorSpaceDesc::Srgb, .. }) = desc.textures.get(&map.texture) {
             return Err(self.files.error(&place, format!("the `color_space` of \"{}\" is `srgb`, but normals are data", map.texture)));
         }
@@ -52,7 +52,7 @@ impl Compiler<'_> {
     }
 
     fn bump_map(&self, path: &str, map: &BumpMapDesc) -> Result<Relief> {
-        let texture = self.textures.find(self.files, &format!("{path}.texture"), &map.texture, TextureUse::Data)?;
+        let texture = self.textures.find_by_uv(self.files, &format!("{path}.texture"), &map.texture, TextureUse::Data)?;
         if !map.height.is_finite() {
             return Err(self.files.error(&format!("{path}.height"), "is not finite"));
         }

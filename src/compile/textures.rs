@@ -73,6 +73,16 @@ impl TextureTable {
         })
     }
 
+    /// The texture that `path` names, for something that knows nothing of a surface but uv.
+    pub fn find_by_uv(&self, files: &Files, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
+        let id = self.find(files, path, name, wanted)?;
+        if self.get(id).uses_vertex_colors() {
+            let message = format!("the texture \"{name}\" has the colours of vertices, which are for parameters of materials");
+            return Err(files.error(path, message));
+        }
+        Ok(id)
+    }
+
     /// The texture that `path` names, for a fraction of light: no channel is below 0 or above 1.
     pub fn reflectance(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
         let id = self.find(files, path, name, TextureUse::Color)?;
@@ -85,7 +95,7 @@ impl TextureTable {
 
     /// The texture that `path` names, for light given off: no channel is below 0.
     pub fn radiance(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
-        let id = self.find(files, path, name, TextureUse::Color)?;
+        let id = self.find_by_uv(files, path, name, TextureUse::Color)?;
         let [min, _] = self.get(id).range();
         if min < 0.0 {
             return Err(files.error(path, format!("the texture \"{name}\" goes down to {min}: light is not negative")));
@@ -154,6 +164,7 @@ impl Loader<'_> {
                 let colors = [color("color0", *color0)?, color("color1", *color1)?];
                 Texture::Checker(Checker { colors, scale: files.uv(&format!("{path}.scale"), *scale)? })
             }
+            TextureDesc::VertexColor => Texture::VertexColor,
             TextureDesc::Product { factors } => {
                 if factors.is_empty() {
                     return Err(files.error(&format!("{path}.factors"), "a product needs at least one factor"));

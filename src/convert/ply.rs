@@ -4,7 +4,8 @@ use std::io::{Result, Write};
 
 use crate::import::MeshData;
 
-/// Writes a mesh as a binary little-endian PLY file: x y z, and nx ny nz and u v where the mesh has them, and triangles.
+/// Writes a mesh as a binary little-endian PLY file: x y z, nx ny nz, u v and linear r g b
+/// where the mesh has them, and triangles.
 ///
 /// # Errors
 /// If writing fails.
@@ -13,6 +14,7 @@ pub fn write_ply(mesh: &MeshData, out: &mut impl Write) -> Result<()> {
     let mut names = vec!["x", "y", "z"];
     names.extend(mesh.normals.iter().flat_map(|_| ["nx", "ny", "nz"]));
     names.extend(mesh.uvs.iter().flat_map(|_| ["u", "v"]));
+    names.extend(mesh.colors.iter().flat_map(|_| ["r", "g", "b"]));
     for name in names {
         writeln!(out, "property float {name}")?;
     }
@@ -22,6 +24,7 @@ pub fn write_ply(mesh: &MeshData, out: &mut impl Write) -> Result<()> {
         write(position)?;
         mesh.normals.as_ref().map_or(Ok(()), |normals| write(&normals[i]))?;
         mesh.uvs.as_ref().map_or(Ok(()), |uvs| write(&uvs[i]))?;
+        mesh.colors.as_ref().map_or(Ok(()), |colors| write(&colors[i]))?;
     }
     for triangle in &mesh.triangles {
         out.write_all(&[3])?;
@@ -44,8 +47,10 @@ mod tests {
         };
         let normals = Some(vec![[0.0, 0.0, 1.0]; 4]);
         let uvs = Some(vec![[0.25, 0.5], [1.0, 2.0], [3.0, -4.0], [0.0, 0.0]]);
-        for (normals, uvs) in [(None, None), (normals.clone(), None), (None, uvs.clone()), (normals, uvs)] {
-            let mesh = MeshData { normals, uvs, ..plain.clone() };
+        let colors = Some(vec![[0.1, 0.7, 1e-9], [1.0, 0.0, 0.3], [0.5; 3], [f32::MIN_POSITIVE, 0.2, 2.5]]);
+        for present in 0..8 {
+            let (normals, uvs) = (normals.clone().filter(|_| present & 1 > 0), uvs.clone().filter(|_| present & 2 > 0));
+            let mesh = MeshData { normals, uvs, colors: colors.clone().filter(|_| present & 4 > 0), ..plain.clone() };
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("m.ply");
             write_ply(&mesh, &mut std::fs::File::create(&path).unwrap()).unwrap();

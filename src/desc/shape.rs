@@ -154,6 +154,9 @@ shapes! {
         /// Inline: a uv for each vertex.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         uvs: Option<Vec<[f32; 2]>>,
+        /// Inline: a linear colour from 0 to 1 for each vertex, for textures of type `vertex_color`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        colors: Option<Vec<[f32; 3]>>,
         /// A mesh that deforms: the files with its vertices at further times, evenly spaced until the shutter closes, as many and in the same
         /// order as in `file`, which has those at its opening. Between them vertices move along straight lines.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -171,6 +174,9 @@ shapes! {
         /// Where normals are computed: how triangles around a vertex are weighted. Default: `angle`.
         #[serde(default)]
         normal_weight: NormalWeightDesc,
+        /// Where normals are computed: what triangles around a vertex are. Default: `position`.
+        #[serde(default)]
+        smooth_by: SmoothByDesc,
     }
     /// A sphere about the origin, or the part of it between two heights and within an angle about +z. u is the angle over `phi_max`; v runs
     /// from the bottom to the top of what is kept, by the angle from -z.
@@ -291,11 +297,35 @@ pub enum NormalWeightDesc {
     Area,
 }
 
+/// Which triangles computed normals are averaged over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SmoothByDesc {
+    /// Those with a corner at the same position: no seams where a file has several vertices at one place, for their uv.
+    #[default]
+    Position,
+    /// Those with the same vertex.
+    Index,
+}
+
 impl MeshDesc {
     /// The mesh of a file, with every other default.
     pub fn from_file(file: impl Into<String>) -> Self {
         let shading = MeshShadingDesc::default();
-        Self::new(Some(file.into()), None, None, None, None, Vec::new(), Vec::new(), shading, None, NormalWeightDesc::default())
+        Self::new(
+            Some(file.into()),
+            None,
+            None,
+            None,
+            None,
+            None,
+            Vec::new(),
+            Vec::new(),
+            shading,
+            None,
+            NormalWeightDesc::default(),
+            SmoothByDesc::default(),
+        )
     }
 }
 

@@ -58,6 +58,10 @@ pub enum TextureDesc {
         #[serde(default)]
         invert: bool,
     },
+    /// The colour of the surface itself: between those of a mesh's vertices, which may have any. In a PLY file these are `red`, `green` and
+    /// `blue` (or `r`, `g` and `b`) of the vertices, linear as floats and sRGB as whole numbers; in an OBJ file three numbers behind those of a
+    /// position, sRGB. For parameters of materials on meshes whose vertices have colours, from 0 to 1.
+    VertexColor,
     /// The product of several colours and textures, such as an image and a tint.
     Product {
         /// What is multiplied: colours, numbers or textures by name.

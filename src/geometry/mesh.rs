@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use super::tangents::{self, CornerTangents};
 pub use super::triangle::TrianglePoints;
+use super::vertex_color::weights;
 use super::{Detail, Hit, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
@@ -24,6 +25,14 @@ pub enum MeshError {
     /// A uv that is not finite.
     #[error("the uv of vertex {0} is not finite")]
     Uv(usize),
+    /// A colour that nothing can reflect.
+    #[error("the colour of vertex {vertex} is {color:?}, but must be within 0 and 1")]
+    Color {
+        /// The vertex.
+        vertex: usize,
+        /// Its colour.
+        color: [f32; 3],
+    },
     /// A corner that names no vertex.
     #[error("triangle {triangle} refers to vertex {index}, but there are only {count}")]
     Index {
@@ -34,7 +43,7 @@ pub enum MeshError {
         /// The number of vertices.
         count: usize,
     },
-    /// Normals or uvs that do not match the positions in number.
+    /// Normals, uvs or colours that do not match the positions in number.
     #[error("{what}: {count} for {vertices} vertices")]
     Count {
         /// Which attribute.
@@ -54,6 +63,8 @@ pub struct Mesh {
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) normals: Option<Vec<[f32; 3]>>,
     pub(super) uvs: Option<Vec<[f32; 2]>>,
+    /// Colours of the vertices.
+    pub(super) colors: Option<Box<[[f32; 3]]>>,
     /// Of a mesh that deforms, its vertices at further times.
     pub(super) later: Vec<MeshStep>,
     /// For normal maps, those of each triangle at each time; else empty.
@@ -118,6 +129,7 @@ impl Mesh {
             triangles,
             normals,
             uvs,
+            colors: None,
             later: Vec::new(),
             tangents: Vec::new(),
             has_slivers: false,
@@ -280,7 +292,7 @@ impl Mesh {
     /// Bytes of the buffers.
     pub fn memory_bytes(&self) -> usize {
         let normals = self.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
-        let uvs = self.uvs.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
+        let uvs = self.uvs.as_ref().map_or(0, |n| size_of_val(n.as_slice())) + self.colors.as_ref().map_or(0, |n| size_of_val(&**n));
         let of_step =
             |step: &MeshStep| size_of_val(step.positions.as_slice()) + step.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
         let later: usize = self.later.iter().map(of_step).sum();
@@ -365,9 +377,7 @@ impl Mesh {
             let corner = corner.as_dvec3();
             p - placement.map_or(corner, |t| t.point(corner))
         });
-        let [a, b, c] = from_corner;
-        let cross = (b - a).cross(c - a);
-        let weights = [b.cross(c), c.cross(a), a.cross(b)].map(|area| area.dot(cross).max(0.0) / cross.length_squared());
+        let weights = weights(from_corner);
         let side = 1f64.copysign((0..3).map(|i| weights[i] * normals[i].dot(toward)).sum());
         let depths = [0, 1, 2].map(|i| (-side * normals[i].dot(from_corner[i])).max(0.0));
         let raise = (0..3).map(|i| normals[i] * (side * depths[i] * weights[i])).sum::<DVec3>();

@@ -18,6 +18,7 @@ mod tangents;
 #[cfg(test)]
 mod testing;
 mod triangle;
+mod vertex_color;
 
 pub use cutout::{Coverage, Cutouts};
 pub use disk::Disk;

@@ -13,6 +13,8 @@ pub struct MeshData {
     pub normals: Option<Vec<[f32; 3]>>,
     /// A uv for each vertex, with the origin at the bottom left.
     pub uvs: Option<Vec<[f32; 2]>>,
+    /// A linear colour for each vertex.
+    pub colors: Option<Vec<[f32; 3]>>,
 }
 
 impl MeshData {
@@ -28,7 +30,22 @@ impl MeshData {
         if let (Some(uvs), Some(others)) = (&mut self.uvs, &mut other.uvs) {
             uvs.append(others);
         }
+        if let (Some(colors), Some(others)) = (&mut self.colors, &mut other.colors) {
+            colors.append(others);
+        }
         Ok(())
+    }
+
+    /// Gives the corners of every triangle these uv if the mesh has none; then triangles share no vertices.
+    pub fn give_uvs(&mut self, corners: [[f32; 2]; 3]) {
+        if self.uvs.is_some() {
+            return;
+        }
+        for values in [Some(&mut self.positions), self.normals.as_mut(), self.colors.as_mut()].into_iter().flatten() {
+            *values = self.triangles.as_flattened().iter().map(|&i| values.get(i as usize).copied().unwrap_or_default()).collect();
+        }
+        self.uvs = Some(corners.repeat(self.triangles.len()));
+        self.triangles = (0..self.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     }
 
     /// Adds a convex polygon as a fan around its first corner; fewer than three corners add nothing.

@@ -1,10 +1,11 @@
-//! OBJ files with their MTL: one mesh for each material.
+//! OBJ files with their MTL: one mesh for each material. Colours behind the positions of vertices are sRGB, as exporters write them.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::fmt::Display;
 use std::path::Path;
 
+use super::foreign::linear;
 use super::mtl_maps::{ObjMaps, take_maps};
 use super::obj_check::{check_obj, expand_colors};
 use super::{AssetError, MeshData};
@@ -52,6 +53,8 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     let used = check_obj(&text)?;
     // The parser takes lines of three and more points for faces.
     let text = if used.has_lines { without_lines(&text) } else { text };
+    // The parser loses count of colours that only some vertices have.
+    let text = if used.colors > 0 && used.colors < used.vertices { without_colors(&text) } else { text };
 
     let folder = path.parent().unwrap_or(Path::new(""));
     let trouble: RefCell<Option<AssetError>> = RefCell::new(None);
@@ -107,6 +110,14 @@ fn without_lines(text: &str) -> String {
     text.lines().filter(|line| line.split_whitespace().next() != Some("l")).flat_map(|line| [line, "\n"]).collect()
 }
 
+fn without_colors(text: &str) -> String {
+    let plain = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
+        ["v", x, y, z, _, _, _, ..] => format!("v {x} {y} {z}\n"),
+        _ => format!("{line}\n"),
+    };
+    text.lines().map(plain).collect()
+}
+
 /// The text of an MTL, fit for the parser; its texture maps are added to `maps`.
 fn read_mtl(path: &Path, maps: &RefCell<HashMap<String, ObjMaps>>) -> Result<String, AssetError> {
     let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
@@ -141,9 +152,11 @@ fn from_tobj(mesh: &tobj::Mesh) -> MeshData {
     let positions = triples(&mesh.positions);
     let normals = triples(&mesh.normals);
     let uvs = mesh.texcoords.as_chunks::<2>().0.to_vec();
+    let colors: Vec<[f32; 3]> = mesh.vertex_color.as_chunks::<3>().0.iter().map(|color| color.map(linear)).collect();
     MeshData {
         normals: (normals.len() == positions.len()).then_some(normals),
         uvs: (uvs.len() == positions.len()).then_some(uvs),
+        colors: (colors.len() == positions.len()).then_some(colors),
         positions,
         triangles: mesh.indices.as_chunks::<3>().0.to_vec(),
     }
@@ -186,6 +199,21 @@ mod tests {
         let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
         let meshes = read_obj(&write(&folder, "q.obj", latin), true).unwrap();
         assert_eq!(meshes[0].mesh.triangles, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn colours_of_vertices_are_decoded_and_all_or_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let colored = "v 0 0 0 1 0 0.2\nv 1 0 0 0 1 0.2\nv 1 1 0 0 0 1\n";
+        let mesh = |text: &str| read_obj(&write(&folder, "q.obj", text), true).unwrap().remove(0).mesh;
+        let blue = linear(0.2);
+        let mixed = mesh(&format!("{colored}f 3 1 2\n"));
+        assert_eq!(mixed.colors, Some(vec![[0.0, 0.0, 1.0], [1.0, 0.0, blue], [0.0, 1.0, blue]]));
+        for some in [format!("{colored}v 0 1 0\n"), format!("v 0 1 0\n{colored}")] {
+            let mesh = mesh(&format!("{some}f 1 2 3 4\n"));
+            assert_eq!((mesh.colors, mesh.positions.len()), (None, 4));
+        }
+        assert_eq!(mesh("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").colors, None);
     }
 
     #[test]

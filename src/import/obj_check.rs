@@ -9,6 +9,9 @@ use super::AssetError;
 pub struct ObjUse {
     /// Lines (from 1) and names of `usemtl`.
     pub materials: Vec<(usize, String)>,
+    /// Vertices, and those of them with colours.
+    pub vertices: usize,
+    pub colors: usize,
     /// Whether there is a `mtllib`.
     pub names_a_library: bool,
     /// Whether there are line elements.
@@ -29,6 +32,8 @@ pub fn check_obj(text: &str) -> Result<ObjUse, AssetError> {
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
+                used.vertices += 1;
+                used.colors += usize::from(words.clone().count() > 5);
                 check_numbers(words, 3).ok_or_else(|| at("a vertex needs three numbers"))?;
                 counts[0] += 1;
             }

@@ -1,5 +1,5 @@
-//! PLY files, ASCII and binary: element `vertex` with x y z, optionally nx ny nz and u v (or s t), and element `face` with a list of vertex
-//! indices. Polygons become fans.
+//! PLY files, ASCII and binary: element `vertex` with x y z, optionally nx ny nz, u v (or s t) and red green blue (or r g b), and element `face`
+//! with a list of vertex indices. Polygons become fans. Colours are linear as floats and sRGB as whole numbers, of which the largest is 1.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -8,6 +8,7 @@ use std::path::Path;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
 
+use super::foreign::linear;
 use super::{AssetError, MeshData};
 
 /// Reads a PLY file.
@@ -77,6 +78,9 @@ fn take_vertices(mesh: &mut MeshData, vertices: &[Vertex], element: &ElementDef)
     if has(&["u", "v"]) || has(&["s", "t"]) || has(&["texture_u", "texture_v"]) {
         mesh.uvs = Some(vertices.iter().map(|v| v.uv).collect());
     }
+    if has(&["red", "green", "blue"]) || has(&["r", "g", "b"]) {
+        mesh.colors = Some(vertices.iter().map(|v| v.color).collect());
+    }
 }
 
 #[derive(Default)]
@@ -84,6 +88,7 @@ struct Vertex {
     position: [f32; 3],
     normal: [f32; 3],
     uv: [f32; 2],
+    color: [f32; 3],
 }
 
 impl PropertyAccess for Vertex {
@@ -92,7 +97,7 @@ impl PropertyAccess for Vertex {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let Some(value) = number(&property) else {
+        let Some(mut value) = number(&property) else {
             return PropertyAccessResult::Ignored;
         };
         let place = match name {
@@ -104,6 +109,16 @@ impl PropertyAccess for Vertex {
             "nz" => &mut self.normal[2],
             "u" | "s" | "texture_u" => &mut self.uv[0],
             "v" | "t" | "texture_v" => &mut self.uv[1],
+            "red" | "r" | "green" | "g" | "blue" | "b" => {
+                if let Some(largest) = largest(&property) {
+                    value = linear(value / largest);
+                }
+                &mut self.color[match name {
+                    "red" | "r" => 0,
+                    "green" | "g" => 1,
+                    _ => 2,
+                }]
+            }
             _ => return PropertyAccessResult::Ignored,
         };
         *place = value;
@@ -122,6 +137,19 @@ fn number(property: &Property) -> Option<f32> {
         Property::UInt(x) => x as f32,
         Property::Float(x) => x,
         Property::Double(x) => x as f32,
+        _ => return None,
+    })
+}
+
+/// The largest value of a type of whole numbers.
+fn largest(property: &Property) -> Option<f32> {
+    Some(match property {
+        Property::Char(_) => f32::from(i8::MAX),
+        Property::UChar(_) => f32::from(u8::MAX),
+        Property::Short(_) => f32::from(i16::MAX),
+        Property::UShort(_) => f32::from(u16::MAX),
+        Property::Int(_) => i32::MAX as f32,
+        Property::UInt(_) => u32::MAX as f32,
         _ => return None,
     })
 }
@@ -177,6 +205,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             normals: None,
             uvs: Some(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
+            colors: None,
         }
     }
 
@@ -245,7 +274,24 @@ mod tests {
             assert_eq!(mesh.positions, [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, -2.0, 0.0]]);
             assert_eq!(mesh.triangles, [[2, 1, 0]]);
             assert_eq!(mesh.normals, Some(vec![[0.0, 0.0, 1.0]; 3]));
-            assert_eq!(mesh.uvs, None);
+            assert_eq!((mesh.uvs, mesh.colors), (None, None));
         }
+    }
+
+    #[test]
+    fn colours_are_linear_as_floats_and_encoded_as_whole_numbers() {
+        let colors = |kind: &str, names: [&str; 3], color: &str| {
+            let properties: String = names.map(|name| format!("property {kind} {name}\n")).concat();
+            let text = format!(
+                "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{properties}\
+                 element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 {color}\n1 0 0 {color}\n0 1 0 {color}\n3 0 1 2\n"
+            );
+            parse_ply(text.as_bytes()).unwrap().colors
+        };
+        assert_eq!(colors("float", ["red", "green", "blue"], "0.25 2 -1"), Some(vec![[0.25, 2.0, -1.0]; 3]));
+        assert_eq!(colors("double", ["r", "g", "b"], "0.25 0.5 1"), Some(vec![[0.25, 0.5, 1.0]; 3]));
+        assert_eq!(colors("uchar", ["b", "g", "r"], "255 51 0"), Some(vec![[0.0, linear(0.2), 1.0]; 3]));
+        assert_eq!(colors("ushort", ["red", "green", "blue"], "0 13107 65535"), Some(vec![[0.0, linear(0.2), 1.0]; 3]));
+        assert_eq!(colors("uchar", ["red", "green", "alpha"], "255 51 0"), None);
     }
 }

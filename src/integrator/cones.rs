@@ -51,9 +51,10 @@ impl World<'_> {
     pub(super) fn footprint(&self, cone: Option<&RayCone>, ray: &Ray, hit: Option<&Hit>, at: &SurfaceInteraction) -> Footprint {
         // Behind a rounding artefact another surface is met than the hit says.
         let hit = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids());
-        let (Some(cone), Some(hit)) = (cone, hit) else { return Footprint::point(at.uv) };
+        let (Some(cone), Some(hit)) = (cone, hit) else { return self.scene.texture_point(at) };
         let derivatives = self.scene.geometry.uv_derivatives(ray, hit);
-        Footprint::of_cone(at.uv, cone.width_at(at.t), ray.direction.dot(at.n_g), derivatives)
+        let footprint = Footprint::of_cone(at.uv, cone.width_at(at.t), ray.direction.dot(at.n_g), derivatives);
+        self.scene.colored(at, footprint)
     }
 }
 

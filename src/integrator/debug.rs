@@ -7,7 +7,6 @@ use crate::film::PixelSample;
 use crate::geometry::SurfaceInteraction;
 use crate::math::{Frame, Ray, Vec3};
 use crate::sampling::{Sampler, warp};
-use crate::texture::Footprint;
 
 /// What a [`DebugView`] shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +62,7 @@ impl Integrator for DebugView {
         for_each_first_surface(world, samples, out, counts, |_, ray, at| PixelSample {
             radiance: self.view.color(world, at),
             alpha: 1.0,
-            surface: surface_sample(world, self.needs, at, ray.direction, || Footprint::point(at.uv)),
+            surface: surface_sample(world, self.needs, at, ray.direction, || world.scene.texture_point(at)),
         });
     }
 }
@@ -92,7 +91,7 @@ impl Integrator for AmbientOcclusion {
             PixelSample {
                 radiance: Rgb::splat(f32::from(u8::from(free))),
                 alpha: 1.0,
-                surface: surface_sample(world, self.needs, at, ray.direction, || Footprint::point(at.uv)),
+                surface: surface_sample(world, self.needs, at, ray.direction, || world.scene.texture_point(at)),
             }
         });
         counts.shadow += shadow_rays;

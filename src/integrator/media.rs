@@ -80,7 +80,7 @@ impl World<'_> {
     #[inline(never)]
     pub(super) fn boundary_bsdf(&self, at: &SurfaceInteraction, direction: Vec3, state: &MediaState) -> Option<Bsdf> {
         let ior = state.ior?;
-        self.scene.met_material(at, direction).boundary(&self.scene.textures, at.uv, ior)
+        self.scene.met_material(at, direction).boundary(&self.scene.textures, || self.scene.texture_point(at), ior)
     }
 
     /// The media beyond a surface, if a path that came along `from` crosses it by going on along `to`; else those it is in.

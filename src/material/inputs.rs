@@ -25,8 +25,12 @@ impl ColorInput {
         }
     }
 
-    pub(super) fn is_constant(&self) -> bool {
-        matches!(self, Self::Constant(_))
+    /// The texture, if it comes from one.
+    pub(super) fn texture(&self) -> Option<TextureId> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Texture(id) => Some(*id),
+        }
     }
 }
 
@@ -54,8 +58,12 @@ impl ScalarInput {
         *self == Self::Constant(0.0)
     }
 
-    pub(super) fn is_constant(&self) -> bool {
-        matches!(self, Self::Constant(_))
+    /// The texture, if it comes from one.
+    pub(super) fn texture(&self) -> Option<TextureId> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Texture(id) => Some(*id),
+        }
     }
 }
 
@@ -83,8 +91,12 @@ impl RangedInput {
         }
     }
 
-    pub(super) fn is_constant(&self) -> bool {
-        matches!(self, Self::Constant(_))
+    /// The texture, if it comes from one.
+    pub(super) fn texture(&self) -> Option<TextureId> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Texture { id, .. } => Some(*id),
+        }
     }
 }
 
@@ -117,7 +129,11 @@ impl AlphaInput {
 
     /// Whether no texture changes it.
     pub fn is_constant(&self) -> bool {
-        self.axes.iter().all(ScalarInput::is_constant)
+        self.textures().is_empty()
+    }
+
+    pub(super) fn textures(&self) -> Vec<TextureId> {
+        self.axes.iter().filter_map(ScalarInput::texture).collect()
     }
 }
 
@@ -155,8 +171,11 @@ impl CoatInput {
         }
     }
 
-    pub(super) fn is_constant(&self) -> bool {
-        matches!(self, Self::Constant(_))
+    pub(super) fn textures(&self) -> Vec<TextureId> {
+        match self {
+            Self::Constant(_) => Vec::new(),
+            Self::Varying { ior, alpha } => ior.texture().into_iter().chain(alpha.textures()).collect(),
+        }
     }
 
     pub(super) fn is_anisotropic(&self) -> bool {

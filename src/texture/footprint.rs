@@ -1,24 +1,27 @@
 //! What part of a texture a lookup stands for.
 
+use crate::color::Rgb;
 use crate::math::{Vec2, Vec3};
 
 /// The least cosine between a ray and a surface: what is seen edge-on has no end.
 const LEAST_COSINE: f32 = 1e-3;
 
-/// A place in uv and how much of uv around it a sample stands for.
+/// A place on a surface: in uv, with how much of uv around it a sample stands for, and the colour that the surface has there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     /// The middle.
     pub uv: Vec2,
     /// An area, in units of uv squared; zero for a point.
     pub area: f32,
+    /// Between the colours of a mesh's vertices; white where there are none.
+    pub color: Rgb,
 }
 
 impl Footprint {
-    /// Nothing but a point.
+    /// Nothing but a point, of white.
     #[inline]
     pub fn point(uv: Vec2) -> Self {
-        Self { uv, area: 0.0 }
+        Self { uv, area: 0.0, color: Rgb::WHITE }
     }
 
     /// Where a cone of this `width`, whose unit axis meets the surface's unit normal at the cosine `cos`, meets a surface that changes with u
@@ -28,7 +31,7 @@ impl Footprint {
         let [du, dv] = derivatives.map(Vec3::as_dvec3);
         let section = f64::from(width).powi(2) / f64::from(cos.abs().max(LEAST_COSINE));
         let area = (section / du.cross(dv).length()) as f32;
-        Self { uv, area: if area.is_finite() { area } else { 0.0 } }
+        Self { area: if area.is_finite() { area } else { 0.0 }, ..Self::point(uv) }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Textures: colours and numbers as functions of uv.
+//! Textures: colours and numbers as functions of uv, or those that vertices have.
 //!
 //! A lookup is a point, or stands for what a sample of a pixel covers: then it takes a smaller version of the image where the samples of the
 //! pixel together would miss texels.
@@ -29,6 +29,8 @@ pub enum Texture {
     Checker(Checker),
     /// An image.
     Bitmap(Bitmap),
+    /// The colour that the surface itself has, between those of its vertices; white where nothing but uv is known.
+    VertexColor,
     /// The product of several textures.
     Product(Box<[Texture]>),
 }
@@ -41,6 +43,7 @@ impl Texture {
             Self::Constant(color) => *color,
             Self::Checker(checker) => checker.color(uv),
             Self::Bitmap(bitmap) => bitmap.color(uv),
+            Self::VertexColor => Rgb::WHITE,
             Self::Product(factors) => factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color(uv)),
         }
     }
@@ -51,7 +54,7 @@ impl Texture {
         match self {
             Self::Bitmap(bitmap) => bitmap.scalar(uv),
             Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar(uv)),
-            Self::Constant(_) | Self::Checker(_) => self.color(uv).luminance(),
+            Self::Constant(_) | Self::Checker(_) | Self::VertexColor => self.color(uv).luminance(),
         }
     }
 
@@ -61,6 +64,7 @@ impl Texture {
         match self {
             Self::Constant(_) | Self::Checker(_) => self.color(footprint.uv),
             Self::Bitmap(bitmap) => bitmap.color_over(footprint),
+            Self::VertexColor => footprint.color,
             Self::Product(factors) => factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color_over(footprint)),
         }
     }
@@ -70,6 +74,7 @@ impl Texture {
     pub fn scalar_over(&self, footprint: &Footprint) -> f32 {
         match self {
             Self::Bitmap(bitmap) => bitmap.scalar_over(footprint),
+            Self::VertexColor => footprint.color.luminance(),
             Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar_over(footprint)),
             Self::Constant(_) | Self::Checker(_) => self.scalar(footprint.uv),
         }
@@ -78,16 +83,34 @@ impl Texture {
     /// Whether a footprint has a say in it.
     pub fn is_filtered(&self) -> bool {
         match self {
-            Self::Constant(_) | Self::Checker(_) => false,
+            Self::Constant(_) | Self::Checker(_) | Self::VertexColor => false,
             Self::Bitmap(bitmap) => bitmap.filter == Filter::Trilinear,
             Self::Product(factors) => factors.iter().any(Self::is_filtered),
+        }
+    }
+
+    /// Whether uv have a say in it.
+    pub fn uses_uv(&self) -> bool {
+        match self {
+            Self::Constant(_) | Self::VertexColor => false,
+            Self::Checker(_) | Self::Bitmap(_) => true,
+            Self::Product(factors) => factors.iter().any(Self::uses_uv),
+        }
+    }
+
+    /// Whether the colours of vertices have a say in it.
+    pub fn uses_vertex_colors(&self) -> bool {
+        match self {
+            Self::Constant(_) | Self::Checker(_) | Self::Bitmap(_) => false,
+            Self::VertexColor => true,
+            Self::Product(factors) => factors.iter().any(Self::uses_vertex_colors),
         }
     }
 
     /// The size of a texel in uv, the smallest of all images; `None` without an image.
     pub fn texel(&self) -> Option<Vec2> {
         match self {
-            Self::Constant(_) | Self::Checker(_) => None,
+            Self::Constant(_) | Self::Checker(_) | Self::VertexColor => None,
             Self::Bitmap(bitmap) => Some(bitmap.texel()),
             Self::Product(factors) => factors.iter().filter_map(Self::texel).reduce(Vec2::min),
         }
@@ -97,7 +120,7 @@ impl Texture {
     pub fn axes(&self) -> [Vec2; 2] {
         match self {
             Self::Bitmap(bitmap) => bitmap.transform.axes(),
-            Self::Constant(_) | Self::Checker(_) | Self::Product(_) => [Vec2::X, Vec2::Y],
+            Self::Constant(_) | Self::Checker(_) | Self::VertexColor | Self::Product(_) => [Vec2::X, Vec2::Y],
         }
     }
 
@@ -109,6 +132,8 @@ impl Texture {
             Self::Constant(color) => of(*color),
             Self::Checker(checker) => join(of(checker.colors[0]), of(checker.colors[1])),
             Self::Bitmap(bitmap) => bitmap.range(),
+            // As meshes are checked.
+            Self::VertexColor => [0.0, 1.0],
             Self::Product(factors) => factors.iter().map(Self::range).fold([1.0; 2], |a, b| {
                 let products = [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]];
                 products.into_iter().fold([f32::INFINITY, f32::NEG_INFINITY], |range, p| join(range, [p; 2]))

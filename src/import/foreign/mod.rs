@@ -10,6 +10,7 @@ mod recolor;
 mod report;
 
 pub use draft::Draft;
+pub(super) use recolor::linear;
 pub use report::{ImportReport, Outcome, ReportEntry};
 
 use std::collections::BTreeMap;

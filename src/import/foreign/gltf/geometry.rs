@@ -21,13 +21,23 @@ pub struct Deformation<'a> {
     pub joints: Option<&'a [DAffine3]>,
 }
 
+/// What is to be known of the colours of a primitive's vertices: red, green, blue and alpha.
+#[derive(Clone, Copy, Debug)]
+pub struct VertexColors {
+    pub mean: [f32; 4],
+    /// Whether vertices differ in anything but alpha.
+    pub differ: bool,
+    /// Whether vertices differ in alpha.
+    pub differ_in_alpha: bool,
+}
+
 /// Triangles of a primitive; only vertices that they use.
 #[derive(Debug)]
 pub struct Triangles {
     /// Without uv.
     pub data: MeshData,
-    /// The mean of the vertices' colours, if they have any: red, green, blue and alpha.
-    pub mean_color: Option<[f32; 4]>,
+    /// About the colours of the vertices, if they have any.
+    pub colors: Option<VertexColors>,
     /// The vertices of the primitive that are used, and how many it has.
     used: Vec<u32>,
     count: usize,
@@ -66,17 +76,19 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
     };
     let normals = column("NORMAL", Semantic::Normals, &[Type::Vec3], Wanted::Floats)?;
     let colors = column("COLOR_0", Semantic::Colors(0), &[Type::Vec3, Type::Vec4], Wanted::Floats)?;
+    let colors: Option<Vec<[f32; 4]>> = colors.map(|colors| used.iter().map(|&i| color(&colors, i as usize)).collect());
     let mut data = MeshData {
         positions: used.iter().map(|&i| positions.floats(i as usize)).collect(),
         triangles,
         normals: normals.map(|normals| used.iter().map(|&i| normals.floats(i as usize)).collect()),
         uvs: None,
+        colors: colors.as_ref().map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect()),
     };
     morph(source, path, primitive, deformation.weights, count, &used, &mut data)?;
     if let Some(joints) = deformation.joints {
         skin(source, path, primitive, joints, &column, &used, &mut data)?;
     }
-    Ok(Some(Triangles { data, mean_color: colors.map(|colors| mean(&colors, &used)), used, count }))
+    Ok(Some(Triangles { data, colors: colors.as_deref().map(VertexColors::of), used, count }))
 }
 
 impl Triangles {
@@ -235,15 +247,19 @@ fn skin<'a>(
     Ok(())
 }
 
-/// The mean of the colours of these vertices.
-fn mean(colors: &Column, used: &[u32]) -> [f32; 4] {
-    let mut sum = [0.0f64; 4];
-    for &i in used {
-        let mut color = colors.floats::<4>(i as usize);
-        if colors.width() < 4 {
-            color[3] = 1.0;
+/// The colour of a vertex, clamped as the format has it.
+fn color(colors: &Column, i: usize) -> [f32; 4] {
+    let [r, g, b, a] = colors.floats::<4>(i);
+    [r, g, b, if colors.width() < 4 { 1.0 } else { a }].map(|c| c.clamp(0.0, 1.0))
+}
+
+impl VertexColors {
+    fn of(colors: &[[f32; 4]]) -> Self {
+        let mut sum = [0.0f64; 4];
+        for color in colors {
+            sum.iter_mut().zip(color).for_each(|(sum, c)| *sum += f64::from(*c));
         }
-        sum.iter_mut().zip(color).for_each(|(sum, c)| *sum += f64::from(c));
+        let differ = |k: usize| colors.iter().any(|color| Some(color[k]) != colors.first().map(|first| first[k]));
+        Self { mean: sum.map(|sum| (sum / colors.len().max(1) as f64) as f32), differ: (0..3).any(differ), differ_in_alpha: differ(3) }
     }
-    sum.map(|sum| (sum / used.len().max(1) as f64).clamp(0.0, 1.0) as f32)
 }

@@ -183,12 +183,12 @@ impl Builder<'_, '_> {
             self.draft.ignored(path, "primitive", "", "has no triangles");
             return Ok(None);
         };
-        let tint = triangles.mean_color.filter(|color| *color != [1.0; 4]);
-        let look = self.materials.look(source, self.draft, primitive.material, tint)?;
+        let look = self.materials.look(source, self.draft, primitive.material, triangles.colors)?;
         if let Some(set) = look.uv_set {
             triangles.read_uvs(source, path, primitive, set)?;
         }
         let mut data = triangles.data;
+        data.colors = data.colors.filter(|_| look.vertex_colors);
         if look.uv_set.is_some() && data.uvs.is_none() {
             self.draft.approximated(path, "primitive", "TEXCOORD", "there is no uv for the textures: they show the colour of one corner");
             data.uvs = Some(vec![[0.0, 1.0]; data.positions.len()]);
@@ -199,7 +199,7 @@ impl Builder<'_, '_> {
         for p in data.positions.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
             grow(bounds, DVec3::from(p.map(f64::from)));
         }
-        let bytes = data.positions.len() * 32 + data.triangles.len() * 12;
+        let bytes = data.positions.len() * (32 + if look.vertex_colors { 12 } else { 0 }) + data.triangles.len() * 12;
         self.budget = self.budget.checked_sub(bytes).ok_or_else(|| {
             source.fault(path, "the meshes of the file are far larger than its buffers: the same data is used again and again")
         })?;

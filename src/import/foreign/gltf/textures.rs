@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::Source;
 use super::buffers::Uri;
 use super::extensions::{TextureInfo, TextureTransform};
-use crate::desc::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
+use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
 use crate::import::{Draft, ImageData, Samples, read_image, read_image_bytes};
 
@@ -41,6 +41,8 @@ enum ImageKind {
 pub struct TextureSet {
     files: BTreeMap<(usize, ImageKind), String>,
     names: BTreeMap<String, String>,
+    /// That of the vertices' colours.
+    vertex_colors: Option<String>,
 }
 
 impl TextureRef {
@@ -77,6 +79,12 @@ impl TextureSet {
     pub fn add_cut(&mut self, source: Source, draft: &mut Draft, texture: &TextureRef, factor: f32, cutoff: f32) -> Result<Option<String>> {
         let kind = ImageKind::Cut { factor: factor.to_bits(), cutoff: cutoff.to_bits() };
         self.add_kind(source, draft, texture, kind, ColorSpaceDesc::Linear, Some(ChannelDesc::R))
+    }
+
+    /// The texture of the vertices' colours.
+    pub fn vertex_colors(&mut self, draft: &mut Draft, place: &str) -> ColorDesc {
+        let add = || draft.add_texture("vertex_color", place, TextureDesc::VertexColor);
+        ColorDesc::Texture { texture: self.vertex_colors.get_or_insert_with(add).clone() }
     }
 
     fn add_kind(

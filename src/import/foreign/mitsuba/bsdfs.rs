@@ -266,6 +266,10 @@ impl<'a> Reader<'a> {
         let inner = self.one_part(element, uv)?;
         let opacity = match self.scalar(element, "opacity", 0.5, 1.0, uv)? {
             ScalarDesc::Constant(v) => OpacityDesc::Number(v),
+            ScalarDesc::Texture { texture } if self.has_vertex_colors(&texture) => {
+                element.ignored("opacity", "opacity has no colours of vertices: 1");
+                OpacityDesc::Number(1.0)
+            }
             ScalarDesc::Texture { texture } => OpacityDesc::Texture { texture: self.without_alpha(&texture, element) },
         };
         if inner.opacity.is_some() {

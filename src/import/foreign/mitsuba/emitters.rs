@@ -69,6 +69,11 @@ impl<'a> Reader<'a> {
             _ => None,
         };
         let emission = match texture.map(|id| self.texture(id, Role::Color, uv)).transpose()? {
+            Some(TextureValue::Named(texture)) if self.has_vertex_colors(&texture) => {
+                element.approximated("radiance", "white in place of the colours of vertices");
+                element.take("radiance");
+                EmissionDesc { radiance: [1.0; 3], texture: None, two_sided: false, group: None }
+            }
             Some(TextureValue::Named(texture)) => {
                 element.take("radiance");
                 EmissionDesc { radiance: [1.0; 3], texture: Some(texture), two_sided: false, group: None }

@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use crate::desc::{MeshDesc, MeshShadingDesc};
+use crate::import::{MeshData, read_obj, read_ply};
 
 /// Mitsuba's cube `[-1, 1]³`, with its uv.
 pub fn cube() -> MeshDesc {
@@ -27,14 +28,36 @@ pub fn cube() -> MeshDesc {
     mesh
 }
 
+/// The mesh of an OBJ or PLY file if it is one, has no uv and can be read.
+pub fn without_uvs(path: &Path) -> Option<MeshData> {
+    let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+    if has(path, &[" u", " s", " texture_u"], b"vt ") {
+        return None;
+    }
+    let mut meshes =
+        if is_obj { read_obj(path, false).ok()?.into_iter().map(|part| part.mesh).collect() } else { vec![read_ply(path).ok()?] };
+    meshes.pop().filter(|mesh| meshes.is_empty() && mesh.uvs.is_none())
+}
+
+/// Whether an OBJ file has uv, but no normals.
+pub fn smooths_over_seams(path: &Path) -> bool {
+    !has(path, &[], b"vn ") && has(path, &[], b"vt ")
+}
+
 /// Whether the header of a PLY file or a line of an OBJ file has normals; not if the file cannot be read.
 pub fn has_normals(path: &Path) -> bool {
+    has(path, &[" nx"], b"vn ")
+}
+
+/// Whether the header of a PLY file has a property whose line ends in one of these, or a line of an OBJ file begins so.
+fn has(path: &Path, endings: &[&str], word: &[u8]) -> bool {
     let Ok(file) = File::open(path) else { return false };
-    let has = |line: &[u8], word: &[u8]| line.trim_ascii().starts_with(word);
+    let begins = |line: &[u8], word: &[u8]| line.trim_ascii().starts_with(word);
     let mut lines = BufReader::new(file).split(b'\n').map_while(std::io::Result::ok).peekable();
-    if lines.peek().is_some_and(|line| has(line, b"ply")) {
-        lines.take_while(|line| !has(line, b"end_header")).any(|line| has(&line, b"property") && line.trim_ascii().ends_with(b" nx"))
+    if lines.peek().is_some_and(|line| begins(line, b"ply")) {
+        let ends = |line: &[u8]| endings.iter().any(|ending| line.trim_ascii().ends_with(ending.as_bytes()));
+        lines.take_while(|line| !begins(line, b"end_header")).any(|line| begins(&line, b"property") && ends(&line))
     } else {
-        lines.any(|line| has(&line, b"vn "))
+        lines.any(|line| begins(&line, word))
     }
 }

@@ -76,13 +76,11 @@ fn decode(stream: &mut impl Read, version: u64) -> Result<MeshData, String> {
     let positions = tuples::<3>(stream, vertices, is_double)?;
     let normals = (flags & HAS_NORMALS != 0).then(|| tuples::<3>(stream, vertices, is_double)).transpose()?;
     let uvs = (flags & HAS_UVS != 0).then(|| tuples::<2>(stream, vertices, is_double)).transpose()?;
-    if flags & HAS_COLORS != 0 {
-        tuples::<3>(stream, vertices, is_double)?;
-    }
+    let colors = (flags & HAS_COLORS != 0).then(|| tuples::<3>(stream, vertices, is_double)).transpose()?;
     let mut corners = Vec::new();
     let count = triangles.checked_mul(3).ok_or("too many triangles")?;
     values::<4>(stream, count, |bytes| corners.push(u32::from_le_bytes(bytes)))?;
-    Ok(MeshData { positions, triangles: corners.as_chunks::<3>().0.to_vec(), normals, uvs })
+    Ok(MeshData { positions, triangles: corners.as_chunks::<3>().0.to_vec(), normals, uvs, colors })
 }
 
 /// `count` tuples of floats or doubles.

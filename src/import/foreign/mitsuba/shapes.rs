@@ -7,8 +7,8 @@ use super::textures::UvOrigin;
 use super::tree::{PluginId, Value};
 use super::{Reader, meshes, serialized, values};
 use crate::desc::{
-    CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, MeshShadingDesc, OpacityDesc, QuadDesc, ShapeDesc, SphereDesc, TransformDesc,
-    TransformStepDesc,
+    CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, MeshShadingDesc, OpacityDesc, QuadDesc, ShapeDesc, SmoothByDesc, SphereDesc,
+    TransformDesc, TransformStepDesc,
 };
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3};
@@ -112,6 +112,11 @@ impl<'a> Reader<'a> {
         let flipped = element.boolean("flip_normals", false)?;
         let bsdf = element.one("bsdf")?;
         let (material, mut opacity) = self.surface(bsdf, &place, uv)?;
+        if let ShapeDesc::Mesh(mesh) = &mut shape
+            && self.has_image(id, &mut BTreeSet::new())
+        {
+            self.give_uvs(mesh, uv, &place);
+        }
         let emission = match element.one("emitter")? {
             Some(emitter) => self.emission(emitter, uv)?,
             None => None,
@@ -135,6 +140,30 @@ impl<'a> Reader<'a> {
         *common.reverse_normal = flipped != reversed;
         element.finish(&mut self.draft);
         Ok(Some((place, shape)))
+    }
+
+    /// Whether a plugin or a part of it has a texture that is looked up by uv; `seen` are parts that have none.
+    fn has_image(&self, id: PluginId, seen: &mut BTreeSet<PluginId>) -> bool {
+        let plugin = &self.document.plugins[id.0];
+        if !seen.insert(id) || seen.len() > super::MAX_REFERENCES {
+            return false;
+        }
+        let mut parts = plugin.properties.iter().filter_map(|property| self.document.plugin_of(property).ok().flatten());
+        matches!(plugin.kind.as_str(), "bitmap" | "checkerboard") || parts.any(|part| self.has_image(part, seen))
+    }
+
+    /// Gives a mesh of a file the uv that Mitsuba gives it if the file has none: each triangle's barycentric coordinates. What is wrong with
+    /// the file is found when the scene is compiled.
+    fn give_uvs(&mut self, desc: &mut MeshDesc, uv: UvOrigin, place: &str) {
+        let Some(file) = desc.file.clone() else { return };
+        let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(&file);
+        let kept = self.draft.assets.meshes.get(&file).filter(|mesh| mesh.uvs.is_none()).cloned();
+        let Some(mut mesh) = kept.or_else(|| meshes::without_uvs(&path)) else { return };
+        mesh.give_uvs(if uv == UvOrigin::Upward { [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]] } else { [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] });
+        self.draft.mapped(place, "shape", "uv");
+        desc.file = Some(self.draft.keep_mesh(&file, mesh));
+        // Triangles no longer share vertices.
+        desc.smooth_by = SmoothByDesc::Position;
     }
 
     /// Whether a BSDF or a part of it looks different along u and along v; `seen` are parts that do not.
@@ -211,6 +240,11 @@ impl<'a> Reader<'a> {
             (file, mirrors && !is_flat && meshes::has_normals(&path))
         };
         let mut desc = MeshDesc::from_file(file);
+        // Vertices of an OBJ come from indices of positions and uv: their seams are smoothed over.
+        if kind == "obj" && !is_flat && meshes::smooths_over_seams(&path) {
+            element.approximated("", "normals are smoothed across seams of uv, where Mitsuba's have edges");
+        }
+        desc.smooth_by = if kind == "obj" { SmoothByDesc::Position } else { SmoothByDesc::Index };
         desc.shading = if is_flat { MeshShadingDesc::Flat } else { MeshShadingDesc::Smooth };
         // Mitsuba leaves the order of the corners as it is: given normals keep their side, found ones turn with the mirrored faces.
         let reversed = map.matrix3.determinant() < 0.0 && (is_flat || !has_normals);

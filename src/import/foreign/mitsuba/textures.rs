@@ -151,6 +151,7 @@ impl<'a> Reader<'a> {
         let value = match (element.plugin.class.as_str(), element.kind()) {
             ("texture", "bitmap") => TextureValue::Named(self.bitmap(&mut element, uv)?),
             ("texture", "checkerboard") => self.checkerboard(&mut element, role, uv)?,
+            ("texture", "mesh_attribute") => self.mesh_attribute(&mut element)?,
             ("texture" | "spectrum", "rawconstant") => TextureValue::Constant(raw_constant(&mut element)?),
             ("spectrum", _) => TextureValue::Constant(self.spectrum_plugin(&mut element, false)?),
             ("texture", kind) => {
@@ -163,6 +164,38 @@ impl<'a> Reader<'a> {
         self.open.pop();
         self.textures.insert((id, role, uv), value.clone());
         Ok(value)
+    }
+
+    /// Colours of vertices; there are no other attributes.
+    fn mesh_attribute(&mut self, element: &mut Element<'a>) -> Result<TextureValue> {
+        let attribute = element.text("name")?.ok_or_else(|| element.place().error("a mesh_attribute needs \"name\""))?;
+        if attribute != "vertex_color" {
+            element.ignored("name", format!("meshes have no attribute {attribute}: a grey of 0.5"));
+            return Ok(TextureValue::Constant([0.5; 3]));
+        }
+        let given = element.float("scale")?.unwrap_or(1.0) as f32;
+        let scale = given.clamp(0.0, 1.0);
+        if scale != given {
+            element.approximated("scale", "the nearest number from 0 to 1");
+        }
+        let place = element.place().to_string();
+        let name = if element.plugin.id.is_empty() { "vertex_color" } else { &element.plugin.id };
+        let colors = self.draft.add_texture(name, &place, TextureDesc::VertexColor);
+        if scale == 1.0 {
+            return Ok(TextureValue::Named(colors));
+        }
+        let factors = vec![ColorDesc::Texture { texture: colors }, ColorDesc::Grey(scale)];
+        Ok(TextureValue::Named(self.draft.add_texture(name, &place, TextureDesc::Product { factors })))
+    }
+
+    /// Whether a texture is one of colours of vertices, which only parameters of materials have.
+    pub(super) fn has_vertex_colors(&self, texture: &str) -> bool {
+        let is_color = |factor: &ColorDesc| matches!(factor, ColorDesc::Texture { texture } if self.has_vertex_colors(texture));
+        match self.draft.desc.textures.get(texture) {
+            Some(TextureDesc::VertexColor) => true,
+            Some(TextureDesc::Product { factors }) => factors.iter().any(is_color),
+            _ => false,
+        }
     }
 
     fn bitmap(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<String> {

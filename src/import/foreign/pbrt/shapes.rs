@@ -10,7 +10,7 @@ use super::params::Params;
 use super::state::{Graphics, Look, World};
 use super::textures::Textures;
 use super::triangles;
-use crate::desc::{CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SphereDesc};
+use crate::desc::{CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SmoothByDesc, SphereDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
 use crate::import::{MeshData, read_ply};
@@ -124,11 +124,13 @@ impl Shapes<'_> {
             Some(mesh.triangles),
             mesh.normals,
             mesh.uvs,
+            mesh.colors,
             Vec::new(),
             Vec::new(),
             shading,
             None,
             NormalWeightDesc::default(),
+            SmoothByDesc::default(),
         ))
     }
 
@@ -264,7 +266,7 @@ fn triangle_mesh(params: &Params) -> Result<MeshData> {
         }
         uvs => uvs,
     };
-    Ok(MeshData { positions, triangles, normals, uvs })
+    Ok(MeshData { positions, triangles, normals, uvs, colors: None })
 }
 
 /// The triangles, and how many patches they are.

@@ -19,20 +19,9 @@ pub fn orient(mesh: &mut MeshData) -> bool {
     any
 }
 
-/// Gives each triangle the uv that pbrt gives it where a mesh has none: (0, 0), (1, 0), (1, 1).
+/// Gives each triangle the uv that pbrt gives it where a mesh has none.
 pub fn give_uvs(mesh: &mut MeshData) {
-    if mesh.uvs.is_some() {
-        return;
-    }
-    mesh.positions = at_corners(&mesh.triangles, &mesh.positions);
-    mesh.normals = mesh.normals.as_deref().map(|normals| at_corners(&mesh.triangles, normals));
-    mesh.uvs = Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]].repeat(mesh.triangles.len()));
-    mesh.triangles = (0..mesh.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-}
-
-/// What belongs to the vertices of a mesh, for each corner of its triangles.
-fn at_corners(triangles: &[[u32; 3]], values: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    triangles.as_flattened().iter().map(|&i| values.get(i as usize).copied().unwrap_or_default()).collect()
+    mesh.give_uvs([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
 }
 
 /// The area of a placed mesh.
@@ -55,6 +44,7 @@ mod tests {
             triangles: vec![[0, 1, 2]],
             normals: Some(vec![normal; 3]),
             uvs: None,
+            colors: None,
         }
     }
 

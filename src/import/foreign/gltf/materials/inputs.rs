@@ -83,6 +83,16 @@ impl<'b> Inputs<'b> {
         Ok(ColorDesc::Texture { texture: draft.add_texture("tinted", &texture.place, product) })
     }
 
+    /// A colour times those of vertices.
+    pub fn colored(&mut self, draft: &mut Draft, place: &str, color: ColorDesc) -> ColorDesc {
+        let colors = self.textures.vertex_colors(draft, place);
+        if matches!(color, ColorDesc::Rgb([1.0, 1.0, 1.0])) {
+            return colors;
+        }
+        let product = TextureDesc::Product { factors: vec![colors, color] };
+        ColorDesc::Texture { texture: draft.add_texture("tinted", place, product) }
+    }
+
     /// A number: a factor, times a channel of a texture if there is one.
     pub fn scalar(
         &mut self,

@@ -7,16 +7,20 @@ mod layers;
 use std::collections::BTreeMap;
 
 use gltf::json::Index;
-use gltf::json::material::Material;
+use gltf::json::material::{AlphaMode, Material};
+use gltf::json::validation::Checked;
 use serde_json::{Map, Value};
 
 use self::inputs::Inputs;
 use super::Source;
 use super::extensions as ext;
+use super::geometry::VertexColors;
 use super::textures::{TextureRef, TextureSet};
 use crate::desc::{ChannelDesc, ColorDesc, EmissionDesc, MaterialDesc, NormalMapDesc, OpacityDesc, PrincipledDesc, ScalarDesc};
 use crate::error::Result;
 use crate::import::Draft;
+
+const UNLIT: &str = "KHR_materials_unlit";
 
 /// What a shape gets from a material.
 #[derive(Clone, Debug, Default)]
@@ -26,13 +30,15 @@ pub struct Look {
     pub emission: Option<EmissionDesc>,
     /// The set of uv that its textures use, if it has any.
     pub uv_set: Option<u32>,
+    /// Whether it shows the colours of vertices.
+    pub vertex_colors: bool,
 }
 
-/// Materials that have been added, by index and the mean of the vertices' colours.
+/// Materials that have been added, by index and what the vertices' colours do to them.
 #[derive(Debug, Default)]
 pub struct MaterialSet {
     textures: TextureSet,
-    done: BTreeMap<(Option<usize>, Option<[u32; 4]>), Look>,
+    done: BTreeMap<(Option<usize>, [u32; 4], bool, bool), Look>,
 }
 
 /// A material while it is read.
@@ -44,25 +50,41 @@ struct Builder<'a, 'b> {
     path: String,
     element: String,
     name: String,
-    /// The mean of the vertices' colours.
+    /// A factor on the base colour, from the vertices' colours.
     tint: [f32; 4],
+    /// Whether the vertices' colours themselves are one.
+    is_colored: bool,
+    /// Whether the tint's alpha stands for several.
+    mixes_alpha: bool,
     color_factor: [f32; 4],
     color_texture: Option<TextureRef>,
 }
 
 impl MaterialSet {
     /// What a material comes to.
-    pub fn look(&mut self, source: Source, draft: &mut Draft, index: Option<Index<Material>>, tint: Option<[f32; 4]>) -> Result<Look> {
-        let key = (index.map(|index| index.value()), tint.map(|tint| tint.map(f32::to_bits)));
-        if let Some(look) = self.done.get(&key) {
-            return Ok(look.clone());
-        }
+    pub fn look(
+        &mut self,
+        source: Source,
+        draft: &mut Draft,
+        index: Option<Index<Material>>,
+        colors: Option<VertexColors>,
+    ) -> Result<Look> {
         let default = Material::default();
         let path = index.map_or_else(|| "materials".into(), |index| format!("materials[{}]", index.value()));
         let json = match index {
             Some(index) => source.root.get(index).ok_or_else(|| source.fault(&path, "there is no such material"))?,
             None => &default,
         };
+        // Light cannot have colours of vertices.
+        let is_unlit = json.extensions.as_ref().is_some_and(|all| all.others.contains_key(UNLIT));
+        let is_colored = colors.is_some_and(|colors| colors.differ) && !is_unlit;
+        let tint =
+            colors.map_or([1.0; 4], |VertexColors { mean: [r, g, b, a], .. }| if is_colored { [1.0, 1.0, 1.0, a] } else { [r, g, b, a] });
+        let mixes_alpha = colors.is_some_and(|colors| colors.differ_in_alpha);
+        let key = (index.map(|index| index.value()), tint.map(f32::to_bits), is_colored, mixes_alpha);
+        if let Some(look) = self.done.get(&key) {
+            return Ok(look.clone());
+        }
         let name = match (&json.name, index) {
             (Some(name), _) => name.clone(),
             (None, Some(index)) => format!("material {}", index.value()),
@@ -79,7 +101,9 @@ impl MaterialSet {
             element: format!("material \"{name}\""),
             path,
             name,
-            tint: tint.unwrap_or([1.0; 4]),
+            tint,
+            is_colored,
+            mixes_alpha,
             color_factor: pbr.base_color_factor.0,
             color_texture,
         };
@@ -125,12 +149,16 @@ impl<'a> Builder<'a, '_> {
     }
 
     fn build(&mut self) -> Result<Look> {
-        if self.tint != [1.0; 4] {
-            self.approximated("COLOR_0", "the mean of the vertices' colours is a factor on the base colour");
+        let is_unlit = self.extensions().is_some_and(|all| all.contains_key(UNLIT));
+        if is_unlit && self.tint != [1.0; 4] {
+            self.approximated("COLOR_0", "the mean of the vertices' colours is a factor on the light given off");
+        } else if self.mixes_alpha && !matches!(self.json.alpha_mode, Checked::Valid(AlphaMode::Opaque)) {
+            self.approximated("COLOR_0", "the mean of the vertices' alpha is a factor on alpha");
+        } else if self.is_colored || self.tint != [1.0; 4] {
+            self.mapped("COLOR_0");
         }
         let glossy = self.specular_glossiness()?;
         self.color_factor = std::array::from_fn(|k| self.color_factor[k] * self.tint[k]);
-        let is_unlit = self.extensions().is_some_and(|all| all.contains_key("KHR_materials_unlit"));
         let (material, mut emission) = if is_unlit { self.unlit()? } else { (self.surface(glossy)?, self.emission()?) };
         let opacity = self.opacity()?;
         let (material, is_medium) = match material {
@@ -155,7 +183,7 @@ impl<'a> Builder<'a, '_> {
         if self.inputs.was_clamped() {
             self.approximated("factors", "numbers outside of 0 to 1 became the nearest within");
         }
-        Ok(Look { material, opacity, emission, uv_set })
+        Ok(Look { material, opacity, emission, uv_set, vertex_colors: self.is_colored && !is_medium })
     }
 
     /// The material of a surface without coat and relief.
@@ -194,7 +222,10 @@ impl<'a> Builder<'a, '_> {
     fn base_color(&mut self) -> Result<ColorDesc> {
         let [r, g, b, _] = self.color_factor;
         let texture = self.color_texture.clone();
-        let color = self.inputs.color(self.source, self.draft, texture.as_ref(), [r, g, b])?;
+        let mut color = self.inputs.color(self.source, self.draft, texture.as_ref(), [r, g, b])?;
+        if self.is_colored {
+            color = self.inputs.colored(self.draft, &self.path, color);
+        }
         self.mapped("baseColorFactor");
         if texture.is_some() {
             self.mapped("baseColorTexture");
@@ -219,7 +250,7 @@ impl<'a> Builder<'a, '_> {
 
     /// A surface that looks the same in any light: black, and it gives off its colour.
     fn unlit(&mut self) -> Result<(Option<MaterialDesc>, Option<EmissionDesc>)> {
-        self.approximated("KHR_materials_unlit", "gives off its colour as light, and so lights what is around it");
+        self.approximated(UNLIT, "gives off its colour as light, and so lights what is around it");
         let [r, g, b, _] = self.color_factor;
         let texture = self.color_texture.clone();
         let emission = self.light(texture.as_ref(), [r, g, b])?;

@@ -182,13 +182,40 @@ fn a_mesh_without_uv_shows_one_colour() {
 }
 
 #[test]
-fn colours_of_vertices_tint_by_their_mean() {
-    let mut asset = square_of(json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 1, 1, 1] } }));
-    let colors = asset.floats(&[[1.0f32, 0.0, 0.25], [1.0, 1.0, 0.25], [0.0, 1.0, 0.25], [0.0, 0.0, 0.25]]);
-    asset.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colors);
-    let imported = asset.read();
-    assert!(matches!(principled(&imported, "m").base_color, ColorDesc::Rgb([0.25, 0.5, 0.25])));
-    assert_eq!(outcome(&imported, "COLOR_0"), Some(Outcome::Approximated));
+fn colours_of_vertices_multiply_the_base_colour() {
+    let colors = [[1.0f32, 0.0, 0.25], [1.0, 1.0, 0.25], [0.0, 1.0, 0.25], [0.0, 2.0, 0.25]];
+    let colored = |material: Value, colors: &[[f32; 3]]| {
+        let mut asset = square_of(material);
+        let colors = asset.floats(colors);
+        asset.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colors);
+        asset.read()
+    };
+    let factors = |imported: &Imported| match &principled(imported, "m").base_color {
+        ColorDesc::Texture { texture } => match &imported.desc.textures[texture] {
+            TextureDesc::Product { factors } => factors.clone(),
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
+    };
+    let imported = colored(json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 1, 1, 1] } }), &colors);
+    let [ColorDesc::Texture { texture }, ColorDesc::Rgb([0.5, 1.0, 1.0])] = &factors(&imported)[..] else { panic!() };
+    assert!(matches!(imported.desc.textures[texture], TextureDesc::VertexColor));
+    assert_eq!(mesh(&imported, 0).colors, Some(colors.map(|c| c.map(|c| c.min(1.0))).to_vec()));
+    assert_eq!(outcome(&imported, "COLOR_0"), Some(Outcome::Mapped));
+
+    let textured = colored(json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }), &colors);
+    assert!(matches!(&factors(&textured)[..], [ColorDesc::Texture { .. }, ColorDesc::Texture { .. }]));
+    let plain = colored(json!({}), &colors);
+    assert!(matches!(&principled(&plain, "m").base_color, ColorDesc::Texture { texture } if texture == "vertex_color"));
+
+    // One colour for all is a factor.
+    let even = colored(json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 1, 1, 1] } }), &[[0.5, 0.25, 1.0]; 4]);
+    assert!(matches!(principled(&even, "m").base_color, ColorDesc::Rgb([0.25, 0.25, 1.0])));
+    assert_eq!((&mesh(&even, 0).colors, outcome(&even, "COLOR_0")), (&None, Some(Outcome::Mapped)));
+
+    let unlit = colored(json!({ "extensions": { "KHR_materials_unlit": {} } }), &colors);
+    assert_eq!((&mesh(&unlit, 0).colors, outcome(&unlit, "COLOR_0")), (&None, Some(Outcome::Approximated)));
+    assert_eq!(unlit.desc.shapes[0].common().emission.unwrap().radiance, [0.5, 0.5, 0.25]);
 }
 
 #[test]

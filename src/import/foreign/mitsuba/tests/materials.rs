@@ -146,6 +146,24 @@ fn principled_surfaces_have_mitsubas_defaults() {
 }
 
 #[test]
+fn attributes_of_meshes_are_colours_of_vertices() {
+    let attribute = |name: &str, more: &str| {
+        format!(
+            r#"<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance"><string name="name" value="{name}"/>{more}</texture></bsdf>"#
+        )
+    };
+    let shape = |bsdf: &str| format!(r#"<shape type="ply"><string name="filename" value="m.ply"/>{bsdf}</shape>"#);
+    let desc = scene(&shape(&attribute("vertex_color", "")));
+    assert!(matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::VertexColor]));
+    let scaled = scene(&shape(&attribute("vertex_color", r#"<float name="scale" value="0.5"/>"#)));
+    let MaterialDesc::Diffuse { albedo: ColorDesc::Texture { texture }, .. } = material(&scaled, 0) else { panic!() };
+    assert!(matches!(&scaled.textures[&texture], TextureDesc::Product { factors } if matches!(factors[1], ColorDesc::Grey(0.5))));
+    assert!(notes(&shape(&attribute("face_color", ""))).iter().any(|(outcome, name, _)| *outcome == Outcome::Ignored && name == "name"));
+    let light = r#"<emitter type="area"><texture type="mesh_attribute" name="radiance"><string name="name" value="vertex_color"/></texture></emitter>"#;
+    assert!(notes(&shape(light)).iter().any(|(outcome, name, _)| *outcome == Outcome::Approximated && name == "radiance"));
+}
+
+#[test]
 fn masks_and_null_are_holes_of_the_shape() {
     let opacity = |bsdf: &str| {
         let desc = scene(&format!("<shape type=\"sphere\">{bsdf}</shape>"));

@@ -1,7 +1,7 @@
 //! Shapes, their uv and their sides.
 
 use super::*;
-use crate::desc::{MeshDesc, MeshShadingDesc, TextureDesc};
+use crate::desc::{MeshDesc, MeshShadingDesc, SmoothByDesc, TextureDesc};
 
 #[track_caller]
 fn mesh(desc: &SceneDesc, i: usize) -> &MeshDesc {
@@ -76,6 +76,38 @@ fn one_texture_on_different_shapes_becomes_two() {
     assert_eq!(desc.textures.len(), 2);
     let name = |i: usize| shape(&desc, i).common().material;
     assert!(name(0) != name(1) && name(0) == name(2));
+}
+
+#[test]
+fn meshes_without_uv_have_barycentric_ones_where_textures_need_them() {
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+               property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
+    let obj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+    let read = |file: &str, color: &str, text: &str| {
+        let scene = format!(
+            r#"<scene version="3.0.0">{SENSOR}<shape type="{}"><string name="filename" value="{file}"/><bsdf type="diffuse">{color}</bsdf></shape></scene>"#,
+            &file[2..]
+        );
+        read_with(&scene, &[], &[(file, text.as_bytes())]).unwrap()
+    };
+    let checker = r#"<texture type="checkerboard" name="reflectance"/>"#;
+    // The v of OBJ files is one minus Mitsuba's.
+    let uvs = [("m.ply", ply, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), ("m.obj", obj, [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]])];
+    for (file, text, corners) in uvs {
+        let imported = read(file, checker, text);
+        let desc = mesh(&imported.desc, 0);
+        let data = &imported.assets.meshes[desc.file.as_ref().unwrap()];
+        assert_eq!(data.uvs, Some(corners.repeat(2)), "{file}");
+        assert_eq!((data.positions.len(), &data.triangles[1], desc.smooth_by), (6, &[3, 4, 5], SmoothByDesc::Position));
+        assert_eq!(data.positions[3..], [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert!(imported.report.entries.iter().any(|entry| entry.parameter == "uv" && entry.outcome == Outcome::Mapped));
+        let plain = read(file, "", text);
+        assert_eq!((plain.assets.meshes.len(), mesh(&plain.desc, 0).file.as_deref()), (0, Some(file)));
+    }
+    let by = |file: &str, text: &str| mesh(&read(file, "", text).desc, 0).smooth_by;
+    assert_eq!((by("m.ply", ply), by("m.obj", obj)), (SmoothByDesc::Index, SmoothByDesc::Position));
+    let with_uv = obj.replace("f 1 2 3 4", "vt 0 0\nf 1/1 2/1 3/1 4/1");
+    assert_eq!(mesh(&read("m.obj", checker, &with_uv).desc, 0).file.as_deref(), Some("m.obj"));
 }
 
 #[test]
