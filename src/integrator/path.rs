@@ -13,7 +13,7 @@ use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::{Light, Receiver};
+use crate::light::{FoundBy, Light, Receiver};
 use crate::math::{DVec3, Frame, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
 use crate::sampling::{PixelSeed, Sampler, power_heuristic};
@@ -29,6 +29,13 @@ pub enum Strategy {
     Light,
     /// Sampling the BSDF wherever possible.
     Bsdf,
+}
+
+impl Strategy {
+    #[inline]
+    fn found_by(self) -> FoundBy {
+        if self == Self::Mis { FoundBy::Both } else { FoundBy::Lights }
+    }
 }
 
 /// Path tracing.
@@ -283,9 +290,10 @@ impl PathIntegrator {
     fn escaped(&self, world: &World, path: &Path, direction: Vec3) -> Rgb {
         let mut radiance = Rgb::BLACK;
         for &id in world.scene.lights.at_infinity() {
-            let found = world.scene.lights.get(id).eval_at_infinity(direction);
+            let found = world.scene.lights.get(id).eval_at_infinity(direction, self.strategy.found_by());
             if !found.radiance.is_black() {
-                radiance += found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from));
+                radiance += found.radiance
+                    * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from, self.strategy.found_by()));
             }
         }
         radiance
@@ -304,7 +312,8 @@ impl PathIntegrator {
         if radiance.is_black() || path.pdf == f32::INFINITY || self.strategy != Strategy::Mis {
             return radiance * self.found_by_chance(path, 0.0);
         }
-        let light_pdf = light.pdf(&world.scene.geometry, path.from.p, ray, at) * world.scene.lights.pmf(id, &path.from);
+        let light_pdf =
+            light.pdf(&world.scene.geometry, path.from.p, ray, at) * world.scene.lights.pmf(id, &path.from, self.strategy.found_by());
         radiance * self.found_by_chance(path, light_pdf)
     }
 
@@ -315,9 +324,9 @@ impl PathIntegrator {
             return None;
         }
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::light(bounce));
-        let choice = world.scene.lights.choose(&vertex.receiver(), [u[0], u[3]])?;
+        let choice = world.scene.lights.choose(&vertex.receiver(), [u[0], u[3]], self.strategy.found_by())?;
         let light = world.scene.lights.get(choice.id);
-        let sample = light.sample(&world.scene.geometry, &world.scene.textures, vertex.at.p, [u[1], u[2]]);
+        let sample = light.sample(&world.scene.geometry, &world.scene.textures, vertex.at.p, [u[1], u[2]], self.strategy.found_by());
         let sample = sample.as_ref()?;
         if self.strategy == Strategy::Bsdf && !sample.is_delta {
             return None;

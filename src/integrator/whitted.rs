@@ -7,7 +7,7 @@ use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sa
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::Light;
+use crate::light::{FoundBy, Light};
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Ray, RayCone};
 use crate::medium::Interior;
@@ -139,7 +139,7 @@ impl Whitted {
 /// Light that arrives from the middle of one light and is scattered back.
 fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, light: &Light, counts: &mut RayCounts) -> Rgb {
     let at = vertex.at;
-    let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2]) else {
+    let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2], FoundBy::Lights) else {
         return Rgb::BLACK;
     };
     let mut raised = None;

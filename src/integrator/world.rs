@@ -4,7 +4,7 @@ use super::cones::Division;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
 use crate::geometry::{Detail, Hit, SurfaceInteraction};
-use crate::light::Light;
+use crate::light::{FoundBy, Light};
 use crate::math::float::step_past;
 use crate::math::{Aabb, Ray, Vec3};
 use crate::scene::Scene;
@@ -116,7 +116,7 @@ impl<'a> World<'a> {
             .lights
             .at_infinity()
             .iter()
-            .fold(Rgb::BLACK, |sum, &id| sum + self.scene.lights.get(id).eval_at_infinity(direction).radiance)
+            .fold(Rgb::BLACK, |sum, &id| sum + self.scene.lights.get(id).eval_at_infinity(direction, FoundBy::Lights).radiance)
     }
 
     /// A camera ray that starts far outside the scene, moved along itself (in `f64`) to just before the scene's box: accelerators compute

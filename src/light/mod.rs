@@ -46,6 +46,16 @@ pub enum Light {
     Environment(Environment),
 }
 
+/// What finds the light of a scene. Where sampling the BSDF finds every direction, sampling lights need not: it had better look where there
+/// is more light than elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FoundBy {
+    /// Sampling lights alone.
+    Lights,
+    /// Sampling lights and sampling the BSDF, combined.
+    Both,
+}
+
 /// Light from infinity along a direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InfinityEval {
@@ -112,9 +122,9 @@ impl Light {
     /// Light that arrives along the unit direction `wi` at a ray that leaves the scene, with the density of sampling it; nothing from
     /// lights that such rays cannot see.
     #[inline]
-    pub fn eval_at_infinity(&self, wi: Vec3) -> InfinityEval {
+    pub fn eval_at_infinity(&self, wi: Vec3, found_by: FoundBy) -> InfinityEval {
         match self {
-            Self::Environment(light) => light.eval(wi),
+            Self::Environment(light) => light.eval(wi, found_by),
             Self::Directional(light) => light.eval(wi),
             Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Ies(_) => InfinityEval::default(),
         }
@@ -127,14 +137,14 @@ impl Light {
 
     /// Light that arrives at `p` from a chosen direction, `u` in the unit square; `None` where nothing can arrive.
     #[inline]
-    pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2], found_by: FoundBy) -> Option<LightSample> {
         match self {
             Self::Area(light) => light.sample(geometry, textures, p, u),
             Self::Point(light) => light.sample(p),
             Self::Spot(light) => light.sample(p),
             Self::Ies(light) => light.sample(p),
             Self::Directional(light) => light.sample(u),
-            Self::Environment(light) => light.sample(u),
+            Self::Environment(light) => light.sample(u, found_by),
         }
     }
 
@@ -158,6 +168,14 @@ impl Light {
             Self::Ies(light) => light.power(),
             Self::Directional(light) => light.power(scene_radius),
             Self::Environment(light) => light.power(scene_radius),
+        }
+    }
+
+    /// The part of [`power`](Self::power) that sampling this light is to find.
+    fn sampled_power(&self, scene_radius: f64, found_by: FoundBy) -> f64 {
+        match self {
+            Self::Environment(light) => light.sampled_power(scene_radius, found_by),
+            _ => self.power(scene_radius),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! All lights of a scene, and which one a path looks at.
 
-use super::Light;
 use super::tree::{LightTree, Receiver};
+use super::{FoundBy, Light};
 use crate::geometry::Geometry;
 use crate::id::LightId;
 use crate::math::float::ONE_MINUS_EPSILON;
@@ -31,21 +31,27 @@ pub enum LightSelection {
 /// infinity gives to a scene depends on the scene's size more than on what the camera sees; so if there are both lights at infinity and
 /// others, either kind has at least a quarter of the choices. Where power decides, a twentieth of the choices of a kind is spread evenly,
 /// so that no light of positive power starves beside a strong one.
+///
+/// An environment [found by sampling the BSDF too](FoundBy::Both) counts with the power that is left to find.
 #[derive(Clone, Debug, Default)]
 pub struct LightSet {
     lights: Vec<Light>,
-    /// All lights, or (beside a tree) those at infinity.
-    table: Option<AliasTable>,
-    tree: Option<Box<NearLights>>,
+    /// Lights that are not at infinity, if a tree chooses among them.
+    tree: Option<Box<LightTree>>,
+    /// Where only sampling lights finds them.
+    alone: Choosing,
+    /// Where sampling the BSDF does too, if that makes a difference.
+    beside_bsdf: Option<Choosing>,
     at_infinity: Vec<LightId>,
 }
 
-/// Lights that are not at infinity.
-#[derive(Clone, Debug)]
-struct NearLights {
-    tree: LightTree,
-    /// Probability of choosing one of them, rather than one at infinity.
-    share: f32,
+/// How lights are chosen.
+#[derive(Clone, Debug, Default)]
+struct Choosing {
+    /// All lights, or (beside a tree) those at infinity.
+    table: Option<AliasTable>,
+    /// Probability of asking the tree.
+    tree_share: f32,
 }
 
 /// From so many lights on that are not at infinity, a tree chooses. Where time is equal, it halves the error of 16 lights, and gains nothing
@@ -70,27 +76,32 @@ impl LightSet {
     pub fn with_selection(lights: Vec<Light>, geometry: &Geometry, selection: LightSelection) -> Self {
         let bounds = geometry.bounds();
         let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().as_dvec3().length() };
-        let power = |light: &Light| {
-            let power = light.power(radius);
-            if power > 0.0 && power.is_finite() { power } else { 0.0 }
+        let powers = |found_by: FoundBy| -> Vec<f64> {
+            let power = |light: &Light| Some(light.sampled_power(radius, found_by)).filter(|p| *p > 0.0 && p.is_finite()).unwrap_or(0.0);
+            lights.iter().map(power).collect()
         };
-        let powers: Vec<f64> = lights.iter().map(power).collect();
         let far: Vec<bool> = lights.iter().map(Light::is_at_infinity).collect();
-        let mut probabilities = probabilities(&powers, &far);
+        let alone = probabilities(&powers(FoundBy::Lights), &far);
+        let has_environment = lights.iter().any(|light| matches!(light, Light::Environment(_)));
+        let beside_bsdf = has_environment.then(|| probabilities(&powers(FoundBy::Both), &far));
         let at_infinity = (0..lights.len()).filter(|&i| lights[i].is_visible_at_infinity()).map(LightId::new).collect();
         let tree = match selection {
             LightSelection::Power => None,
             LightSelection::Tree => {
-                let of = |i: usize| if probabilities[i] > 0.0 { lights[i].bounds(geometry) } else { None };
+                let of = |i: usize| if alone[i] > 0.0 { lights[i].bounds(geometry) } else { None };
                 LightTree::new(&(0..lights.len()).map(of).collect::<Vec<_>>())
             }
         };
-        let tree = tree.map(|tree| {
-            let share = probabilities.iter().zip(&far).filter(|(_, far)| !**far).map(|(p, _)| p).sum::<f64>().min(1.0);
-            probabilities.iter_mut().zip(&far).filter(|(_, far)| !**far).for_each(|(p, _)| *p = 0.0);
-            Box::new(NearLights { tree, share: share as f32 })
-        });
-        Self { lights, table: AliasTable::new(&probabilities), tree, at_infinity }
+        let choosing = |mut probabilities: Vec<f64>| {
+            let mut tree_share = 0.0;
+            if tree.is_some() {
+                tree_share = probabilities.iter().zip(&far).filter(|(_, far)| !**far).map(|(p, _)| p).sum::<f64>().min(1.0) as f32;
+                probabilities.iter_mut().zip(&far).filter(|(_, far)| !**far).for_each(|(p, _)| *p = 0.0);
+            }
+            Choosing { table: AliasTable::new(&probabilities), tree_share }
+        };
+        let (alone, beside_bsdf) = (choosing(alone), beside_bsdf.map(choosing));
+        Self { lights, tree: tree.map(Box::new), alone, beside_bsdf, at_infinity }
     }
 
     /// All lights, by [`LightId`].
@@ -111,7 +122,7 @@ impl LightSet {
 
     /// Whether any light shines.
     pub fn shines(&self) -> bool {
-        self.table.is_some() || self.tree.is_some()
+        self.alone.table.is_some() || self.tree.is_some()
     }
 
     /// How a light is chosen.
@@ -119,39 +130,36 @@ impl LightSet {
         if self.tree.is_some() { LightSelection::Tree } else { LightSelection::Power }
     }
 
+    #[inline]
+    fn choosing(&self, found_by: FoundBy) -> &Choosing {
+        match &self.beside_bsdf {
+            Some(choosing) if found_by == FoundBy::Both => choosing,
+            _ => &self.alone,
+        }
+    }
+
     /// A light for `from`, `u` in the unit square (the second number adds digits to the first, for many lights); `None` if none shines
     /// there, as far as the choice has looked.
     #[inline]
-    pub fn choose(&self, from: &Receiver, u: [f32; 2]) -> Option<LightChoice> {
-        if let Some(near) = &self.tree {
-            return self.choose_by_tree(near, from, u);
+    pub fn choose(&self, from: &Receiver, u: [f32; 2], found_by: FoundBy) -> Option<LightChoice> {
+        let choosing = self.choosing(found_by);
+        if let Some(tree) = &self.tree {
+            return choosing.choose_by_tree(tree, from, u);
         }
-        let table = self.table.as_ref()?;
+        let table = choosing.table.as_ref()?;
         let chosen = table.sample(u[0]);
         Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index) })
     }
 
-    fn choose_by_tree(&self, near: &NearLights, from: &Receiver, u: [f32; 2]) -> Option<LightChoice> {
-        // Random numbers are multiples of 2^-24.
-        let u = f64::from(u[0]) + f64::from(u[1]) * (1.0 / 16_777_216.0);
-        let share = f64::from(near.share);
-        if u < share {
-            let chosen = near.tree.choose(from, u / share)?;
-            return Some(LightChoice { id: LightId(chosen.light), pmf: chosen.pmf * near.share });
-        }
-        let table = self.table.as_ref()?;
-        let chosen = table.sample(((u - share) / (1.0 - share)).clamp(0.0, f64::from(ONE_MINUS_EPSILON)) as f32);
-        Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index) * (1.0 - near.share) })
-    }
-
-    /// Probability with which [`choose`](Self::choose) finds a light for `from`.
+    /// Probability with which [`choose`](Self::choose) takes this light for `from`.
     #[inline]
-    pub fn pmf(&self, id: LightId, from: &Receiver) -> f32 {
-        let by_power = self.table.as_ref().map_or(0.0, |table| table.pmf(id.index()));
+    pub fn pmf(&self, id: LightId, from: &Receiver, found_by: FoundBy) -> f32 {
+        let choosing = self.choosing(found_by);
+        let by_power = choosing.table.as_ref().map_or(0.0, |table| table.pmf(id.index()));
         match &self.tree {
             None => by_power,
-            Some(near) if by_power > 0.0 => by_power * (1.0 - near.share),
-            Some(near) => near.tree.pmf(from, id.0) * near.share,
+            Some(_) if self.get(id).is_at_infinity() => by_power * (1.0 - choosing.tree_share),
+            Some(tree) => tree.pmf(from, id.0) * choosing.tree_share,
         }
     }
 
@@ -159,6 +167,21 @@ impl LightSet {
     #[inline]
     pub fn at_infinity(&self) -> &[LightId] {
         &self.at_infinity
+    }
+}
+
+impl Choosing {
+    fn choose_by_tree(&self, tree: &LightTree, from: &Receiver, u: [f32; 2]) -> Option<LightChoice> {
+        // Random numbers are multiples of 2^-24.
+        let u = f64::from(u[0]) + f64::from(u[1]) * (1.0 / 16_777_216.0);
+        let share = f64::from(self.tree_share);
+        if u < share {
+            let chosen = tree.choose(from, u / share)?;
+            return Some(LightChoice { id: LightId(chosen.light), pmf: chosen.pmf * self.tree_share });
+        }
+        let table = self.table.as_ref()?;
+        let chosen = table.sample(((u - share) / (1.0 - share)).clamp(0.0, f64::from(ONE_MINUS_EPSILON)) as f32);
+        Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index) * (1.0 - self.tree_share) })
     }
 }
 
@@ -215,33 +238,33 @@ mod tests {
         let n = 1 << 20;
         let mut count = [0u32; 6];
         for i in 0..n {
-            let choice = lights.choose(&ANYWHERE, [i as f32 / n as f32, 0.0]).unwrap();
-            assert_eq!(choice.pmf, lights.pmf(choice.id, &ANYWHERE));
+            let choice = lights.choose(&ANYWHERE, [i as f32 / n as f32, 0.0], FoundBy::Lights).unwrap();
+            assert_eq!(choice.pmf, lights.pmf(choice.id, &ANYWHERE, FoundBy::Lights));
             count[choice.id.index()] += 1;
         }
         let mut sum = 0.0;
         for (i, &c) in count.iter().enumerate() {
-            let pmf = lights.pmf(LightId::new(i), &ANYWHERE);
+            let pmf = lights.pmf(LightId::new(i), &ANYWHERE, FoundBy::Lights);
             assert!((c as f32 / n as f32 - pmf).abs() < 1e-5, "{i}");
             assert_eq!(pmf > 0.0, i != 2, "{i}");
             sum += pmf;
         }
         assert!((sum - 1.0).abs() < 1e-6);
-        assert!(lights.pmf(LightId(1), &ANYWHERE) + lights.pmf(LightId(4), &ANYWHERE) >= 0.249);
+        assert!([1, 4].map(|i| lights.pmf(LightId(i), &ANYWHERE, FoundBy::Lights)).iter().sum::<f32>() >= 0.249);
         assert_eq!(lights.at_infinity(), [LightId(1), LightId(4)]);
     }
 
     #[test]
     fn equal_lights_are_chosen_equally() {
         let lights = set(vec![point(2.0); 5]);
-        assert!((0..5).all(|i| (lights.pmf(LightId(i), &ANYWHERE) - 0.2).abs() < 1e-7));
+        assert!((0..5).all(|i| (lights.pmf(LightId(i), &ANYWHERE, FoundBy::Lights) - 0.2).abs() < 1e-7));
     }
 
     #[test]
     fn a_sharp_sun_is_not_visible_and_no_light_is_no_choice() {
         let lights = set(vec![Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0)))]);
-        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0), &ANYWHERE) == 1.0);
-        assert!(LightSet::default().choose(&ANYWHERE, [0.5, 0.0]).is_none() && LightSet::default().is_empty());
-        assert!(set(vec![point(0.0)]).choose(&ANYWHERE, [0.5, 0.0]).is_none());
+        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0), &ANYWHERE, FoundBy::Lights) == 1.0);
+        assert!(LightSet::default().choose(&ANYWHERE, [0.5, 0.0], FoundBy::Lights).is_none() && LightSet::default().is_empty());
+        assert!(set(vec![point(0.0)]).choose(&ANYWHERE, [0.5, 0.0], FoundBy::Lights).is_none());
     }
 }

@@ -4,16 +4,23 @@
 //! `u = 1/2 + atan2(d.x, -d.z) / (2 pi)` and `v = acos(d.y) / pi`, where (0, 0) is the image's upper left corner. The middle column is -Z and
 //! +X lies at three quarters of the width (Mitsuba's `envmap` after half a turn about +Y). The lookup is bilinear between texel centres,
 //! wraps in u and clamps in v.
+//!
+//! Beside sampling the BSDF, which finds all directions about evenly, an image is sampled by how much brighter it is than its mean (Karlik
+//! et al., "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling"): nothing of an even sky.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
-use super::{InfinityEval, LightSample, ShadowTarget, unit_circle};
+use super::{FoundBy, InfinityEval, LightSample, ShadowTarget, unit_circle};
 use crate::color::Rgb;
 use crate::math::{DMat3, Vec3};
 use crate::sampling::Piecewise2d;
 
 const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
+
+/// By this share of the mean a cell is at least brighter than the mean, or counts as even.
+const EVEN: f64 = 1e-6;
 
 /// Light from every direction.
 #[derive(Clone, Debug)]
@@ -25,10 +32,11 @@ pub enum Environment {
 }
 
 impl Environment {
-    /// Light from a direction chosen by brightness; `u` in the unit square. `None` if there is no light at all.
+    /// Light from a direction chosen by brightness; `u` in the unit square. `None` if there is nothing to find.
     #[inline]
-    pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample(&self, u: [f32; 2], found_by: FoundBy) -> Option<LightSample> {
         let (wi, radiance, pdf) = match self {
+            Self::Constant(_) if found_by == FoundBy::Both => return None,
             Self::Constant(radiance) => {
                 let z = 1.0 - 2.0 * u[0];
                 let sin = (4.0 * u[0] * (1.0 - u[0])).max(0.0).sqrt();
@@ -36,7 +44,7 @@ impl Environment {
                 (Vec3::new(around.x, around.y, z).normalize(), *radiance, UNIFORM_SPHERE_PDF)
             }
             Self::Map(map) => {
-                let s = map.sample(u)?;
+                let s = map.sample(u, found_by)?;
                 (s.wi, s.radiance, s.pdf)
             }
         };
@@ -45,12 +53,14 @@ impl Environment {
 
     /// Radiance arriving along the unit direction `wi`, and the density of sampling it.
     #[inline]
-    pub fn eval(&self, wi: Vec3) -> InfinityEval {
+    pub fn eval(&self, wi: Vec3, found_by: FoundBy) -> InfinityEval {
         match self {
-            Self::Constant(radiance) => InfinityEval { radiance: *radiance, pdf: UNIFORM_SPHERE_PDF },
+            Self::Constant(radiance) => {
+                InfinityEval { radiance: *radiance, pdf: if found_by == FoundBy::Both { 0.0 } else { UNIFORM_SPHERE_PDF } }
+            }
             Self::Map(map) => {
                 let at = map.locate(wi);
-                InfinityEval { radiance: map.lookup(at), pdf: map.pdf(at) }
+                InfinityEval { radiance: map.lookup(at), pdf: map.pdf(at, found_by) }
             }
         }
     }
@@ -64,20 +74,17 @@ impl Environment {
         }
     }
 
-    /// Density with which [`sample`](Self::sample) chooses `wi`.
-    #[inline]
-    pub fn pdf(&self, wi: Vec3) -> f32 {
-        match self {
-            Self::Constant(_) => UNIFORM_SPHERE_PDF,
-            Self::Map(map) => map.pdf(map.locate(wi)),
-        }
-    }
-
     /// Power that falls on a scene of the given radius, as luminance.
     pub fn power(&self, scene_radius: f64) -> f64 {
+        self.sampled_power(scene_radius, FoundBy::Lights)
+    }
+
+    /// The part of [`power`](Self::power) that [`sample`](Self::sample) is to find.
+    pub(super) fn sampled_power(&self, scene_radius: f64, found_by: FoundBy) -> f64 {
         let fluence = match self {
+            Self::Constant(_) if found_by == FoundBy::Both => 0.0,
             Self::Constant(radiance) => 4.0 * PI * f64::from(radiance.luminance()),
-            Self::Map(map) => map.fluence,
+            Self::Map(map) => map.fluence(found_by),
         };
         PI * scene_radius * scene_radius * fluence
     }
@@ -120,13 +127,11 @@ pub struct EnvironmentMap {
     texels: Vec<Rgb>,
     /// Columns in world space: the light's axes.
     axes: [Vec3; 3],
-    /// None if all is black. Column i lies between the centres of texels i and i + 1; row j between those of rows j - 1 and j, the first
+    /// How directions are chosen, by [`FoundBy`]; made when asked for. None if there is nothing to find. Column i lies between the centres of texels i and i + 1; row j between those of rows j - 1 and j, the first
     /// and the last between the outermost centres and the poles.
-    density: Option<Piecewise2d>,
+    densities: [OnceLock<Option<Piecewise2d>>; 2],
     /// Cosine of the polar angle at the upper limit of each row of the density, and at the lower pole.
     cosines: Vec<f64>,
-    /// Integral of luminance over all directions.
-    fluence: f64,
 }
 
 /// A direction in the image: a cell of the density and where between its corners, linear in azimuth and polar angle.
@@ -169,40 +174,39 @@ impl EnvironmentMap {
         // Half rows at both poles.
         let limit = |row: usize| (row as f64 - 0.5).clamp(0.0, height as f64) / height as f64;
         let cosines = (0..=height + 1).map(|row| (PI * limit(row)).cos()).collect();
-        let map = Self { width, height, texels, axes, density: None, cosines, fluence: 0.0 };
-        let weights = map.weights();
-        let fluence = map.fluence();
-        let density = Piecewise2d::new(width, height + 1, &weights);
-        Ok(Self { density, fluence, ..map })
+        Ok(Self { width, height, texels, axes, densities: Default::default(), cosines })
     }
 
-    /// Mean of the bilinear luminance over each cell (its corners' mean) times its solid angle, up to a factor; row by row.
-    fn weights(&self) -> Vec<f32> {
+    /// What is to be found in each cell: the mean of the bilinear luminance (its corners' mean) times the cell's solid angle; row by row.
+    fn weights(&self, found_by: FoundBy) -> Vec<f64> {
         // Negative channels (of colours out of gamut) must not cancel others: such a texel is not black.
         let brightness = |t: Rgb| f64::from(t.map(f32::abs).luminance());
-        let mut weights = Vec::with_capacity(self.width * (self.height + 1));
-        for y in 0..=self.height {
-            let cap = self.cosines[y] - self.cosines[y + 1];
-            for x in 0..self.width {
-                let mean = self.corners(x, y).map(brightness).iter().sum::<f64>();
-                weights.push(mean * cap);
-            }
-        }
-        // Scaled so that neither the brightest nor faint ones leave the range of f32.
-        let largest = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        weights.iter().map(|&w| if w > 0.0 { ((w / largest) as f32).max(f32::MIN_POSITIVE) } else { 0.0 }).collect()
+        let cells = || (0..=self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
+        let mean = |(x, y): (usize, usize)| 0.25 * self.corners(x, y).map(brightness).iter().sum::<f64>();
+        let solid_angle = |y: usize| (self.cosines[y] - self.cosines[y + 1]) * 2.0 * PI / self.width as f64;
+        let found_without = match found_by {
+            FoundBy::Lights => 0.0,
+            FoundBy::Both => cells().map(|cell| mean(cell) * solid_angle(cell.1)).sum::<f64>() / (4.0 * PI),
+        };
+        // Of an even image nothing but rounding would be left.
+        let left = |brightness: f64| if brightness > found_without * (1.0 + EVEN) { brightness - found_without } else { 0.0 };
+        cells().map(|cell| left(mean(cell)) * solid_angle(cell.1)).collect()
     }
 
-    /// Integral of luminance over all directions, with the lookup's mean over each cell.
-    fn fluence(&self) -> f64 {
-        let mut sum = 0.0;
-        for y in 0..=self.height {
-            let cap = self.cosines[y] - self.cosines[y + 1];
-            for x in 0..self.width {
-                sum += cap * self.corners(x, y).iter().map(|t| f64::from(t.luminance())).sum::<f64>();
-            }
-        }
-        (0.25 * 2.0 * PI / self.width as f64 * sum).max(0.0)
+    fn density(&self, found_by: FoundBy) -> Option<&Piecewise2d> {
+        let make = || {
+            let weights = self.weights(found_by);
+            // Scaled so that neither the brightest nor faint ones leave the range of f32.
+            let largest = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+            let scaled = |&w: &f64| if w > 0.0 { ((w / largest) as f32).max(f32::MIN_POSITIVE) } else { 0.0 };
+            Piecewise2d::new(self.width, self.height + 1, &weights.iter().map(scaled).collect::<Vec<_>>())
+        };
+        self.densities[found_by as usize].get_or_init(make).as_ref()
+    }
+
+    /// Integral of the luminance that is to be found over all directions.
+    fn fluence(&self, found_by: FoundBy) -> f64 {
+        self.weights(found_by).iter().sum()
     }
 
     /// The texels at the corners of a cell: upper left, upper right, lower left, lower right.
@@ -242,8 +246,8 @@ impl EnvironmentMap {
 
     /// Density per solid angle, constant in each cell.
     #[inline]
-    fn pdf(&self, at: Location) -> f32 {
-        self.density.as_ref().map_or(0.0, |density| density.pmf(at.x, at.y) * self.inverse_solid_angle(at.y))
+    fn pdf(&self, at: Location, found_by: FoundBy) -> f32 {
+        self.density(found_by).map_or(0.0, |density| density.pmf(at.x, at.y) * self.inverse_solid_angle(at.y))
     }
 
     #[inline]
@@ -253,8 +257,8 @@ impl EnvironmentMap {
     }
 
     #[inline]
-    fn sample(&self, u: [f32; 2]) -> Option<MapSample> {
-        let cell = self.density.as_ref()?.sample_cell(u);
+    fn sample(&self, u: [f32; 2], found_by: FoundBy) -> Option<MapSample> {
+        let cell = self.density(found_by)?.sample_cell(u);
 
         // Uniform on the cell: in the cosine of the polar angle and in the azimuth.
         let (upper, lower) = (self.cosines[cell.y], self.cosines[cell.y + 1]);

@@ -45,16 +45,16 @@ fn the_density_is_finite_at_the_poles_and_at_texel_corners() {
     let map = map(16, 8, |x, y| (x + y) as f32);
     for d in [Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(1e-20, 1.0, 0.0), Vec3::new(0.0, -1.0, -1e-30)] {
         let at = map.locate(d);
-        assert!(map.pdf(at).is_finite() && map.pdf(at) > 0.0 && map.lookup(at).is_finite(), "{d}");
+        assert!(map.pdf(at, FoundBy::Lights).is_finite() && map.pdf(at, FoundBy::Lights) > 0.0 && map.lookup(at).is_finite(), "{d}");
     }
     for y in 0..=8 {
         for x in 0..=16 {
             let d = direction(f64::from(x) / 16.0, PI * f64::from(y) / 8.0);
-            assert!(map.pdf(map.locate(d)).is_finite());
+            assert!(map.pdf(map.locate(d), FoundBy::Lights).is_finite());
         }
     }
     for u in [[0.0, 0.0], [0.0, 0.999_999_94], [0.999_999_94, 0.0], [0.999_999_94; 2]] {
-        let s = map.sample(u).unwrap();
+        let s = map.sample(u, FoundBy::Lights).unwrap();
         assert!(s.wi.is_finite() && s.pdf.is_finite() && s.pdf > 0.0);
     }
 }
@@ -76,7 +76,7 @@ fn wherever_there_is_light_the_density_is_positive() {
         for _ in 0..20_000 {
             let d = random.direction().as_vec3();
             let at = map.locate(d);
-            assert!(map.lookup(at).is_black() || map.pdf(at) > 0.0, "{d}");
+            assert!(map.lookup(at).is_black() || map.pdf(at, FoundBy::Lights) > 0.0, "{d}");
         }
     }
 }
@@ -88,7 +88,7 @@ fn power_is_the_light_from_all_sides() {
     let n = 400;
     let mut sum = 0.0;
     for i in 0..n * n {
-        let s = environment.sample([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32]).unwrap();
+        let s = environment.sample([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32], FoundBy::Lights).unwrap();
         sum += f64::from(s.radiance.luminance() / s.pdf);
     }
     let power = PI * 9.0 * sum / f64::from(n * n);
@@ -103,8 +103,8 @@ fn a_constant_environment_is_sampled_uniformly() {
     let environment = Environment::Constant(Rgb::WHITE);
     let (mut counts, mut random) = (vec![0u32; 100], Rng::new(2));
     for _ in 0..100_000 {
-        let s = environment.sample(random.pair()).unwrap();
-        assert!((s.pdf - environment.pdf(s.wi)).abs() < 1e-9 && (s.wi.length() - 1.0).abs() < 1e-6);
+        let s = environment.sample(random.pair(), FoundBy::Lights).unwrap();
+        assert!((s.pdf - environment.eval(s.wi, FoundBy::Lights).pdf).abs() < 1e-9 && (s.wi.length() - 1.0).abs() < 1e-6);
         let i = ((0.5 + 0.5 * s.wi.x) * 10.0) as usize;
         let j = ((s.wi.y.atan2(s.wi.z) / TAU as f32 + 0.5) * 10.0) as usize;
         counts[i.min(9) * 10 + j.min(9)] += 1;
@@ -124,5 +124,52 @@ fn what_is_no_environment_is_refused_and_black_gives_nothing() {
     let scaled = DMat3::from_diagonal(DVec3::new(1.0, 2.0, 1.0));
     assert_eq!(new(1, 1, vec![Rgb::WHITE], scaled, 1.0), Err(EnvironmentMapError::Rotation));
     let black = environment(map(4, 2, |_, _| 0.0));
-    assert!(black.sample([0.5; 2]).is_none() && black.pdf(Vec3::X) == 0.0 && black.radiance(Vec3::X).is_black());
+    assert!(
+        black.sample([0.5; 2], FoundBy::Lights).is_none()
+            && black.eval(Vec3::X, FoundBy::Lights).pdf == 0.0
+            && black.radiance(Vec3::X).is_black()
+    );
+}
+
+/// With directions of even density beside it, and the balance heuristic, the density of what is brighter than the mean finds all light.
+#[test]
+fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
+    const EVEN: f64 = 0.25 / PI;
+    let sky = |x: usize, y: usize| if (x, y) == (20, 9) { 300.0 } else { 0.5 + 0.1 * (x % 7) as f32 };
+    let environment = environment(turned(64, 32, DMat3::from_rotation_x(0.7), sky));
+    let mean = environment.power(1.0) / (4.0 * PI * PI);
+    let light = |wi: Vec3| f64::from(environment.radiance(wi).luminance());
+    // Some function of the direction in place of a BSDF.
+    let response = |wi: Vec3| f64::from(1.0 + wi.x);
+    let mut random = Rng::new(4);
+    let n = 400_000;
+    let (mut by_lights, mut by_both) = ([0.0; 2], [0.0; 2]);
+    let add = |sums: &mut [f64; 2], x: f64| {
+        sums[0] += x / f64::from(n);
+        sums[1] += x * x / f64::from(n);
+    };
+    for _ in 0..n {
+        let even = random.direction().as_vec3();
+        for (found_by, sums) in [(FoundBy::Lights, &mut by_lights), (FoundBy::Both, &mut by_both)] {
+            let pdf = |wi: Vec3| f64::from(environment.eval(wi, found_by).pdf);
+            let s = environment.sample(random.pair(), found_by).unwrap();
+            let at = environment.eval(s.wi, found_by);
+            assert!((at.pdf - s.pdf).abs() <= 1e-5 * s.pdf || found_by == FoundBy::Lights, "{} {}", at.pdf, s.pdf);
+            add(sums, light(s.wi) * response(s.wi) / (f64::from(s.pdf) + EVEN) + light(even) * response(even) / (pdf(even) + EVEN));
+        }
+        // Cells are as bright as their corners in the middle, so that dark directions share a cell with bright ones at most.
+        let at = environment.eval(even, FoundBy::Both);
+        assert!(at.pdf > 0.0 || f64::from(at.radiance.luminance()) < 2.0 * mean, "{at:?}");
+    }
+    let [a, b] = [by_lights, by_both].map(|[first, second]| (first, second - first * first));
+    let z = (a.0 - b.0) / ((a.1 + b.1) / f64::from(n)).sqrt();
+    assert!(z.abs() < 5.0, "{a:?} {b:?}: {z}");
+    assert!(b.1 < 0.9 * a.1, "variances {} and {}", a.1, b.1);
+
+    // Of an even sky nothing is left.
+    let even = [Environment::Constant(Rgb::WHITE), self::environment(map(8, 4, |_, _| 2.0))];
+    for sky in even {
+        assert!(sky.sample([0.3, 0.6], FoundBy::Both).is_none() && sky.eval(Vec3::X, FoundBy::Both).pdf == 0.0);
+        assert!(sky.sampled_power(1.0, FoundBy::Both) == 0.0 && sky.power(1.0) > 0.0);
+    }
 }

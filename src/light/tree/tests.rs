@@ -2,7 +2,9 @@ use super::*;
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Mesh, Placed, Quad, Shape, Sphere};
 use crate::id::{LightId, ShapeId};
-use crate::light::{AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, SpotLight};
+use crate::light::{
+    AreaLight, Emission, Environment, FoundBy, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, SpotLight,
+};
 use crate::math::{DAffine3, Rng, Transform};
 
 const CLOUD: usize = 40;
@@ -70,7 +72,7 @@ fn receivers(seed: u64, count: usize) -> Vec<Receiver> {
 }
 
 fn pmfs(set: &LightSet, from: &Receiver) -> Vec<f64> {
-    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from))).collect()
+    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from, FoundBy::Lights))).collect()
 }
 
 #[test]
@@ -82,7 +84,7 @@ fn whatever_can_shine_somewhere_can_be_chosen_there() {
         for (light, pmf) in set.lights().iter().zip(pmfs(&set, &from)) {
             let mut arrives = false;
             for _ in 0..16 {
-                let Some(s) = light.sample(&geometry, &[], from.p, random.pair()) else { continue };
+                let Some(s) = light.sample(&geometry, &[], from.p, random.pair(), FoundBy::Lights) else { continue };
                 arrives |= s.radiance.luminance() > 0.0 && (from.n == Vec3::ZERO || s.wi.dot(from.n) > 0.0);
             }
             assert!(pmf > 0.0 || !arrives, "{from:?} {light:?}");
@@ -104,7 +106,7 @@ fn near_lights_are_preferred_to_strong_ones_far_away() {
     for i in 0..20 {
         let from = Receiver { p: DVec3::new(f64::from(i), 0.1, 0.0), n: Vec3::ZERO };
         // 100 from the light at hand, less than 3.3 from all others together.
-        assert!(set.pmf(LightId::new(i as usize), &from) > 0.9, "{i}");
+        assert!(set.pmf(LightId::new(i as usize), &from, FoundBy::Lights) > 0.9, "{i}");
     }
 }
 

@@ -8,7 +8,7 @@ use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Placed, Quad, Shape, Sphere};
 use crate::id::{LightId, ShapeId};
 use crate::light::{
-    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, Receiver, SpotLight,
+    AreaLight, Emission, Environment, FoundBy, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, Receiver, SpotLight,
 };
 use crate::math::{DMat3, DVec3, Rng, Vec3};
 
@@ -74,7 +74,7 @@ fn receivers(rng: &mut Rng, count: usize) -> Vec<Receiver> {
 }
 
 fn probabilities(set: &LightSet, from: &Receiver) -> Vec<f64> {
-    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from))).collect()
+    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from, FoundBy::Lights))).collect()
 }
 
 /// Where every light reaches every point, no choice may be without a light: how far sums are from 1. Elsewhere: how far they exceed 1.
@@ -112,7 +112,7 @@ fn choose(set: &LightSet, from: &Receiver, probabilities: &[f64], count: u32, rn
     let reachable = probabilities.iter().filter(|p| **p > 0.0).count().max(1) as f64;
     let (mut counts, mut difference, mut sum) = (vec![0u32; probabilities.len() + 1], 0f64, 0.0);
     for _ in 0..count {
-        let Some(choice) = set.choose(from, rng.pair()) else {
+        let Some(choice) = set.choose(from, rng.pair(), FoundBy::Lights) else {
             counts[probabilities.len()] += 1;
             continue;
         };
