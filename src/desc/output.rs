@@ -48,6 +48,12 @@ pub enum LayerDesc {
     /// Fraction of light scattered by the first surface.
     #[serde(rename = "albedo")]
     Albedo,
+    /// Variance of the picture's red, green and blue, that is, their expected squared error, as far as the samples show it.
+    #[serde(rename = "variance")]
+    Variance,
+    /// Number of samples.
+    #[serde(rename = "samples")]
+    Samples,
 }
 
 /// How colour is stored.

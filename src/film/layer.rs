@@ -16,6 +16,10 @@ pub enum LayerKind {
     P,
     /// Fraction of light scattered.
     Albedo,
+    /// Variance of the picture.
+    Variance,
+    /// Number of samples.
+    Samples,
 }
 
 /// What the table says of a layer.
@@ -31,21 +35,21 @@ pub struct LayerInfo {
     pub always_float: bool,
     /// What the file's comment says of it.
     pub comment: &'static str,
-    /// Writes a sample's values, one for each channel.
-    pub(super) read: fn(&SurfaceSample, &mut [f32]),
+    /// Writes a sample's values, one for each channel; absent where samples have none.
+    pub(super) read: Option<fn(&SurfaceSample, &mut [f32])>,
 }
 
 impl LayerKind {
     /// Every layer, in the order of files and of memory.
-    pub const ALL: [LayerInfo; 5] = [
-        LayerInfo { kind: Self::Color, name: "color", channels: &["R", "G", "B", "A"], always_float: false, comment: "", read: |_, _| {} },
+    pub const ALL: [LayerInfo; 7] = [
+        LayerInfo { kind: Self::Color, name: "color", channels: &["R", "G", "B", "A"], always_float: false, comment: "", read: None },
         LayerInfo {
             kind: Self::Z,
             name: "Z",
             channels: &["Z"],
             always_float: true,
             comment: "Z: depth along the view axis; 1e10 where nothing was hit",
-            read: |s, out| out[0] = s.depth,
+            read: Some(|s, out| out[0] = s.depth),
         },
         LayerInfo {
             kind: Self::N,
@@ -53,7 +57,7 @@ impl LayerKind {
             channels: &["N.X", "N.Y", "N.Z"],
             always_float: false,
             comment: "N: shading normal, world; 0 where nothing was hit",
-            read: |s, out| out.copy_from_slice(&s.normal.to_array()),
+            read: Some(|s, out| out.copy_from_slice(&s.normal.to_array())),
         },
         LayerInfo {
             kind: Self::P,
@@ -61,7 +65,7 @@ impl LayerKind {
             channels: &["P.X", "P.Y", "P.Z"],
             always_float: true,
             comment: "P: position, world; 0 where nothing was hit",
-            read: |s, out| out.copy_from_slice(&s.position.to_array()),
+            read: Some(|s, out| out.copy_from_slice(&s.position.to_array())),
         },
         LayerInfo {
             kind: Self::Albedo,
@@ -69,7 +73,23 @@ impl LayerKind {
             channels: &["albedo.R", "albedo.G", "albedo.B"],
             always_float: false,
             comment: "albedo: fraction of light scattered by the first surface",
-            read: |s, out| out.copy_from_slice(&s.albedo.to_array()),
+            read: Some(|s, out| out.copy_from_slice(&s.albedo.to_array())),
+        },
+        LayerInfo {
+            kind: Self::Variance,
+            name: "variance",
+            channels: &["variance.R", "variance.G", "variance.B"],
+            always_float: true,
+            comment: "variance: of the picture's R, G and B, their expected squared error",
+            read: None,
+        },
+        LayerInfo {
+            kind: Self::Samples,
+            name: "samples",
+            channels: &["stats.samples"],
+            always_float: true,
+            comment: "stats.samples: samples of the pixel",
+            read: None,
         },
     ];
 
@@ -88,6 +108,8 @@ impl From<LayerDesc> for LayerKind {
             LayerDesc::N => Self::N,
             LayerDesc::P => Self::P,
             LayerDesc::Albedo => Self::Albedo,
+            LayerDesc::Variance => Self::Variance,
+            LayerDesc::Samples => Self::Samples,
         }
     }
 }
@@ -115,15 +137,16 @@ impl LayerSet {
         matches!(kind, LayerKind::Color) || self.bits & (1 << kind as u8) != 0
     }
 
-    /// Whether any layer beside the colour is part of the set, that is, whether [`SurfaceSample`] is needed.
+    /// Whether any layer is part of the set that [`SurfaceSample`] is needed for.
     #[inline]
     pub const fn needs_surface(self) -> bool {
-        self.bits & !(1 << LayerKind::Color as u8) != 0
+        const OF_PIXELS: u8 = 1 << LayerKind::Color as u8 | 1 << LayerKind::Variance as u8 | 1 << LayerKind::Samples as u8;
+        self.bits & !OF_PIXELS != 0
     }
 
-    /// The layers beside the colour, in the table's order.
-    pub fn beside_color(self) -> impl Iterator<Item = &'static LayerInfo> {
-        LayerKind::ALL.iter().skip(1).filter(move |info| self.contains(info.kind))
+    /// The layers that samples have values for beside the colour, in the table's order.
+    pub fn of_surfaces(self) -> impl Iterator<Item = &'static LayerInfo> {
+        LayerKind::ALL.iter().filter(move |info| info.read.is_some() && self.contains(info.kind))
     }
 
     /// All layers, in the table's order.
@@ -166,7 +189,8 @@ mod tests {
         assert_eq!(set.iter().map(|info| info.kind).collect::<Vec<_>>(), [LayerKind::Color, LayerKind::Z, LayerKind::P]);
         assert!(set.needs_surface() && !LayerSet::COLOR.needs_surface());
         assert!(LayerSet::COLOR.contains(LayerKind::Color));
-        assert_eq!([LayerDesc::Albedo].iter().collect::<LayerSet>().beside_color().count(), 1);
+        assert_eq!([LayerDesc::Albedo, LayerDesc::Samples].iter().collect::<LayerSet>().of_surfaces().count(), 1);
+        assert!(!LayerSet::from_iter(&[LayerDesc::Variance, LayerDesc::Samples]).needs_surface());
         assert_eq!(LayerSet::FULL.iter().count(), LayerKind::ALL.len());
     }
 }

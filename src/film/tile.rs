@@ -20,6 +20,14 @@ pub struct DroppedSample {
     pub sample: u32,
 }
 
+/// How far groups of a pixel's samples lie apart.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spread {
+    groups: u32,
+    sums: [f64; 3],
+    squares: [f64; 3],
+}
+
 /// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own.
 ///
 /// A sample's order of arrival at its pixel is the order of summation: whoever adds samples in the order of their indices gets the same
@@ -38,6 +46,8 @@ pub struct FilmTile {
     /// All other layers, a pixel's values side by side. Empty without such layers, and so is `hits`.
     beside: Vec<f64>,
     hits: Vec<u32>,
+    /// Empty unless the variance is asked for.
+    spread: Vec<Spread>,
     dropped_count: u64,
     dropped: Vec<DroppedSample>,
 }
@@ -55,6 +65,7 @@ impl FilmTile {
             corrections: Vec::new(),
             beside: vec![0.0; pixels * stride],
             hits: vec![0; if stride > 0 { pixels } else { 0 }],
+            spread: vec![Spread::default(); if layers.contains(LayerKind::Variance) { pixels } else { 0 }],
             dropped_count: 0,
             dropped: Vec::new(),
         }
@@ -106,6 +117,40 @@ impl FilmTile {
         true
     }
 
+    /// Tells of a group of the pixel's samples, which have been added, the mean of weight times radiance and that of the weight, if the variance
+    /// is asked for. The better the samples of a group are spread, the less is their variance overestimated; all groups of a pixel are of
+    /// one size.
+    #[inline]
+    pub fn add_group(&mut self, pixel: usize, weighted: [f64; 3], weight: f64) {
+        let mut mean = weighted;
+        if weight != 1.0 {
+            // As the estimate has it.
+            let color = self.color_at(pixel);
+            mean = [0, 1, 2].map(|k| weighted[k] - (weight - 1.0) * f64::from(color[k]));
+        }
+        let Some(spread) = self.spread.get_mut(pixel) else { return };
+        spread.groups += 1;
+        for k in 0..3 {
+            spread.sums[k] += mean[k];
+            spread.squares[k] += mean[k] * mean[k];
+        }
+    }
+
+    /// Whether [`add_group`](Self::add_group) does anything.
+    #[inline]
+    pub fn wants_groups(&self) -> bool {
+        !self.spread.is_empty()
+    }
+
+    /// Mean of a pixel's groups and the variance of that mean, by channel; `None` with fewer than two groups.
+    pub fn group_statistics(&self, pixel: usize) -> Option<([f64; 3], [f64; 3])> {
+        let spread = self.spread.get(pixel).filter(|spread| spread.groups >= 2)?;
+        let n = f64::from(spread.groups);
+        let mean = spread.sums.map(|sum| sum / n);
+        let variance = [0, 1, 2].map(|k| ((spread.squares[k] / n - mean[k] * mean[k]) / (n - 1.0)).max(0.0));
+        Some((mean, variance))
+    }
+
     /// Adds to the layers beside the colour; `false` (and nothing is added) if a value is not finite.
     fn add_beside(&mut self, pixel: usize, value: &PixelSample) -> bool {
         if value.alpha <= 0.0 {
@@ -114,8 +159,10 @@ impl FilmTile {
         let stride = channels_beside(self.layers);
         let mut values = [0.0; MAX_CHANNELS_BESIDE];
         let mut start = 0;
-        for info in self.layers.beside_color() {
-            (info.read)(&value.surface, &mut values[start..start + info.channels.len()]);
+        for info in self.layers.of_surfaces() {
+            if let Some(read) = info.read {
+                read(&value.surface, &mut values[start..start + info.channels.len()]);
+            }
             start += info.channels.len();
         }
         if !values.iter().all(|v| v.is_finite()) {
@@ -169,6 +216,18 @@ impl FilmTile {
         mean.map(to_f32)
     }
 
+    /// What the film itself knows of a pixel, for layers that samples have no values for.
+    fn own_at(&self, pixel: usize, kind: LayerKind, out: &mut [f32]) {
+        match kind {
+            LayerKind::Color => out.copy_from_slice(&self.color_at(pixel)),
+            LayerKind::Samples => out[0] = self.samples[pixel] as f32,
+            _ => {
+                let (_, variance) = self.group_statistics(pixel).unwrap_or_default();
+                out.copy_from_slice(&variance.map(to_f32));
+            }
+        }
+    }
+
     /// A layer's values at a pixel; `first` is the layer's first channel within those beside the colour.
     fn beside_at(&self, pixel: usize, info: &LayerInfo, first: usize, out: &mut [f32]) {
         let hits = f64::from(self.hits[pixel]);
@@ -177,7 +236,7 @@ impl FilmTile {
         let divisor = match info.kind {
             LayerKind::Z | LayerKind::P => hits,
             LayerKind::N => sums.iter().map(|sum| sum * sum).sum::<f64>().sqrt(),
-            LayerKind::Color | LayerKind::Albedo => f64::from(self.samples[pixel]),
+            _ => f64::from(self.samples[pixel]),
         };
         if info.kind == LayerKind::Z && hits == 0.0 {
             out.fill(MISS_DEPTH);
@@ -204,7 +263,7 @@ const MAX_CHANNELS_BESIDE: usize = {
 };
 
 fn channels_beside(layers: LayerSet) -> usize {
-    layers.beside_color().map(|info| info.channels.len()).sum()
+    layers.of_surfaces().map(|info| info.channels.len()).sum()
 }
 
 /// The film: the tiles that a picture's crop touches.
@@ -295,11 +354,11 @@ impl Film {
                     for layer in &mut layers {
                         let info = layer.kind.info();
                         let out = &mut layer.data[to * info.channels.len()..(to + 1) * info.channels.len()];
-                        if layer.kind == LayerKind::Color {
-                            out.copy_from_slice(&tile.color_at(from));
-                        } else {
+                        if info.read.is_some() {
                             tile.beside_at(from, info, first, out);
                             first += info.channels.len();
+                        } else {
+                            tile.own_at(from, layer.kind, out);
                         }
                     }
                 }
@@ -312,7 +371,8 @@ impl Film {
 /// Asks for the film's memory in one piece first: many small requests would be granted long past what the machine has.
 fn check_memory(crop: &Crop, layers: LayerSet) -> Result<()> {
     let beside = channels_beside(layers);
-    let pixel = size_of::<[f64; 4]>() + size_of::<u32>() * (1 + usize::from(beside > 0)) + size_of::<f64>() * beside;
+    let spread = if layers.contains(LayerKind::Variance) { size_of::<Spread>() } else { 0 };
+    let pixel = spread + size_of::<[f64; 4]>() + size_of::<u32>() * (1 + usize::from(beside > 0)) + size_of::<f64>() * beside;
     let bytes = usize::try_from(u128::from(crop.area()) * pixel as u128).unwrap_or(usize::MAX);
     Vec::<u8>::new()
         .try_reserve_exact(bytes)

@@ -3,6 +3,7 @@
 //! A batch is one sample index of one tile of the full film's grid, whatever the crop, the threads or the passes; so every sample can be
 //! replayed alone, and any split of the work gives the same picture bit for bit.
 
+mod adaptive;
 mod progress;
 mod settings;
 
@@ -29,6 +30,9 @@ pub const TILE_SIZE: u32 = 32;
 /// Camera rays of a block of this many pixels each way are traced side by side.
 const BLOCK_SIZE: u32 = 4;
 
+/// Textures are as sharp as so many samples per pixel can show.
+const FINEST_SPP: u32 = 1024;
+
 /// A pass aims at this time: long enough to cost nothing, short enough that an interrupt is answered soon.
 const PASS_TIME: Duration = Duration::from_millis(500);
 
@@ -41,8 +45,10 @@ pub struct Stats {
     pub first_pass_seconds: f64,
     /// Samples in the picture: pixels times samples per pixel.
     pub samples: u64,
-    /// Samples per pixel done.
+    /// Samples per pixel done; with a target error their mean, rounded.
     pub spp_done: u32,
+    /// The picture's estimated relative squared error, of renders with a target for it.
+    pub estimated_error: Option<f64>,
     /// Rays by purpose.
     pub rays: RayCounts,
     /// Samples that were NaN or infinite and were dropped.
@@ -81,7 +87,7 @@ impl<'a> Job<'a> {
             geometry: wanted(LayerKind::Z) || wanted(LayerKind::N) || wanted(LayerKind::P),
             albedo: wanted(LayerKind::Albedo),
         };
-        let world = World::new(scene, accel).of_picture(settings.size, settings.spp);
+        let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
         Self {
             world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
             integrator: integrator::build(&settings.integrator, sampler, needs),
@@ -93,11 +99,16 @@ impl<'a> Job<'a> {
 
     /// Renders one sample of every pixel of the tile with this origin; `out` is in [slot order](pixel_of_slot).
     fn render_batch(&self, origin: [u32; 2], sample: u32, batch: &mut Batch, counts: &mut RayCounts) {
+        let pixels = (0..TILE_SIZE * TILE_SIZE).map(pixel_of_slot);
+        self.render_samples(pixels.map(|[dx, dy]| ([origin[0] + dx, origin[1] + dy], sample)), batch, counts);
+    }
+
+    /// Renders samples of pixels, at most as many as a tile has pixels; `out` is in their order.
+    #[inline]
+    fn render_samples(&self, samples: impl Iterator<Item = ([u32; 2], u32)>, batch: &mut Batch, counts: &mut RayCounts) {
         batch.samples.clear();
         let weights = &mut batch.weights;
-        batch.samples.extend((0..TILE_SIZE * TILE_SIZE).map(|slot| {
-            let [dx, dy] = pixel_of_slot(slot);
-            let (x, y) = (origin[0] + dx, origin[1] + dy);
+        batch.samples.extend(samples.zip(0usize..).map(|(([x, y], sample), slot)| {
             let seed = self.sampler.pixel(x, y);
             let u = self.sampler.sample_4d(seed, sample, dimensions::CAMERA);
             let filter = self.filter.sample([u[0], u[1]]);
@@ -106,7 +117,7 @@ impl<'a> Job<'a> {
             let moves = self.world.scene.features.motion;
             let time = if moves { camera.time(self.sampler.sample_4d(seed, sample, dimensions::TIME)[0]) } else { 0.0 };
             let ray = camera.ray(film, self.size, [u[2], u[3]], time);
-            weights[slot as usize] = filter.weight;
+            weights[slot] = filter.weight;
             CameraSample { ray: self.world.approach(ray), seed, sample }
         }));
         self.integrator.render_batch(&self.world, &batch.samples, &mut batch.out, counts);
@@ -122,12 +133,20 @@ impl<'a> Job<'a> {
                 let [dx, dy] = pixel_of_slot(slot);
                 let (x, y) = (tile.origin()[0] + dx, tile.origin()[1] + dy);
                 if active.contains(x, y) {
-                    tile.add(tile.index(x, y), sample, out, weight);
+                    let pixel = tile.index(x, y);
+                    if tile.add(pixel, sample, out, weight) && tile.wants_groups() {
+                        tile.add_group(pixel, weighted(out, weight), f64::from(weight));
+                    }
                 }
             }
         }
         counts
     }
+}
+
+/// A sample's radiance with the filter's weight.
+fn weighted(sample: &PixelSample, weight: f32) -> [f64; 3] {
+    sample.radiance.to_array().map(|v| f64::from(v) * f64::from(weight))
 }
 
 /// Buffers of one batch.
@@ -176,6 +195,9 @@ pub fn render(
         .build()
         .map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))?;
     let job = Job::new(scene, accel, settings);
+    if let Some(target) = settings.target_error {
+        return adaptive::render(&job, &pool, settings, target, progress, stop);
+    }
     let mut film = Film::new(settings.size, settings.crop, &settings.layers, TILE_SIZE)?;
     let mut stats = Stats::default();
     let pixels = u64::from(settings.crop.width) * u64::from(settings.crop.height);

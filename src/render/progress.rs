@@ -7,6 +7,11 @@ pub trait Progress: Sync {
         let _ = (samples_per_pixel, pixels);
     }
 
+    /// The plan is another: so many samples in all, since the picture's error is `error` and is to be `target`.
+    fn plan(&self, samples: u64, error: f64, target: f64) {
+        let _ = (samples, error, target);
+    }
+
     /// A tile got this many more samples, all pixels together.
     fn tile_done(&self, samples: u64) {
         let _ = samples;

@@ -15,6 +15,9 @@ pub const DEFAULT_EXTENSIONS: [&str; 2] = ["exr", "png"];
 /// Largest width and height: beyond it, `f32` film coordinates would be coarser than 1/256 of a pixel.
 const MAX_SIDE: u32 = 1 << 16;
 
+/// The most samples of a pixel where a target error decides and nothing else is said.
+const MOST_SAMPLES: u32 = 1 << 16;
+
 /// More threads than this are a slip of the keyboard.
 const MAX_THREADS: usize = 4096;
 
@@ -29,8 +32,10 @@ pub struct Settings {
     pub filter: FilterDesc,
     /// How samples are chosen.
     pub sampler: SamplerKind,
-    /// Samples per pixel.
+    /// Samples per pixel; with a target error the most that a pixel gets.
     pub spp: u32,
+    /// The relative squared error that the picture is to stay below; samples then go where they are needed.
+    pub target_error: Option<f64>,
     /// A different seed gives different noise.
     pub seed: u64,
     /// The algorithm.
@@ -52,6 +57,8 @@ pub struct Settings {
 pub struct Overrides {
     /// `--spp`.
     pub spp: Option<u32>,
+    /// `--target-error`.
+    pub target_error: Option<f64>,
     /// `--size`: width and height.
     pub size: Option<[u32; 2]>,
     /// `--crop`: x, y, width, height.
@@ -107,7 +114,8 @@ impl Settings {
             crop: crop(desc, overrides, size)?,
             filter: desc.film.filter,
             sampler,
-            spp: overrides.spp.unwrap_or(desc.sampler.spp),
+            spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() { MOST_SAMPLES } else { desc.sampler.spp }),
+            target_error: target_error(overrides)?,
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
             integrator: integrator(desc, overrides)?,
             accel: overrides.accel.unwrap_or_default(),
@@ -185,6 +193,15 @@ fn threads(overrides: &Overrides) -> Result<usize> {
         0 => Ok(std::thread::available_parallelism().map_or(1, NonZero::get)),
         threads if threads > MAX_THREADS => Err(usage(format!("--threads {threads}: at most {MAX_THREADS}"))),
         threads => Ok(threads),
+    }
+}
+
+fn target_error(overrides: &Overrides) -> Result<Option<f64>> {
+    match overrides.target_error {
+        Some(error) if !(error > 0.0 && error < f64::INFINITY) => {
+            Err(usage(format!("--target-error {error}: a relative squared error above 0, such as 0.01")))
+        }
+        target => Ok(target),
     }
 }
 
@@ -327,6 +344,8 @@ mod tests {
         let d = Overrides::default;
         let cases = [
             ("--spp", Overrides { spp: Some(0), ..d() }),
+            ("--target-error", Overrides { target_error: Some(0.0), ..d() }),
+            ("--target-error", Overrides { target_error: Some(f64::NAN), ..d() }),
             ("--size", Overrides { size: Some([0, 5]), ..d() }),
             ("--size", Overrides { size: Some([1 << 20, 5]), ..d() }),
             ("--size", Overrides { size: Some([20, 20]), ..d() }),

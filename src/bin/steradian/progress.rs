@@ -37,6 +37,8 @@ struct State {
     total: u64,
     last: Option<Instant>,
     last_percent: Option<u64>,
+    /// What the picture's error is and is to be.
+    errors: Option<[f64; 2]>,
     stop_told: bool,
 }
 
@@ -48,7 +50,7 @@ impl Reporter {
             (false, true) => Sink::Bar(bar()),
             (false, false) => Sink::Lines,
         };
-        let state = State { start: Instant::now(), total: 0, last: None, last_percent: None, stop_told: false };
+        let state = State { start: Instant::now(), total: 0, last: None, last_percent: None, errors: None, stop_told: false };
         Self { sink, stop, time_limit, done: AtomicU64::new(0), state: Mutex::new(state) }
     }
 
@@ -78,7 +80,10 @@ impl Reporter {
             state.stop_told = true;
             self.say("interrupted: finishing the samples under way; interrupt again to leave at once");
         }
-        let view = view(self.done.load(Ordering::Relaxed), state.total, now - state.start, self.time_limit);
+        let mut view = view(self.done.load(Ordering::Relaxed), state.total, now - state.start, self.time_limit);
+        if let Some([error, target]) = state.errors {
+            view.text += &format!(", error {error:.2e} of {target:.2e}");
+        }
         match &self.sink {
             Sink::Nowhere => {}
             Sink::Bar(bar) => {
@@ -140,6 +145,13 @@ impl Progress for Reporter {
             state.start = Instant::now();
             state.last = Some(state.start);
             state.total = u64::from(samples_per_pixel) * pixels;
+        }
+    }
+
+    fn plan(&self, samples: u64, error: f64, target: f64) {
+        if let Ok(mut state) = self.state.lock() {
+            state.total = samples;
+            state.errors = Some([error, target]);
         }
     }
 

@@ -125,6 +125,9 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
         settings.threads,
         accel.description(),
     ));
+    if let (Some(error), Some(target)) = (stats.estimated_error, settings.target_error) {
+        reporter.say(&format!("relative squared error about {error:.3e}, asked for {target:.3e}"));
+    }
     for output in &settings.outputs {
         reporter.say(&format!("wrote {}", PathBuf::from(&output.file).display()));
     }

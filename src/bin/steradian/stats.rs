@@ -30,6 +30,7 @@ pub fn value(run: &Run, settings: &Settings, accel: &dyn Accelerator, stats: &St
         "width": settings.crop.width,
         "height": settings.crop.height,
         "spp": stats.spp_done,
+        "estimated_error": stats.estimated_error,
         "threads": settings.threads,
         "accelerator": description,
         "embree": embree(&description),

@@ -105,6 +105,13 @@ pub struct RenderArgs {
     /// Samples per pixel
     #[arg(long, value_name = "N", help_heading = "Picture")]
     pub spp: Option<u32>,
+    /// Render until the picture's relative squared error is below this, with samples where they are needed
+    ///
+    /// The error is the mean of (picture - truth)² / (truth² + 0.01) over pixels and channels, as far as the samples show it: 0.01 is a
+    /// rough picture, 0.001 a good one. The render ends when the error is below the target by two standard deviations; --spp is then the
+    /// most samples of a pixel. Store the layers "variance" and "samples" to see where they went.
+    #[arg(long, value_name = "ERROR", help_heading = "Picture")]
+    pub target_error: Option<f64>,
     /// Width and height in pixels, such as 1920x1080
     #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Picture")]
     pub size: Option<[u32; 2]>,
@@ -204,6 +211,7 @@ impl RenderArgs {
     pub fn overrides(&self, default_outputs: Vec<String>) -> Overrides {
         Overrides {
             spp: self.spp,
+            target_error: self.target_error,
             size: self.size,
             crop: self.crop,
             threads: self.threads,

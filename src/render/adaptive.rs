@@ -1,0 +1,363 @@
+//! Adaptive sampling: samples go where the picture's relative squared error needs them, until that is below a target.
+//!
+//! Blocks of 4 x 4 pixels get samples in groups of eight, a stretch of each pixel's own sequence. The means of a pixel's groups tell their
+//! variance, which is that of well-spread samples (single ones would tell of independent samples and overestimate it). With `v` a block's
+//! variance of a group over `color² + 0.01` and `n` its groups, the picture's error is the mean of `v / n`, and for a given cost it is least with
+//! `n` in proportion to `sqrt(v)` (Neyman).
+//!
+//! A block that met a bright path by luck must not get more samples for it, for that would take weight from the path: the picture would be
+//! too dark where such paths are rare. So what a block gets depends on the blocks around it alone. In the first stage its samples
+//! are thus independent of their number; later ones depend on it only through how precisely its neighbours know their variance.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use super::{BLOCK_SIZE, Batch, Job, Progress, RenderResult, Settings, Stats, TILE_SIZE, next_pass, weighted};
+use crate::error::Result;
+use crate::film::{Crop, Film, FilmTile, LayerKind};
+use crate::integrator::RayCounts;
+
+/// Samples of a group.
+const GROUP: u32 = 8;
+
+/// Groups of every block before the first estimate.
+const PILOT: u32 = 2;
+
+/// By this factor a block's groups may grow in one stage: estimates get better on the way.
+const GROWTH: u32 = 3;
+
+/// How many standard deviations the error must be below the target.
+const CONFIDENCE: f64 = 2.0;
+
+/// What relative errors are related to beside the square of the colour.
+const FLOOR: f64 = 0.01;
+
+/// Pixels of a block.
+const BLOCK_PIXELS: u32 = BLOCK_SIZE * BLOCK_SIZE;
+
+/// Pairs of a block and a group in a batch.
+const BATCH_GROUPS: usize = (TILE_SIZE * TILE_SIZE / (BLOCK_PIXELS * GROUP)) as usize;
+
+/// The blocks of a picture's crop on the full picture's grid.
+struct Blocks {
+    /// First column and row.
+    first: [u32; 2],
+    /// Columns and rows.
+    count: [u32; 2],
+    /// Groups that each block has had.
+    done: Vec<u32>,
+    /// Groups that each block is to have.
+    wanted: Vec<u32>,
+}
+
+/// What the picture's samples say of it.
+struct Estimate {
+    /// Each block's variance of a group, relative and mean over its pixels.
+    variances: Vec<f64>,
+    /// Relative squared error of the picture.
+    error: f64,
+    /// Standard deviation of that: of the estimate, and of the picture's actual error.
+    deviation: f64,
+}
+
+impl Blocks {
+    fn new(crop: Crop) -> Self {
+        let first = [crop.x / BLOCK_SIZE, crop.y / BLOCK_SIZE];
+        let last = [(crop.x + crop.width - 1) / BLOCK_SIZE, (crop.y + crop.height - 1) / BLOCK_SIZE];
+        let count = [last[0] - first[0] + 1, last[1] - first[1] + 1];
+        let blocks = count[0] as usize * count[1] as usize;
+        Self { first, count, done: vec![0; blocks], wanted: vec![PILOT; blocks] }
+    }
+
+    /// The block of this column and row of the full picture's grid.
+    fn index(&self, [x, y]: [u32; 2]) -> usize {
+        (y - self.first[1]) as usize * self.count[0] as usize + (x - self.first[0]) as usize
+    }
+
+    /// The column and row of a block.
+    fn place(&self, index: usize) -> [u32; 2] {
+        let index = index as u32;
+        [self.first[0] + index % self.count[0], self.first[1] + index / self.count[0]]
+    }
+
+    /// The blocks of a tile that reach the picture.
+    fn of_tile(&self, tile: &FilmTile) -> impl Iterator<Item = usize> + '_ {
+        let area = tile.active();
+        let range = |start: u32, length: u32| start / BLOCK_SIZE..=(start + length - 1) / BLOCK_SIZE;
+        let columns = range(area.x, area.width);
+        range(area.y, area.height).flat_map(move |y| columns.clone().map(move |x| self.index([x, y])))
+    }
+
+    /// The mean over the neighbours of a block, all eight where it has them.
+    fn around(&self, index: usize, values: &[f64]) -> f64 {
+        let [x, y] = self.place(index);
+        let (mut sum, mut count) = (0.0, 0);
+        for [dx, dy] in [[0, 0], [1, 0], [2, 0], [0, 1], [2, 1], [0, 2], [1, 2], [2, 2]] {
+            let inside = |at: u32, d: u32, k: usize| at + d > self.first[k] && at + d <= self.first[k] + self.count[k];
+            if inside(x, dx, 0) && inside(y, dy, 1) {
+                sum += values[self.index([x + dx - 1, y + dy - 1])];
+                count += 1;
+            }
+        }
+        if count == 0 { values[index] } else { sum / f64::from(count) }
+    }
+
+    fn estimate(&self, film: &Film) -> Estimate {
+        let mut variances = vec![0.0; self.done.len()];
+        let (mut squares, mut pixels) = (0.0, 0.0);
+        for tile in film.tiles() {
+            for index in self.of_tile(tile) {
+                let block = BlockVariance::new(tile, self.place(index));
+                let n = f64::from(self.done[index]);
+                variances[index] = block.mean * n;
+                squares += block.squares;
+                pixels += f64::from(block.pixels);
+            }
+        }
+        let count = variances.len() as f64;
+        let errors = variances.iter().zip(&self.done).map(|(v, n)| v / f64::from(*n));
+        let error = errors.clone().sum::<f64>() / count;
+        let spread = errors.map(|e| (e - error).powi(2)).sum::<f64>() / (count * (count - 1.0).max(1.0));
+        // The square of a normal deviate has a variance of 2.
+        let actual = 2.0 * squares / (pixels * pixels);
+        Estimate { variances, error, deviation: (spread + actual).sqrt() }
+    }
+
+    /// Sets what is wanted so that the error becomes `goal`, as far as one stage may go; the most groups of a block are `most`.
+    fn plan(&mut self, variances: &[f64], goal: f64, most: u32) {
+        let roots: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
+        let shares: Vec<f64> = (0..roots.len()).map(|i| self.around(i, &roots)).collect();
+        let groups = |i: usize, scale: f64| -> u32 {
+            let done = self.done[i];
+            ((shares[i] * scale).ceil() as u32).clamp(done, (done * GROWTH).min(most).max(done))
+        };
+        let error = |scale: f64| {
+            let sum: f64 = variances.iter().enumerate().map(|(i, v)| v / f64::from(groups(i, scale))).sum();
+            sum / variances.len() as f64
+        };
+        // By halving, between a scale that asks for nothing and one that asks for everything.
+        let most_share = shares.iter().copied().fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+        let least_share = shares.iter().copied().filter(|s| *s > 0.0).fold(most_share, f64::min);
+        let (mut low, mut high) = ((1.0 / most_share).ln(), (f64::from(most) / least_share).ln());
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if error(middle.exp()) > goal { low = middle } else { high = middle }
+        }
+        let wanted: Vec<u32> = (0..shares.len()).map(|i| groups(i, high.exp())).collect();
+        self.wanted = wanted;
+    }
+
+    /// Gives every block some more: where there is no better plan.
+    fn add_to_all(&mut self, most: u32) {
+        for (wanted, done) in self.wanted.iter_mut().zip(&self.done) {
+            *wanted = (done + done.div_ceil(8)).min(most).max(*done);
+        }
+    }
+
+    /// Samples of the pixels within the crop, done and wanted.
+    fn samples(&self, film: &Film) -> [u64; 2] {
+        let mut sums = [0; 2];
+        for tile in film.tiles() {
+            for index in self.of_tile(tile) {
+                let pixels = block_area(tile, self.place(index)).area() * u64::from(GROUP);
+                sums[0] += pixels * u64::from(self.done[index]);
+                sums[1] += pixels * u64::from(self.wanted[index]);
+            }
+        }
+        sums
+    }
+}
+
+/// The pixels of a block that reach the picture.
+fn block_area(tile: &FilmTile, [x, y]: [u32; 2]) -> Crop {
+    Crop { x: x * BLOCK_SIZE, y: y * BLOCK_SIZE, width: BLOCK_SIZE, height: BLOCK_SIZE }.intersection(&tile.active())
+}
+
+/// Relative variance of the pixels of a block.
+struct BlockVariance {
+    /// Mean over pixels and channels.
+    mean: f64,
+    /// Sum over pixels of the square of the mean over channels.
+    squares: f64,
+    pixels: u32,
+}
+
+impl BlockVariance {
+    fn new(tile: &FilmTile, place: [u32; 2]) -> Self {
+        let area = block_area(tile, place);
+        let pixels = (area.y..area.y + area.height).flat_map(|y| (area.x..area.x + area.width).map(move |x| tile.index(x, y)));
+        let statistics: Vec<_> = pixels.map(|pixel| tile.group_statistics(pixel).unwrap_or_default()).collect();
+        let count = statistics.len() as f64;
+        let totals = [0, 1, 2].map(|k| statistics.iter().map(|(mean, _)| mean[k]).sum::<f64>());
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for (mean, variance) in &statistics {
+            let relative: f64 = (0..3)
+                .map(|k| {
+                    // What makes a pixel uncertain may make it bright: the others of its block know better.
+                    let others = (totals[k] - mean[k]) / (count - 1.0).max(1.0);
+                    let color = if count > 1.0 { mean[k].abs().min(others.abs()) } else { mean[k] };
+                    variance[k] / (color * color + FLOOR)
+                })
+                .sum();
+            sum += relative / 3.0;
+            squares += (relative / 3.0).powi(2);
+        }
+        Self { mean: sum / count, squares, pixels: statistics.len() as u32 }
+    }
+}
+
+/// Renders until the relative squared error is below `target`, or a pixel would get more samples than the settings allow.
+pub(super) fn render(
+    job: &Job,
+    pool: &rayon::ThreadPool,
+    settings: &Settings,
+    target: f64,
+    progress: &dyn Progress,
+    stop: &AtomicBool,
+) -> Result<RenderResult> {
+    let mut layers = settings.layers;
+    layers.insert(LayerKind::Variance);
+    let mut film = Film::new(settings.size, settings.crop, &layers, TILE_SIZE)?;
+    let mut stats = Stats::default();
+    let pixels = settings.crop.area();
+    let most = settings.spp.div_ceil(GROUP).max(PILOT);
+    let mut blocks = Blocks::new(settings.crop);
+    progress.start(PILOT * GROUP, pixels);
+
+    let start = Instant::now();
+    loop {
+        let timed_out = || settings.time_limit.is_some_and(|limit| start.elapsed() >= limit);
+        let finished = render_stage(job, pool, &mut film, &mut blocks, &mut stats, (start, settings.time_limit), progress, stop);
+        if !finished {
+            stats.interrupted = stop.load(Ordering::Relaxed);
+            stats.time_limited = !stats.interrupted && timed_out();
+        }
+        let estimate = blocks.estimate(&film);
+        stats.estimated_error = Some(estimate.error);
+        let reached = estimate.error + CONFIDENCE * estimate.deviation <= target;
+        if reached || !finished || blocks.done.iter().all(|&n| n >= most) {
+            break;
+        }
+        // The deviation falls with the error; a little less spares a stage for the last bit.
+        let goal = 0.97 * target / (1.0 + CONFIDENCE * estimate.deviation / estimate.error);
+        blocks.plan(&estimate.variances, goal, most);
+        let [mut done, mut wanted] = blocks.samples(&film);
+        if wanted < done + done / 50 {
+            blocks.add_to_all(most);
+            [done, wanted] = blocks.samples(&film);
+        }
+        debug_assert!(wanted >= done, "samples are never taken back");
+        progress.plan(wanted, estimate.error, target);
+    }
+    stats.render_seconds = start.elapsed().as_secs_f64();
+    progress.finish();
+
+    stats.samples = blocks.samples(&film)[0];
+    stats.spp_done = (stats.samples as f64 / pixels as f64).round() as u32;
+    stats.nan_samples = film.dropped_count();
+    stats.dropped = film.dropped();
+    let mut image = film.resolve();
+    image.layers.retain(|layer| settings.layers.contains(layer.kind));
+    Ok(RenderResult { image, stats })
+}
+
+/// Renders what is wanted, in passes that end soon when asked to; says whether all of it is there.
+#[allow(clippy::too_many_arguments)]
+fn render_stage(
+    job: &Job,
+    pool: &rayon::ThreadPool,
+    film: &mut Film,
+    blocks: &mut Blocks,
+    stats: &mut Stats,
+    (start, time_limit): (Instant, Option<Duration>),
+    progress: &dyn Progress,
+    stop: &AtomicBool,
+) -> bool {
+    let mut step = 1;
+    while blocks.done.iter().zip(&blocks.wanted).any(|(done, wanted)| done < wanted) {
+        // Fewer groups than the pilot's would say nothing of the error.
+        let has_pilot = blocks.done.iter().all(|&n| n >= PILOT);
+        if has_pilot && (stop.load(Ordering::Relaxed) || time_limit.is_some_and(|limit| start.elapsed() >= limit)) {
+            return false;
+        }
+        let pass_start = Instant::now();
+        stats.rays.add(&render_pass(job, pool, film, blocks, step, progress));
+        for (done, wanted) in blocks.done.iter_mut().zip(&blocks.wanted) {
+            *done = (*done + step).min(*wanted);
+        }
+        if stats.first_pass_seconds == 0.0 {
+            stats.first_pass_seconds = start.elapsed().as_secs_f64();
+        }
+        step = next_pass(step, pass_start.elapsed(), time_limit.map(|limit| limit.saturating_sub(start.elapsed())));
+    }
+    true
+}
+
+/// Renders at most `step` more groups of every block that wants them.
+fn render_pass(job: &Job, pool: &rayon::ThreadPool, film: &mut Film, blocks: &Blocks, step: u32, progress: &dyn Progress) -> RayCounts {
+    pool.install(|| {
+        film.tiles_mut()
+            .par_iter_mut()
+            .with_max_len(1)
+            .map_init(Batch::new, |batch, tile| {
+                let missing = |index: usize| blocks.done[index]..(blocks.done[index] + step).min(blocks.wanted[index]);
+                let of_block = |index: usize| missing(index).map(move |group| (index, group));
+                let groups: Vec<([u32; 2], u32)> =
+                    blocks.of_tile(tile).flat_map(of_block).map(|(index, group)| (blocks.place(index), group)).collect();
+                let mut counts = RayCounts::default();
+                let mut samples = 0;
+                for groups in groups.chunks(BATCH_GROUPS) {
+                    samples += render_groups(job, tile, groups, batch, &mut counts);
+                }
+                progress.tile_done(samples);
+                counts
+            })
+            .reduce(RayCounts::default, |mut a, b| {
+                a.add(&b);
+                a
+            })
+    })
+}
+
+/// Renders a group of samples of each of these blocks; says how many samples are in the picture.
+fn render_groups(job: &Job, tile: &mut FilmTile, groups: &[([u32; 2], u32)], batch: &mut Batch, counts: &mut RayCounts) -> u64 {
+    let pixel = |[x, y]: [u32; 2], within: u32| [x * BLOCK_SIZE + within % BLOCK_SIZE, y * BLOCK_SIZE + within / BLOCK_SIZE];
+    // The pixels of a block side by side, for their rays are alike.
+    let of_group = |&(block, group): &([u32; 2], u32)| {
+        let of_sample = move |sample: u32| (0..BLOCK_PIXELS).map(move |within| (pixel(block, within), sample));
+        (group * GROUP..(group + 1) * GROUP).flat_map(of_sample)
+    };
+    job.render_samples(groups.iter().flat_map(of_group), batch, counts);
+    let active = tile.active();
+    let mut count = 0;
+    for (g, &(block, group)) in groups.iter().enumerate() {
+        for within in 0..BLOCK_PIXELS {
+            let [x, y] = pixel(block, within);
+            if !active.contains(x, y) {
+                continue;
+            }
+            let index = tile.index(x, y);
+            let (mut sum, mut weights, mut kept) = ([0.0; 3], 0.0, 0.0);
+            for i in 0..GROUP {
+                let slot = g * (BLOCK_PIXELS * GROUP) as usize + (i * BLOCK_PIXELS + within) as usize;
+                let (sample, weight) = (&batch.out[slot], batch.weights[slot]);
+                if tile.add(index, group * GROUP + i, sample, weight) {
+                    let value = weighted(sample, weight);
+                    sum = [0, 1, 2].map(|k| sum[k] + value[k]);
+                    weights += f64::from(weight);
+                    kept += 1.0;
+                }
+            }
+            if kept > 0.0 {
+                tile.add_group(index, sum.map(|s| s / kept), weights / kept);
+            }
+            count += u64::from(GROUP);
+        }
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests;
