@@ -26,7 +26,7 @@ const GROUP: u32 = 8;
 const PILOT: u32 = 2;
 
 /// By this factor a block's groups may grow in one stage: estimates get better on the way.
-const GROWTH: u32 = 3;
+const GROWTH: u32 = 8;
 
 /// How many standard deviations the error must be below the target.
 const CONFIDENCE: f64 = 2.0;
