@@ -19,6 +19,7 @@ use crate::{scene, text};
 pub fn run(command: &BenchCommand) -> Result<u8> {
     match command {
         BenchCommand::Accel(arguments) => accel(arguments),
+        BenchCommand::Error(arguments) => crate::bench_error::run(arguments),
         BenchCommand::Reports(arguments) => reports(arguments),
         BenchCommand::Stability(arguments) => stability(arguments),
     }
@@ -137,7 +138,7 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
 }
 
 /// The command as it was given, without the folder of the program.
-fn command_line() -> String {
+pub fn command_line() -> String {
     std::iter::once("steradian".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
 }
 
@@ -171,9 +172,11 @@ fn show(path: &Path) -> String {
 }
 
 /// The present step on stderr.
-struct Steps<'a> {
-    bar: ProgressBar,
-    interrupt: &'a Interrupt,
+pub struct Steps<'a> {
+    /// The line.
+    pub bar: ProgressBar,
+    /// Asks for the end.
+    pub interrupt: &'a Interrupt,
 }
 
 impl Watch for Steps<'_> {
@@ -187,7 +190,8 @@ impl Watch for Steps<'_> {
     }
 }
 
-fn spinner(quiet: bool) -> ProgressBar {
+/// A line on stderr; none if `quiet`.
+pub fn spinner(quiet: bool) -> ProgressBar {
     let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template("{elapsed} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
     ProgressBar::with_draw_target(None, target).with_style(style)
