@@ -4,6 +4,7 @@
 
 mod bias;
 mod external;
+pub mod flip;
 mod plan;
 mod report;
 mod summary;
@@ -66,7 +67,10 @@ pub fn bench_error(
                 watch.step(&format!("repeat {} of {}: {budget}, {}", repeat + 1, options.repeats, variant.name));
                 let seed = options.seed.wrapping_add(repeat as u64);
                 let Some(measured) = program.render(v, *budget, seed)? else { break 'all };
-                let run = judge(&reference, &measured, &variant.name)?;
+                let mut run = judge(&reference, &measured, &variant.name)?;
+                if repeat == 0 {
+                    run.flip = Some(flip::mean(&flip::hdr_flip(&reference.image, &measured.image)?));
+                }
                 blocks[v][b].add(&reference.image, &measured.image);
                 report.add(v, b, Run { repeat, seed, ..run });
             }
