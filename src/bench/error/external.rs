@@ -101,7 +101,7 @@ fn wait(child: &mut Child, stop: &AtomicBool) -> std::io::Result<Option<ExitStat
         }
         if stop.load(Ordering::Relaxed) {
             // It may have ended in between, which is as well.
-            let _ = Command::new("sh").args(["-c", &format!("kill -TERM -- -{}", child.id())]).stderr(Stdio::null()).status();
+            let _ = Command::new("sh").args(["-c", &format!("kill -TERM -{}", child.id())]).stderr(Stdio::null()).status();
             child.wait()?;
             return Ok(None);
         }

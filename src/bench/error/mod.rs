@@ -5,11 +5,13 @@
 mod bias;
 mod external;
 pub mod flip;
+mod page;
 mod plan;
 mod report;
 mod summary;
 
 pub use external::External;
+pub use page::Pictures;
 pub use plan::{Budget, ErrorOptions, Standard, Subject, Variant};
 pub use summary::{Bias, EqualError, ErrorReport, Point, ReferenceInfo, Run, VariantReport};
 
@@ -60,6 +62,8 @@ pub fn bench_error(
         return Ok(report);
     };
     report.reference = reference.info.clone();
+    report.pictures = Pictures::new(&reference.image);
+    let all_fit = report.pictures.fit(options.variants.len() * options.budgets.len());
     let mut blocks = vec![vec![Blocks::default(); options.budgets.len()]; options.variants.len()];
     'all: for repeat in 0..options.repeats {
         for (b, budget) in options.budgets.iter().enumerate() {
@@ -69,6 +73,9 @@ pub fn bench_error(
                 let Some(measured) = program.render(v, *budget, seed)? else { break 'all };
                 let mut run = judge(&reference, &measured, &variant.name)?;
                 if repeat == 0 {
+                    if all_fit || Some(*budget) == options.largest_budget() {
+                        report.pictures.add(v, b, &measured.image);
+                    }
                     run.flip = Some(flip::mean(&flip::hdr_flip(&reference.image, &measured.image)?));
                 }
                 blocks[v][b].add(&reference.image, &measured.image);

@@ -79,6 +79,15 @@ impl ErrorReport {
         write_files(folder, &[("error.json", self.json()?), ("error.csv", self.csv()), ("error.md", self.markdown())])
     }
 
+    /// Writes everything: those, and `error.html`.
+    ///
+    /// # Errors
+    /// [`Error::Output`] naming the file.
+    pub fn write_to(&self, folder: &Path) -> Result<()> {
+        self.write_figures_to(folder)?;
+        write_files(folder, &[("error.html", self.html()?)])
+    }
+
     /// Where and how it was measured.
     pub(super) fn header(&self) -> String {
         let m = &self.machine;

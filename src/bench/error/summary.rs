@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::Budget;
 use super::bias::Blocks;
 use super::plan::{ErrorOptions, Subject};
+use super::{Budget, Pictures};
 use crate::bench::{Machine, fitted_slope, median_and_range};
 
 /// Everything that a run has found.
@@ -26,6 +26,9 @@ pub struct ErrorReport {
     pub variants: Vec<VariantReport>,
     /// The time that each takes to the same error.
     pub equal_error: Option<EqualError>,
+    /// For the viewer.
+    #[serde(skip)]
+    pub pictures: Pictures,
 }
 
 /// What was rendered against.
@@ -158,6 +161,7 @@ impl ErrorReport {
             interrupted: false,
             variants: variants.collect(),
             equal_error: None,
+            pictures: Pictures::default(),
         }
     }
 
@@ -177,11 +181,8 @@ impl ErrorReport {
                 point.summarize();
                 point.bias = blocks.ratio().map(|[ratio, low, high]| Bias { ratio, low, high });
             }
-            let measured = || variant.points.iter().filter(|point| !point.runs.is_empty());
-            let of_time: Vec<_> = measured().map(|point| (point.seconds[0], point.relmse[0])).collect();
-            let of_spp: Vec<_> = measured().filter_map(|point| Some((point.spp?, point.relmse[0]))).collect();
-            variant.slope_of_time = fitted_slope(&of_time);
-            variant.slope_of_spp = fitted_slope(&of_spp);
+            variant.slope_of_time = fitted_slope(&variant.curve());
+            variant.slope_of_spp = fitted_slope(&variant.curve_of_spp());
         }
         let curves: Vec<Vec<(f64, f64)>> = self.variants.iter().map(VariantReport::curve).collect();
         self.equal_error = equal_error(&curves);
@@ -191,8 +192,18 @@ impl ErrorReport {
 impl VariantReport {
     /// Seconds and relMSE of the points that have any, by time.
     pub(super) fn curve(&self) -> Vec<(f64, f64)> {
-        let measured = self.points.iter().filter(|point| !point.runs.is_empty() && point.relmse[0] > 0.0 && point.seconds[0] > 0.0);
-        let mut curve: Vec<_> = measured.map(|point| (point.seconds[0], point.relmse[0])).collect();
+        self.curve_over(|point| Some(point.seconds[0]))
+    }
+
+    /// Samples per pixel and relMSE.
+    pub(super) fn curve_of_spp(&self) -> Vec<(f64, f64)> {
+        self.curve_over(|point| point.spp)
+    }
+
+    fn curve_over(&self, of: impl Fn(&Point) -> Option<f64>) -> Vec<(f64, f64)> {
+        let measured = self.points.iter().filter(|point| !point.runs.is_empty());
+        let mut curve: Vec<_> =
+            measured.filter_map(|point| Some((of(point)?, point.relmse[0]))).filter(|(x, y)| *x > 0.0 && *y > 0.0).collect();
         curve.sort_by(|a, b| a.0.total_cmp(&b.0));
         curve
     }

@@ -139,7 +139,13 @@ pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, marks: &[(f64, f64
             }
         }
         chart.draw_series(marks.iter().map(|p| Circle::new(*p, 5, BLACK.stroke_width(2)))).map_err(failed)?;
-        legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
+        let falling = |c: &&Curve| c.points.first().zip(c.points.last()).is_some_and(|(first, last)| first.1 > last.1);
+        let free = if 2 * curves.iter().filter(falling).count() > curves.len() {
+            SeriesLabelPosition::UpperRight
+        } else {
+            SeriesLabelPosition::UpperLeft
+        };
+        legend(&mut chart, free)?;
         root.present().map_err(failed)?;
     }
     Ok(svg)

@@ -40,9 +40,13 @@ pub fn run(arguments: &BenchErrorArgs) -> Result<u8> {
     watch.bar.finish_and_clear();
     match &arguments.out {
         Some(folder) => {
-            report.write_figures_to(folder)?;
+            report.write_to(folder)?;
             if !arguments.quiet {
-                text::print(&format!("{}\nerror.md, error.csv and error.json are in {}", report.markdown().trim_end(), folder.display()))?;
+                text::print(&format!(
+                    "{}\nerror.html, error.md, error.csv and error.json are in {}",
+                    report.markdown().trim_end(),
+                    folder.display()
+                ))?;
             }
         }
         None if arguments.json => text::print(&report.json()?)?,
