@@ -9,13 +9,15 @@ mod page;
 mod plan;
 mod report;
 mod summary;
+mod tax;
 
 pub use external::External;
 pub use page::Pictures;
 pub use plan::{Budget, ErrorOptions, Standard, Subject, Variant};
 pub use summary::{Bias, EqualError, ErrorReport, Point, ReferenceInfo, Run, VariantReport};
+pub use tax::TaxReport;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use self::bias::Blocks;
 use self::plan::{Measured, Program};
@@ -85,8 +87,11 @@ pub fn bench_error(
         report.summarize(&blocks);
         after(&report)?;
     }
-    report.interrupted = stop.load(Ordering::Relaxed) && report.runs() < options.runs();
     report.summarize(&blocks);
+    if options.tax && !watch.is_stopped() {
+        report.tax = tax::bench_tax(scene, options, watch, stop)?;
+    }
+    report.interrupted = report.runs() < options.runs() || options.tax && report.tax.is_none();
     Ok(report)
 }
 

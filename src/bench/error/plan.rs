@@ -90,6 +90,8 @@ pub struct ErrorOptions {
     pub seed: u64,
     /// What is rendered against.
     pub reference: Standard,
+    /// Whether to replay the rays of a render.
+    pub tax: bool,
 }
 
 impl ErrorOptions {

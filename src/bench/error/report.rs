@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{ErrorReport, Point};
+use super::{ErrorReport, Point, TaxReport};
 use crate::bench::report::csv::field;
 use crate::bench::report::markdown::{self, Table};
 use crate::bench::report::write_files;
@@ -136,6 +136,7 @@ impl ErrorReport {
         if self.variants.iter().any(|variant| variant.slope_of_time.is_some()) || self.equal_error.is_some() {
             tables.push(self.slopes());
         }
+        tables.extend(self.tax.as_ref().map(tax));
         tables
     }
 
@@ -187,6 +188,23 @@ impl ErrorReport {
         });
         Table { title: "Convergence (least squares of the logarithms; -1: independent samples)".into(), heads, rows: rows.collect() }
     }
+}
+
+fn tax(tax: &TaxReport) -> Table {
+    let heads = ["variant", "picture", "rays", "threads", "render s", "bare replay s", "render / replay"].map(str::to_owned).to_vec();
+    let [width, height] = tax.size;
+    let same = if tax.same_hits { "" } else { " (the replay found other hits)" };
+    let row = vec![
+        tax.variant.clone(),
+        format!("{width}x{height}, {} spp", tax.spp),
+        format!("{}, of which {} hit{same}", tax.rays, tax.hits),
+        tax.threads.to_string(),
+        range(tax.render_seconds),
+        range(tax.replay_seconds),
+        range(tax.ratio),
+    ];
+    let title = format!("Shading tax: the render beside bare calls of {} with its own rays, in the same packets", tax.accelerator);
+    Table { title, heads, rows: vec![row] }
 }
 
 fn row(name: &str, point: &Point) -> Vec<String> {

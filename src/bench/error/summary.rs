@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::bias::Blocks;
 use super::plan::{ErrorOptions, Subject};
-use super::{Budget, Pictures};
+use super::{Budget, Pictures, TaxReport};
 use crate::bench::{Machine, fitted_slope, median_and_range};
 
 /// Everything that a run has found.
@@ -26,6 +26,8 @@ pub struct ErrorReport {
     pub variants: Vec<VariantReport>,
     /// The time that each takes to the same error.
     pub equal_error: Option<EqualError>,
+    /// What rendering takes beyond tracing, if asked for.
+    pub tax: Option<TaxReport>,
     /// For the viewer.
     #[serde(skip)]
     pub pictures: Pictures,
@@ -161,6 +163,7 @@ impl ErrorReport {
             interrupted: false,
             variants: variants.collect(),
             equal_error: None,
+            tax: None,
             pictures: Pictures::default(),
         }
     }

@@ -80,6 +80,7 @@ fn options(arguments: &BenchErrorArgs, desc: &SceneDesc, reference: Standard) ->
         repeats: arguments.repeat as usize,
         seed: arguments.seed,
         reference,
+        tax: arguments.tax,
     })
 }
 
