@@ -111,7 +111,7 @@ fn mistakes_are_named() {
         (&[&scene, "--reference", "missing.exr"], 4, "missing.exr"),
         (&[&scene, "--reference", &reference, "--size", "48x32"], 2, "reference has 24x16 pixels"),
         (&[&scene, "--spp", "1,0"], 2, "--spp"),
-        (&[&scene, "--times", "-1"], 2, "--times"),
+        (&[&scene, "--times", "0"], 2, "--times"),
         (&[&scene, "--external", "x=render {scene} {out}"], 2, "{spp}"),
         (&[&[scene.as_str()], &small[..], &["--external", failing]].concat(), 1, "--external broken: exit status: 7"),
         (&[&[scene.as_str()], &small[..], &["--external", "idle=true {spp} {out}"]].concat(), 1, "it wrote no {out}"),

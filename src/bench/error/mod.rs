@@ -50,13 +50,16 @@ pub fn bench_error(
     stop: &AtomicBool,
     mut after: impl FnMut(&ErrorReport) -> Result<()>,
 ) -> Result<ErrorReport> {
+    if options.tax {
+        tax::subject(options)?;
+    }
     let machine = Machine::here();
     let mut program = Program::new(scene, options, stop)?;
     let mut report = ErrorReport::new(machine, options);
-    for variant in 0..options.variants.len() {
+    for (v, variant) in options.variants.iter().enumerate() {
         if !watch.is_stopped() {
-            watch.step(&format!("{}: warming up", options.variants[variant].name));
-            program.warm_up(variant)?;
+            watch.step(&format!("{}: warming up", variant.name));
+            program.warm_up(v)?;
         }
     }
     let Some(reference) = reference(&program, options, watch)? else {
@@ -156,3 +159,6 @@ fn judge(reference: &Reference, measured: &Measured, name: &str) -> Result<Run> 
         efficiency,
     })
 }
+
+#[cfg(test)]
+mod tests;

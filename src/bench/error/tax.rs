@@ -7,7 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::plan::{ErrorOptions, Subject};
-use crate::accel::{AccelKind, Accelerator, Coherence, EmbreeAccel, EmbreeReplay};
+use crate::accel::{AccelKind, Accelerator, Coherence, EmbreeAccel, EmbreeOptions, EmbreeReplay};
 use crate::bench::{Watch, median_and_range};
 use crate::error::{Error, Result};
 use crate::film::Crop;
@@ -52,24 +52,30 @@ pub struct TaxReport {
     pub ratio: [f64; 3],
 }
 
-/// Measures the first variant that renders with Embree; `None` if interrupted.
+/// The first variant that renders with Embree: its name, its settings, Embree's options.
 ///
 /// # Errors
-/// If there is no such variant, or as a render.
-pub fn bench_tax(scene: &Scene, options: &ErrorOptions, watch: &dyn Watch, stop: &AtomicBool) -> Result<Option<TaxReport>> {
-    let ours = options.variants.iter().find_map(|variant| match &variant.subject {
+/// If there is none.
+pub(super) fn subject(options: &ErrorOptions) -> Result<(&str, &Settings, EmbreeOptions)> {
+    let found = options.variants.iter().find_map(|variant| match &variant.subject {
         Subject::Ours(settings) => match settings.accel {
-            AccelKind::Embree(embree) => Some((&variant.name, settings, embree)),
+            AccelKind::Embree(embree) => Some((variant.name.as_str(), &**settings, embree)),
             _ => None,
         },
         Subject::External(_) => None,
     });
-    let Some((name, settings, embree)) = ours else {
-        return Err(Error::Usage("--tax: no variant of ours renders with embree".into()));
-    };
+    found.ok_or_else(|| Error::Usage("--tax: no variant of ours renders with embree".into()))
+}
+
+/// Measures the [`subject`]; `None` if interrupted.
+///
+/// # Errors
+/// If there is no such variant, or as a render.
+pub(super) fn bench_tax(scene: &Scene, options: &ErrorOptions, watch: &dyn Watch, stop: &AtomicBool) -> Result<Option<TaxReport>> {
+    let (name, settings, embree) = subject(options)?;
     watch.step(&format!("tax: recording the rays of {name}"));
     let accel = EmbreeAccel::with_options(&scene.geometry, settings.threads, embree)?;
-    let one = Settings { spp: 1, seed: options.seed, time_limit: None, ..Settings::clone(settings) };
+    let one = Settings { spp: 1, seed: options.seed, time_limit: None, ..settings.clone() };
     let first = render::render(scene, &accel, &one, &Silent, stop)?.stats;
     let settings = within(&one, first.rays.total());
     let recorder = Recorder { inner: &accel, replay: Mutex::new(EmbreeReplay::new(&accel)), hits: AtomicU64::new(0) };
@@ -103,7 +109,7 @@ pub fn bench_tax(scene: &Scene, options: &ErrorOptions, watch: &dyn Watch, stop:
     }
     let ratios: Vec<f64> = renders.iter().zip(&replays).map(|(render, replay)| render / replay.max(1e-9)).collect();
     Ok(Some(TaxReport {
-        variant: name.clone(),
+        variant: name.to_owned(),
         accelerator: accel.description(),
         threads: settings.threads,
         size: [settings.crop.width, settings.crop.height],

@@ -69,9 +69,10 @@
     for (const [k, view] of views.entries()) {
       view.figure.hidden = shown !== "all" && shown !== view.name;
       if (view.figure.hidden) continue;
-      const scale = Math.min(1, view.figure.clientWidth / width) || 1;
-      view.canvas.width = Math.round(width * (shown === "all" ? scale : Math.max(1, scale)));
-      view.canvas.height = Math.round(view.canvas.width * height / width);
+      // As wide as there is room for, and not higher than the window.
+      const room = Math.min(view.figure.clientWidth || width, 0.85 * innerHeight * width / height);
+      view.canvas.width = Math.max(1, Math.round(room));
+      view.canvas.height = Math.max(1, Math.round(room * height / width));
       const context = view.canvas.getContext("2d"), size = view.canvas.width / width * zoom;
       context.imageSmoothingEnabled = size < 1;
       context.setTransform(size, 0, 0, size, -left * size, -top * size);

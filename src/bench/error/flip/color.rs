@@ -62,7 +62,7 @@ impl Planes {
     }
 
     /// Back to linear RGB, limited to what a screen can show.
-    pub fn from_opponent(&self) -> Self {
+    pub fn to_screen(&self) -> Self {
         self.map_pixels(|[lightness, red, yellow]| {
             let y = (lightness + 16.0) / 116.0;
             let white = white();
@@ -107,7 +107,7 @@ mod tests {
     #[test]
     fn the_way_there_and_back_is_the_identity() {
         let picture = Planes { size: [2, 1], planes: [vec![0.2, 1.0], vec![0.5, 0.0], vec![0.9, 0.3]] };
-        let back = picture.to_opponent().from_opponent();
+        let back = picture.to_opponent().to_screen();
         for i in 0..2 {
             assert!(picture.pixel(i).iter().zip(back.pixel(i)).all(|(a, b)| (a - b).abs() < 1e-5), "{back:?}");
         }

@@ -140,7 +140,7 @@ impl Seen {
             let vertical = filter::convolve(&lightness, size, &down, &across);
             horizontal.iter().zip(vertical).map(|(x, y)| x.hypot(y)).collect()
         });
-        Self { colors: filtered.from_opponent(), features }
+        Self { colors: filtered.to_screen(), features }
     }
 }
 
