@@ -184,8 +184,8 @@ impl ErrorReport {
                 point.summarize();
                 point.bias = blocks.ratio().map(|[ratio, low, high]| Bias { ratio, low, high });
             }
-            variant.slope_of_time = fitted_slope(&variant.curve());
-            variant.slope_of_spp = fitted_slope(&variant.curve_of_spp());
+            variant.slope_of_time = slope(&variant.curve());
+            variant.slope_of_spp = slope(&variant.curve_of_spp());
         }
         let curves: Vec<Vec<(f64, f64)>> = self.variants.iter().map(VariantReport::curve).collect();
         self.equal_error = equal_error(&curves);
@@ -250,6 +250,12 @@ impl Point {
     }
 }
 
+/// The fitted slope; none where the axis hardly changes, as the time of programs does that start slowly.
+fn slope(curve: &[(f64, f64)]) -> Option<f64> {
+    let wide = curve.first().zip(curve.last()).is_some_and(|(first, last)| last.0 > 1.5 * first.0);
+    fitted_slope(curve).filter(|_| wide)
+}
+
 /// The times to the smallest error that every curve reaches; `None` if there are fewer than two curves with points.
 fn equal_error(curves: &[Vec<(f64, f64)>]) -> Option<EqualError> {
     let best = |curve: &Vec<(f64, f64)>| curve.iter().map(|p| p.1).reduce(f64::min);
@@ -289,6 +295,12 @@ mod tests {
         }
         assert_eq!(time_to(&slow, 0.01), None);
         assert_eq!(equal_error(&[slow, Vec::new()]), None);
+    }
+
+    #[test]
+    fn slopes_need_a_range() {
+        assert!((slope(&[(1.0, 0.4), (4.0, 0.1), (16.0, 0.025)]).unwrap() + 1.0).abs() < 1e-12);
+        assert_eq!((slope(&[(1.0, 0.4), (1.01, 0.1)]), slope(&[(1.0, 0.4)]), slope(&[])), (None, None, None));
     }
 
     #[test]

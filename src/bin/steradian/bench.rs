@@ -1,5 +1,6 @@
 //! `steradian bench`.
 
+use std::io::Write;
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -38,7 +39,7 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         steradian::output::check_creatable(&folder.join("accel.json"))?;
     }
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
     let options = options(arguments);
     let machine = Machine::here();
     let mut scenes: Vec<SceneReport> = Vec::new();
@@ -78,7 +79,7 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
 
 fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
     let defaults = ReportsOptions::default();
     let tests = if arguments.full { u64::MAX } else { defaults.tests };
     let report = bench_reports(&ReportsOptions { size: arguments.size, rounds: arguments.rounds as usize, tests }, &watch)?;
@@ -100,7 +101,7 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
         steradian::output::check_creatable(&folder.join("stability.json"))?;
     }
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
     let machine = Machine::here();
     let effort = if arguments.quick { Effort::Quick } else { Effort::Full };
     let kept = match &arguments.out {
@@ -177,10 +178,16 @@ pub struct Steps<'a> {
     pub bar: ProgressBar,
     /// Asks for the end.
     pub interrupt: &'a Interrupt,
+    /// Whether steps are lines, where there is no terminal.
+    pub lines: bool,
 }
 
 impl Watch for Steps<'_> {
     fn step(&self, what: &str) {
+        if self.lines {
+            // Stderr may be gone; that is no reason to stop.
+            let _ = writeln!(std::io::stderr(), "{what}");
+        }
         self.bar.set_message(what.to_owned());
         self.bar.tick();
     }

@@ -1,5 +1,6 @@
 //! `steradian bench error`.
 
+use std::io::IsTerminal;
 use std::path::Path;
 
 use serde::Serialize;
@@ -27,7 +28,8 @@ pub fn run(arguments: &BenchErrorArgs) -> Result<u8> {
         output::check_creatable(&folder.join("error.json"))?;
     }
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let lines = !arguments.quiet && !std::io::stderr().is_terminal();
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines };
     watch.step(&format!("{}: loading", arguments.scene.display()));
     let imported = scene::load(&arguments.scene, &arguments.import, Verbosity { quiet: arguments.quiet, verbose: 0 })?;
     let options = options(arguments, &imported.desc, reference)?;
