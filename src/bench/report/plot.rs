@@ -103,7 +103,7 @@ pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, marks: &[(f64, f64
     let all = || curves.iter().flat_map(|c| &c.points);
     let range = |of: fn(&(f64, f64)) -> f64| {
         let (low, high) = all().map(of).filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0), |(low, high), v| (v.min(low), v.max(high)));
-        if low < high { low * 0.9..high * 1.1 } else { 0.1..10.0 }
+        if low < high { labelled(low * 0.9, high * 1.1) } else { 0.1..10.0 }
     };
     let mut svg = String::new();
     {
@@ -151,6 +151,14 @@ pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, marks: &[(f64, f64
     Ok(svg)
 }
 
+/// A range, widened to powers of ten if fewer than two of them lie in it: short logarithmic axes have no other labels.
+fn labelled(low: f64, high: f64) -> std::ops::Range<f64> {
+    if high.log10().floor() - low.log10().ceil() >= 1.0 {
+        return low..high;
+    }
+    10f64.powf(low.log10().floor())..10f64.powf(high.log10().ceil())
+}
+
 fn legend<'a, CT>(chart: &mut ChartContext<'a, SVGBackend<'a>, CT>, position: SeriesLabelPosition) -> Result<()>
 where
     CT: CoordTranslate,
@@ -173,4 +181,14 @@ fn short(value: f64) -> String {
         return text.trim_end_matches('0').trim_end_matches('.').to_owned();
     }
     format!("{value:.0e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_axes_reach_from_power_to_power_of_ten() {
+        assert_eq!((labelled(0.9, 300.0), labelled(1.8, 7.3), labelled(0.02, 0.2)), (0.9..300.0, 1.0..10.0, 0.01..1.0));
+    }
 }
