@@ -8,6 +8,8 @@ mod bad_input;
 mod bad_materials;
 /// Accelerators compared from the command line.
 mod bench_accel;
+/// Error against time from the command line.
+mod bench_error;
 /// The catalogue of checks from the command line.
 mod bench_stability;
 /// What the cameras of the scene file see.

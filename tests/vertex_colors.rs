@@ -114,7 +114,7 @@ fn faults_name_the_shape_and_the_material() {
         (json!({ "type": "cube", "material": "m" }), ErrorKind::Scene, ["shapes[0]", "\"m\"", "the shape has none"]),
         (json!({ "type": "mesh", "material": "m", "file": "plain.obj" }), ErrorKind::Scene, ["shapes[0]", "plain.obj", "\"m\""]),
         (json!({ "type": "mesh", "material": "m", "file": "bad.ply" }), ErrorKind::Scene, ["bad.ply", "vertex 1", "-0.25"]),
-        (json!({ "type": "mesh", "material": "m", "file": "nan.ply" }), ErrorKind::Scene, ["nan.ply", "vertex 2", "NaN"]),
+        (json!({ "type": "mesh", "material": "m", "file": "nan.ply" }), ErrorKind::Scene, ["nan.ply", "Line 15", "NaN"]),
     ] {
         assert_error(&folder, &scene_of(shape), kind, &parts);
     }

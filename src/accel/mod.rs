@@ -11,7 +11,7 @@ mod tree;
 
 pub use bvh::BvhOptions;
 pub(crate) use embree::Registered;
-pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality};
+pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality, EmbreeReplay};
 pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};
 pub use linear::LinearAccel;

@@ -1,7 +1,8 @@
-//! Accelerators compared on the same rays: record, replay, check, report; and numerical stability.
+//! Accelerators compared on the same rays: record, replay, check, report; error against time; and numerical stability.
 
 pub mod agreement;
 mod epo;
+pub mod error;
 mod machine;
 mod measure;
 mod mesh;

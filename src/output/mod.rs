@@ -7,7 +7,7 @@ mod png;
 
 pub use self::exr::{read_exr, write_exr};
 pub use atomic::{check_creatable, check_writable, write_atomically};
-pub use compare::{Comparison, compare};
+pub use compare::{Comparison, RELATIVE_FLOOR, compare};
 pub use png::write_png;
 
 use std::path::Path;

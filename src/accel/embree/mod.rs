@@ -8,10 +8,12 @@ mod callbacks;
 mod device;
 mod gate;
 mod packet;
+mod replay;
 mod scene;
 mod sys;
 
 pub use device::EmbreeInfo;
+pub use replay::EmbreeReplay;
 
 use super::{Accelerator, Coherence};
 use crate::error::Result;

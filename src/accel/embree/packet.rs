@@ -18,7 +18,7 @@ pub(super) const WIDTH: usize = 16;
 pub(super) const INVALID: u32 = u32::MAX;
 
 /// Embree ignores geometries whose mask has no bit in common with the ray's.
-const ALL_GEOMETRIES: u32 = u32::MAX;
+pub(super) const ALL_GEOMETRIES: u32 = u32::MAX;
 
 /// What traces, and what it may be given.
 pub(super) struct Tracer {
@@ -32,7 +32,7 @@ pub(super) struct Tracer {
 
 impl Tracer {
     /// Whether a packet is traced as a frustum.
-    fn as_frustum(&self, coherence: Coherence) -> bool {
+    pub(super) fn as_frustum(&self, coherence: Coherence) -> bool {
         self.frusta && coherence == Coherence::Coherent
     }
 
@@ -110,7 +110,7 @@ fn c_ray(ray: &Ray) -> *const sys::StRay {
 
 /// Which lanes Embree may look at: -1, others 0.
 #[repr(C, align(64))]
-struct Lanes([i32; WIDTH]);
+pub(super) struct Lanes(pub(super) [i32; WIDTH]);
 
 impl Lanes {
     #[inline]
@@ -200,7 +200,7 @@ impl ShadowPacket {
 
 /// Writes `rays` into the lanes, and for those that are not fit for a packet harmless numbers and `valid = 0`.
 #[inline(always)]
-fn fill(packet: &mut RTCRay16, valid: &mut Lanes, tracer: &Tracer, rays: &[Ray; WIDTH]) {
+pub(super) fn fill(packet: &mut RTCRay16, valid: &mut Lanes, tracer: &Tracer, rays: &[Ray; WIDTH]) {
     // SAFETY: both hold sixteen rays, and `StRay` is `Ray` under its C name.
     unsafe { sys::st_fill16(packet, c_ray(&rays[0])) };
     for lane in 0..WIDTH {

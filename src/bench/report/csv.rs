@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::Report;
 
 /// A field in quotes where it needs them (RFC 4180).
-fn field(text: &str) -> String {
+pub fn field(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 

@@ -1,6 +1,6 @@
 //! Reports: JSON, CSV, Markdown, and one page of HTML that needs no network.
 
-mod csv;
+pub(super) mod csv;
 pub(super) mod html;
 pub(super) mod markdown;
 pub(super) mod plot;

@@ -103,7 +103,7 @@ pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, marks: &[(f64, f64
     let all = || curves.iter().flat_map(|c| &c.points);
     let range = |of: fn(&(f64, f64)) -> f64| {
         let (low, high) = all().map(of).filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0), |(low, high), v| (v.min(low), v.max(high)));
-        if low < high { low * 0.9..high * 1.1 } else { 0.1..10.0 }
+        if low < high { labelled(low * 0.9, high * 1.1) } else { 0.1..10.0 }
     };
     let mut svg = String::new();
     {
@@ -139,10 +139,24 @@ pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, marks: &[(f64, f64
             }
         }
         chart.draw_series(marks.iter().map(|p| Circle::new(*p, 5, BLACK.stroke_width(2)))).map_err(failed)?;
-        legend(&mut chart, SeriesLabelPosition::UpperLeft)?;
+        let falling = |c: &&Curve| c.points.first().zip(c.points.last()).is_some_and(|(first, last)| first.1 > last.1);
+        let free = if 2 * curves.iter().filter(falling).count() > curves.len() {
+            SeriesLabelPosition::UpperRight
+        } else {
+            SeriesLabelPosition::UpperLeft
+        };
+        legend(&mut chart, free)?;
         root.present().map_err(failed)?;
     }
     Ok(svg)
+}
+
+/// A range, widened to powers of ten if fewer than two of them lie in it: short logarithmic axes have no other labels.
+fn labelled(low: f64, high: f64) -> std::ops::Range<f64> {
+    if high.log10().floor() - low.log10().ceil() >= 1.0 {
+        return low..high;
+    }
+    10f64.powf(low.log10().floor())..10f64.powf(high.log10().ceil())
 }
 
 fn legend<'a, CT>(chart: &mut ChartContext<'a, SVGBackend<'a>, CT>, position: SeriesLabelPosition) -> Result<()>
@@ -167,4 +181,14 @@ fn short(value: f64) -> String {
         return text.trim_end_matches('0').trim_end_matches('.').to_owned();
     }
     format!("{value:.0e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_axes_reach_from_power_to_power_of_ten() {
+        assert_eq!((labelled(0.9, 300.0), labelled(1.8, 7.3), labelled(0.02, 0.2)), (0.9..300.0, 1.0..10.0, 0.01..1.0));
+    }
 }

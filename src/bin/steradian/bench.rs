@@ -1,5 +1,6 @@
 //! `steradian bench`.
 
+use std::io::Write;
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -19,6 +20,7 @@ use crate::{scene, text};
 pub fn run(command: &BenchCommand) -> Result<u8> {
     match command {
         BenchCommand::Accel(arguments) => accel(arguments),
+        BenchCommand::Error(arguments) => crate::bench_error::run(arguments),
         BenchCommand::Reports(arguments) => reports(arguments),
         BenchCommand::Stability(arguments) => stability(arguments),
     }
@@ -37,7 +39,7 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         steradian::output::check_creatable(&folder.join("accel.json"))?;
     }
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
     let options = options(arguments);
     let machine = Machine::here();
     let mut scenes: Vec<SceneReport> = Vec::new();
@@ -77,7 +79,7 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
 
 fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
     let defaults = ReportsOptions::default();
     let tests = if arguments.full { u64::MAX } else { defaults.tests };
     let report = bench_reports(&ReportsOptions { size: arguments.size, rounds: arguments.rounds as usize, tests }, &watch)?;
@@ -99,7 +101,7 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
         steradian::output::check_creatable(&folder.join("stability.json"))?;
     }
     let interrupt = Interrupt::listen()?;
-    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt };
+    let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
     let machine = Machine::here();
     let effort = if arguments.quick { Effort::Quick } else { Effort::Full };
     let kept = match &arguments.out {
@@ -137,7 +139,7 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
 }
 
 /// The command as it was given, without the folder of the program.
-fn command_line() -> String {
+pub fn command_line() -> String {
     std::iter::once("steradian".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
 }
 
@@ -171,13 +173,21 @@ fn show(path: &Path) -> String {
 }
 
 /// The present step on stderr.
-struct Steps<'a> {
-    bar: ProgressBar,
-    interrupt: &'a Interrupt,
+pub struct Steps<'a> {
+    /// The line.
+    pub bar: ProgressBar,
+    /// Asks for the end.
+    pub interrupt: &'a Interrupt,
+    /// Whether steps are lines, where there is no terminal.
+    pub lines: bool,
 }
 
 impl Watch for Steps<'_> {
     fn step(&self, what: &str) {
+        if self.lines {
+            // Stderr may be gone; that is no reason to stop.
+            let _ = writeln!(std::io::stderr(), "{what}");
+        }
         self.bar.set_message(what.to_owned());
         self.bar.tick();
     }
@@ -187,7 +197,8 @@ impl Watch for Steps<'_> {
     }
 }
 
-fn spinner(quiet: bool) -> ProgressBar {
+/// A line on stderr; none if `quiet`.
+pub fn spinner(quiet: bool) -> ProgressBar {
     let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template("{elapsed} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
     ProgressBar::with_draw_target(None, target).with_style(style)

@@ -2,6 +2,7 @@
 
 mod args;
 mod bench;
+mod bench_error;
 mod compare;
 mod convert;
 mod info;

@@ -143,7 +143,7 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
     let response = |wi: Vec3| f64::from(1.0 + wi.x);
     let mut random = Rng::new(4);
     let n = 400_000;
-    let (mut by_lights, mut by_both) = ([0.0; 2], [0.0; 2]);
+    let (mut by_lights, mut by_both, mut strays) = ([0.0; 2], [0.0; 2], 0);
     let add = |sums: &mut [f64; 2], x: f64| {
         sums[0] += x / f64::from(n);
         sums[1] += x * x / f64::from(n);
@@ -154,13 +154,15 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
             let pdf = |wi: Vec3| f64::from(environment.eval(wi, found_by).pdf);
             let s = environment.sample(random.pair(), found_by).unwrap();
             let at = environment.eval(s.wi, found_by);
-            assert!((at.pdf - s.pdf).abs() <= 1e-5 * s.pdf || found_by == FoundBy::Lights, "{} {}", at.pdf, s.pdf);
+            // Rounding takes directions at a limit to the next cell.
+            strays += u32::from((at.pdf - s.pdf).abs() > 1e-5 * s.pdf);
             add(sums, light(s.wi) * response(s.wi) / (f64::from(s.pdf) + EVEN) + light(even) * response(even) / (pdf(even) + EVEN));
         }
         // Cells are as bright as their corners in the middle, so that dark directions share a cell with bright ones at most.
         let at = environment.eval(even, FoundBy::Both);
         assert!(at.pdf > 0.0 || f64::from(at.radiance.luminance()) < 2.0 * mean, "{at:?}");
     }
+    assert!(strays < n / 1000, "{strays} of {n}");
     let [a, b] = [by_lights, by_both].map(|[first, second]| (first, second - first * first));
     let z = (a.0 - b.0) / ((a.1 + b.1) / f64::from(n)).sqrt();
     assert!(z.abs() < 5.0, "{a:?} {b:?}: {z}");

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 use steradian::accel::AccelKind;
 
 use super::import::ImportArgs;
-use super::{accel_help, parse_size};
+use super::{accel_help, bench_error, parse_size};
 
 const BENCH_REPORTS_ABOUT: &str = "\
 Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
@@ -36,6 +36,9 @@ pub enum BenchCommand {
     /// Compare accelerators on the same rays
     #[command(after_help = BENCH_ACCEL_EXAMPLES)]
     Accel(BenchAccelArgs),
+    /// Measure error against time: variants of a render, and other renderers, beside a reference
+    #[command(long_about = bench_error::ABOUT, after_help = bench_error::EXAMPLES)]
+    Error(Box<bench_error::BenchErrorArgs>),
     /// Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
     #[command(long_about = BENCH_REPORTS_ABOUT)]
     Reports(BenchReportsArgs),

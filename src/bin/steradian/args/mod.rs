@@ -1,6 +1,7 @@
 //! The command line.
 
 mod bench;
+mod bench_error;
 mod import;
 
 use std::path::PathBuf;
@@ -13,6 +14,7 @@ use steradian::render::Overrides;
 
 use crate::names;
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
+pub use bench_error::BenchErrorArgs;
 pub use import::{ConvertArgs, ImportArgs};
 
 const EXAMPLES: &str = "\
@@ -78,7 +80,7 @@ pub enum Command {
     /// Compare a picture with its reference
     ///
     /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of (test - reference)² /
-    /// (reference² + 0.01), psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
+    /// (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels, psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
     #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
     Compare(CompareArgs),
     /// Measure

@@ -215,7 +215,7 @@ fn colours_of_vertices_multiply_the_base_colour() {
 
     let unlit = colored(json!({ "extensions": { "KHR_materials_unlit": {} } }), &colors);
     assert_eq!((&mesh(&unlit, 0).colors, outcome(&unlit, "COLOR_0")), (&None, Some(Outcome::Approximated)));
-    assert_eq!(unlit.desc.shapes[0].common().emission.unwrap().radiance, [0.5, 0.5, 0.25]);
+    assert_eq!(unlit.desc.shapes[0].common().emission.unwrap().radiance, [0.5, 0.75, 0.25]);
 }
 
 #[test]
