@@ -2,6 +2,7 @@
 
 /// Embree answers alike alone, in packets and from many threads.
 mod accel_agreement;
+mod adaptive;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
 /// The same for materials of several parts or many parameters.

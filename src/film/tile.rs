@@ -130,9 +130,9 @@ impl FilmTile {
         }
         let Some(spread) = self.spread.get_mut(pixel) else { return };
         spread.groups += 1;
-        for k in 0..3 {
-            spread.sums[k] += mean[k];
-            spread.squares[k] += mean[k] * mean[k];
+        for (k, value) in mean.into_iter().enumerate() {
+            spread.sums[k] += value;
+            spread.squares[k] += value * value;
         }
     }
 

@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn names_are_those_of_the_scene_format() {
-        assert_eq!(names(from_name::<LayerDesc>), ["Z", "N", "P", "albedo"]);
+        assert_eq!(names(from_name::<LayerDesc>), ["Z", "N", "P", "albedo", "variance", "samples"]);
         assert_eq!(names(from_name::<SamplerKindDesc>), ["sobol", "independent"]);
         let integrators = names(from_type::<IntegratorDesc>);
         assert_eq!(integrators[..3], ["path", "whitted", "normal"]);

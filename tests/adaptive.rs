@@ -1,0 +1,146 @@
+//! Adaptive sampling: pictures keep what they promise, are not biased, and take fewer samples.
+
+use serde_json::{Value, json};
+use steradian::accel::{self, AccelKind};
+use steradian::film::{Image, LayerKind};
+use steradian::render::{self, Overrides, RenderResult, Settings, Silent};
+
+use crate::util::render::prepare;
+
+/// A bright lamp and a mirror ball over a floor: some of the picture is black, some even, some full of noise.
+fn room() -> Value {
+    json!({
+        "camera": { "position": [0, 1.2, 4], "look_at": [0, 0.6, 0], "vertical_fov_degrees": 40 },
+        "film": { "width": 72, "height": 48 },
+        "integrator": { "type": "path", "max_depth": 6 },
+        "materials": {
+            "floor": { "type": "diffuse", "albedo": [0.7, 0.6, 0.5] },
+            "mirror": { "type": "conductor", "eta": [0.2, 0.9, 1.1], "k": [3.9, 2.4, 2.2], "roughness": 0.2 }
+        },
+        "shapes": [
+            { "type": "quad", "material": "floor", "origin": [-2, 0, -2], "edge_u": [0, 0, 4], "edge_v": [4, 0, 0] },
+            { "type": "sphere", "material": "mirror", "radius": 0.6, "transform": [{ "translate": [0.3, 0.6, 0] }] },
+            { "type": "quad", "material": "floor", "origin": [-1.6, 1.9, -0.2], "edge_u": [0.3, 0, 0], "edge_v": [0, 0, 0.3],
+              "emission": { "radiance": [40, 36, 30] } }
+        ]
+    })
+}
+
+fn render(scene: &Value, overrides: &Overrides) -> RenderResult {
+    let prepared = prepare(scene, overrides);
+    let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
+    render::render(&prepared.scene, &*accel, &prepared.settings, &Silent, &false.into()).unwrap()
+}
+
+fn adaptive(scene: &Value, error: f64, seed: u64) -> RenderResult {
+    render(scene, &Overrides { target_error: Some(error), seed: Some(seed), ..Overrides::default() })
+}
+
+fn colors(image: &Image) -> Vec<[f64; 3]> {
+    let layer = image.layer(LayerKind::Color).unwrap();
+    layer.pixels().map(|p| [0, 1, 2].map(|k| f64::from(p[k]))).collect()
+}
+
+fn relative_error(reference: &[[f64; 3]], test: &[[f64; 3]]) -> f64 {
+    let of_pixel = |(r, t): (&[f64; 3], &[f64; 3])| (0..3).map(|k| (t[k] - r[k]).powi(2) / (r[k] * r[k] + 0.01)).sum::<f64>() / 3.0;
+    reference.iter().zip(test).map(of_pixel).sum::<f64>() / reference.len() as f64
+}
+
+fn reference() -> Vec<[f64; 3]> {
+    colors(&render(&room(), &Overrides { spp: Some(1536), seed: Some(1000), ..Overrides::default() }).image)
+}
+
+/// In 20 renders, the picture is as good as promised at least 19 times, its mean is that of a reference, and it took fewer samples than one
+/// that has as many everywhere.
+#[test]
+fn pictures_are_as_good_as_promised_with_fewer_samples_and_without_bias() {
+    let (scene, reference, target) = (room(), reference(), 0.001);
+    let (mut kept, mut samples, mut errors, mut means) = (0, 0, 0.0, Vec::new());
+    let mean = |pixels: &[[f64; 3]]| pixels.iter().map(|p| p[1]).sum::<f64>() / pixels.len() as f64;
+    for seed in 0..20 {
+        let result = adaptive(&scene, target, seed);
+        let test = colors(&result.image);
+        let error = relative_error(&reference, &test);
+        let estimated = result.stats.estimated_error.unwrap();
+        kept += usize::from(error <= target);
+        errors += error / 20.0;
+        samples += result.stats.samples / 20;
+        means.push(mean(&test));
+        assert!(estimated <= target && estimated < 3.0 * error && estimated > 0.8 * error, "{estimated} for {error}");
+    }
+    assert!(kept >= 19, "{kept} of 20");
+    let average = means.iter().sum::<f64>() / 20.0;
+    let deviation = (means.iter().map(|m| (m - average).powi(2)).sum::<f64>() / (19.0 * 20.0)).sqrt();
+    // With 19 degrees of freedom |t| > 7.2 has a probability below 1e-6; the reference's own error is far below.
+    let expected = mean(&reference);
+    assert!((average - expected).abs() < 7.2 * deviation, "{average} +- {deviation}, expected {expected}");
+
+    let even = render(&scene, &Overrides { spp: Some(64), ..Overrides::default() });
+    let of_even = relative_error(&reference, &colors(&even.image)) * even.stats.samples as f64;
+    let gain = of_even / (errors * samples as f64);
+    assert!(gain > 1.3, "error times samples is only {gain} times better than with the same number everywhere");
+}
+
+#[test]
+fn the_picture_and_its_statistics_do_not_depend_on_threads() {
+    let run = |threads| render(&room(), &Overrides { target_error: Some(0.05), threads: Some(threads), ..Overrides::default() });
+    let (a, b) = (run(1), run(3));
+    assert_eq!(colors(&a.image), colors(&b.image));
+    assert_eq!((a.stats.samples, a.stats.estimated_error), (b.stats.samples, b.stats.estimated_error));
+}
+
+/// The variance layer is the variance of pictures with different seeds, and the layer of samples adds up to all of them.
+#[test]
+fn layers_tell_variance_and_samples() {
+    let mut scene = room();
+    scene["sampler"] = json!({ "type": "independent", "spp": 16 });
+    scene["outputs"] = json!([{ "file": "unused.exr", "layers": ["variance", "samples"] }]);
+    let renders: Vec<_> = (0..40).map(|seed| render(&scene, &Overrides { seed: Some(seed), ..Overrides::default() }).image).collect();
+    let pictures: Vec<_> = renders.iter().map(colors).collect();
+    let (mut told, mut seen) = (0.0, 0.0);
+    for pixel in 0..pictures[0].len() {
+        let values: Vec<f64> = pictures.iter().map(|p| p[pixel][1]).collect();
+        let mean = values.iter().sum::<f64>() / 40.0;
+        // Relative, so that the brightest pixels do not decide alone.
+        let scale = 1.0 / (mean * mean + 0.01);
+        seen += scale * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 39.0;
+        let layer = |image: &Image| f64::from(image.layer(LayerKind::Variance).unwrap().pixels().nth(pixel).unwrap()[1]);
+        told += scale * renders.iter().map(layer).sum::<f64>() / 40.0;
+    }
+    assert!((told / seen - 1.0).abs() < 0.1, "{told} told, {seen} seen");
+    let samples = |image: &Image| image.layer(LayerKind::Samples).unwrap().pixels().map(|p| f64::from(p[0])).collect::<Vec<_>>();
+    assert!(samples(&renders[0]).iter().all(|n| *n == 16.0));
+
+    let result = {
+        scene["sampler"] = json!({ "type": "sobol" });
+        adaptive(&scene, 0.02, 1)
+    };
+    let counts = samples(&result.image);
+    assert_eq!(counts.iter().sum::<f64>(), result.stats.samples as f64);
+    let most = counts.iter().copied().fold(0.0, f64::max);
+    assert!(counts.iter().all(|n| *n >= 16.0) && most >= 32.0, "{most}");
+}
+
+#[test]
+fn limits_of_samples_time_and_crops_hold() {
+    let limited = render(&room(), &Overrides { target_error: Some(1e-9), spp: Some(32), ..Overrides::default() });
+    assert_eq!((limited.stats.samples, limited.stats.spp_done), (32 * 72 * 48, 32));
+    assert!(limited.stats.estimated_error.unwrap() > 1e-9);
+
+    let stopped = render(&room(), &Overrides { target_error: Some(1e-9), time_limit: Some(0.05), ..Overrides::default() });
+    assert!(stopped.stats.time_limited && stopped.stats.samples >= 16 * 72 * 48);
+
+    let crop = render(&room(), &Overrides { target_error: Some(0.05), crop: Some([30, 17, 13, 9]), ..Overrides::default() });
+    assert!(crop.stats.samples >= 16 * 13 * 9 && colors(&crop.image).len() == 13 * 9);
+
+    // One pixel has no neighbours.
+    let pixel = render(&room(), &Overrides { target_error: Some(0.05), crop: Some([30, 17, 1, 1]), ..Overrides::default() });
+    assert!(pixel.stats.samples >= 16 && pixel.stats.estimated_error.is_some());
+
+    // Nothing but black has no error.
+    let mut black = room();
+    black["integrator"]["max_depth"] = json!(1);
+    black["shapes"][2]["emission"]["radiance"] = json!([1e-9, 0, 0]);
+    assert_eq!(adaptive(&black, 1e-6, 0).stats.spp_done, 16);
+    let _: &Settings = &prepare(&room(), &Overrides::default()).settings;
+}
