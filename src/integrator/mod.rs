@@ -9,16 +9,18 @@ mod debug;
 mod media;
 mod path;
 mod shading;
+mod strategy;
 mod whitted;
 mod world;
 
 pub use debug::{AmbientOcclusion, DebugView, View};
-pub use path::{PathIntegrator, Strategy};
+pub use path::PathIntegrator;
 pub(crate) use shading::{facing_normal, terminator_factor};
+pub use strategy::Strategy;
 pub use whitted::Whitted;
 pub use world::World;
 
-use crate::desc::{IntegratorDesc, StrategyDesc};
+use crate::desc::IntegratorDesc;
 use crate::film::{PixelSample, SurfaceSample};
 use crate::geometry::SurfaceInteraction;
 use crate::math::{Ray, Vec3};
@@ -121,16 +123,6 @@ pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Bo
         IntegratorDesc::PrimitiveId => view(View::PrimitiveId),
         IntegratorDesc::AmbientOcclusion { distance } => {
             Box::new(AmbientOcclusion { distance: distance.unwrap_or(f32::INFINITY), sampler, needs })
-        }
-    }
-}
-
-impl From<StrategyDesc> for Strategy {
-    fn from(desc: StrategyDesc) -> Self {
-        match desc {
-            StrategyDesc::Mis => Self::Mis,
-            StrategyDesc::Light => Self::Light,
-            StrategyDesc::Bsdf => Self::Bsdf,
         }
     }
 }

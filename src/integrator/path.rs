@@ -7,36 +7,17 @@ use std::cell::RefCell;
 
 use super::media::MediaState;
 use super::shading::{facing_normal, raised_start, terminator_factor};
-use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions, surface_sample};
+use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions, surface_sample};
 use crate::accel::Coherence;
 use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::{FoundBy, Light, Receiver};
+use crate::light::{Light, Receiver};
 use crate::math::{DVec3, Frame, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
 use crate::sampling::{PixelSeed, Sampler, power_heuristic};
 use crate::texture::Footprint;
-
-/// How directions towards lights are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Strategy {
-    /// Sampling lights and sampling the BSDF, combined.
-    #[default]
-    Mis,
-    /// Sampling lights wherever possible.
-    Light,
-    /// Sampling the BSDF wherever possible.
-    Bsdf,
-}
-
-impl Strategy {
-    #[inline]
-    fn found_by(self) -> FoundBy {
-        if self == Self::Mis { FoundBy::Both } else { FoundBy::Lights }
-    }
-}
 
 /// Path tracing.
 #[derive(Clone, Debug)]

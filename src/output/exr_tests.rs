@@ -4,7 +4,7 @@ use std::process::Command;
 
 use crate::desc::LayerDesc;
 
-const LAYERS: [LayerDesc; 4] = [LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo];
+const LAYERS: [LayerDesc; 6] = [LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo, LayerDesc::Variance, LayerDesc::Samples];
 
 /// A cropped picture of every layer with numbers that 16 bits hold, save where a layer is always of 32.
 fn picture() -> Image {
@@ -53,7 +53,7 @@ fn files_come_back_exactly() {
                 assert!(read.is_finite() && *read == expected, "{read} {written}");
             }
             let channels = all_channels(&path);
-            assert_eq!(channels.len(), 14);
+            assert_eq!(channels.len(), 18);
             for layer in &image.layers[1..] {
                 for (i, name) in layer.kind.info().channels.iter().enumerate() {
                     let samples = &channels.iter().find(|(n, _)| n == name).unwrap().1;
