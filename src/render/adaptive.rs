@@ -34,6 +34,9 @@ const REACH: u32 = 2;
 /// How much of what a block seems to need is what blocks need on average: rare bright paths are still to be met where there was none yet.
 const EVEN_SHARE: f64 = 0.15;
 
+/// By this factor one stage may lower the error.
+const STEP: f64 = 4.0;
+
 /// How many standard deviations the error must be below the target.
 const CONFIDENCE: f64 = 2.0;
 
@@ -253,8 +256,9 @@ pub(super) fn render(
         if reached || !finished || blocks.done.iter().all(|&n| n >= most) {
             break;
         }
-        // The deviation falls with the error; a little less spares a stage for the last bit.
-        let goal = 0.97 * target / (1.0 + CONFIDENCE * estimate.deviation / estimate.error);
+        // What few samples tell of the deviation is no reason to go far: the next estimate knows more.
+        let deviation = (estimate.deviation / estimate.error).min(0.1);
+        let goal = (0.97 * target / (1.0 + CONFIDENCE * deviation)).max(estimate.error / STEP);
         blocks.plan(&estimate.variances, goal, most);
         let [mut done, mut wanted] = blocks.samples(&film);
         if wanted < done + done / 50 {
