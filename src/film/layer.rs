@@ -140,8 +140,15 @@ impl LayerSet {
     /// Whether any layer is part of the set that [`SurfaceSample`] is needed for.
     #[inline]
     pub const fn needs_surface(self) -> bool {
-        const OF_PIXELS: u8 = 1 << LayerKind::Color as u8 | 1 << LayerKind::Variance as u8 | 1 << LayerKind::Samples as u8;
-        self.bits & !OF_PIXELS != 0
+        const OF_SURFACES: u8 = {
+            let (mut bits, mut i) = (0, 0);
+            while i < LayerKind::ALL.len() {
+                bits |= (LayerKind::ALL[i].read.is_some() as u8) << i;
+                i += 1;
+            }
+            bits
+        };
+        self.bits & OF_SURFACES != 0
     }
 
     /// The layers that samples have values for beside the colour, in the table's order.

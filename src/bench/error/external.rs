@@ -161,8 +161,8 @@ mod tests {
 
     #[test]
     fn words_of_the_template_are_filled_in_for_the_shell() {
-        let line = external("r {scene} -n{spp} --seed {seed} -o {out}").unwrap().line(Path::new("/tmp/o.exr"), Budget::Spp(4), 7);
-        assert_eq!(line, r"r 'it'\''s/a scene.xml' -n4 --seed 7 -o '/tmp/o.exr'");
+        let line = external("r {scene} -n{spp} --seed {seed} -o {out}").unwrap().line(Path::new("a b/o.exr"), Budget::Spp(4), 7);
+        assert_eq!(line, r"r 'it'\''s/a scene.xml' -n4 --seed 7 -o 'a b/o.exr'");
         let timed = External::new("x", "r {seconds} {out}", Path::new("s"), &[Budget::Seconds(0.5)]).unwrap();
         assert_eq!(timed.line(Path::new("o"), Budget::Seconds(0.5), 7), "r 0.5 'o'");
         for (template, missing) in [("r {spp}", "{out}"), ("r {out}", "{spp}")] {
