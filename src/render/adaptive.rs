@@ -61,6 +61,23 @@ struct Blocks {
     wanted: Vec<u32>,
 }
 
+/// When a render ends whatever its error is.
+struct Limits<'a> {
+    start: Instant,
+    time: Option<Duration>,
+    stop: &'a AtomicBool,
+}
+
+impl Limits<'_> {
+    fn remaining(&self) -> Option<Duration> {
+        self.time.map(|limit| limit.saturating_sub(self.start.elapsed()))
+    }
+
+    fn is_over(&self) -> bool {
+        self.stop.load(Ordering::Relaxed) || self.remaining().is_some_and(|left| left.is_zero())
+    }
+}
+
 /// What the picture's samples say of it.
 struct Estimate {
     /// Each block's variance of a group, relative and mean over its pixels.
@@ -242,13 +259,12 @@ pub(super) fn render(
     let mut blocks = Blocks::new(settings.crop);
     progress.start(PILOT * GROUP, pixels);
 
-    let start = Instant::now();
+    let limits = Limits { start: Instant::now(), time: settings.time_limit, stop };
     loop {
-        let timed_out = || settings.time_limit.is_some_and(|limit| start.elapsed() >= limit);
-        let finished = render_stage(job, pool, &mut film, &mut blocks, &mut stats, (start, settings.time_limit), progress, stop);
+        let finished = render_stage(job, pool, &mut film, &mut blocks, &mut stats, &limits, progress);
         if !finished {
             stats.interrupted = stop.load(Ordering::Relaxed);
-            stats.time_limited = !stats.interrupted && timed_out();
+            stats.time_limited = !stats.interrupted;
         }
         let estimate = blocks.estimate(&film);
         stats.estimated_error = Some(estimate.error);
@@ -268,7 +284,7 @@ pub(super) fn render(
         debug_assert!(wanted >= done, "samples are never taken back");
         progress.plan(wanted, estimate.error, target);
     }
-    stats.render_seconds = start.elapsed().as_secs_f64();
+    stats.render_seconds = limits.start.elapsed().as_secs_f64();
     progress.finish();
 
     stats.samples = blocks.samples(&film)[0];
@@ -281,22 +297,20 @@ pub(super) fn render(
 }
 
 /// Renders what is wanted, in passes that end soon when asked to; says whether all of it is there.
-#[allow(clippy::too_many_arguments)]
 fn render_stage(
     job: &Job,
     pool: &rayon::ThreadPool,
     film: &mut Film,
     blocks: &mut Blocks,
     stats: &mut Stats,
-    (start, time_limit): (Instant, Option<Duration>),
+    limits: &Limits,
     progress: &dyn Progress,
-    stop: &AtomicBool,
 ) -> bool {
     let mut step = 1;
     while blocks.done.iter().zip(&blocks.wanted).any(|(done, wanted)| done < wanted) {
         // Fewer groups than the pilot's would say nothing of the error.
         let has_pilot = blocks.done.iter().all(|&n| n >= PILOT);
-        if has_pilot && (stop.load(Ordering::Relaxed) || time_limit.is_some_and(|limit| start.elapsed() >= limit)) {
+        if has_pilot && limits.is_over() {
             return false;
         }
         let pass_start = Instant::now();
@@ -305,9 +319,9 @@ fn render_stage(
             *done = (*done + step).min(*wanted);
         }
         if stats.first_pass_seconds == 0.0 {
-            stats.first_pass_seconds = start.elapsed().as_secs_f64();
+            stats.first_pass_seconds = limits.start.elapsed().as_secs_f64();
         }
-        step = next_pass(step, pass_start.elapsed(), time_limit.map(|limit| limit.saturating_sub(start.elapsed())));
+        step = next_pass(step, pass_start.elapsed(), limits.remaining());
     }
     true
 }
