@@ -265,6 +265,11 @@ impl Varying {
         }
     }
 
+    /// Whether it is diffuse reflection, rough or not.
+    pub fn is_diffuse(&self) -> bool {
+        matches!(self, Self::Diffuse { .. })
+    }
+
     fn is_constant(&self) -> bool {
         self.textures().is_empty()
     }

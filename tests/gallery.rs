@@ -5,6 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use steradian::accel::AccelKind;
+use steradian::desc::LayerDesc;
+use steradian::film::LayerSet;
 use steradian::render::{Overrides, Settings};
 use steradian::{compile, import};
 
@@ -24,9 +26,17 @@ fn names(folder: &Path, extension: &str) -> BTreeSet<String> {
     paths.filter(|path| path.extension().is_some_and(|e| e == extension)).map(stem).collect()
 }
 
+/// Diffuse surfaces are shaded side by side by the functions that shade each of them alone.
 #[test]
-fn every_scene_renders() {
-    let overrides = Overrides { spp: Some(1), size: Some([16, 16]), threads: Some(2), ..Overrides::default() };
+fn every_scene_renders_and_side_by_side_the_same() {
+    let overrides = Overrides {
+        spp: Some(1),
+        size: Some([40, 40]),
+        threads: Some(2),
+        layers: vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo],
+        outputs: vec!["all.exr".into()],
+        ..Overrides::default()
+    };
     for name in names(&folder(), "json") {
         // Its mesh is fetched by `get_scans.sh`.
         if name == "scan" && !folder().join("scans").exists() {
@@ -36,10 +46,17 @@ fn every_scene_renders() {
         let desc = import::load_scene(&path).unwrap();
         let settings = Settings::new(&desc, &overrides).unwrap();
         let scene = compile::compile(&desc, &path).unwrap();
-        let result = render_with(&Prepared { scene, settings }, AccelKind::EMBREE);
-        assert_eq!(result.stats.nan_samples, 0, "{name}");
-        let lit = pixels(&result.image).filter(|pixel| pixel.iter().any(|c| *c > 0.0)).count();
-        assert!(lit >= 64, "{name}: {lit} pixels of 256 are not black");
+        let mut prepared = Prepared { scene, settings };
+        for layers in [prepared.settings.layers, LayerSet::COLOR] {
+            (prepared.settings.layers, prepared.settings.side_by_side) = (layers, true);
+            let result = render_with(&prepared, AccelKind::EMBREE);
+            assert_eq!(result.stats.nan_samples, 0, "{name}");
+            prepared.settings.side_by_side = false;
+            let alone = render_with(&prepared, AccelKind::EMBREE);
+            assert!(result.image == alone.image && result.stats.rays == alone.stats.rays, "{name}");
+            let lit = pixels(&alone.image).filter(|pixel| pixel.iter().any(|c| *c > 0.0)).count();
+            assert!(lit >= 400, "{name}: {lit} pixels of 1600 are not black");
+        }
     }
 }
 

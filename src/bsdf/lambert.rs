@@ -14,9 +14,20 @@ pub struct Lambert {
     pub albedo: Rgb,
 }
 
+/// A direction chosen by the cosine.
+#[derive(Clone, Copy, Debug)]
+pub struct DiffuseDirection {
+    /// The direction, unit, local.
+    pub wi: Vec3,
+    /// Density per solid angle.
+    pub pdf: f32,
+    /// Whether it can be used.
+    pub is_valid: bool,
+}
+
 impl Lambert {
     /// `albedo / pi |cos|` for directions on the same side.
-    #[inline]
+    #[inline(always)]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
         if wo.z * wi.z <= 0.0 {
             return BsdfEval::default();
@@ -26,19 +37,24 @@ impl Lambert {
     }
 
     /// A direction on the side of `wo`, by the cosine.
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, wo: Vec3, _u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let DiffuseDirection { wi, pdf, is_valid } = self.direction(wo, u);
+        is_valid.then_some(BsdfSample { wi, weight: self.albedo, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+    }
+
+    /// What [`sample`](Self::sample) chooses, without branches.
+    #[inline(always)]
+    pub fn direction(&self, wo: Vec3, u: [f32; 2]) -> DiffuseDirection {
         let mut wi = warp::cosine_hemisphere(u);
-        if wo.z == 0.0 || wi.z == 0.0 {
-            return None;
-        }
+        let is_valid = (wo.z != 0.0) & (wi.z != 0.0);
         let pdf = warp::cosine_hemisphere_pdf(wi.z);
         wi.z = wi.z.copysign(wo.z);
-        Some(BsdfSample { wi, weight: self.albedo, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        DiffuseDirection { wi, pdf, is_valid }
     }
 
     /// Never.
-    #[inline]
+    #[inline(always)]
     pub fn is_delta(&self) -> bool {
         false
     }

@@ -29,7 +29,7 @@ pub use dielectric::Dielectric;
 pub use energy::bake as bake_energy_tables;
 pub use eon::Eon;
 pub use glossy::Glossy;
-pub use lambert::Lambert;
+pub use lambert::{DiffuseDirection, Lambert};
 pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA};
 pub use mirror::Mirror;
 pub use plastic::Plastic;

@@ -44,9 +44,9 @@ pub enum Detail {
     Full,
 }
 
-/// The far end of a shadow ray: a sampled point on a light.
+/// Where a ray starts or ends: a point of a surface, or in space.
 #[derive(Clone, Copy, Debug)]
-pub struct SpawnTarget {
+pub struct SpawnPoint {
     /// The point, in world space.
     pub p: DVec3,
     /// Unit geometric normal at the point; zero for a point in space.
@@ -66,30 +66,50 @@ impl SurfaceInteraction {
         self.instance != Hit::NO_INSTANCE
     }
 
+    /// Where rays from here start.
+    #[inline(always)]
+    pub fn spawn_point(&self) -> SpawnPoint {
+        SpawnPoint { p: self.p, n: self.n_g, error: self.error }
+    }
+
     /// A ray from here in `direction` without an end.
     #[inline]
     pub fn spawn(&self, direction: Vec3) -> Ray {
-        let side = direction.dot(self.n_g);
-        Ray { time: self.time, ..Ray::new(offset_origin(self.p, self.n_g, self.error, side), direction) }
+        Ray { time: self.time, ..self.spawn_point().ray_along(direction) }
     }
 
     /// A ray from here to just before `target`: `t` runs from 0 to the largest number below 1.
     #[inline(always)]
-    pub fn spawn_to(&self, target: &SpawnTarget) -> Ray {
+    pub fn spawn_to(&self, target: &SpawnPoint) -> Ray {
+        Ray { time: self.time, ..self.spawn_point().ray_to(target) }
+    }
+}
+
+impl SpawnPoint {
+    /// A ray from here in `direction` without an end.
+    #[inline(always)]
+    pub fn ray_along(&self, direction: Vec3) -> Ray {
+        let side = direction.dot(self.n);
+        Ray::new(offset_origin(self.p, self.n, self.error, side), direction)
+    }
+
+    /// A ray from here to just before `target`: `t` runs from 0 to the largest number below 1.
+    #[inline(always)]
+    pub fn ray_to(&self, target: &Self) -> Ray {
         let toward = (target.p - self.p).as_vec3();
-        let origin = offset_origin(self.p, self.n_g, self.error, toward.dot(self.n_g));
+        let origin = offset_origin(self.p, self.n, self.error, toward.dot(self.n));
         // The end moves off the light towards us, also by the rounding of the direction and of the accelerator's arithmetic on it.
         let side = -toward.dot(target.n);
         let n = target.n.as_dvec3().abs();
         let end_error = f64::from(target.error) + 4.0 * UNIT_ROUNDOFF * n.dot(toward.as_dvec3().abs());
         let end = offset_point(target.p, target.n, end_error, side);
         let direction = (end - origin.as_dvec3()).as_vec3();
-        Ray { t_max: 1f32.next_down(), time: self.time, ..Ray::new(origin, direction) }
+        Ray { t_max: 1f32.next_down(), ..Ray::new(origin, direction) }
     }
 }
 
 /// `p` moved along `n` to the given side by the half-ulp box plus `error`, in `f64`.
-#[inline]
+#[inline(always)]
 fn offset_point(p: DVec3, n: Vec3, error: f64, side: f32) -> DVec3 {
     let n = n.as_dvec3();
     let delta = UNIT_ROUNDOFF * n.abs().dot(p.abs()) + error;
@@ -97,7 +117,7 @@ fn offset_point(p: DVec3, n: Vec3, error: f64, side: f32) -> DVec3 {
 }
 
 /// [`offset_point`] rounded to `f32`. The half-ulp box is added twice: what rounding to nearest takes back at most, and what is to remain.
-#[inline]
+#[inline(always)]
 fn offset_origin(p: DVec3, n: Vec3, error: f32, side: f32) -> Vec3 {
     let half_ulp_box = UNIT_ROUNDOFF * n.as_dvec3().abs().dot(p.abs());
     offset_point(p, n, f64::from(error) + half_ulp_box, side).as_vec3()
@@ -138,7 +158,7 @@ mod tests {
 
     #[test]
     fn shadow_rays_end_before_the_light() {
-        let target = SpawnTarget { p: DVec3::new(0.3, 7.0, 0.2), n: -Vec3::Y, error: 0.0 };
+        let target = SpawnPoint { p: DVec3::new(0.3, 7.0, 0.2), n: -Vec3::Y, error: 0.0 };
         let ray = point(DVec3::new(1.0, 0.1, 2.0), Vec3::Y).spawn_to(&target);
         assert!(ray.origin.y > 0.1 && f64::from(ray.at(ray.t_max).y) < 7.0);
     }

@@ -170,8 +170,7 @@ impl Mesh {
 
     /// Whether a triangle that was found in `f32` to be hit lies ahead of the ray.
     pub fn confirms_hit(&self, prim: PrimId, ray: &Ray) -> bool {
-        let points = self.triangle_points_at(prim, ray.time);
-        points.plane_distance(points.cross(), ray) > 0.0
+        self.triangle_points_at(prim, ray.time).place(ray.origin, ray.direction).t > 0.0
     }
 
     /// Whether vertices move.
@@ -211,7 +210,7 @@ impl Mesh {
 
     /// The normals of a triangle's corners at a time from 0 to 1, if normals are interpolated.
     #[inline]
-    fn corner_normals(&self, prim: PrimId, time: f32) -> Option<[Vec3; 3]> {
+    pub(crate) fn corner_normals(&self, prim: PrimId, time: f32) -> Option<[Vec3; 3]> {
         let normals = self.normals.as_ref()?;
         let corners = self.triangles[prim.index()];
         let of = |normals: &[[f32; 3]]| corners.map(|i| Vec3::from(normals[i as usize]));
@@ -311,19 +310,11 @@ impl Mesh {
     pub(super) fn interaction_and_dp_dv(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
         let points = self.triangle_points_at(hit.prim, ray.time);
 
-        // The hit point in f64, on the plane of the triangle.
-        let cross = points.cross();
-        let t = points.plane_distance(cross, ray);
-        if !(t > 0.0 && t < f64::INFINITY) {
+        let place = points.place(ray.origin, ray.direction);
+        if !place.is_ahead() {
             return None;
         }
-        let p = ray.origin.as_dvec3() + ray.direction.as_dvec3() * t;
-        let n_g = (cross / cross.length()).as_vec3();
-
-        // Embree subtracts the origin from the corners and forms the normal in f32: 4 units of roundoff of the extent seen from here.
-        let p32 = p.as_vec3();
-        let reach = (points.a - p32).abs().max((points.b - p32).abs()).max((points.c - p32).abs());
-        let mut error = 4.0 * UNIT_ROUNDOFF as f32 * reach.max_element();
+        let (p, n_g, mut error) = (place.p, place.n_g, place.error);
         if self.is_deforming() {
             // Moving a corner to its place takes three roundings.
             let size = points.a.abs().max(points.b.abs()).max(points.c.abs());
@@ -334,7 +325,7 @@ impl Mesh {
         let parameters = if detail == Detail::Full { self.parameters(hit, &points, n_s, length, ray.time) } else { Parameters::default() };
         let at = SurfaceInteraction {
             p,
-            t: t as f32,
+            t: place.t as f32,
             error,
             n_g,
             n_s,
@@ -352,16 +343,7 @@ impl Mesh {
     #[inline(always)]
     fn shading_normal(&self, hit: &Hit, n_g: Vec3, time: f32) -> (Vec3, f32) {
         let Some([n_a, n_b, n_c]) = self.corner_normals(hit.prim, time) else { return (n_g, 1.0) };
-        let n = n_a * (1.0 - hit.u - hit.v) + n_b * hit.u + n_c * hit.v;
-        let length_squared = n.length_squared();
-        // A vanishing interpolated normal (opposite corners) falls back to the flat one, as does a NaN.
-        if !(length_squared > 1e-12) {
-            return (n_g, 1.0);
-        }
-        let length = length_squared.sqrt();
-        let n = n / length;
-        // A mesh may be wound against its normals: the shading normal follows the front.
-        (if n.dot(n_g) < 0.0 { -n } else { n }, length)
+        interpolated_normal([n_a, n_b, n_c], [hit.u, hit.v], n_g)
     }
 
     /// The point `p` of a triangle moved to the surface that the corners' normals suggest (Hanika, "Hacking the Shadow Terminator"): to the
@@ -426,6 +408,24 @@ impl Mesh {
         let at = |step: usize| tangents::interpolate(&self.tangents[step][prim.index()], weights);
         let ((from, side), (to, _)) = (at(first)?, at(second)?);
         Some((from * (1.0 - s) + to * s, side))
+    }
+}
+
+/// The unit shading normal where the corners' normals have these weights but the first one's, and the length of the interpolated vector.
+#[inline(always)]
+pub(crate) fn interpolated_normal([n_a, n_b, n_c]: [Vec3; 3], [u, v]: [f32; 2], n_g: Vec3) -> (Vec3, f32) {
+    let n = n_a * (1.0 - u - v) + n_b * u + n_c * v;
+    let length_squared = n.length_squared();
+    let length = length_squared.sqrt();
+    let n = n / length;
+    // A vanishing interpolated normal (opposite corners) falls back to the flat one, as does a NaN.
+    if !(length_squared > 1e-12) {
+        (n_g, 1.0)
+    } else if n.dot(n_g) < 0.0 {
+        // A mesh may be wound against its normals: the shading normal follows the front.
+        (-n, length)
+    } else {
+        (n, length)
     }
 }
 

@@ -25,7 +25,8 @@ pub use disk::Disk;
 pub use frustum::Frustum;
 pub use hit::Hit;
 pub use instance::{Instance, Object};
-pub use interaction::{Detail, SpawnTarget, SurfaceInteraction};
+pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
+pub(crate) use mesh::interpolated_normal;
 pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
 pub use placed::{Analytic, LocalHit, LocalSurface, Placed, PlacedPoint, ShapeSample};
 pub use profile::Profile;
@@ -34,7 +35,7 @@ pub use revolution::Revolution;
 pub use sector::Sector;
 pub use shape_error::ShapeError;
 pub use sphere::Sphere;
-pub use triangle::{TriangleHit, TriangleRay, TriangleSample};
+pub use triangle::{TriangleHit, TrianglePlace, TriangleRay, TriangleSample};
 
 use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
 use crate::math::float::step_past;

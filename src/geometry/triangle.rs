@@ -3,6 +3,7 @@
 //! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection": shear the ray onto the axis where its direction is largest; the signs of
 //! three edge functions decide. Shared edges are computed from the same numbers in both triangles, so no ray passes between them.
 
+use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{Aabb, DVec3, Ray, RayF64, Vec3};
 
 /// The corners of one triangle. The front is where they appear counter-clockwise.
@@ -27,6 +28,27 @@ pub struct TriangleHit {
     pub v: f32,
 }
 
+/// Where a ray meets the plane of a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct TrianglePlace {
+    /// The point.
+    pub p: DVec3,
+    /// Distance in units of the ray's direction; only a hit if it is [ahead](Self::is_ahead).
+    pub t: f64,
+    /// Unit geometric normal, towards the front.
+    pub n_g: Vec3,
+    /// As [`SurfaceInteraction::error`](super::SurfaceInteraction::error), for a triangle at rest.
+    pub error: f32,
+}
+
+impl TrianglePlace {
+    /// Whether the distance is positive and finite: else the hit was a rounding artefact.
+    #[inline(always)]
+    pub fn is_ahead(&self) -> bool {
+        self.t > 0.0 && self.t < f64::INFINITY
+    }
+}
+
 /// A point chosen uniformly on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleSample {
@@ -48,17 +70,24 @@ impl TrianglePoints {
         Aabb { min: self.a.min(self.b).min(self.c), max: self.a.max(self.b).max(self.c) }
     }
 
+    /// Where a ray meets the plane of the triangle, in `f64`.
+    #[inline(always)]
+    pub fn place(&self, origin: Vec3, direction: Vec3) -> TrianglePlace {
+        let cross = self.cross();
+        let t = cross.dot(self.a.as_dvec3() - origin.as_dvec3()) / cross.dot(direction.as_dvec3());
+        let p = origin.as_dvec3() + direction.as_dvec3() * t;
+        let n_g = (cross / cross.length()).as_vec3();
+        // Embree subtracts the origin from the corners and forms the normal in f32: 4 units of roundoff of the extent seen from here.
+        let p32 = p.as_vec3();
+        let reach = (self.a - p32).abs().max((self.b - p32).abs()).max((self.c - p32).abs());
+        TrianglePlace { p, t, n_g, error: 4.0 * UNIT_ROUNDOFF as f32 * reach.max_element() }
+    }
+
     /// Twice the area times the normal, in `f64`.
-    #[inline]
+    #[inline(always)]
     pub fn cross(&self) -> DVec3 {
         let a = self.a.as_dvec3();
         (self.b.as_dvec3() - a).cross(self.c.as_dvec3() - a)
-    }
-
-    /// The distance along `ray` to the plane of the triangle, in `f64`; not finite if they are parallel. `cross` is [`cross`](Self::cross).
-    #[inline]
-    pub fn plane_distance(&self, cross: DVec3, ray: &Ray) -> f64 {
-        cross.dot(self.a.as_dvec3() - ray.origin.as_dvec3()) / cross.dot(ray.direction.as_dvec3())
     }
 
     /// The inverse sine of the angle between the two shortest edges, at least 1: a normal computed from them in `f32` is off by so many units

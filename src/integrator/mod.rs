@@ -10,6 +10,7 @@ mod media;
 mod path;
 mod shading;
 mod strategy;
+mod vertex;
 mod whitted;
 mod world;
 
@@ -100,8 +101,8 @@ pub trait Integrator: Send + Sync {
     fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts);
 }
 
-/// The integrator with these parameters, drawing from `sampler`.
-pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Box<dyn Integrator> {
+/// The integrator with these parameters, drawing from `sampler`; `side_by_side` as in [`PathIntegrator`].
+pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds, side_by_side: bool) -> Box<dyn Integrator> {
     let view = |view| Box::new(DebugView { view, needs }) as Box<dyn Integrator>;
     match *desc {
         IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, hide_emitters } => Box::new(PathIntegrator {
@@ -112,6 +113,7 @@ pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Bo
             hide_emitters,
             sampler,
             needs,
+            side_by_side,
         }),
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
             Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, needs })

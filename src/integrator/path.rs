@@ -3,21 +3,23 @@
 //! One round lengthens every living path by a segment: trace, shade (emission, choice of a light, choice of a direction), trace shadow
 //! rays, drop dead paths. Each path draws its numbers from its own (pixel, sample, bounce), so a path is the same in any batch.
 
+mod lanes;
+mod side_by_side;
+
 use std::cell::RefCell;
 
 use super::media::MediaState;
-use super::shading::{facing_normal, raised_start, terminator_factor};
+use super::vertex::Vertex;
 use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions, surface_sample};
 use crate::accel::Coherence;
-use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::light::{Light, Receiver};
-use crate::math::{DVec3, Frame, Ray, RayCone, Vec3};
+use crate::math::{DVec3, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
-use crate::sampling::{PixelSeed, Sampler, power_heuristic};
-use crate::texture::Footprint;
+use crate::sampling::{BATCH, Numbers, PixelSeed, Requests, Sampler, power_heuristic};
+use side_by_side::Shaded;
 
 /// Path tracing.
 #[derive(Clone, Debug)]
@@ -36,6 +38,8 @@ pub struct PathIntegrator {
     pub sampler: Sampler,
     /// What the layers need.
     pub needs: SurfaceNeeds,
+    /// Whether diffuse surfaces are shaded side by side where that is possible: faster, with the same result bit for bit.
+    pub side_by_side: bool,
 }
 
 /// A path under way.
@@ -75,6 +79,29 @@ struct Scratch {
     media: Vec<MediaState>,
     /// Beside `paths`, in pictures of scenes with filtered textures; else empty.
     cones: Vec<RayCone>,
+    draws: Draws,
+    shaded: Shaded,
+}
+
+/// Random numbers for the vertices that are shaded next.
+#[derive(Default)]
+struct Draws {
+    requests: Requests,
+    light: Numbers,
+    bsdf: Numbers,
+}
+
+impl Draws {
+    /// Draws for at most [`BATCH`] paths; numbers for lights only `with_light`.
+    fn draw(&mut self, sampler: &Sampler, paths: &[Path], bounce: u32, with_light: bool) {
+        for (path, (pixel, sample)) in paths.iter().zip(self.requests.pixels.iter_mut().zip(&mut self.requests.samples)) {
+            (*pixel, *sample) = (path.seed, path.sample);
+        }
+        if with_light {
+            sampler.sample_4d_batch(&self.requests, paths.len(), dimensions::light(bounce), &mut self.light);
+        }
+        sampler.sample_4d_batch(&self.requests, paths.len(), dimensions::bsdf(bounce), &mut self.bsdf);
+    }
 }
 
 thread_local! {
@@ -186,62 +213,93 @@ impl PathIntegrator {
     /// Large results stay where they were returned and are read through references: a copy would have to wait for them.
     /// `MEDIA` is whether the scene has media.
     fn shade_all<const MEDIA: bool>(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, .. } = scratch;
-        shadow_rays.clear();
-        pending.clear();
+        scratch.shadow_rays.clear();
+        scratch.pending.clear();
+        let count = scratch.paths.len();
+        let is_last = bounce + 1 >= self.max_depth;
+        let side_by_side = !MEDIA && !is_last && self.shades_side_by_side(world);
         let mut alive = 0;
-        for i in 0..paths.len() {
-            let (path, ray) = (&paths[i], &rays[i]);
-            let sample = &mut out[path.slot as usize];
-            let found = world.resolve(ray, hits[i]);
-            let Some(at) = &found else {
-                if bounce > 0 || !self.hide_emitters {
-                    sample.radiance += self.clamped(path.throughput * self.escaped(world, path, ray.direction), bounce);
-                }
-                continue;
-            };
-            let cone = cones.get(i).copied();
-            let footprint = || world.footprint(cone.as_ref(), ray, hits[i].as_ref(), at);
-            if bounce == 0 {
-                sample.alpha = 1.0;
-                if self.needs != SurfaceNeeds::default() {
-                    sample.surface = surface_sample(world, self.needs, at, ray.direction, footprint);
-                }
+        for first in (0..count).step_by(BATCH) {
+            let last = count.min(first + BATCH);
+            if !is_last {
+                scratch.draws.draw(&self.sampler, &scratch.paths[first..last], bounce, !world.scene.lights.is_empty());
             }
-            sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
-            if bounce + 1 >= self.max_depth {
-                continue;
+            scratch.shaded.clear();
+            if side_by_side {
+                self.shade_side_by_side(world, bounce, first..last, out, scratch);
             }
-
-            let mut bsdf = None;
-            let boundary = if MEDIA { world.boundary_bsdf(at, ray.direction, &media[i]) } else { None };
-            let mut vertex = Vertex::new(world, at, ray, footprint, &mut bsdf);
-            if let Some(boundary) = &boundary {
-                vertex.bsdf = boundary;
-            }
-            if let Some(mut shadow) = self.sample_light(world, path, &vertex, bounce) {
-                if MEDIA {
-                    let here = world.media_toward(at, ray.direction, shadow.ray.direction, &media[i].here);
-                    shadow.contribution *= world.transmittance(&here, &shadow.ray);
+            for i in first..last {
+                if let Some(lane) = scratch.shaded.lane(i - first) {
+                    self.collect(world, bounce, [i, first], lane, out, scratch, &mut alive);
+                } else {
+                    self.shade::<MEDIA>(world, bounce, [i, first], out, scratch, &mut alive);
                 }
-                shadow_rays.push(shadow.ray);
-                pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
-            }
-            if let Some((path, next)) = self.scatter(world, path, &vertex, bounce) {
-                if MEDIA {
-                    let here = world.media_toward(at, ray.direction, next.direction, &media[i].here);
-                    media[alive] = MediaState { here, ..media[i] };
-                }
-                if let Some(cone) = cone {
-                    cones[alive] = world.scattered_cone(cone, at.t, path.pdf);
-                }
-                paths[alive] = path;
-                rays[alive] = next;
-                alive += 1;
             }
         }
-        paths.truncate(alive);
-        rays.truncate(alive);
+        scratch.paths.truncate(alive);
+        scratch.rays.truncate(alive);
+    }
+
+    /// Shades the hit of the path `i`, of the batch that starts with `first`.
+    #[inline(always)]
+    fn shade<const MEDIA: bool>(
+        &self,
+        world: &World,
+        bounce: u32,
+        [i, first]: [usize; 2],
+        out: &mut [PixelSample],
+        scratch: &mut Scratch,
+        alive: &mut usize,
+    ) {
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, .. } = scratch;
+        let (path, ray) = (&paths[i], &rays[i]);
+        let sample = &mut out[path.slot as usize];
+        let found = world.resolve(ray, hits[i]);
+        let Some(at) = &found else {
+            if bounce > 0 || !self.hide_emitters {
+                sample.radiance += self.clamped(path.throughput * self.escaped(world, path, ray.direction), bounce);
+            }
+            return;
+        };
+        let cone = cones.get(i).copied();
+        let footprint = || world.footprint(cone.as_ref(), ray, hits[i].as_ref(), at);
+        if bounce == 0 {
+            sample.alpha = 1.0;
+            if self.needs != SurfaceNeeds::default() {
+                sample.surface = surface_sample(world, self.needs, at, ray.direction, footprint);
+            }
+        }
+        sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
+        if bounce + 1 >= self.max_depth {
+            return;
+        }
+
+        let mut bsdf = None;
+        let boundary = if MEDIA { world.boundary_bsdf(at, ray.direction, &media[i]) } else { None };
+        let mut vertex = Vertex::new(world, at, ray, footprint, &mut bsdf);
+        if let Some(boundary) = &boundary {
+            vertex.bsdf = boundary;
+        }
+        if let Some(mut shadow) = self.sample_light(world, path, &vertex, draws.light.of(i - first)) {
+            if MEDIA {
+                let here = world.media_toward(at, ray.direction, shadow.ray.direction, &media[i].here);
+                shadow.contribution *= world.transmittance(&here, &shadow.ray);
+            }
+            shadow_rays.push(shadow.ray);
+            pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
+        }
+        if let Some((path, next)) = self.scatter(world, path, &vertex, bounce, draws.bsdf.of(i - first)) {
+            if MEDIA {
+                let here = world.media_toward(at, ray.direction, next.direction, &media[i].here);
+                media[*alive] = MediaState { here, ..media[i] };
+            }
+            if let Some(cone) = cone {
+                cones[*alive] = world.scattered_cone(cone, at.t, path.pdf);
+            }
+            paths[*alive] = path;
+            rays[*alive] = next;
+            *alive += 1;
+        }
     }
 
     /// What a contribution brings that was scattered so many times between the light and the camera.
@@ -300,11 +358,10 @@ impl PathIntegrator {
 
     /// A shadow ray towards a light, with what it brings if it is free.
     #[inline(always)]
-    fn sample_light(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32) -> Option<ShadowRay> {
+    fn sample_light(&self, world: &World, path: &Path, vertex: &Vertex, u: [f32; 4]) -> Option<ShadowRay> {
         if vertex.bsdf.is_delta() || world.scene.lights.is_empty() {
             return None;
         }
-        let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::light(bounce));
         let choice = world.scene.lights.choose(&vertex.receiver(), [u[0], u[3]], self.strategy.found_by())?;
         let light = world.scene.lights.get(choice.id);
         let sample = light.sample(&world.scene.geometry, &world.scene.textures, vertex.at.p, [u[1], u[2]], self.strategy.found_by());
@@ -328,8 +385,7 @@ impl PathIntegrator {
 
     /// The path after its next scattering with its next ray, unless it ends here.
     #[inline(always)]
-    fn scatter(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32) -> Option<(Path, Ray)> {
-        let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::bsdf(bounce));
+    fn scatter(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32, u: [f32; 4]) -> Option<(Path, Ray)> {
         let (sample, ray) = vertex.sample(world, u[0], [u[1], u[2]])?;
         let mut throughput = path.throughput * sample.weight;
         let eta_squared = path.eta_squared * (sample.eta * sample.eta);
@@ -360,127 +416,3 @@ struct ShadowRay {
     contribution: Rgb,
 }
 
-/// Reflection into a direction that the facet does not see.
-pub(super) struct RaisedEval {
-    eval: BsdfEval,
-    /// The point above the facet where a ray in that direction starts.
-    start: SurfaceInteraction,
-}
-
-/// A surface point with its scattering and the frame for it.
-pub(super) struct Vertex<'a> {
-    pub at: &'a SurfaceInteraction,
-    pub bsdf: &'a Bsdf,
-    pub frame: Frame,
-    /// The direction back, in the frame.
-    pub wo: Vec3,
-    /// Cosine between the direction back and the geometric normal.
-    cos_geometric: f32,
-    /// Cosine between the shading and the geometric normal, if they differ by a normal map or a bump map.
-    cos_normals: Option<f32>,
-}
-
-impl<'a> Vertex<'a> {
-    /// The vertex at `at`, where `ray` arrives, which stands for `footprint`; `bsdf` is the place for scattering that is not the same
-    /// everywhere.
-    #[inline(always)]
-    pub fn new(
-        world: &'a World,
-        at: &'a SurfaceInteraction,
-        ray: &Ray,
-        footprint: impl FnOnce() -> Footprint,
-        bsdf: &'a mut Option<Bsdf>,
-    ) -> Self {
-        let back = -ray.direction;
-        let cos_geometric = back.dot(at.n_g);
-        let n_s = if world.scene.features.shading_normals { facing_normal(back, at.n_s, at.n_g) } else { at.n_g };
-        let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
-        let bsdf = world.scene.bsdf(at, ray.direction, footprint, bsdf);
-        // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
-        let has_relief = world.scene.features.reliefs && world.scene.relief(at, ray.direction).is_some();
-        let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
-        Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric, cos_normals }
-    }
-
-    /// The point and the side of it that light must reach.
-    #[inline]
-    fn receiver(&self) -> Receiver {
-        let n = if self.bsdf.transmits() { Vec3::ZERO } else { self.frame.z * 1f32.copysign(self.wo.z) };
-        Receiver { p: self.at.p, n }
-    }
-
-    /// What the surface lets through of light from a direction, beyond its BSDF: nothing where the shading frame and the geometry disagree on
-    /// its side, for it would leak through, and less where only the shading normal sees it well. 1 for most.
-    #[inline]
-    pub fn shadowing(&self, local: Vec3, world: Vec3) -> f32 {
-        let cos = world.dot(self.at.n_g);
-        let reflected_in_frame = local.z * self.wo.z > 0.0;
-        let reflected_in_geometry = cos * self.cos_geometric > 0.0;
-        if reflected_in_frame != reflected_in_geometry {
-            return 0.0;
-        }
-        match self.cos_normals {
-            Some(cos_normals) if reflected_in_frame => terminator_factor(cos, local.z, cos_normals),
-            _ => 1.0,
-        }
-    }
-
-    #[inline(always)]
-    fn eval(&self, direction: Vec3) -> Option<BsdfEval> {
-        let wi = self.frame.to_local(direction);
-        let shadowing = self.shadowing(wi, direction);
-        if shadowing == 0.0 {
-            return None;
-        }
-        let BsdfEval { value, pdf } = self.bsdf.eval(self.wo, wi);
-        (!value.is_black()).then(|| BsdfEval { value: value * shadowing, pdf })
-    }
-
-    /// What is scattered from a direction, and where a ray in that direction starts: here, or above the facet if that hides it (then in `place`).
-    #[inline(always)]
-    pub fn eval_toward<'b>(
-        &'b self,
-        world: &World,
-        direction: Vec3,
-        place: &'b mut Option<RaisedEval>,
-    ) -> Option<(BsdfEval, &'b SurfaceInteraction)> {
-        if let Some(eval) = self.eval(direction) {
-            return Some((eval, self.at));
-        }
-        *place = self.eval_raised(world, direction);
-        place.as_ref().map(|raised| (raised.eval, &raised.start))
-    }
-
-    /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other directions, and where
-    /// [`raised_start`] finds no start.
-    #[inline]
-    fn eval_raised(&self, world: &World, direction: Vec3) -> Option<RaisedEval> {
-        let start = self.raised(world, direction)?;
-        Some(RaisedEval { eval: self.bsdf.eval(self.wo, self.frame.to_local(direction)), start })
-    }
-
-    /// Where a ray starts in a direction that the shading normal sees and the facet does not.
-    #[inline]
-    fn raised(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
-        let in_frame = direction.dot(self.frame.z) * self.wo.z > 0.0;
-        let hidden = in_frame && direction.dot(self.at.n_g) * self.cos_geometric <= 0.0;
-        // Under a relief, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
-        if !hidden || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.transmits() {
-            return None;
-        }
-        raised_start(world, self.at, self.receiver().n)
-    }
-
-    /// A scattered direction and the ray that follows it.
-    #[inline(always)]
-    fn sample(&self, world: &World, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray)> {
-        let mut sample = self.bsdf.sample(self.wo, u_lobe, u)?;
-        let direction = self.frame.to_world(sample.wi);
-        let shadowing = self.shadowing(sample.wi, direction);
-        if !sample.is_delta && shadowing > 0.0 {
-            sample.weight *= shadowing;
-        }
-        let ray = if shadowing > 0.0 { self.at.spawn(direction) } else { self.raised(world, direction)?.spawn(direction) };
-        Some((sample, ray))
-    }
-}

@@ -2,7 +2,7 @@
 //! normal maps no hard edge where the surface turns away from the light.
 
 use super::World;
-use crate::geometry::{SpawnTarget, SurfaceInteraction};
+use crate::geometry::{SpawnPoint, SurfaceInteraction};
 use crate::math::Vec3;
 use crate::math::float::UNIT_ROUNDOFF;
 
@@ -14,15 +14,21 @@ const LEAST_REFLECTION: f32 = 0.01;
 /// the surface, `n_s` lies in the hemisphere of `n_g`, and so does the result, which `back` sees from the same side as `n_g`.
 #[inline]
 pub fn facing_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
+    if faces(back, n_s, n_g) { n_s } else { turned_normal(back, n_s, n_g) }
+}
+
+/// Whether the shading normal is to be used as it is.
+#[inline(always)]
+pub fn faces(back: Vec3, n_s: Vec3, n_g: Vec3) -> bool {
     let cos = back.dot(n_g);
     let reflected_cos = 2.0 * back.dot(n_s) * n_s.dot(n_g) - cos;
     let least = LEAST_REFLECTION.min(0.9 * cos.abs());
-    if reflected_cos * 1f32.copysign(cos) >= least { n_s } else { turned_normal(back, n_s, n_g) }
+    reflected_cos * 1f32.copysign(cos) >= least
 }
 
 /// In `f64`: at grazing angles the two directions nearly cancel.
 #[cold]
-fn turned_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
+pub fn turned_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
     let (back, n_s, normal) = (back.as_dvec3().normalize_or_zero(), n_s.as_dvec3(), n_g.as_dvec3());
     let cos = back.dot(normal);
     let side = 1f64.copysign(cos);
@@ -70,7 +76,7 @@ pub fn raised_start(world: &World, at: &SurfaceInteraction, n: Vec3) -> Option<S
         return None;
     }
     // A little further, so that the distance which rays keep from surfaces is free too.
-    let way = at.spawn_to(&SpawnTarget { p: p + raise * (16.0 / LEAST_RAISE), n: Vec3::ZERO, error: 0.0 });
+    let way = at.spawn_to(&SpawnPoint { p: p + raise * (16.0 / LEAST_RAISE), n: Vec3::ZERO, error: 0.0 });
     (!world.accel.occluded(&way)).then_some(SurfaceInteraction { p, n_g: n, ..*at })
 }
 

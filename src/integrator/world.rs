@@ -36,6 +36,12 @@ impl<'a> World<'a> {
         Self { scene, accel, bounds: accel.bounds(), detail, division: None, media_bounds: super::media::bounds(scene) }
     }
 
+    /// Whether places are all that is found of surfaces, without parameters.
+    #[inline]
+    pub(super) fn finds_places_only(&self) -> bool {
+        self.detail == Detail::Place
+    }
+
     /// With the parametrisation of every surface, whether or not the scene needs it.
     pub fn in_full(self) -> Self {
         Self { detail: Detail::Full, ..self }

@@ -24,7 +24,7 @@ pub use spot::SpotLight;
 pub use tree::Receiver;
 
 use crate::color::Rgb;
-use crate::geometry::{Geometry, SpawnTarget, SurfaceInteraction};
+use crate::geometry::{Geometry, SpawnPoint, SurfaceInteraction};
 use crate::math::{DVec2, DVec3, Ray, Vec3};
 use crate::texture::Texture;
 use bounds::LightBounds;
@@ -69,7 +69,7 @@ pub struct InfinityEval {
 #[derive(Clone, Copy, Debug)]
 pub enum ShadowTarget {
     /// At a point.
-    Point(SpawnTarget),
+    Point(SpawnPoint),
     /// Nowhere: the light is infinitely far.
     Infinity,
 }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::bounds::{EmissionCone, LightBounds};
 use super::{LightSample, ShadowTarget};
 use crate::color::Rgb;
-use crate::geometry::SpawnTarget;
+use crate::geometry::SpawnPoint;
 use crate::math::{DVec3, Vec3};
 
 /// Light from a point, the same in every direction: the irradiance at distance d is `intensity / d²`.
@@ -33,7 +33,7 @@ impl PointLight {
             radiance: self.intensity * (1.0 / distance_squared) as f32,
             pdf: 1.0,
             is_delta: true,
-            target: ShadowTarget::Point(SpawnTarget { p: self.position, n: Vec3::ZERO, error: 0.0 }),
+            target: ShadowTarget::Point(SpawnPoint { p: self.position, n: Vec3::ZERO, error: 0.0 }),
         })
     }
 

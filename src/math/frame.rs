@@ -15,7 +15,7 @@ pub struct Frame {
 
 impl Frame {
     /// A frame around the unit normal `n` (Duff et al., "Building an Orthonormal Basis, Revisited").
-    #[inline]
+    #[inline(always)]
     pub fn from_normal(n: Vec3) -> Self {
         let sign = 1f32.copysign(n.z);
         let a = -1.0 / (sign + n.z);
@@ -24,7 +24,7 @@ impl Frame {
     }
 
     /// A frame around the unit normal `n` whose `x` is `tangent` without its part along `n`; any frame if nothing is left of it.
-    #[inline]
+    #[inline(always)]
     pub fn from_normal_and_tangent(n: Vec3, tangent: Vec3) -> Self {
         let across = tangent - n * n.dot(tangent);
         let length_squared = across.length_squared();
@@ -37,13 +37,13 @@ impl Frame {
     }
 
     /// Components of a world vector in this frame.
-    #[inline]
+    #[inline(always)]
     pub fn to_local(&self, v: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
     /// The world vector with components `v` in this frame.
-    #[inline]
+    #[inline(always)]
     pub fn to_world(&self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }

@@ -11,6 +11,7 @@ mod ray;
 mod roots;
 mod transform;
 mod trig;
+pub mod vectorize;
 
 pub use aabb::{Aabb, Bounds};
 pub use cone::RayCone;

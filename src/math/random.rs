@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{DMat3, DVec3};
 
 /// A bijective hash of 64 bits: what [SplitMix64](Rng) gives first for this seed.
-#[inline]
+#[inline(always)]
 pub fn mix(n: u64) -> u64 {
     let n = n.wrapping_add(STEP);
     let n = (n ^ (n >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

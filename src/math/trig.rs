@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_PI_2;
 
 /// Sine and cosine of `x` radians, `|x| <= pi / 4`; at most 1.2e-7 from the exact values (coefficients of Moshier's Cephes library).
-#[inline]
+#[inline(always)]
 pub fn sin_cos_eighth(x: f32) -> (f32, f32) {
     let x2 = x * x;
     let sin = x + x * x2 * (-0.166_666_55 + x2 * (8.332_161e-3 + x2 * -1.951_529_6e-4));
@@ -12,7 +12,7 @@ pub fn sin_cos_eighth(x: f32) -> (f32, f32) {
 }
 
 /// Sine and cosine of `turns` full turns, `|turns| < 1e5`; at most 1.2e-7 from the exact values.
-#[inline]
+#[inline(always)]
 pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
     // Adding 1.5 * 2^23 rounds to an integer, which is then in the lowest bits.
     const TO_INTEGER: f32 = 12_582_912.0;

@@ -21,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::film::{DroppedSample, Film, FilmTile, Filter, Image, LayerKind, PixelSample};
 use crate::integrator::{self, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
 use crate::math::Vec2;
-use crate::sampling::Sampler;
+use crate::sampling::{BATCH, Numbers, Requests, Sampler};
 use crate::scene::Scene;
 
 /// Width and height of a tile in pixels: a batch has 1,024 paths. Of a Cornell box, batches of 256 paths take 3 % longer.
@@ -90,7 +90,7 @@ impl<'a> Job<'a> {
         let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
         Self {
             world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
-            integrator: integrator::build(&settings.integrator, sampler, needs),
+            integrator: integrator::build(&settings.integrator, sampler, needs, settings.side_by_side),
             sampler,
             filter: Filter::new(&settings.filter),
             size: settings.size,
@@ -106,21 +106,49 @@ impl<'a> Job<'a> {
     /// Renders samples of pixels, at most as many as a tile has pixels; `out` is in their order.
     #[inline]
     fn render_samples(&self, samples: impl Iterator<Item = ([u32; 2], u32)>, batch: &mut Batch, counts: &mut RayCounts) {
+        let mut samples = samples.fuse();
         batch.samples.clear();
-        let weights = &mut batch.weights;
-        batch.samples.extend(samples.zip(0usize..).map(|(([x, y], sample), slot)| {
-            let seed = self.sampler.pixel(x, y);
-            let u = self.sampler.sample_4d(seed, sample, dimensions::CAMERA);
-            let filter = self.filter.sample([u[0], u[1]]);
-            let film = Vec2::new(x as f32 + 0.5 + filter.offset.x, y as f32 + 0.5 + filter.offset.y);
-            let camera = &self.world.scene.camera;
-            let moves = self.world.scene.features.motion;
-            let time = if moves { camera.time(self.sampler.sample_4d(seed, sample, dimensions::TIME)[0]) } else { 0.0 };
-            let ray = camera.ray(film, self.size, [u[2], u[3]], time);
-            weights[slot] = filter.weight;
-            CameraSample { ray: self.world.approach(ray), seed, sample }
-        }));
+        loop {
+            let start = batch.samples.len();
+            let count = self.request(&mut samples, batch);
+            if count == 0 {
+                break;
+            }
+            self.sampler.sample_4d_batch(&batch.requests, count, dimensions::CAMERA, &mut batch.numbers);
+            for i in 0..count {
+                let (sample, weight) = self.camera_sample(i, batch);
+                batch.samples.push(sample);
+                batch.weights[start + i] = weight;
+            }
+        }
         self.integrator.render_batch(&self.world, &batch.samples, &mut batch.out, counts);
+    }
+
+    /// Takes up the next samples of pixels, and says how many.
+    #[inline]
+    fn request(&self, samples: &mut impl Iterator<Item = ([u32; 2], u32)>, batch: &mut Batch) -> usize {
+        let mut count = 0;
+        for ([x, y], sample) in samples.take(BATCH) {
+            batch.pixels[count] = [x, y];
+            batch.requests.pixels[count] = self.sampler.pixel(x, y);
+            batch.requests.samples[count] = sample;
+            count += 1;
+        }
+        count
+    }
+
+    /// The camera sample for a request, and the filter's weight.
+    #[inline]
+    fn camera_sample(&self, i: usize, batch: &Batch) -> (CameraSample, f32) {
+        let ([x, y], u) = (batch.pixels[i], batch.numbers.of(i));
+        let (seed, sample) = (batch.requests.pixels[i], batch.requests.samples[i]);
+        let filter = self.filter.sample([u[0], u[1]]);
+        let film = Vec2::new(x as f32 + 0.5 + filter.offset.x, y as f32 + 0.5 + filter.offset.y);
+        let camera = &self.world.scene.camera;
+        let moves = self.world.scene.features.motion;
+        let time = if moves { camera.time(self.sampler.sample_4d(seed, sample, dimensions::TIME)[0]) } else { 0.0 };
+        let ray = camera.ray(film, self.size, [u[2], u[3]], time);
+        (CameraSample { ray: self.world.approach(ray), seed, sample }, filter.weight)
     }
 
     /// Renders the samples `first .. first + count` of every pixel of a tile.
@@ -154,12 +182,22 @@ struct Batch {
     samples: Vec<CameraSample>,
     weights: Vec<f32>,
     out: Vec<PixelSample>,
+    pixels: [[u32; 2]; BATCH],
+    requests: Requests,
+    numbers: Numbers,
 }
 
 impl Batch {
     fn new() -> Self {
         let count = (TILE_SIZE * TILE_SIZE) as usize;
-        Self { samples: Vec::with_capacity(count), weights: vec![1.0; count], out: vec![PixelSample::default(); count] }
+        Self {
+            samples: Vec::with_capacity(count),
+            weights: vec![1.0; count],
+            out: vec![PixelSample::default(); count],
+            pixels: [[0; 2]; BATCH],
+            requests: Requests::default(),
+            numbers: Numbers::default(),
+        }
     }
 }
 

@@ -42,6 +42,8 @@ pub struct Settings {
     pub integrator: IntegratorDesc,
     /// What finds hits.
     pub accel: AccelKind,
+    /// Whether paths shade diffuse surfaces side by side: faster, with the same picture bit for bit.
+    pub side_by_side: bool,
     /// Number of threads, at least 1.
     pub threads: usize,
     /// The render ends after this time even if samples are missing.
@@ -119,6 +121,7 @@ impl Settings {
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
             integrator: integrator(desc, overrides)?,
             accel: overrides.accel.unwrap_or_default(),
+            side_by_side: true,
             threads: threads(overrides)?,
             time_limit: time_limit(overrides)?,
             outputs,

@@ -2,7 +2,7 @@
 
 /// Veach's power heuristic with exponent 2: the weight of a strategy of density `pdf` against one of density `other`, one sample each.
 /// A density of infinity (a delta) takes all the weight.
-#[inline]
+#[inline(always)]
 pub fn power_heuristic(pdf: f32, other: f32) -> f32 {
     if pdf <= 0.0 {
         return 0.0;

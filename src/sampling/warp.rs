@@ -11,7 +11,7 @@ pub fn concentric_disk(u: [f32; 2]) -> Vec2 {
 }
 
 /// The point and its signed distance from the centre, which the map gives without rounding.
-#[inline]
+#[inline(always)]
 fn concentric(u: [f32; 2]) -> (Vec2, f32) {
     let (a, b) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
     let first = a.abs() > b.abs();
@@ -39,14 +39,14 @@ pub fn inverse_concentric_disk(p: Vec2) -> [f32; 2] {
 }
 
 /// A direction of the hemisphere with density [`cosine_hemisphere_pdf`] (Malley's method).
-#[inline]
+#[inline(always)]
 pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let (p, radius) = concentric(u);
     p.extend(((1.0 - radius) * (1.0 + radius)).sqrt())
 }
 
 /// Density per solid angle of [`cosine_hemisphere`] at a direction with the given cosine, not negative.
-#[inline]
+#[inline(always)]
 pub fn cosine_hemisphere_pdf(cos: f32) -> f32 {
     cos * FRAC_1_PI
 }

@@ -14,7 +14,7 @@ use triangle::{TriangleEmitter, triangle_error};
 use super::bounds::{EmissionCone, LightBounds, to_positive};
 use super::{LightSample, ShadowTarget};
 use crate::color::Rgb;
-use crate::geometry::{Analytic, Geometry, Mesh, Placed, Shape, SpawnTarget, SurfaceInteraction};
+use crate::geometry::{Analytic, Geometry, Mesh, Placed, Shape, SpawnPoint, SurfaceInteraction};
 use crate::id::{PrimId, ShapeId, TextureId};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Ray, Vec2, Vec3};
@@ -136,7 +136,7 @@ impl LightSample {
     /// Light from a point of a surface with this error of its position.
     #[inline(always)]
     fn at(sample: &SurfaceSample, error: f32, radiance: Rgb) -> Self {
-        let target = ShadowTarget::Point(SpawnTarget { p: sample.p, n: sample.n, error });
+        let target = ShadowTarget::Point(SpawnPoint { p: sample.p, n: sample.n, error });
         Self { wi: sample.wi, radiance, pdf: sample.pdf, is_delta: false, target }
     }
 }

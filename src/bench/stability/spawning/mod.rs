@@ -11,7 +11,7 @@ mod triangles;
 use super::geometry::{Closest, Rng, closest, ray_through};
 use super::{Effort, Outcome};
 use crate::accel::{self, AccelKind, Accelerator};
-use crate::geometry::{Geometry, Mesh, SpawnTarget, SurfaceInteraction};
+use crate::geometry::{Geometry, Mesh, SpawnPoint, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Ray, Vec3};
@@ -98,7 +98,7 @@ fn free_segment(si: &SurfaceInteraction, direction: DVec3, distance: f64) -> Opt
     let n = si.n_g.as_dvec3().abs();
     let resolved = UNIT_ROUNDOFF * (n.dot(si.p.abs()) + n.dot(p.abs()) + distance) + f64::from(si.error);
     let height = (direction * distance).dot(si.n_g.as_dvec3()).abs();
-    (height > 8.0 * resolved).then(|| si.spawn_to(&SpawnTarget { p, n: Vec3::ZERO, error: 0.0 }))
+    (height > 8.0 * resolved).then(|| si.spawn_to(&SpawnPoint { p, n: Vec3::ZERO, error: 0.0 }))
 }
 
 /// What became of rays that leave a body that should not be in their way.

@@ -80,7 +80,7 @@ fn checkpoint(film: &Film, sums: &[Sum], squares: f64, spp: u32) -> Checkpoint {
 
 fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let sampler = Sampler::new(settings.sampler, settings.seed);
-    let integrator = integrator::build(&settings.integrator, sampler, SurfaceNeeds::default());
+    let integrator = integrator::build(&settings.integrator, sampler, SurfaceNeeds::default(), settings.side_by_side);
     let mut film = Film::new([WIDTH; 2], Crop::full([WIDTH; 2]), &LayerSet::COLOR, WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
     let mut out = vec![PixelSample::default(); COUNT * AT_ONCE as usize];

@@ -1,0 +1,232 @@
+//! Which vertices are shaded side by side, and what becomes of them: those on diffuse surfaces.
+
+use std::ops::Range;
+
+use super::lanes::{Found, Lanes, Roulette};
+use super::{Path, PathIntegrator, Pending, Scratch};
+use crate::bsdf::{Bsdf, Lambert};
+use crate::film::PixelSample;
+use crate::geometry::{Hit, Mesh, Shape};
+use crate::integrator::shading::turned_normal;
+use crate::integrator::vertex::Vertex;
+use crate::integrator::{Strategy, SurfaceNeeds, World, surface_sample};
+use crate::material::Material;
+use crate::math::Ray;
+use crate::sampling::BATCH;
+
+/// No lane.
+const ALONE: u8 = u8::MAX;
+const _: () = assert!(BATCH < ALONE as usize);
+
+/// A batch of vertices, of which some are shaded side by side.
+pub(super) struct Shaded {
+    lanes: Box<Lanes>,
+    /// By vertex.
+    lane_of: [u8; BATCH],
+    /// By lane.
+    vertex_of: [u8; BATCH],
+    /// Vertices on diffuse surfaces of which more is to be found out.
+    others: Vec<u8>,
+}
+
+impl Default for Shaded {
+    fn default() -> Self {
+        Self { lanes: Box::default(), lane_of: [ALONE; BATCH], vertex_of: [0; BATCH], others: Vec::with_capacity(BATCH) }
+    }
+}
+
+impl Shaded {
+    pub fn clear(&mut self) {
+        self.lanes.clear();
+        self.lane_of = [ALONE; BATCH];
+        self.others.clear();
+    }
+
+    /// The lane of a vertex, if it is not to be shaded alone.
+    #[inline(always)]
+    pub fn lane(&self, vertex: usize) -> Option<usize> {
+        let lane = self.lane_of[vertex];
+        (lane != ALONE).then_some(usize::from(lane))
+    }
+
+    #[inline(always)]
+    fn assign(&mut self, vertex: usize, lane: usize) {
+        self.lane_of[vertex] = lane as u8;
+        self.vertex_of[lane] = vertex as u8;
+    }
+}
+
+impl PathIntegrator {
+    /// Whether diffuse vertices of this scene are shaded side by side.
+    pub(super) fn shades_side_by_side(&self, world: &World) -> bool {
+        let features = &world.scene.features;
+        self.side_by_side && self.strategy == Strategy::Mis && !features.anisotropic && !features.reliefs
+    }
+
+    /// Shades the vertices of a batch that can be shaded side by side, up to [`collect`](Self::collect).
+    pub(super) fn shade_side_by_side(
+        &self,
+        world: &World,
+        bounce: u32,
+        batch: Range<usize>,
+        out: &mut [PixelSample],
+        scratch: &mut Scratch,
+    ) {
+        let smooth = world.scene.features.shading_normals;
+        self.find_diffuse(world, bounce, batch.clone(), scratch);
+        scratch.shaded.lanes.place(smooth);
+        self.settle(world, bounce, batch, out, scratch);
+        let Scratch { shaded: Shaded { lanes, vertex_of, lane_of, .. }, draws, .. } = scratch;
+        if lanes.count() == 0 {
+            return;
+        }
+        lanes.face(smooth, turned_normal);
+
+        let lights = &world.scene.lights;
+        let found_by = self.strategy.found_by();
+        for (lane, &vertex) in vertex_of[..lanes.count()].iter().enumerate() {
+            let vertex = usize::from(vertex);
+            let u = draws.bsdf.of(vertex);
+            lanes.set_numbers(lane, [u[1], u[2], u[3]]);
+            if lights.is_empty() || usize::from(lane_of[vertex]) != lane {
+                continue;
+            }
+            let u = draws.light.of(vertex);
+            let receiver = lanes.receiver(lane);
+            let Some(choice) = lights.choose(&receiver, [u[0], u[3]], found_by) else { continue };
+            let sample =
+                lights.get(choice.id).sample(&world.scene.geometry, &world.scene.textures, receiver.p, [u[1], u[2]], found_by);
+            if let Some(sample) = &sample {
+                lanes.set_light(lane, sample, choice.pmf);
+            }
+        }
+        if !lights.is_empty() {
+            lanes.illuminate();
+        }
+        lanes.scatter(if bounce + 1 >= self.rr_depth { Roulette::ByThroughput } else { Roulette::Not });
+    }
+
+    /// Looks for vertices on diffuse surfaces: on triangles of which nothing but their place is to be found out, and others.
+    fn find_diffuse(&self, world: &World, bounce: u32, batch: Range<usize>, scratch: &mut Scratch) {
+        let Scratch { paths, rays, hits, shaded, .. } = scratch;
+        let scene = world.scene;
+        let wants_surface = bounce == 0 && self.needs != SurfaceNeeds::default();
+        let places_suffice = world.finds_places_only() && !wants_surface;
+        for (vertex, i) in batch.enumerate() {
+            let Some(hit) = &hits[i] else { continue };
+            let surface = scene.surface(hit.shape);
+            let material = &scene.materials[surface.material.index()];
+            match (material, still_mesh(world, hit)) {
+                (Material::Constant(Bsdf::Lambert(lambert)), Some(mesh)) if places_suffice && surface.first_light.is_none() => {
+                    let normals = if scene.features.shading_normals { Some(mesh.corner_normals(hit.prim, 0.0)) } else { None };
+                    // Without normals of its own, a triangle is flat.
+                    let smooth = normals.map(|normals| (normals.unwrap_or_default(), [hit.u, hit.v]));
+                    let Path { throughput, eta_squared, .. } = paths[i];
+                    let points = mesh.triangle_points(hit.prim);
+                    let lane = shaded.lanes.push_triangle(&rays[i], &points, smooth, throughput, eta_squared, lambert.albedo);
+                    shaded.assign(vertex, lane);
+                }
+                (Material::Constant(Bsdf::Lambert(_)), _) => shaded.others.push(vertex as u8),
+                (Material::Varying(varying), _) if varying.is_diffuse() => shaded.others.push(vertex as u8),
+                _ => {}
+            }
+        }
+    }
+
+    /// Leaves those that turn out to be elsewhere, and adds other vertices on diffuse surfaces.
+    fn settle(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut [PixelSample], scratch: &mut Scratch) {
+        let Scratch { paths, rays, hits, cones, shaded, .. } = scratch;
+        let first = batch.start;
+        for lane in 0..shaded.lanes.count() {
+            if !shaded.lanes.is_ahead(lane) {
+                shaded.lane_of[usize::from(shaded.vertex_of[lane])] = ALONE;
+            }
+        }
+        for k in 0..shaded.others.len() {
+            let vertex = usize::from(shaded.others[k]);
+            let i = first + vertex;
+            let (path, ray) = (&paths[i], &rays[i]);
+            let found = world.resolve(ray, hits[i]);
+            let Some(at) = &found else { continue };
+            let cone = cones.get(i).copied();
+            let footprint = || world.footprint(cone.as_ref(), ray, hits[i].as_ref(), at);
+            let mut place = None;
+            let Bsdf::Lambert(Lambert { albedo }) = *world.scene.bsdf(at, ray.direction, footprint, &mut place) else { continue };
+            let sample = &mut out[path.slot as usize];
+            if bounce == 0 && self.needs != SurfaceNeeds::default() {
+                sample.surface = surface_sample(world, self.needs, at, ray.direction, footprint);
+            }
+            sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
+            let lane = shaded.lanes.push_known(ray, at, path.throughput, path.eta_squared, albedo);
+            shaded.assign(vertex, lane);
+        }
+    }
+
+    /// Takes up what became of the path `i`, of the batch that starts with `first`.
+    #[allow(clippy::too_many_arguments)]
+    #[inline(always)]
+    pub(super) fn collect(
+        &self,
+        world: &World,
+        bounce: u32,
+        [i, first]: [usize; 2],
+        lane: usize,
+        out: &mut [PixelSample],
+        scratch: &mut Scratch,
+        alive: &mut usize,
+    ) {
+        let Scratch { paths, rays, hits, shadow_rays, pending, cones, draws, shaded, .. } = scratch;
+        let lanes = &shaded.lanes;
+        let (path, time) = (paths[i], rays[i].time);
+        if bounce == 0 {
+            out[path.slot as usize].alpha = 1.0;
+        }
+        let (shadow, shadow_ray) = lanes.shadow_ray(lane);
+        let (next, next_ray) = lanes.next_ray(lane);
+        let mut bsdf = None;
+        let hidden = shadow == Found::Hidden || next == Found::Hidden;
+        let found = if hidden { world.resolve(&rays[i], hits[i]) } else { None };
+        let cone = cones.get(i).copied();
+        let footprint = || world.footprint(cone.as_ref(), &rays[i], hits[i].as_ref(), found.as_ref().expect("a vertex that was found"));
+        let vertex = found.as_ref().map(|at| Vertex::new(world, at, &rays[i], footprint, &mut bsdf));
+
+        let shadow = match (shadow, &vertex) {
+            (Found::Ray, _) => Some((Ray { time, ..shadow_ray }, lanes.contribution(lane))),
+            (Found::Hidden, Some(vertex)) => {
+                self.sample_light(world, &path, vertex, draws.light.of(i - first)).map(|shadow| (shadow.ray, shadow.contribution))
+            }
+            _ => None,
+        };
+        if let Some((ray, contribution)) = shadow {
+            shadow_rays.push(ray);
+            pending.push(Pending { contribution: self.clamped(contribution, bounce + 1), slot: path.slot });
+        }
+
+        let next = match (next, &vertex) {
+            (Found::Ray, _) => {
+                let pdf = if world.scene.lights.is_empty() { f32::INFINITY } else { lanes.next_pdf(lane) };
+                let path = Path { throughput: lanes.throughput(lane), pdf, from: lanes.receiver(lane), ..path };
+                Some((path, Ray { time, ..next_ray }))
+            }
+            (Found::Hidden, Some(vertex)) => self.scatter(world, &path, vertex, bounce, draws.bsdf.of(i - first)),
+            _ => None,
+        };
+        if let Some((path, ray)) = next {
+            if let Some(cone) = cone {
+                cones[*alive] = world.scattered_cone(cone, lanes.t(lane), path.pdf);
+            }
+            paths[*alive] = path;
+            rays[*alive] = ray;
+            *alive += 1;
+        }
+    }
+}
+
+/// The mesh of a hit that neither moves nor stands elsewhere than its vertices say.
+#[inline(always)]
+fn still_mesh<'a>(world: &'a World, hit: &Hit) -> Option<&'a Mesh> {
+    match world.scene.geometry.shape(hit.shape) {
+        Shape::Mesh(mesh) if hit.instance == Hit::NO_INSTANCE && !mesh.is_deforming() => Some(mesh),
+        _ => None,
+    }
+}

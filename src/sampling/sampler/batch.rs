@@ -1,0 +1,168 @@
+//! Numbers for many samples at once, the same as for each of them alone.
+
+use super::{PixelSeed, SOBOL_COLUMNS, Sampler, SamplerKind, SobolSeeds, owen_scramble, pcg_4d, unit};
+use crate::math::vectorize::{Kernel, vectorize};
+
+/// Samples that are worked on side by side at most: their numbers stay in the nearest cache.
+pub const BATCH: usize = 128;
+
+/// Samples of pixels for which numbers are wanted.
+#[derive(Clone, Debug)]
+pub struct Requests {
+    /// Seeds of the pixels.
+    pub pixels: [PixelSeed; BATCH],
+    /// Indices of the samples.
+    pub samples: [u32; BATCH],
+}
+
+impl Default for Requests {
+    fn default() -> Self {
+        Self { pixels: [PixelSeed(0); BATCH], samples: [0; BATCH] }
+    }
+}
+
+/// Four numbers for each of many samples, by dimension.
+#[derive(Clone, Debug)]
+pub struct Numbers([[f32; BATCH]; 4]);
+
+impl Default for Numbers {
+    fn default() -> Self {
+        Self([[0.0; BATCH]; 4])
+    }
+}
+
+impl Numbers {
+    /// The four numbers of one sample.
+    #[inline(always)]
+    pub fn of(&self, i: usize) -> [f32; 4] {
+        [self.0[0][i], self.0[1][i], self.0[2][i], self.0[3][i]]
+    }
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, bits: [u32; 4]) {
+        for (row, bits) in self.0.iter_mut().zip(bits) {
+            row[i] = unit(bits);
+        }
+    }
+}
+
+impl Sampler {
+    /// [`sample_4d`](Self::sample_4d) for the first `count` samples of `requests`, at most [`BATCH`].
+    #[inline]
+    pub fn sample_4d_batch(&self, requests: &Requests, count: usize, set: u32, numbers: &mut Numbers) {
+        let count = count.min(BATCH);
+        match self.kind {
+            SamplerKind::Sobol => vectorize(SobolBatch { requests, count, set, numbers }),
+            SamplerKind::Independent => vectorize(IndependentBatch { requests, count, set, numbers }),
+        }
+    }
+}
+
+struct SobolBatch<'a> {
+    requests: &'a Requests,
+    count: usize,
+    set: u32,
+    numbers: &'a mut Numbers,
+}
+
+impl Kernel for SobolBatch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for i in 0..self.count.min(BATCH) {
+            self.numbers.set(i, sobol_4d_by_columns(self.requests.pixels[i], self.requests.samples[i], self.set));
+        }
+    }
+}
+
+struct IndependentBatch<'a> {
+    requests: &'a Requests,
+    count: usize,
+    set: u32,
+    numbers: &'a mut Numbers,
+}
+
+impl Kernel for IndependentBatch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for i in 0..self.count.min(BATCH) {
+            self.numbers.set(i, pcg_4d([self.requests.samples[i], self.set, self.requests.pixels[i].0, 0]));
+        }
+    }
+}
+
+/// Adds, to the points of the second to fourth dimension, the columns of the given bits of the index: what a loop does, laid out since
+/// loops within loops are not turned into vector code.
+macro_rules! add_columns {
+    ($point:ident, $index:ident, $($bit:literal)*) => { $(
+        let chosen = 0u32.wrapping_sub($index >> $bit & 1);
+        $point[1] ^= chosen & SOBOL_COLUMNS[$bit][1];
+        $point[2] ^= chosen & SOBOL_COLUMNS[$bit][2];
+        $point[3] ^= chosen & SOBOL_COLUMNS[$bit][3];
+    )* };
+}
+
+/// As `sobol_4d`, without a table: each bit of the index adds its column.
+#[inline(always)]
+fn sobol_4d_by_columns(pixel: PixelSeed, sample: u32, set: u32) -> [u32; 4] {
+    let seeds = SobolSeeds::new(pixel, set);
+    let index = owen_scramble(reversed(sample), seeds.shuffle);
+    // The first dimension is the index itself.
+    let mut point = [reversed(index), 0, 0, 0];
+    add_columns!(point, index, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31);
+    let scramble = |k: usize| reversed(owen_scramble(point[k], seeds.scrambles[k]));
+    [scramble(0), scramble(1), scramble(2), scramble(3)]
+}
+
+/// `reverse_bits` in steps that every vector unit has.
+#[inline(always)]
+fn reversed(n: u32) -> u32 {
+    let n = (n >> 1 & 0x5555_5555) | (n & 0x5555_5555) << 1;
+    let n = (n >> 2 & 0x3333_3333) | (n & 0x3333_3333) << 2;
+    let n = (n >> 4 & 0x0f0f_0f0f) | (n & 0x0f0f_0f0f) << 4;
+    n.swap_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rng;
+    use crate::math::vectorize::with_each;
+
+    #[test]
+    fn numbers_are_those_of_single_samples_on_every_instruction_set() {
+        let mut rng = Rng::new(31);
+        for round in 0..200u32 {
+            let mut requests = Requests::default();
+            for (pixel, sample) in requests.pixels.iter_mut().zip(&mut requests.samples) {
+                *pixel = PixelSeed(rng.bits() as u32);
+                *sample = rng.bits() as u32 >> (round % 32);
+            }
+            let (set, count) = (rng.bits() as u32, 1 + rng.bits() as usize % BATCH);
+            for kind in [SamplerKind::Sobol, SamplerKind::Independent] {
+                let sampler = Sampler::new(kind, 5);
+                let mut results = [(); 4].map(|()| Numbers::default());
+                let [first, others @ ..] = &mut results;
+                sampler.sample_4d_batch(&requests, count, set, first);
+                let mut others = others.iter_mut();
+                match kind {
+                    SamplerKind::Sobol => {
+                        with_each(|| SobolBatch { requests: &requests, count, set, numbers: others.next().unwrap() });
+                    }
+                    SamplerKind::Independent => {
+                        with_each(|| IndependentBatch { requests: &requests, count, set, numbers: others.next().unwrap() });
+                    }
+                }
+                let run = 4 - others.len();
+                for numbers in &results[..run] {
+                    for i in 0..count {
+                        assert_eq!(numbers.of(i), sampler.sample_4d(requests.pixels[i], requests.samples[i], set));
+                    }
+                }
+            }
+        }
+    }
+}
