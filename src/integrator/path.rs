@@ -3,6 +3,7 @@
 //! One round lengthens every living path by a segment: trace, shade (emission, choice of a light, choice of a direction), trace shadow
 //! rays, drop dead paths. Each path draws its numbers from its own (pixel, sample, bounce), so a path is the same in any batch.
 
+mod escapes;
 mod lanes;
 mod side_by_side;
 
@@ -15,10 +16,11 @@ use crate::accel::Coherence;
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::{Light, Receiver};
+use crate::light::{InfinityEval, Light, Receiver};
 use crate::math::{DVec3, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
 use crate::sampling::{BATCH, Numbers, PixelSeed, Requests, Sampler, power_heuristic};
+use escapes::Escapes;
 use side_by_side::Shaded;
 
 /// Path tracing.
@@ -80,6 +82,7 @@ struct Scratch {
     /// Beside `paths`, in pictures of scenes with filtered textures; else empty.
     cones: Vec<RayCone>,
     draws: Draws,
+    escapes: Escapes,
     shaded: Shaded,
 }
 
@@ -224,6 +227,7 @@ impl PathIntegrator {
             if !is_last {
                 scratch.draws.draw(&self.sampler, &scratch.paths[first..last], bounce, !world.scene.lights.is_empty());
             }
+            scratch.escapes.look(world, self.strategy.found_by(), &scratch.rays[first..last], &scratch.hits[first..last]);
             scratch.shaded.clear();
             if side_by_side {
                 self.shade_side_by_side(world, bounce, first..last, out, scratch);
@@ -251,13 +255,14 @@ impl PathIntegrator {
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, .. } = scratch;
         let (path, ray) = (&paths[i], &rays[i]);
         let sample = &mut out[path.slot as usize];
         let found = world.resolve(ray, hits[i]);
         let Some(at) = &found else {
             if bounce > 0 || !self.hide_emitters {
-                sample.radiance += self.clamped(path.throughput * self.escaped(world, path, ray.direction), bounce);
+                sample.radiance +=
+                    self.clamped(path.throughput * self.escaped(world, path, ray.direction, escapes.of(i - first, hits[i])), bounce);
             }
             return;
         };
@@ -325,14 +330,14 @@ impl PathIntegrator {
         }
     }
 
-    /// Light from infinity along `direction`.
-    fn escaped(&self, world: &World, path: &Path, direction: Vec3) -> Rgb {
+    /// Light from infinity along `direction`; `known` if it has been looked up already.
+    fn escaped(&self, world: &World, path: &Path, direction: Vec3, known: Option<InfinityEval>) -> Rgb {
         let mut radiance = Rgb::BLACK;
+        let found_by = self.strategy.found_by();
         for &id in world.scene.lights.at_infinity() {
-            let found = world.scene.lights.get(id).eval_at_infinity(direction, self.strategy.found_by());
+            let found = known.unwrap_or_else(|| world.scene.lights.get(id).eval_at_infinity(direction, found_by));
             if !found.radiance.is_black() {
-                radiance += found.radiance
-                    * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from, self.strategy.found_by()));
+                radiance += found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from, found_by));
             }
         }
         radiance
@@ -415,4 +420,3 @@ struct ShadowRay {
     ray: Ray,
     contribution: Rgb,
 }
-

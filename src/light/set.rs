@@ -1,7 +1,7 @@
 //! All lights of a scene, and which one a path looks at.
 
 use super::tree::{LightTree, Receiver};
-use super::{FoundBy, Light};
+use super::{Environment, EnvironmentMap, FoundBy, Light};
 use crate::geometry::Geometry;
 use crate::id::LightId;
 use crate::math::float::ONE_MINUS_EPSILON;
@@ -160,6 +160,18 @@ impl LightSet {
             None => by_power,
             Some(_) if self.get(id).is_at_infinity() => by_power * (1.0 - choosing.tree_share),
             Some(tree) => tree.pmf(from, id.0) * choosing.tree_share,
+        }
+    }
+
+    /// The image around the scene, if it is all that rays leaving the scene can see.
+    #[inline]
+    pub fn image_at_infinity(&self) -> Option<(LightId, &EnvironmentMap)> {
+        match self.at_infinity[..] {
+            [id] => match self.get(id) {
+                Light::Environment(Environment::Map(map)) => Some((id, map)),
+                _ => None,
+            },
+            _ => None,
         }
     }
 

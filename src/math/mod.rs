@@ -22,4 +22,4 @@ pub use random::Rng;
 pub use ray::{Ray, RayF64};
 pub use roots::{Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, quadratic_roots, solve_quadratic};
 pub use transform::Transform;
-pub use trig::{sin_cos_eighth, sin_cos_turns};
+pub use trig::{angle_of, sin_cos_eighth, sin_cos_turns};

@@ -1,6 +1,6 @@
 //! Sine and cosine without range reduction by pi: directions are drawn as fractions of a turn.
 
-use std::f32::consts::FRAC_PI_2;
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Sine and cosine of `x` radians, `|x| <= pi / 4`; at most 1.2e-7 from the exact values (coefficients of Moshier's Cephes library).
 #[inline(always)]
@@ -27,6 +27,25 @@ pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
     (negate(sin, quadrant & 2), negate(cos, quadrant.wrapping_add(1) & 2))
 }
 
+/// The angle of the point (x, y), within `[-pi, pi]`; at most 3e-7 from the exact one, and 0 or pi at the origin (coefficients of Moshier's
+/// Cephes library). Without branches, for loops over many numbers.
+#[inline(always)]
+pub fn angle_of(y: f32, x: f32) -> f32 {
+    const TAN_EIGHTH: f32 = 0.414_213_57;
+    let (width, height) = (x.abs(), y.abs());
+    let is_steep = height > width;
+    let (small, large) = if is_steep { (width, height) } else { (height, width) };
+    // Beyond pi / 8 the rest of the angle to pi / 4 is found instead.
+    let is_wide = small > TAN_EIGHTH * large;
+    let (above, below) = if is_wide { (small - large, small + large) } else { (small, large) };
+    let q = if below > 0.0 { above / below } else { 0.0 };
+    let z = q * q;
+    let polynomial = ((8.053_744_5e-2 * z - 0.138_776_85) * z + 0.199_777_1) * z - 0.333_329_5;
+    let angle = q + q * z * polynomial + if is_wide { FRAC_PI_4 } else { 0.0 };
+    let angle = if is_steep { FRAC_PI_2 - angle } else { angle };
+    (if x.is_sign_negative() { PI - angle } else { angle }).copysign(y)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -42,6 +61,23 @@ mod tests {
             worst = worst.max((f64::from(sin) - exact_sin).abs()).max((f64::from(cos) - exact_cos).abs());
         }
         assert!(worst < 1.2e-7, "{worst}");
+    }
+
+    #[test]
+    fn angles_are_those_of_the_library() {
+        let mut worst = 0.0f64;
+        for i in 0..200_000 {
+            let (sin, cos) = (f64::from(i) * TAU / 200_000.0 - TAU / 2.0).sin_cos();
+            for scale in [1e-30, 1.0, 1e30] {
+                let (x, y) = ((cos * scale) as f32, (sin * scale) as f32);
+                worst = worst.max((f64::from(angle_of(y, x)) - f64::from(y).atan2(f64::from(x))).abs());
+            }
+        }
+        assert!(worst < 3e-7, "{worst}");
+        let axes = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.0, -1.0), (0.0, 0.0), (0.0, -0.0), (1.0, 1e-40), (1e-40, 1.0)];
+        for (y, x) in axes {
+            assert!((angle_of(y, x) - f32::atan2(y, x)).abs() < 3e-7, "{y} {x}: {}", angle_of(y, x));
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::geometry::{Hit, Mesh, Shape};
 use crate::integrator::shading::turned_normal;
 use crate::integrator::vertex::Vertex;
 use crate::integrator::{Strategy, SurfaceNeeds, World, surface_sample};
+use crate::light::LightSample;
 use crate::material::Material;
 use crate::math::Ray;
 use crate::sampling::BATCH;
@@ -27,11 +28,47 @@ pub(super) struct Shaded {
     vertex_of: [u8; BATCH],
     /// Vertices on diffuse surfaces of which more is to be found out.
     others: Vec<u8>,
+    sky: SkySamples,
+}
+
+/// Lanes that look at an image around the scene.
+struct SkySamples {
+    lanes: Vec<u8>,
+    pmfs: Vec<f32>,
+    us: Vec<[f32; 2]>,
+    samples: [Option<LightSample>; BATCH],
+}
+
+impl Default for SkySamples {
+    fn default() -> Self {
+        Self { lanes: Vec::with_capacity(BATCH), pmfs: Vec::with_capacity(BATCH), us: Vec::with_capacity(BATCH), samples: [None; BATCH] }
+    }
+}
+
+impl SkySamples {
+    fn clear(&mut self) {
+        self.lanes.clear();
+        self.pmfs.clear();
+        self.us.clear();
+    }
+
+    #[inline(always)]
+    fn push(&mut self, lane: usize, pmf: f32, u: [f32; 2]) {
+        self.lanes.push(lane as u8);
+        self.pmfs.push(pmf);
+        self.us.push(u);
+    }
 }
 
 impl Default for Shaded {
     fn default() -> Self {
-        Self { lanes: Box::default(), lane_of: [ALONE; BATCH], vertex_of: [0; BATCH], others: Vec::with_capacity(BATCH) }
+        Self {
+            lanes: Box::default(),
+            lane_of: [ALONE; BATCH],
+            vertex_of: [0; BATCH],
+            others: Vec::with_capacity(BATCH),
+            sky: SkySamples::default(),
+        }
     }
 }
 
@@ -76,34 +113,57 @@ impl PathIntegrator {
         self.find_diffuse(world, bounce, batch.clone(), scratch);
         scratch.shaded.lanes.place(smooth);
         self.settle(world, bounce, batch, out, scratch);
-        let Scratch { shaded: Shaded { lanes, vertex_of, lane_of, .. }, draws, .. } = scratch;
+        let Scratch { shaded: Shaded { lanes, vertex_of, .. }, draws, .. } = scratch;
         if lanes.count() == 0 {
             return;
         }
         lanes.face(smooth, turned_normal);
 
+        for (lane, &vertex) in vertex_of[..lanes.count()].iter().enumerate() {
+            let u = draws.bsdf.of(usize::from(vertex));
+            lanes.set_numbers(lane, [u[1], u[2], u[3]]);
+        }
+        if !world.scene.lights.is_empty() {
+            self.light_lanes(world, scratch);
+        }
+        let Scratch { shaded: Shaded { lanes, .. }, .. } = scratch;
+        lanes.scatter(if bounce + 1 >= self.rr_depth { Roulette::ByThroughput } else { Roulette::Not });
+    }
+
+    /// Lets vertices look at lights.
+    fn light_lanes(&self, world: &World, scratch: &mut Scratch) {
+        let Scratch { shaded: Shaded { lanes, vertex_of, lane_of, sky, .. }, draws, .. } = scratch;
         let lights = &world.scene.lights;
         let found_by = self.strategy.found_by();
+        let image = lights.image_at_infinity();
+        sky.clear();
         for (lane, &vertex) in vertex_of[..lanes.count()].iter().enumerate() {
             let vertex = usize::from(vertex);
-            let u = draws.bsdf.of(vertex);
-            lanes.set_numbers(lane, [u[1], u[2], u[3]]);
-            if lights.is_empty() || usize::from(lane_of[vertex]) != lane {
+            if usize::from(lane_of[vertex]) != lane {
                 continue;
             }
             let u = draws.light.of(vertex);
             let receiver = lanes.receiver(lane);
             let Some(choice) = lights.choose(&receiver, [u[0], u[3]], found_by) else { continue };
-            let sample =
-                lights.get(choice.id).sample(&world.scene.geometry, &world.scene.textures, receiver.p, [u[1], u[2]], found_by);
+            if image.is_some_and(|(id, _)| id == choice.id) {
+                sky.push(lane, choice.pmf, [u[1], u[2]]);
+                continue;
+            }
+            let sample = lights.get(choice.id).sample(&world.scene.geometry, &world.scene.textures, receiver.p, [u[1], u[2]], found_by);
             if let Some(sample) = &sample {
                 lanes.set_light(lane, sample, choice.pmf);
             }
         }
-        if !lights.is_empty() {
-            lanes.illuminate();
+        if let Some((_, image)) = image {
+            let count = sky.lanes.len();
+            image.sample_batch(&sky.us, found_by, &mut sky.samples[..count]);
+            for ((&lane, &pmf), sample) in sky.lanes.iter().zip(&sky.pmfs).zip(&sky.samples) {
+                if let Some(sample) = sample {
+                    lanes.set_light(usize::from(lane), sample, pmf);
+                }
+            }
         }
-        lanes.scatter(if bounce + 1 >= self.rr_depth { Roulette::ByThroughput } else { Roulette::Not });
+        lanes.illuminate();
     }
 
     /// Looks for vertices on diffuse surfaces: on triangles of which nothing but their place is to be found out, and others.

@@ -8,13 +8,15 @@
 //! Beside sampling the BSDF, which finds all directions about evenly, an image is sampled by how much brighter it is than its mean (Karlik
 //! et al., "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling"): nothing of an even sky.
 
+mod batch;
+
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 use super::{FoundBy, InfinityEval, LightSample, ShadowTarget, unit_circle};
 use crate::color::Rgb;
-use crate::math::{DMat3, Vec3};
+use crate::math::{DMat3, Vec3, angle_of};
 use crate::sampling::Piecewise2d;
 
 const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
@@ -44,11 +46,11 @@ impl Environment {
                 (Vec3::new(around.x, around.y, z).normalize(), *radiance, UNIFORM_SPHERE_PDF)
             }
             Self::Map(map) => {
-                let s = map.sample(u, found_by)?;
-                (s.wi, s.radiance, s.pdf)
+                let chosen = map.choose(map.density(found_by)?, u);
+                (chosen.wi, map.lookup(chosen.at), chosen.pdf)
             }
         };
-        Some(LightSample { wi, radiance, pdf, is_delta: false, target: ShadowTarget::Infinity })
+        Some(far_away(wi, radiance, pdf))
     }
 
     /// Radiance arriving along the unit direction `wi`, and the density of sampling it.
@@ -88,6 +90,12 @@ impl Environment {
         };
         PI * scene_radius * scene_radius * fluence
     }
+}
+
+/// Light from infinity.
+#[inline(always)]
+fn far_away(wi: Vec3, radiance: Rgb, pdf: f32) -> LightSample {
+    LightSample { wi, radiance, pdf, is_delta: false, target: ShadowTarget::Infinity }
 }
 
 /// Why an image cannot be an environment.
@@ -137,14 +145,16 @@ pub struct EnvironmentMap {
 /// A direction in the image: a cell of the density and where between its corners, linear in azimuth and polar angle.
 #[derive(Clone, Copy)]
 struct Location {
-    x: usize,
-    y: usize,
+    x: u32,
+    y: u32,
     within: [f32; 2],
 }
 
-struct MapSample {
+/// A direction that was chosen.
+#[derive(Clone, Copy)]
+struct Chosen {
     wi: Vec3,
-    radiance: Rgb,
+    at: Location,
     pdf: f32,
 }
 
@@ -220,34 +230,32 @@ impl EnvironmentMap {
 
     #[inline]
     fn lookup(&self, at: Location) -> Rgb {
-        let [a, b, c, d] = self.corners(at.x, at.y);
+        let [a, b, c, d] = self.corners(at.x as usize, at.y as usize);
         let [s, t] = at.within;
         (a * (1.0 - s) + b * s) * (1.0 - t) + (c * (1.0 - s) + d * s) * t
     }
 
     /// Where in the image the unit direction `wi` looks.
-    #[inline]
+    #[inline(always)]
     fn locate(&self, wi: Vec3) -> Location {
         let d = Vec3::new(self.axes[0].dot(wi), self.axes[1].dot(wi), self.axes[2].dot(wi));
-        let u = 0.5 + d.x.atan2(-d.z) / TAU;
-        self.place(u, d.x.hypot(d.z).atan2(d.y))
-    }
-
-    #[inline]
-    fn place(&self, u: f32, theta: f32) -> Location {
+        let u = 0.5 + angle_of(d.x, -d.z) * (1.0 / TAU);
+        let theta = angle_of((d.x * d.x + d.z * d.z).sqrt(), d.y);
         // Texel centres lie at half-integers; half a texel left of the first centre belongs to the last column.
-        let x = u * self.width as f32 - 0.5;
-        let x = if x < 0.0 { x + self.width as f32 } else { x };
-        let column = (x as usize).min(self.width - 1);
-        let y = theta * FRAC_1_PI * self.height as f32 + 0.5;
-        let row = (y as usize).min(self.height);
-        Location { x: column, y: row, within: [(x - column as f32).min(1.0), (y - row as f32).min(1.0)] }
+        let (width, height) = (self.width as i32, self.height as i32);
+        let x = u * width as f32 - 0.5;
+        let x = if x < 0.0 { x + width as f32 } else { x };
+        let column = (x as i32).min(width - 1);
+        let y = theta * FRAC_1_PI * height as f32 + 0.5;
+        let row = (y as i32).min(height);
+        Location { x: column as u32, y: row as u32, within: [(x - column as f32).min(1.0), (y - row as f32).min(1.0)] }
     }
 
     /// Density per solid angle, constant in each cell.
     #[inline]
     fn pdf(&self, at: Location, found_by: FoundBy) -> f32 {
-        self.density(found_by).map_or(0.0, |density| density.pmf(at.x, at.y) * self.inverse_solid_angle(at.y))
+        let (x, y) = (at.x as usize, at.y as usize);
+        self.density(found_by).map_or(0.0, |density| density.pmf(x, y) * self.inverse_solid_angle(y))
     }
 
     #[inline]
@@ -256,9 +264,10 @@ impl EnvironmentMap {
         self.width as f32 / (TAU * cap as f32)
     }
 
+    /// A direction chosen by a density.
     #[inline]
-    fn sample(&self, u: [f32; 2], found_by: FoundBy) -> Option<MapSample> {
-        let cell = self.density(found_by)?.sample_cell(u);
+    fn choose(&self, density: &Piecewise2d, u: [f32; 2]) -> Chosen {
+        let cell = density.sample_cell(u);
 
         // Uniform on the cell: in the cosine of the polar angle and in the azimuth.
         let (upper, lower) = (self.cosines[cell.y], self.cosines[cell.y + 1]);
@@ -271,10 +280,10 @@ impl EnvironmentMap {
         let [right, up, back] = self.axes;
         let wi = right * -around.y as f32 + up * cos as f32 + back * around.x as f32;
 
-        let theta = (sin as f32).atan2(cos as f32);
+        let theta = angle_of(sin as f32, cos as f32);
         let t = theta * FRAC_1_PI * self.height as f32 + 0.5 - cell.y as f32;
-        let radiance = self.lookup(Location { x: cell.x, y: cell.y, within: [cell.within[0], t.clamp(0.0, 1.0)] });
-        Some(MapSample { wi: wi.normalize(), radiance, pdf: cell.pmf * self.inverse_solid_angle(cell.y) })
+        let at = Location { x: cell.x as u32, y: cell.y as u32, within: [cell.within[0], t.clamp(0.0, 1.0)] };
+        Chosen { wi: wi.normalize(), at, pdf: cell.pmf * self.inverse_solid_angle(cell.y) }
     }
 }
 

@@ -54,7 +54,7 @@ fn the_density_is_finite_at_the_poles_and_at_texel_corners() {
         }
     }
     for u in [[0.0, 0.0], [0.0, 0.999_999_94], [0.999_999_94, 0.0], [0.999_999_94; 2]] {
-        let s = map.sample(u, FoundBy::Lights).unwrap();
+        let s = map.choose(map.density(FoundBy::Lights).unwrap(), u);
         assert!(s.wi.is_finite() && s.pdf.is_finite() && s.pdf > 0.0);
     }
 }
@@ -173,5 +173,24 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
     for sky in even {
         assert!(sky.sample([0.3, 0.6], FoundBy::Both).is_none() && sky.eval(Vec3::X, FoundBy::Both).pdf == 0.0);
         assert!(sky.sampled_power(1.0, FoundBy::Both) == 0.0 && sky.power(1.0) > 0.0);
+    }
+}
+
+#[test]
+fn many_directions_at_once_are_each_of_them() {
+    let mut rng = Rng::new(77);
+    let map = map(37, 19, |x, y| if y < 3 { 0.0 } else { ((x * 7 + y * 3) % 11) as f32 });
+    let directions: Vec<_> = (0..1000).map(|_| rng.cube().as_vec3().normalize()).collect();
+    let us: Vec<_> = (0..1000).map(|_| rng.pair()).collect();
+    for found_by in [FoundBy::Lights, FoundBy::Both] {
+        let (mut evals, mut samples) = (vec![InfinityEval::default(); 1000], vec![None; 1000]);
+        map.eval_batch(&directions, found_by, &mut evals);
+        map.sample_batch(&us, found_by, &mut samples);
+        let sky = environment(map.clone());
+        for i in 0..1000 {
+            assert_eq!(evals[i], sky.eval(directions[i], found_by));
+            let (one, many) = (sky.sample(us[i], found_by).unwrap(), samples[i].unwrap());
+            assert!(one.wi == many.wi && one.radiance == many.radiance && one.pdf == many.pdf);
+        }
     }
 }
