@@ -11,7 +11,9 @@ mod node;
 mod tests;
 
 use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::vectorize::{Kernel, vectorize};
 use crate::math::{DVec3, Vec3};
+use arrayvec::ArrayVec;
 use node::{Node, WIDTH};
 
 /// No node.
@@ -59,81 +61,50 @@ pub(super) struct LightTree {
 }
 
 /// The root and near nodes below it, with the importance of those children that are not in the cut themselves.
+#[derive(Default)]
 struct Cut {
-    nodes: [u32; MAX_OPEN],
-    importances: [[f32; WIDTH]; MAX_OPEN],
-    sums: [f32; MAX_OPEN],
-    count: usize,
+    nodes: ArrayVec<u32, MAX_OPEN>,
+    importances: ArrayVec<[f32; WIDTH], MAX_OPEN>,
+    sums: ArrayVec<f32, MAX_OPEN>,
     total: f32,
 }
 
 impl LightTree {
-    /// The cut for a point; `None` where nothing arrives.
-    #[inline]
-    fn cut(&self, p: Vec3, n: Vec3) -> Option<Cut> {
-        let mut cut = Cut { nodes: [0; MAX_OPEN], importances: [[0.0; WIDTH]; MAX_OPEN], sums: [0.0; MAX_OPEN], count: 1, total: 0.0 };
+    /// Finds the cut for a point, in an empty one; false where nothing arrives.
+    #[inline(always)]
+    fn find_cut(&self, p: Vec3, n: Vec3, cut: &mut Cut) -> bool {
+        cut.nodes.push(0);
         let mut i = 0;
-        while i < cut.count {
+        while i < cut.nodes.len() {
             let node = &self.nodes[cut.nodes[i] as usize];
             let mut found = node.importances(p, n);
             while found.near != 0 {
                 let slot = found.near.trailing_zeros() as usize;
                 found.near &= found.near - 1;
                 let child = node.child(slot);
-                if child & LEAF == 0 && found.of[slot] > 0.0 && cut.count < MAX_OPEN {
+                if child & LEAF == 0 && found.of[slot] > 0.0 && cut.nodes.len() < MAX_OPEN {
                     found.of[slot] = 0.0;
-                    cut.nodes[cut.count] = child;
-                    cut.count += 1;
+                    cut.nodes.push(child);
                 }
             }
-            cut.importances[i] = found.of;
-            cut.sums[i] = found.of.iter().sum();
-            cut.total += cut.sums[i];
+            let sum = found.of.iter().sum();
+            cut.importances.push(found.of);
+            cut.sums.push(sum);
+            cut.total += sum;
             i += 1;
         }
-        (cut.total > 0.0 && cut.total < f32::INFINITY).then_some(cut)
+        cut.total > 0.0 && cut.total < f32::INFINITY
     }
 
     /// A light, `u` in `[0, 1)`; `None` where nothing arrives.
     #[inline]
     pub fn choose(&self, from: &Receiver, u: f64) -> Option<TreeChoice> {
-        let (p, n) = (from.p.as_vec3(), from.n);
-        let cut = self.cut(p, n)?;
-        let open = pick(&cut.sums[..cut.count], u * f64::from(cut.total))?;
-        let importances = &cut.importances[open.index];
-        let mut picked = pick(importances, open.within)?;
-        let mut pmf = importances[picked.index] / cut.total;
-        let mut child = self.nodes[cut.nodes[open.index] as usize].child(picked.index);
-        while child & LEAF == 0 {
-            let node = &self.nodes[child as usize];
-            let importances = node.importances(p, n).of;
-            let total = total(&importances)?;
-            picked = pick(&importances, picked.share() * f64::from(total))?;
-            pmf *= importances[picked.index] / total;
-            child = node.child(picked.index);
-        }
-        Some(TreeChoice { light: child & !LEAF, pmf })
+        vectorize(Choose { tree: self, p: from.p.as_vec3(), n: from.n, u })
     }
 
     /// The probability with which [`choose`](Self::choose) finds a light.
     pub fn pmf(&self, from: &Receiver, light: u32) -> f32 {
-        let (p, n) = (from.p.as_vec3(), from.n);
-        let mut place = self.light_places[light as usize];
-        if place.node == NONE {
-            return 0.0;
-        }
-        let Some(cut) = self.cut(p, n) else { return 0.0 };
-        let mut pmf = 1.0;
-        // Up to the cut, which holds the root.
-        loop {
-            if let Some(open) = cut.nodes[..cut.count].iter().position(|&node| node == place.node) {
-                return pmf * cut.importances[open][place.slot as usize] / cut.total;
-            }
-            let importances = self.nodes[place.node as usize].importances(p, n).of;
-            let Some(total) = total(&importances) else { return 0.0 };
-            pmf *= importances[place.slot as usize] / total;
-            place = self.node_places[place.node as usize];
-        }
+        vectorize(Pmf { tree: self, p: from.p.as_vec3(), n: from.n, light })
     }
 
     /// Bytes of the tables.
@@ -143,8 +114,77 @@ impl LightTree {
     }
 }
 
+struct Choose<'a> {
+    tree: &'a LightTree,
+    p: Vec3,
+    n: Vec3,
+    u: f64,
+}
+
+impl Kernel for Choose<'_> {
+    type Output = Option<TreeChoice>;
+
+    #[inline(always)]
+    fn call(self) -> Option<TreeChoice> {
+        let Self { tree, p, n, u } = self;
+        let mut cut = Cut::default();
+        if !tree.find_cut(p, n, &mut cut) {
+            return None;
+        }
+        let open = pick(&cut.sums, u * f64::from(cut.total))?;
+        let importances = &cut.importances[open.index];
+        let mut picked = pick(importances, open.within)?;
+        let mut pmf = importances[picked.index] / cut.total;
+        let mut child = tree.nodes[cut.nodes[open.index] as usize].child(picked.index);
+        while child & LEAF == 0 {
+            let node = &tree.nodes[child as usize];
+            let importances = node.importances(p, n).of;
+            let total = total(&importances)?;
+            picked = pick(&importances, picked.share() * f64::from(total))?;
+            pmf *= importances[picked.index] / total;
+            child = node.child(picked.index);
+        }
+        Some(TreeChoice { light: child & !LEAF, pmf })
+    }
+}
+
+struct Pmf<'a> {
+    tree: &'a LightTree,
+    p: Vec3,
+    n: Vec3,
+    light: u32,
+}
+
+impl Kernel for Pmf<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn call(self) -> f32 {
+        let Self { tree, p, n, light } = self;
+        let mut place = tree.light_places[light as usize];
+        if place.node == NONE {
+            return 0.0;
+        }
+        let mut cut = Cut::default();
+        if !tree.find_cut(p, n, &mut cut) {
+            return 0.0;
+        }
+        let mut pmf = 1.0;
+        // Up to the cut, which holds the root.
+        loop {
+            if let Some(open) = cut.nodes.iter().position(|&node| node == place.node) {
+                return pmf * cut.importances[open][place.slot as usize] / cut.total;
+            }
+            let importances = tree.nodes[place.node as usize].importances(p, n).of;
+            let Some(total) = total(&importances) else { return 0.0 };
+            pmf *= importances[place.slot as usize] / total;
+            place = tree.node_places[place.node as usize];
+        }
+    }
+}
+
 /// The sum if something can be chosen in proportion to it.
-#[inline]
+#[inline(always)]
 fn total(importances: &[f32; WIDTH]) -> Option<f32> {
     let total = importances.iter().sum();
     (total > 0.0 && total < f32::INFINITY).then_some(total)
@@ -161,14 +201,14 @@ struct Picked {
 
 impl Picked {
     /// How far into the entry, in `[0, 1)`.
-    #[inline]
+    #[inline(always)]
     fn share(&self) -> f64 {
         self.within / self.size
     }
 }
 
 /// The entry in which `x` falls if all are laid end to end; never an entry of zero. `None` if all are.
-#[inline]
+#[inline(always)]
 fn pick(entries: &[f32], x: f64) -> Option<Picked> {
     let mut lower = 0.0;
     let mut found = None;

@@ -2,7 +2,7 @@
 
 use super::NONE;
 use crate::light::bounds::LightBounds;
-use crate::math::{Vec3, Vec4};
+use crate::math::Vec3;
 
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
@@ -18,7 +18,7 @@ const LEAST_COSINE: f32 = 1e-3;
 const NEAR: f32 = 2.0;
 
 /// One number of each child.
-type Lanes = [Vec4; WIDTH / 4];
+type Lanes = [f32; WIDTH];
 
 /// Bounds of eight children, side by side.
 #[derive(Clone, Debug)]
@@ -47,87 +47,91 @@ pub(super) struct Importances {
 
 impl Node {
     pub const EMPTY: Self = Self {
-        center: [[Vec4::ZERO; WIDTH / 4]; 3],
-        radius: [Vec4::ZERO; WIDTH / 4],
-        axis: [[Vec4::ZERO; WIDTH / 4]; 3],
-        cos_spread: [Vec4::ONE; WIDTH / 4],
-        sin_spread: [Vec4::ZERO; WIDTH / 4],
-        cos_reach: [Vec4::ZERO; WIDTH / 4],
-        intensity: [Vec4::ZERO; WIDTH / 4],
+        center: [[0.0; WIDTH]; 3],
+        radius: [0.0; WIDTH],
+        axis: [[0.0; WIDTH]; 3],
+        cos_spread: [1.0; WIDTH],
+        sin_spread: [0.0; WIDTH],
+        cos_reach: [0.0; WIDTH],
+        intensity: [0.0; WIDTH],
         child: [NONE; WIDTH],
     };
 
     /// Sets a child.
     pub fn set(&mut self, slot: usize, bounds: &LightBounds, child: u32) {
-        let (half, lane) = (slot / 4, slot % 4);
         let center = bounds.bounds.center();
         let reach = (bounds.bounds.max - center).max(center - bounds.bounds.min);
         let axis = bounds.cone.axis;
         for k in 0..3 {
-            self.center[k][half][lane] = center[k];
-            self.axis[k][half][lane] = axis[k];
+            self.center[k][slot] = center[k];
+            self.axis[k][slot] = axis[k];
         }
         // Widened by the rounding of the centre and of points near it.
-        self.radius[half][lane] = reach.length() + 4.0 * f32::EPSILON * center.abs().max_element();
-        (self.sin_spread[half][lane], self.cos_spread[half][lane]) = bounds.cone.spread.sin_cos();
-        self.cos_reach[half][lane] = bounds.cone.reach.cos() - SLACK;
-        self.intensity[half][lane] = if bounds.two_sided { -bounds.intensity } else { bounds.intensity };
+        self.radius[slot] = reach.length() + 4.0 * f32::EPSILON * center.abs().max_element();
+        (self.sin_spread[slot], self.cos_spread[slot]) = bounds.cone.spread.sin_cos();
+        self.cos_reach[slot] = bounds.cone.reach.cos() - SLACK;
+        self.intensity[slot] = if bounds.two_sided { -bounds.intensity } else { bounds.intensity };
         self.child[slot] = child;
     }
 
     /// A node, or [`LEAF`](super::LEAF) and a light.
-    #[inline]
+    #[inline(always)]
     pub fn child(&self, slot: usize) -> u32 {
         self.child[slot]
     }
 
     /// What each child gives at `p` on a surface with the normal `n`, or (if that is zero) from any side.
-    #[inline]
+    #[inline(always)]
     pub fn importances(&self, p: Vec3, n: Vec3) -> Importances {
-        let mut out = Importances { of: [0.0; WIDTH], near: 0 };
-        for half in 0..WIDTH / 4 {
-            let (of, near) = self.half_importances(half, p, n);
-            out.of[4 * half..][..4].copy_from_slice(&of.to_array());
-            out.near |= near << (4 * half);
+        let (mut of, mut near) = ([0.0; WIDTH], [0; WIDTH]);
+        let from_any_side = n == Vec3::ZERO;
+        for i in 0..WIDTH {
+            (of[i], near[i]) = self.importance(i, p, n, from_any_side);
         }
-        out
+        Importances { of, near: (0..WIDTH).fold(0, |bits, i| bits | near[i] << i) }
     }
 
+    /// Of one child, without branches.
     #[inline(always)]
-    fn half_importances(&self, half: usize, p: Vec3, n: Vec3) -> (Vec4, u32) {
-        let [x, y, z] = [0, 1, 2].map(|k| self.center[k][half] - p[k]);
-        let (radius, intensity) = (self.radius[half], self.intensity[half]);
-        let distance_squared = (x * x + y * y + z * z).max(Vec4::splat(f32::MIN_POSITIVE));
-        let inverse_distance = sqrt(distance_squared).recip();
+    fn importance(&self, i: usize, p: Vec3, n: Vec3, from_any_side: bool) -> (f32, u32) {
+        let [x, y, z] = [self.center[0][i] - p.x, self.center[1][i] - p.y, self.center[2][i] - p.z];
+        let (radius, intensity) = (self.radius[i], self.intensity[i]);
+        let distance_squared = larger(x * x + y * y + z * z, f32::MIN_POSITIVE);
+        let inverse_distance = 1.0 / distance_squared.sqrt();
 
         // The sine of the angle that the child's bounding sphere fills; inside of it all angles do.
-        let sin_bound = (radius * inverse_distance).min(Vec4::ONE);
-        let cos_squared_bound = Vec4::ONE - sin_bound * sin_bound;
+        let sin_bound = smaller(radius * inverse_distance, 1.0);
+        let cos_squared_bound = 1.0 - sin_bound * sin_bound;
         // An upper limit of cos(angle - bound) without roots: the bound's cosine lies between its square and 1.
-        let widened = |cos: Vec4| (cos.max(cos * cos_squared_bound) + sin_bound).min(Vec4::ONE);
-        let kept = |cos: Vec4, limit: Vec4| Vec4::select(cos.cmplt(limit), Vec4::ZERO, cos.max(Vec4::splat(LEAST_COSINE)));
+        let widened = |cos: f32| smaller(larger(cos, cos * cos_squared_bound) + sin_bound, 1.0);
+        let kept = |cos: f32, limit: f32| if cos < limit { 0.0 } else { larger(cos, LEAST_COSINE) };
 
         // The angle between emission and the nearest normal.
-        let [ax, ay, az] = self.axis.map(|axis| axis[half]);
-        let cos_axis = (x * ax + y * ay + z * az) * -inverse_distance;
-        let cos_axis = Vec4::select(intensity.cmplt(Vec4::ZERO), cos_axis.abs(), cos_axis);
-        let sin_axis = sqrt((Vec4::ONE - cos_axis * cos_axis).max(Vec4::ZERO));
-        let cos_normal = cos_axis * self.cos_spread[half] + sin_axis * self.sin_spread[half];
-        let cos_normal = Vec4::select(cos_axis.cmpge(self.cos_spread[half]), Vec4::ONE, cos_normal);
-        let emission = kept(widened(cos_normal), self.cos_reach[half]);
+        let cos_axis = (x * self.axis[0][i] + y * self.axis[1][i] + z * self.axis[2][i]) * -inverse_distance;
+        let cos_axis = if intensity < 0.0 { cos_axis.abs() } else { cos_axis };
+        let sin_axis = larger(1.0 - cos_axis * cos_axis, 0.0).sqrt();
+        let cos_normal = cos_axis * self.cos_spread[i] + sin_axis * self.sin_spread[i];
+        let cos_normal = if cos_axis >= self.cos_spread[i] { 1.0 } else { cos_normal };
+        let emission = kept(widened(cos_normal), self.cos_reach[i]);
 
         // The angle between arrival and the receiver's normal.
-        let cos_arrival = if n == Vec3::ZERO { Vec4::ONE } else { (x * n.x + y * n.y + z * n.z) * inverse_distance };
-        let arrival = kept(widened(cos_arrival), Vec4::splat(-SLACK));
+        let cos_arrival = (x * n.x + y * n.y + z * n.z) * inverse_distance;
+        let arrival = kept(widened(if from_any_side { 1.0 } else { cos_arrival }), -SLACK);
 
         let radius_squared = radius * radius;
-        let near = distance_squared.cmplt(NEAR * radius_squared).bitmask();
-        (intensity.abs() * emission * arrival / distance_squared.max(0.5 * radius_squared), near)
+        let near = u32::from(distance_squared < NEAR * radius_squared);
+        (intensity.abs() * emission * arrival / larger(distance_squared, 0.5 * radius_squared), near)
     }
 }
 
-/// Written so that the compiler takes four roots at once.
+/// The larger number, without regard to NaN: one instruction.
 #[inline(always)]
-fn sqrt(v: Vec4) -> Vec4 {
-    Vec4::from_array(v.to_array().map(f32::sqrt))
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The smaller number, without regard to NaN.
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
