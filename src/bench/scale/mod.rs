@@ -69,3 +69,65 @@ fn in_a_process(mut program: Command, case: &Case, stop: &AtomicBool) -> Result<
     }
     serde_json::from_str(&said).map(Some).map_err(|e| failed(format!("no answer: {e}")))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::AccelKind;
+
+    struct Patient;
+
+    impl Watch for Patient {
+        fn step(&self, _: &str) {}
+        fn is_stopped(&self) -> bool {
+            false
+        }
+    }
+
+    fn options(sweep: &str) -> ScaleOptions {
+        ScaleOptions {
+            command: String::new(),
+            sweeps: vec![sweep.to_owned()],
+            quick: true,
+            repeats: 2,
+            size: [16; 2],
+            spp: 1,
+            threads: 1,
+            triangles: 1_000,
+            lights: 1,
+            instances: 1,
+            accel: AccelKind::EMBREE,
+        }
+    }
+
+    #[test]
+    fn a_case_that_fails_is_named_once_and_the_others_are_measured() {
+        let case = r#"{ "triangles": 1, "instances": 0, "lights": 1, "make_seconds": 1, "load_seconds": 1, "build_seconds": 1,
+            "first_pass_seconds": 1, "render_seconds": 2, "processor_seconds": 3, "samples": 1000, "rays": 5000, "mesh_bytes": 1,
+            "accelerator_bytes": 1, "film_bytes_per_pixel": 36, "memory": null }"#;
+        // In the place of the program: it fails with four segments.
+        let script = format!("if grep -q '\"depth\":4'; then echo no memory >&2; exit 33; fi; echo '{case}'");
+        let program = || {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", &script]);
+            shell
+        };
+        let report = bench_scale(&options("depth"), program, &Patient, &AtomicBool::new(false), |_| Ok(())).unwrap();
+        let failures = report.failures();
+        assert!(failures.len() == 1 && failures[0].starts_with("depth 4: ") && failures[0].ends_with("no memory"), "{failures:?}");
+        assert!(!report.interrupted && report.markdown().contains("Failed: depth 4"));
+        let runs: Vec<usize> = report.sweeps[0].points.iter().map(|point| point.runs.len()).collect();
+        assert_eq!(runs, [2, 2, 0, 2, 2, 2]);
+        assert!(report.sweeps[0].slopes.iter().all(|law| law.fit.slope.abs() < 1e-12 && law.fit.standard_error.is_some()));
+    }
+
+    #[test]
+    fn scenes_of_every_kind_render() {
+        for (sweep, _) in SWEEPS {
+            let (_, _, case) = plan::sweeps(&options(sweep)).unwrap()[0].cases[0].clone();
+            let run = run_case(&case).unwrap();
+            assert!(run.samples > 0 && run.rays >= run.samples && run.mesh_bytes > 0, "{sweep}: {run:?}");
+        }
+        assert!(plan::sweeps(&options("colour")).is_err());
+    }
+}

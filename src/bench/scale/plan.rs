@@ -110,6 +110,9 @@ pub const SWEEPS: [(&str, &str); 8] = [
 /// Triangles of the sphere that instances place.
 const INSTANCED: [usize; 2] = [2_000, 20_000];
 
+/// Width and height that the scene format allows.
+const LARGEST_SIDE: u32 = 1 << 16;
+
 /// Depth, where that is not what grows.
 const DEPTH: u32 = 8;
 
@@ -144,12 +147,12 @@ fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Swee
     let picture = format!("{width}x{height}, {} spp", options.spp);
     match name {
         "resolution" => {
-            let sizes = [1, 2, 4, 8, 16].map(|factor| [(width * factor).div_ceil(4), (height * factor).div_ceil(4)]);
+            let sizes = [1, 2, 4, 8, 16].map(|factor| options.size.map(|side| (side * factor).div_ceil(4).min(LARGEST_SIDE)));
             make(
                 format!("The room, {} spp", options.spp),
                 &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
                 &[Q::Render, Q::Sample, Q::Peak],
-                sizes.into_iter().map(|size| plain((size[0] * size[1]) as usize, Case { size, ..base.clone() })).collect(),
+                sizes.into_iter().map(|size| plain(size[0] as usize * size[1] as usize, Case { size, ..base.clone() })).collect(),
             )
         }
         "spp" => {
@@ -191,7 +194,7 @@ fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Swee
             [1, 2, 4, 8, 16, 32].into_iter().map(|depth| plain(depth as usize, Case { depth, ..base.clone() })).collect(),
         ),
         "layers" => {
-            let size = options.size.map(|side| 2 * side);
+            let size = options.size.map(|side| (2 * side).min(LARGEST_SIDE));
             let sets = [
                 ("color", 4, vec![]),
                 ("color, Z", 5, vec![LayerDesc::Z]),
