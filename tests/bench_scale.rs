@@ -77,6 +77,7 @@ fn every_sweep_has_its_costs_and_their_slopes() {
     assert_eq!(counted("instances", "triangles"), [2_000; 3]);
     assert_eq!(counted("lights", "lights"), [1, 10, 40]);
     assert_eq!(counted("resolution", "samples"), [64, 256, 1024, 4096, 16384]);
+    assert_eq!(counted("spp", "samples"), [64, 256, 1024, 4096]);
     // In a closed room a path of so many segments has a ray and a shadow ray for each but the last, nearly always.
     let rays: Vec<f64> = points("depth").iter().map(|p| value(p, "rays a sample")).collect();
     assert!(rays[0] == 1.0 && rays[5] > 45.0 && rays.windows(2).all(|pair| pair[0] < pair[1]), "{rays:?}");

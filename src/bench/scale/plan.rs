@@ -149,21 +149,22 @@ fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Swee
         "resolution" => {
             let sizes = [1, 2, 4, 8, 16].map(|factor| options.size.map(|side| (side * factor).div_ceil(4).min(LARGEST_SIDE)));
             make(
-                format!("The room, {} spp", options.spp),
+                "The room, 1 spp".to_owned(),
                 &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
                 &[Q::Render, Q::Sample, Q::Peak],
-                sizes.into_iter().map(|size| plain(size[0] as usize * size[1] as usize, Case { size, ..base.clone() })).collect(),
+                sizes.into_iter().map(|size| plain(size[0] as usize * size[1] as usize, Case { size, spp: 1, ..base.clone() })).collect(),
             )
         }
         "spp" => {
             let counts = [1, 4, 16, 64, 256].map(|spp| if options.quick { spp.min(64) } else { spp });
             let mut counts = counts.to_vec();
             counts.dedup();
+            let size = options.size.map(|side| side.div_ceil(4));
             make(
-                format!("The room, {width}x{height}"),
+                format!("The room, {}x{}", size[0], size[1]),
                 &[Q::Render, Q::Sample, Q::Rate, Q::Peak],
                 &[Q::Render, Q::Sample],
-                counts.into_iter().map(|spp| plain(spp as usize, Case { spp, ..base.clone() })).collect(),
+                counts.into_iter().map(|spp| plain(spp as usize, Case { size, spp, ..base.clone() })).collect(),
             )
         }
         "triangles" => make(
@@ -194,7 +195,6 @@ fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Swee
             [1, 2, 4, 8, 16, 32].into_iter().map(|depth| plain(depth as usize, Case { depth, ..base.clone() })).collect(),
         ),
         "layers" => {
-            let size = options.size.map(|side| (2 * side).min(LARGEST_SIDE));
             let sets = [
                 ("color", 4, vec![]),
                 ("color, Z", 5, vec![LayerDesc::Z]),
@@ -208,11 +208,11 @@ fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Swee
                 ),
             ];
             make(
-                format!("The room, {}x{}, {} spp; by channels", size[0], size[1], options.spp),
+                format!("The room, {picture}; by channels"),
                 &[Q::Sample, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
                 &[Q::Sample, Q::FilmPerPixel],
                 sets.into_iter()
-                    .map(|(name, channels, layers)| (f64::from(channels), Some(name.to_owned()), Case { size, layers, ..base.clone() }))
+                    .map(|(name, channels, layers)| (f64::from(channels), Some(name.to_owned()), Case { layers, ..base.clone() }))
                     .collect(),
             )
         }

@@ -161,6 +161,11 @@ impl ScaleReport {
         points.filter_map(|(sweep, point)| Some(format!("{} {}: {}", sweep.name, point.name(), point.failure.as_ref()?))).collect()
     }
 
+    /// The sweeps of which anything was measured.
+    fn measured(&self) -> impl Iterator<Item = &SweepReport> {
+        self.sweeps.iter().filter(|sweep| sweep.points.iter().any(|point| !point.runs.is_empty()))
+    }
+
     /// As JSON.
     ///
     /// # Errors
@@ -200,7 +205,7 @@ impl ScaleReport {
             let _ = writeln!(out, "- {note}");
         }
         markdown::add(&mut out, &self.laws());
-        for sweep in &self.sweeps {
+        for sweep in self.measured() {
             markdown::add(&mut out, &sweep.table());
         }
         out
@@ -218,7 +223,7 @@ impl ScaleReport {
         }
         out.push_str("</ul>\n");
         html::add_table(&mut out, &self.laws());
-        for sweep in &self.sweeps {
+        for sweep in self.measured() {
             let _ = writeln!(out, "<h2>{}</h2>", html::escape(sweep.name));
             let curves = sweep.curves();
             if !curves.is_empty() {

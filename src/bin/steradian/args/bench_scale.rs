@@ -16,7 +16,7 @@ most memory that the process held. The exponent of a power law is fitted to each
 
 pub const EXAMPLES: &str = "\
 Examples:
-  steradian bench scale --out scale              Everything: scale.html with plots, scale.md, scale.csv, scale.json; about 10 minutes of two cores, 6 GB
+  steradian bench scale --out scale              Everything: scale.html with plots, scale.md, scale.csv, scale.json; about 5 minutes of two cores, 3 GB
   steradian bench scale --quick                  Up to 1 million triangles: a minute or two
   steradian bench scale threads --repeat 5       One sweep
 
