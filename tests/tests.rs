@@ -11,6 +11,8 @@ mod bad_materials;
 mod bench_accel;
 /// Error against time from the command line.
 mod bench_error;
+/// Time and memory as scenes grow, from the command line.
+mod bench_scale;
 /// The catalogue of checks from the command line.
 mod bench_stability;
 /// What the cameras of the scene file see.

@@ -33,6 +33,12 @@ impl Machine {
             version: env!("CARGO_PKG_VERSION"),
         }
     }
+
+    /// In one line, with the version.
+    pub fn line(&self) -> String {
+        let load = self.load.map_or(String::new(), |load| format!(", load {load:.2} before"));
+        format!("{} ({}, {} threads{load}), steradian {}", self.processor, self.instruction_set, self.threads, self.version)
+    }
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -4,11 +4,17 @@ use std::f64::consts::{PI, TAU};
 
 use crate::geometry::{Geometry, Mesh, Shape};
 use crate::id::ShapeId;
+use crate::import::MeshData;
 use crate::math::DVec3;
 
 /// A sphere of radius about 1 with bumps of several sizes, of `triangles` triangles if that number is even and has a factor near its square
 /// root, else of about as many.
 pub fn bumpy_sphere(triangles: usize) -> Mesh {
+    checked(bumpy_sphere_data(triangles))
+}
+
+/// The buffers of a [`bumpy_sphere`].
+pub fn bumpy_sphere_data(triangles: usize) -> MeshData {
     radial(triangles, |direction| {
         let waves = [(3.0, 0.10), (7.0, 0.05), (17.0, 0.02), (41.0, 0.008), (97.0, 0.003)];
         let bump = |(frequency, height): (f64, f64)| {
@@ -26,7 +32,7 @@ pub fn sphere_geometry(triangles: usize) -> Geometry {
 
 /// A head with nose, chin, ears and eye sockets, looking along -y, about 2 high along z.
 pub fn head(triangles: usize) -> Mesh {
-    radial(triangles, |direction| {
+    checked(radial(triangles, |direction| {
         // Each feature is a bell around a direction: height, width, and where it is.
         let features = [
             (0.30, 0.16, DVec3::new(0.0, -1.0, -0.05)),
@@ -43,22 +49,23 @@ pub fn head(triangles: usize) -> Mesh {
         };
         let radius = 1.0 + features.into_iter().map(bell).sum::<f64>();
         direction * radius * DVec3::new(0.78, 0.9, 1.0)
-    })
+    }))
 }
 
 /// A sphere of latitude rings with every vertex moved from its unit direction by `place`.
-fn radial(triangles: usize, place: impl Fn(DVec3) -> DVec3) -> Mesh {
+fn radial(triangles: usize, place: impl Fn(DVec3) -> DVec3) -> MeshData {
     let [slices, bands] = slices_and_bands(triangles);
-    let mut positions = vec![place(DVec3::Z)];
+    let mut positions = Vec::with_capacity(slices * bands + 2);
+    let mut add = |direction: DVec3| positions.push(place(direction).as_vec3().to_array());
+    add(DVec3::Z);
     for ring in 1..=bands {
         let (sin_theta, cos_theta) = (PI * ring as f64 / (bands + 1) as f64).sin_cos();
-        positions.extend((0..slices).map(|slice| {
+        for slice in 0..slices {
             let (sin, cos) = (TAU * slice as f64 / slices as f64).sin_cos();
-            place(DVec3::new(sin_theta * cos, sin_theta * sin, cos_theta))
-        }));
+            add(DVec3::new(sin_theta * cos, sin_theta * sin, cos_theta));
+        }
     }
-    positions.push(place(-DVec3::Z));
-    let positions = positions.into_iter().map(|p| p.as_vec3().to_array()).collect();
+    add(-DVec3::Z);
 
     let (slices, bands) = (slices as u32, bands as u32);
     let last = 1 + bands * slices;
@@ -72,8 +79,13 @@ fn radial(triangles: usize, place: impl Fn(DVec3) -> DVec3) -> Mesh {
         }
     }
     corners.extend((0..slices).map(|slice| [at(bands, slice), last, at(bands, slice + 1)]));
-    // Formulas give finite positions, and the loops above name each of them.
-    Mesh::new(positions, corners, None, None).unwrap_or_else(|e| unreachable!("{e}"))
+    MeshData { positions, triangles: corners, ..MeshData::default() }
+}
+
+/// As a mesh.
+fn checked(data: MeshData) -> Mesh {
+    // Formulas give finite positions, and all corners name one of them.
+    Mesh::new(data.positions, data.triangles, None, None).unwrap_or_else(|e| unreachable!("{e}"))
 }
 
 /// Slices and bands with `2 * slices * bands` equal or near to `triangles`, the first no more than four times the second.

@@ -1,6 +1,7 @@
-//! Accelerators compared on the same rays: record, replay, check, report; error against time; and numerical stability.
+//! Accelerators compared on the same rays: record, replay, check, report; error against time; cost as scenes grow; and numerical stability.
 
 pub mod agreement;
+mod child;
 mod epo;
 pub mod error;
 mod machine;
@@ -10,6 +11,7 @@ mod naive;
 mod record;
 pub mod report;
 mod reports;
+pub mod scale;
 mod scaling;
 pub mod stability;
 
@@ -19,7 +21,7 @@ pub use mesh::{bumpy_sphere, head};
 pub use naive::{MatrixLinear, NaiveBvh, NaiveKdTree, NaiveOctree};
 pub use record::{RayKind, RaySet, record};
 pub use reports::{Comparison, ReportsOptions, ReportsReport, Row, bench_reports};
-pub use scaling::{ScalingPoint, ScalingReport, bench_scaling, fitted_slope};
+pub use scaling::{Fit, ScalingPoint, ScalingReport, bench_scaling, fit, fitted_slope};
 
 /// Is told what a benchmark is doing, and may end it.
 pub trait Watch: Sync {

@@ -105,15 +105,35 @@ pub fn bench_scaling(first: usize, last: usize, options: &Options, watch: &dyn W
     Ok(ScalingReport { points, slopes })
 }
 
-/// The slope of the straight line fitted to the logarithms of both coordinates by least squares; `None` for fewer than two points.
-pub fn fitted_slope(points: &[(f64, f64)]) -> Option<f64> {
+/// A straight line through the logarithms of both coordinates, by least squares.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Fit {
+    /// The exponent of the power law.
+    pub slope: f64,
+    /// Standard error of the slope, from what the points lie off the line; none for two points, which are always on it.
+    pub standard_error: Option<f64>,
+}
+
+/// Fits a power law; `None` for fewer than two points.
+pub fn fit(points: &[(f64, f64)]) -> Option<Fit> {
     let logs: Vec<_> = points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.ln(), y.ln())).collect();
     let n = logs.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / n;
     let (mx, my) = (mean(|p| p.0), mean(|p| p.1));
     let sxx: f64 = logs.iter().map(|p| (p.0 - mx).powi(2)).sum();
     let sxy: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
-    (logs.len() > 1 && sxx > 0.0).then(|| sxy / sxx)
+    if logs.len() < 2 || !(sxx > 0.0) {
+        return None;
+    }
+    let slope = sxy / sxx;
+    let off: f64 = logs.iter().map(|p| (p.1 - my - slope * (p.0 - mx)).powi(2)).sum();
+    let standard_error = (logs.len() > 2).then(|| (off / (n - 2.0) / sxx).sqrt());
+    Some(Fit { slope, standard_error })
+}
+
+/// The slope of [`fit`].
+pub fn fitted_slope(points: &[(f64, f64)]) -> Option<f64> {
+    fit(points).map(|fit| fit.slope)
 }
 
 #[cfg(test)]
@@ -125,5 +145,11 @@ mod tests {
         let points: Vec<_> = [1e3, 1e4, 1e5].iter().map(|x: &f64| (*x, 7.0 * x.powf(0.25))).collect();
         assert!((fitted_slope(&points).unwrap() - 0.25).abs() < 1e-12);
         assert!(fitted_slope(&points[..1]).is_none());
+        let exact = fit(&points).unwrap().standard_error.unwrap();
+        assert!(exact < 1e-12 && fit(&points[..2]).unwrap().standard_error.is_none());
+        // Three logarithms off a line by 1, -2 and 1 times ln 2: the sum of squares is 6 (ln 2)², that of x is 2 (ln 10)².
+        let off: Vec<_> = points.iter().zip([2.0, 0.25, 2.0]).map(|((x, y), factor)| (*x, y * factor)).collect();
+        let expected = 3f64.sqrt() * 2f64.ln() / 10f64.ln();
+        assert!((fit(&off).unwrap().standard_error.unwrap() - expected).abs() < 1e-12);
     }
 }

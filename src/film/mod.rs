@@ -10,7 +10,7 @@ mod tile;
 pub use filter::{Filter, FilterSample};
 pub use image::{Crop, Image, Layer};
 pub use layer::{LayerInfo, LayerKind, LayerSet};
-pub use tile::{DroppedSample, Film, FilmTile};
+pub use tile::{DroppedSample, Film, FilmTile, bytes_per_pixel};
 
 use crate::color::Rgb;
 use crate::math::Vec3;

@@ -368,12 +368,16 @@ impl Film {
     }
 }
 
-/// Asks for the film's memory in one piece first: many small requests would be granted long past what the machine has.
-fn check_memory(crop: &Crop, layers: LayerSet) -> Result<()> {
+/// Bytes that a film with these layers holds for each pixel; 40 more with a filter that has negative lobes.
+pub fn bytes_per_pixel(layers: LayerSet) -> usize {
     let beside = channels_beside(layers);
     let spread = if layers.contains(LayerKind::Variance) { size_of::<Spread>() } else { 0 };
-    let pixel = spread + size_of::<[f64; 4]>() + size_of::<u32>() * (1 + usize::from(beside > 0)) + size_of::<f64>() * beside;
-    let bytes = usize::try_from(u128::from(crop.area()) * pixel as u128).unwrap_or(usize::MAX);
+    spread + size_of::<[f64; 4]>() + size_of::<u32>() * (1 + usize::from(beside > 0)) + size_of::<f64>() * beside
+}
+
+/// Asks for the film's memory in one piece first: many small requests would be granted long past what the machine has.
+fn check_memory(crop: &Crop, layers: LayerSet) -> Result<()> {
+    let bytes = usize::try_from(u128::from(crop.area()) * bytes_per_pixel(layers) as u128).unwrap_or(usize::MAX);
     Vec::<u8>::new()
         .try_reserve_exact(bytes)
         .map_err(|_| Error::OutOfMemory(format!("a film of {}x{} pixels needs {} MiB", crop.width, crop.height, bytes >> 20)))

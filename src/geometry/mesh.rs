@@ -90,7 +90,7 @@ impl Mesh {
     /// If a number is not finite, an index out of range, an attribute's count wrong, or there is no triangle.
     pub fn new(
         mut positions: Vec<[f32; 3]>,
-        triangles: Vec<[u32; 3]>,
+        mut triangles: Vec<[u32; 3]>,
         normals: Option<Vec<[f32; 3]>>,
         uvs: Option<Vec<[f32; 2]>>,
     ) -> Result<Self, MeshError> {
@@ -124,6 +124,7 @@ impl Mesh {
         }
         positions.push([0.0; 3]);
         positions.shrink_to_fit();
+        triangles.shrink_to_fit();
         let mut mesh = Self {
             positions,
             triangles,

@@ -20,15 +20,12 @@ pub fn read_ply(path: &Path) -> Result<MeshData, AssetError> {
     parse_ply(BufReader::with_capacity(1 << 20, file))
 }
 
+/// Elements that are read at a time: as the parser has them, they take several times the memory that they end in.
+const AT_ONCE: usize = 1 << 14;
+
 fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
-    // The parser's messages run over several lines: what, the text in question, and the same again in other words.
-    let malformed = |e: &dyn std::fmt::Display| {
-        let text = e.to_string();
-        let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.chars().all(|c| c == '\'')).take(2).collect();
-        AssetError::Malformed(format!("not a valid PLY file: {}", lines.join(" ")))
-    };
     let mut reader = Reader::new(source);
-    let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(|e| malformed(&e))?;
+    let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(|e| malformed("", &e))?;
     let mut mesh = MeshData::default();
     for (name, element) in &header.elements {
         match name.as_str() {
@@ -36,20 +33,21 @@ fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
                 if let Some(axis) = ["x", "y", "z"].iter().find(|axis| !element.properties.contains_key(**axis)) {
                     return Err(AssetError::Malformed(format!("the vertices have no property {axis}")));
                 }
-                let vertices = read_elements::<Vertex>(&mut reader, element, &header).map_err(|e| malformed(&e))?;
-                take_vertices(&mut mesh, &vertices, element);
+                read_elements(&mut reader, element, &header, |_, vertices| take_vertices(&mut mesh, &vertices, element))?;
             }
             "face" => {
-                for (i, face) in read_elements::<Face>(&mut reader, element, &header).map_err(|e| malformed(&e))?.iter().enumerate() {
-                    if let Some(bad) = face.negative {
-                        return Err(AssetError::Malformed(format!("face {i} refers to vertex {bad}")));
+                let mut negative = None;
+                read_elements(&mut reader, element, &header, |first, faces: Vec<Face>| {
+                    for (i, face) in faces.iter().enumerate() {
+                        negative = negative.or(face.negative.map(|bad| (first + i, bad)));
+                        mesh.push_polygon(&face.corners);
                     }
-                    mesh.push_polygon(&face.corners);
+                })?;
+                if let Some((face, bad)) = negative {
+                    return Err(AssetError::Malformed(format!("face {face} refers to vertex {bad}")));
                 }
             }
-            _ => {
-                read_elements::<DefaultElement>(&mut reader, element, &header).map_err(|e| malformed(&e))?;
-            }
+            _ => read_elements(&mut reader, element, &header, |_, _: Vec<DefaultElement>| ())?,
         }
     }
     if mesh.positions.is_empty() {
@@ -61,25 +59,46 @@ fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
     Ok(mesh)
 }
 
+/// The parser's messages run over several lines: what, the text in question, and the same again in other words.
+fn malformed(place: &str, error: &dyn std::fmt::Display) -> AssetError {
+    let text = error.to_string();
+    let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.chars().all(|c| c == '\'')).take(2).collect();
+    AssetError::Malformed(format!("not a valid PLY file: {place}{}", lines.join(" ")))
+}
+
+/// Reads all elements of a kind; `take` gets them some at a time, with the number of those before.
 fn read_elements<E: PropertyAccess>(
     reader: &mut Reader<impl BufRead>,
     element: &ElementDef,
     header: &Header,
-) -> ply_rs_bw::parser::Result<Vec<E>> {
-    Parser::<E>::new().read_payload_for_element(reader, element, header)
+    mut take: impl FnMut(usize, Vec<E>),
+) -> Result<(), AssetError> {
+    let parser = Parser::<E>::new();
+    let mut some = element.clone();
+    let mut first = 0;
+    while first < element.count {
+        some.count = AT_ONCE.min(element.count - first);
+        let elements = parser.read_payload_for_element(reader, &some, header).map_err(|e| {
+            let place = if first > 0 { format!("after {first} of {} elements: ", element.count) } else { String::new() };
+            malformed(&place, &e)
+        })?;
+        take(first, elements);
+        first += some.count;
+    }
+    Ok(())
 }
 
 fn take_vertices(mesh: &mut MeshData, vertices: &[Vertex], element: &ElementDef) {
     let has = |names: &[&str]| names.iter().all(|name| element.properties.contains_key(*name));
-    mesh.positions = vertices.iter().map(|v| v.position).collect();
+    mesh.positions.extend(vertices.iter().map(|v| v.position));
     if has(&["nx", "ny", "nz"]) {
-        mesh.normals = Some(vertices.iter().map(|v| v.normal).collect());
+        mesh.normals.get_or_insert_default().extend(vertices.iter().map(|v| v.normal));
     }
     if has(&["u", "v"]) || has(&["s", "t"]) || has(&["texture_u", "texture_v"]) {
-        mesh.uvs = Some(vertices.iter().map(|v| v.uv).collect());
+        mesh.uvs.get_or_insert_default().extend(vertices.iter().map(|v| v.uv));
     }
     if has(&["red", "green", "blue"]) || has(&["r", "g", "b"]) {
-        mesh.colors = Some(vertices.iter().map(|v| v.color).collect());
+        mesh.colors.get_or_insert_default().extend(vertices.iter().map(|v| v.color));
     }
 }
 
@@ -255,6 +274,27 @@ mod tests {
             let error = parse_ply(text.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
             assert!(!error.contains('\n'), "{error}");
         }
+    }
+
+    #[test]
+    fn long_files_are_read_piece_by_piece() {
+        let count = 2 * AT_ONCE + 5;
+        let header = HEADER.replace("vertex 4", &format!("vertex {count}")).replace("face 1", &format!("face {count}"));
+        let vertices: String = (0..count).map(|i| format!("{i} 0 {} 0 1\n", i % 7)).collect();
+        let faces: String = (0..count).map(|i| format!("3 0 {i} {}\n", i / 2)).collect();
+        let text = format!("ply\nformat ascii 1.0\n{header}{vertices}{faces}");
+        let mesh = parse_ply(text.as_bytes()).unwrap();
+        assert_eq!((mesh.positions.len(), mesh.triangles.len(), mesh.uvs.map(|uvs| uvs.len())), (count, count, Some(count)));
+        for i in [0, AT_ONCE - 1, AT_ONCE, count - 1] {
+            assert_eq!((mesh.positions[i], mesh.triangles[i]), ([i as f32, 0.0, (i % 7) as f32], [0, i as u32, i as u32 / 2]));
+        }
+        let late = AT_ONCE + 2;
+        let error = |text: &str| parse_ply(text.as_bytes()).unwrap_err().to_string();
+        assert!(
+            error(&text.replace(&format!("3 0 {late} "), &format!("3 -1 {late} "))).contains(&format!("face {late} refers to vertex -1"))
+        );
+        assert!(error(&text[..text.len() - 20]).contains(&format!("after {} of {count} elements", 2 * AT_ONCE)));
+        assert!(error(&text.replace(&format!("\n{late} 0 "), &format!("\n{late} x "))).contains(&format!("Line {}", 12 + late)));
     }
 
     #[test]

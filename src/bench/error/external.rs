@@ -1,23 +1,15 @@
 //! Other renderers, started by a command.
 
-use std::fs::File;
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
 
 use serde_json::Value;
 
 use super::plan::{Budget, Measured};
+use crate::bench::child::{self, Ended};
 use crate::error::{Error, Result};
 use crate::output::read_exr;
-
-/// Characters of a failed command's messages that are shown.
-const TAIL: usize = 400;
-
-/// Between two looks at whether a command has ended: a hundredth of the shortest that is worth measuring.
-const PERIOD: Duration = Duration::from_millis(2);
 
 /// A command that renders the scene into an EXR file.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,28 +40,16 @@ impl External {
     pub(super) fn run(&self, budget: Budget, seed: u64, stop: &AtomicBool) -> Result<Option<Measured>> {
         let failed = |message: String| Error::Internal(format!("--external {}: {message}", self.name));
         let folder = tempfile::tempdir().map_err(|e| failed(format!("no folder for its files: {e}")))?;
-        let [out, said, complained] = ["out.exr", "stdout", "stderr"].map(|name| folder.path().join(name));
+        let out = folder.path().join("out.exr");
         let line = self.line(&out, budget, seed);
-        let create = |path: &Path| File::create(path).map_err(|e| failed(format!("{}: {e}", path.display())));
-        let start = Instant::now();
-        let mut child = Command::new("sh")
-            .args(["-c", &line])
-            // Of its own, so that all of it can be ended.
-            .process_group(0)
-            .stdin(Stdio::null())
-            .stdout(create(&said)?)
-            .stderr(create(&complained)?)
-            .spawn()
-            .map_err(|e| failed(format!("the shell cannot be started: {e}")))?;
-        let Some(status) = wait(&mut child, stop).map_err(|e| failed(e.to_string()))? else { return Ok(None) };
-        let process_seconds = start.elapsed().as_secs_f64();
+        let ended = child::run(Command::new("sh").args(["-c", &line]), None, stop).map_err(failed)?;
+        let Some(Ended { status, seconds: process_seconds, said, complained }) = ended else { return Ok(None) };
         if !status.success() || !out.exists() {
             let what = if status.success() { "it wrote no {out}".to_owned() } else { status.to_string() };
-            let text = std::fs::read(&complained).unwrap_or_default();
-            return Err(failed(format!("{what}; command: {line}; its messages end in: {}", tail(&String::from_utf8_lossy(&text)))));
+            return Err(failed(format!("{what}; command: {line}; its messages end in: {complained}")));
         }
         let image = read_exr(&out).map_err(|e| failed(e.to_string()))?;
-        let told = Told::in_text(&String::from_utf8_lossy(&std::fs::read(&said).unwrap_or_default()));
+        let told = Told::in_text(&said);
         let spp = told.spp.or(if let Budget::Spp(spp) = budget { Some(spp) } else { None });
         Ok(Some(Measured {
             seconds: told.seconds.unwrap_or(process_seconds),
@@ -91,31 +71,6 @@ impl External {
         };
         line.replace("{seed}", &seed.to_string()).replace("{scene}", &quote(&self.scene)).replace("{out}", &quote(out))
     }
-}
-
-/// Waits for the end; `None` if `stop` came first, after which nothing of the command runs.
-fn wait(child: &mut Child, stop: &AtomicBool) -> std::io::Result<Option<ExitStatus>> {
-    loop {
-        if let Some(status) = child.try_wait()? {
-            return Ok(Some(status));
-        }
-        if stop.load(Ordering::Relaxed) {
-            // It may have ended in between, which is as well.
-            let _ = Command::new("sh").args(["-c", &format!("kill -TERM -{}", child.id())]).stderr(Stdio::null()).status();
-            child.wait()?;
-            return Ok(None);
-        }
-        std::thread::sleep(PERIOD);
-    }
-}
-
-/// The end of a text, in one line.
-fn tail(text: &str) -> String {
-    let words: Vec<&str> = text.split_whitespace().collect();
-    let line = words.join(" ");
-    let skipped = line.chars().count().saturating_sub(TAIL);
-    let end: String = line.chars().skip(skipped).collect();
-    if end.is_empty() { "(nothing)".into() } else { end }
 }
 
 /// What a renderer says of itself on standard output, as JSON.
@@ -180,7 +135,6 @@ mod tests {
         let message = failure("true {spp} {out}");
         assert!(message.contains("it wrote no {out}") && message.ends_with("(nothing)"), "{message}");
         assert!(failure("echo nonsense {spp} > {out}").contains("out.exr"));
-        assert_eq!(tail(&"ab ".repeat(1000)).chars().count(), TAIL);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{ErrorReport, Point, TaxReport};
 use crate::bench::report::csv::field;
-use crate::bench::report::markdown::{self, Table};
+use crate::bench::report::markdown::{self, Table, number, range};
 use crate::bench::report::write_files;
 use crate::error::{Error, Result};
 
@@ -90,13 +90,8 @@ impl ErrorReport {
 
     /// Where and how it was measured.
     pub(super) fn header(&self) -> String {
-        let m = &self.machine;
-        let load = m.load.map_or(String::new(), |load| format!(", load {load:.2} before"));
         let cut = if self.interrupted { " Interrupted: what is missing was not measured." } else { "" };
-        format!(
-            "{} ({}, {} threads{load}), steradian {}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}",
-            m.processor, m.instruction_set, m.threads, m.version, self.command, self.repeats
-        )
+        format!("{}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}", self.machine.line(), self.command, self.repeats)
     }
 
     /// What the columns mean.
@@ -224,47 +219,4 @@ fn row(name: &str, point: &Point) -> Vec<String> {
         optional(point.mrays_per_second),
         optional(point.efficiency),
     ]
-}
-
-/// The middle, and the ends if they differ from it.
-fn range([median, low, high]: [f64; 3]) -> String {
-    let [median, low, high] = [median, low, high].map(number);
-    if low == high { median } else { format!("{median} ({low} to {high})") }
-}
-
-/// Three digits.
-pub(super) fn number(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 {
-        return "0".into();
-    }
-    if !(1e-4..1e6).contains(&size) {
-        return format!("{value:.2e}");
-    }
-    let digits = (2 - size.log10().floor() as i32).clamp(0, 6) as usize;
-    let text = format!("{value:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_three_digits() {
-        let cases = [
-            (0.0, "0"),
-            (256.0, "256"),
-            (1234.6, "1235"),
-            (0.012345, "0.0123"),
-            (0.5, "0.5"),
-            (-2.0, "-2"),
-            (3.2e-5, "3.20e-5"),
-            (9.999, "10"),
-        ];
-        for (value, text) in cases {
-            assert_eq!(number(value), text);
-        }
-        assert_eq!((range([1.0, 1.0, 1.0]), range([1.0, 0.5, 2.0])), ("1".to_owned(), "1 (0.5 to 2)".to_owned()));
-    }
 }

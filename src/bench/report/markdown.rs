@@ -32,12 +32,11 @@ pub fn write(report: &Report) -> String {
 
 /// Where and how it was measured.
 pub fn header(report: &Report) -> String {
-    let m = &report.machine;
-    let load = m.load.map_or(String::new(), |load| format!(", load {load:.2} before"));
     format!(
-        "{} ({}, {} threads{load}), steradian {}; `{}`. Rates are medians of interleaved rounds after a warm-up, in millions of rays per \
+        "{}; `{}`. Rates are medians of interleaved rounds after a warm-up, in millions of rays per \
          second; SAH cost: 1 a node, 1 a primitive; EPO: end-point overlap.",
-        m.processor, m.instruction_set, m.threads, m.version, report.command
+        report.machine.line(),
+        report.command
     )
 }
 
@@ -244,4 +243,47 @@ fn reports_table(comparison: &Comparison) -> Table {
     });
     let title = format!("{} triangles; times faster: the first line's time within the accelerator over this one's.", comparison.triangles);
     Table { title, heads: heads.map(str::to_owned).to_vec(), rows: rows.collect() }
+}
+
+/// The middle, and the ends if they differ from it.
+pub fn range([median, low, high]: [f64; 3]) -> String {
+    let [median, low, high] = [median, low, high].map(number);
+    if low == high { median } else { format!("{median} ({low} to {high})") }
+}
+
+/// Three digits.
+pub fn number(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        return "0".into();
+    }
+    if !(1e-4..1e6).contains(&size) {
+        return format!("{value:.2e}");
+    }
+    let digits = (2 - size.log10().floor() as i32).clamp(0, 6) as usize;
+    let text = format!("{value:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits() {
+        let cases = [
+            (0.0, "0"),
+            (256.0, "256"),
+            (1234.6, "1235"),
+            (0.012345, "0.0123"),
+            (0.5, "0.5"),
+            (-2.0, "-2"),
+            (3.2e-5, "3.20e-5"),
+            (9.999, "10"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+        }
+        assert_eq!((range([1.0, 1.0, 1.0]), range([1.0, 0.5, 2.0])), ("1".to_owned(), "1 (0.5 to 2)".to_owned()));
+    }
 }

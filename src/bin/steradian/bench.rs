@@ -22,6 +22,8 @@ pub fn run(command: &BenchCommand) -> Result<u8> {
         BenchCommand::Accel(arguments) => accel(arguments),
         BenchCommand::Error(arguments) => crate::bench_error::run(arguments),
         BenchCommand::Reports(arguments) => reports(arguments),
+        BenchCommand::Scale(arguments) => crate::bench_scale::run(arguments),
+        BenchCommand::ScaleCase => crate::bench_scale::run_one().map(|()| 0),
         BenchCommand::Stability(arguments) => stability(arguments),
     }
 }

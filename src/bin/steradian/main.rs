@@ -3,6 +3,7 @@
 mod args;
 mod bench;
 mod bench_error;
+mod bench_scale;
 mod compare;
 mod convert;
 mod info;

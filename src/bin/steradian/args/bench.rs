@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 use steradian::accel::AccelKind;
 
 use super::import::ImportArgs;
-use super::{accel_help, bench_error, parse_size};
+use super::{accel_help, bench_error, bench_scale, parse_size};
 
 const BENCH_REPORTS_ABOUT: &str = "\
 Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
@@ -42,6 +42,12 @@ pub enum BenchCommand {
     /// Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
     #[command(long_about = BENCH_REPORTS_ABOUT)]
     Reports(BenchReportsArgs),
+    /// Measure time and memory as pictures and scenes grow
+    #[command(long_about = bench_scale::ABOUT, after_help = bench_scale::EXAMPLES)]
+    Scale(bench_scale::BenchScaleArgs),
+    /// One case of `scale`, as JSON on standard input
+    #[command(hide = true, name = crate::bench_scale::ONE_CASE)]
+    ScaleCase,
     /// Check numerical stability: every check with its criterion and what was measured
     #[command(long_about = BENCH_STABILITY_ABOUT, after_help = BENCH_STABILITY_EXAMPLES)]
     Stability(BenchStabilityArgs),

@@ -2,6 +2,7 @@
 
 mod bench;
 mod bench_error;
+mod bench_scale;
 mod import;
 
 use std::path::PathBuf;
@@ -15,6 +16,7 @@ use steradian::render::Overrides;
 use crate::names;
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 pub use bench_error::BenchErrorArgs;
+pub use bench_scale::BenchScaleArgs;
 pub use import::{ConvertArgs, ImportArgs};
 
 const EXAMPLES: &str = "\

@@ -1,0 +1,92 @@
+//! Other processes that a benchmark starts.
+
+use std::fs::File;
+use std::io::Write;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Characters of a failed command's messages that are shown.
+const TAIL: usize = 400;
+
+/// Between two looks at whether a command has ended: a hundredth of the shortest that is worth measuring.
+const PERIOD: Duration = Duration::from_millis(2);
+
+/// A process that has ended by itself.
+pub struct Ended {
+    pub status: ExitStatus,
+    /// Seconds from its start to its end.
+    pub seconds: f64,
+    /// What it wrote to standard output.
+    pub said: String,
+    /// The end of what it wrote to standard error, in one line.
+    pub complained: String,
+}
+
+/// Runs a command, with a text on its standard input; `None` if `stop` came first, after which nothing of it runs.
+pub fn run(command: &mut Command, input: Option<&str>, stop: &AtomicBool) -> Result<Option<Ended>, String> {
+    let folder = tempfile::tempdir().map_err(|e| format!("no folder for its files: {e}"))?;
+    let [asked, said, complained] = ["stdin", "stdout", "stderr"].map(|name| folder.path().join(name));
+    let fault = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
+    let create = |path: &Path| File::create(path).map_err(|e| fault(path, e));
+    let stdin = match input {
+        None => Stdio::null(),
+        Some(text) => {
+            create(&asked)?.write_all(text.as_bytes()).map_err(|e| fault(&asked, e))?;
+            File::open(&asked).map_err(|e| fault(&asked, e))?.into()
+        }
+    };
+    let start = Instant::now();
+    let mut child = command
+        // Of its own, so that all of it can be ended.
+        .process_group(0)
+        .stdin(stdin)
+        .stdout(create(&said)?)
+        .stderr(create(&complained)?)
+        .spawn()
+        .map_err(|e| format!("it cannot be started: {e}"))?;
+    let Some(status) = wait(&mut child, stop).map_err(|e| e.to_string())? else { return Ok(None) };
+    let seconds = start.elapsed().as_secs_f64();
+    let text = |path: &Path| String::from_utf8_lossy(&std::fs::read(path).unwrap_or_default()).into_owned();
+    Ok(Some(Ended { status, seconds, said: text(&said), complained: tail(&text(&complained)) }))
+}
+
+/// Waits for the end; `None` if `stop` came first.
+fn wait(child: &mut Child, stop: &AtomicBool) -> std::io::Result<Option<ExitStatus>> {
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        if stop.load(Ordering::Relaxed) {
+            // It may have ended in between, which is as well.
+            let _ = Command::new("sh").args(["-c", &format!("kill -TERM -{}", child.id())]).stderr(Stdio::null()).status();
+            child.wait()?;
+            return Ok(None);
+        }
+        std::thread::sleep(PERIOD);
+    }
+}
+
+/// The end of a text, in one line.
+fn tail(text: &str) -> String {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let line = words.join(" ");
+    let skipped = line.chars().count().saturating_sub(TAIL);
+    let end: String = line.chars().skip(skipped).collect();
+    if end.is_empty() { "(nothing)".into() } else { end }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_reads_its_input_and_tells_how_it_ended() {
+        let ended = run(Command::new("sh").args(["-c", "cat; echo no >&2; exit 3"]), Some("a text"), &AtomicBool::new(false));
+        let ended = ended.unwrap().unwrap();
+        assert_eq!((ended.status.code(), ended.said.as_str(), ended.complained.as_str()), (Some(3), "a text", "no"));
+        assert_eq!(tail(&"ab ".repeat(1000)).chars().count(), TAIL);
+    }
+}
