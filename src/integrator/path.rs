@@ -17,9 +17,10 @@ use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::light::{InfinityEval, Light, Receiver};
+use crate::math::rows::BATCH;
 use crate::math::{DVec3, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
-use crate::sampling::{BATCH, Numbers, PixelSeed, Requests, Sampler, power_heuristic};
+use crate::sampling::{Numbers, PixelSeed, Requests, Sampler, power_heuristic};
 use escapes::Escapes;
 use side_by_side::Shaded;
 
@@ -255,10 +256,10 @@ impl PathIntegrator {
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, shaded, .. } = scratch;
         let (path, ray) = (&paths[i], &rays[i]);
         let sample = &mut out[path.slot as usize];
-        let found = world.resolve(ray, hits[i]);
+        let found = shaded.place(world, i - first, hits[i], ray);
         let Some(at) = &found else {
             if bounce > 0 || !self.hide_emitters {
                 sample.radiance +=

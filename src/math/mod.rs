@@ -9,6 +9,7 @@ mod motion;
 pub mod random;
 mod ray;
 mod roots;
+pub mod rows;
 mod transform;
 mod trig;
 pub mod vectorize;

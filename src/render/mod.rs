@@ -21,7 +21,8 @@ use crate::error::{Error, Result};
 use crate::film::{DroppedSample, Film, FilmTile, Filter, Image, LayerKind, PixelSample};
 use crate::integrator::{self, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
 use crate::math::Vec2;
-use crate::sampling::{BATCH, Numbers, Requests, Sampler};
+use crate::math::rows::BATCH;
+use crate::sampling::{Numbers, Requests, Sampler};
 use crate::scene::Scene;
 
 /// Width and height of a tile in pixels: a batch has 1,024 paths. Of a Cornell box, batches of 256 paths take 3 % longer.

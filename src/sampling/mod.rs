@@ -10,4 +10,4 @@ pub mod warp;
 pub use discrete::{AliasTable, DiscreteSample};
 pub use mis::power_heuristic;
 pub use piecewise::{Piecewise2d, PiecewiseCell, PiecewiseSample};
-pub use sampler::{BATCH, Numbers, PixelSeed, Requests, Sampler, SamplerKind};
+pub use sampler::{Numbers, PixelSeed, Requests, Sampler, SamplerKind};

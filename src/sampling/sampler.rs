@@ -10,7 +10,7 @@ mod batch;
 use crate::desc::SamplerKindDesc;
 use crate::math::random::mix;
 
-pub use batch::{BATCH, Numbers, Requests};
+pub use batch::{Numbers, Requests};
 
 /// How samples are chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

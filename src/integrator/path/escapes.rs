@@ -3,8 +3,8 @@
 use crate::geometry::Hit;
 use crate::integrator::World;
 use crate::light::{FoundBy, InfinityEval};
+use crate::math::rows::BATCH;
 use crate::math::{Ray, Vec3};
-use crate::sampling::BATCH;
 
 /// What the rays of a batch bring that have left the scene, if only an image is there.
 pub(super) struct Escapes {

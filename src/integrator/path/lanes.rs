@@ -1,62 +1,15 @@
 //! Vertices on diffuse surfaces, shaded side by side: a row of numbers for each quantity, and loops over rows that the compiler turns into
 //! vector code. They call the very functions that a vertex alone is shaded with, so the results are the same bit for bit.
 
-use crate::bsdf::Lambert;
+mod kernels;
+
 use crate::color::Rgb;
-use crate::geometry::{SpawnPoint, SurfaceInteraction, TrianglePoints, interpolated_normal};
-use crate::integrator::shading::faces;
-use crate::integrator::vertex::Sides;
+use crate::geometry::{Hit, SurfaceInteraction, TrianglePoints};
 use crate::light::{LightSample, Receiver, ShadowTarget};
-use crate::math::vectorize::{Kernel, vectorize};
-use crate::math::{DVec3, Frame, Ray, Vec3};
-use crate::sampling::{BATCH, power_heuristic};
-
-/// One number for each vertex.
-type Row<T = f32> = [T; BATCH];
-
-#[derive(Clone)]
-struct Vectors([Row; 3]);
-
-impl Vectors {
-    const ZERO: Self = Self([[0.0; BATCH]; 3]);
-
-    #[inline(always)]
-    fn get(&self, i: usize) -> Vec3 {
-        Vec3::new(self.0[0][i], self.0[1][i], self.0[2][i])
-    }
-
-    #[inline(always)]
-    fn set(&mut self, i: usize, v: Vec3) {
-        (self.0[0][i], self.0[1][i], self.0[2][i]) = (v.x, v.y, v.z);
-    }
-
-    #[inline(always)]
-    fn rgb(&self, i: usize) -> Rgb {
-        Rgb::new(self.0[0][i], self.0[1][i], self.0[2][i])
-    }
-
-    #[inline(always)]
-    fn set_rgb(&mut self, i: usize, v: Rgb) {
-        (self.0[0][i], self.0[1][i], self.0[2][i]) = (v.r, v.g, v.b);
-    }
-}
-
-#[derive(Clone)]
-struct Points([Row<f64>; 3]);
-
-impl Points {
-    const ZERO: Self = Self([[0.0; BATCH]; 3]);
-
-    #[inline(always)]
-    fn get(&self, i: usize) -> DVec3 {
-        DVec3::new(self.0[0][i], self.0[1][i], self.0[2][i])
-    }
-
-    #[inline(always)]
-    fn set(&mut self, i: usize, v: DVec3) {
-        (self.0[0][i], self.0[1][i], self.0[2][i]) = (v.x, v.y, v.z);
-    }
-}
+use crate::math::rows::{BATCH, Points, Row, Vectors};
+use crate::math::vectorize::vectorize;
+use crate::math::{Ray, Vec2, Vec3};
+use kernels::{Face, Illuminate, Place, Scatter};
 
 /// What has become of a ray that a loop was to find.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -237,9 +190,9 @@ impl Lanes {
         let lane = self.count;
         self.count += 1;
         self.rows.direction.set(lane, ray.direction);
-        self.rows.throughput.set_rgb(lane, throughput);
+        self.rows.throughput.set(lane, throughput.to_array().into());
         self.rows.eta_squared[lane] = eta_squared;
-        self.rows.albedo.set_rgb(lane, albedo);
+        self.rows.albedo.set(lane, albedo.to_array().into());
         (self.rows.light_at[lane], self.rows.shadow_found[lane]) = (NO_LIGHT, Found::NOTHING);
         lane
     }
@@ -288,6 +241,24 @@ impl Lanes {
         }
     }
 
+    /// The place that was found for `hit` of a ray at this time, without parameters.
+    pub fn interaction(&self, lane: usize, hit: &Hit, time: f32, smooth: bool) -> SurfaceInteraction {
+        let n_g = self.rows.n_g.get(lane);
+        SurfaceInteraction {
+            p: self.points.p.get(lane),
+            t: self.rows.t[lane],
+            error: self.rows.error[lane],
+            n_g,
+            n_s: if smooth { self.rows.n_s.get(lane) } else { n_g },
+            dp_du: Vec3::ZERO,
+            uv: Vec2::ZERO,
+            shape: hit.shape,
+            prim: hit.prim,
+            instance: hit.instance,
+            time,
+        }
+    }
+
     /// Whether a triangle is met at all.
     pub fn is_ahead(&self, lane: usize) -> bool {
         self.rows.is_ahead[lane] != 0
@@ -327,7 +298,7 @@ impl Lanes {
     pub fn set_light(&mut self, lane: usize, sample: &LightSample, pmf: f32) {
         self.rows.light_is_delta[lane] = u32::from(sample.is_delta);
         self.rows.light_direction.set(lane, sample.wi);
-        self.rows.light_radiance.set_rgb(lane, sample.radiance);
+        self.rows.light_radiance.set(lane, sample.radiance.to_array().into());
         self.rows.light_pdf[lane] = sample.pdf * pmf;
         match &sample.target {
             ShadowTarget::Point(target) => {
@@ -356,7 +327,7 @@ impl Lanes {
     /// What the shadow ray brings.
     #[inline(always)]
     pub fn contribution(&self, lane: usize) -> Rgb {
-        self.rows.contribution.rgb(lane)
+        rgb(&self.rows.contribution, lane)
     }
 
     /// Random numbers of a vertex: a direction (two) and roulette (one).
@@ -390,150 +361,11 @@ impl Lanes {
     /// The path's throughput after scattering.
     #[inline(always)]
     pub fn throughput(&self, lane: usize) -> Rgb {
-        self.rows.throughput.rgb(lane)
-    }
-}
-
-/// Where rays start from a vertex.
-#[inline(always)]
-fn start(rows: &Rows, points: &LongRows, i: usize) -> SpawnPoint {
-    SpawnPoint { p: points.p.get(i), n: rows.n_g.get(i), error: rows.error[i] }
-}
-
-struct Place<'a, const SMOOTH: bool>(&'a mut Lanes);
-
-impl<const SMOOTH: bool> Kernel for Place<'_, SMOOTH> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Lanes { count, rows, points } = self.0;
-        place::<SMOOTH>(rows, points, *count);
+        rgb(&self.rows.throughput, lane)
     }
 }
 
 #[inline(always)]
-fn place<const SMOOTH: bool>(rows: &mut Rows, points: &mut LongRows, count: usize) {
-    for i in 0..count.min(BATCH) {
-        let [a, b, c] = &rows.corners;
-        let place = TrianglePoints { a: a.get(i), b: b.get(i), c: c.get(i) }.place(rows.origin.get(i), rows.direction.get(i));
-        points.p.set(i, place.p);
-        rows.t[i] = place.t as f32;
-        rows.error[i] = place.error;
-        rows.is_ahead[i] = u32::from(place.is_ahead());
-        rows.n_g.set(i, place.n_g);
-        if SMOOTH {
-            let [a, b, c] = &rows.normals;
-            let weights = [rows.weights[0][i], rows.weights[1][i]];
-            let n_s = interpolated_normal([a.get(i), b.get(i), c.get(i)], weights, place.n_g).0;
-            rows.n_s.set(i, n_s);
-        }
-    }
-}
-
-struct Face<'a, const SMOOTH: bool>(&'a mut Lanes);
-
-impl<const SMOOTH: bool> Kernel for Face<'_, SMOOTH> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Lanes { count, rows, .. } = self.0;
-        face::<SMOOTH>(rows, *count);
-    }
-}
-
-#[inline(always)]
-fn face<const SMOOTH: bool>(rows: &mut Rows, count: usize) {
-    for i in 0..count.min(BATCH) {
-        let (back, n_g) = (-rows.direction.get(i), rows.n_g.get(i));
-        let n = if SMOOTH { rows.n_s.get(i) } else { n_g };
-        if SMOOTH {
-            rows.is_facing[i] = u32::from(faces(back, n, n_g));
-        }
-        rows.n.set(i, n);
-        rows.side[i] = 1f32.copysign(n.dot(back));
-    }
-}
-
-struct Illuminate<'a>(&'a mut Lanes);
-
-impl Kernel for Illuminate<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Lanes { count, rows, points } = self.0;
-        illuminate(rows, points, *count);
-    }
-}
-
-#[inline(always)]
-fn illuminate(rows: &mut Rows, points: &mut LongRows, count: usize) {
-    for i in 0..count.min(BATCH) {
-        let (back, n_g, direction) = (-rows.direction.get(i), rows.n_g.get(i), rows.light_direction.get(i));
-        let frame = Frame::from_normal(rows.n.get(i));
-        let (wo, wi) = (frame.to_local(back), frame.to_local(direction));
-        let sides = Sides::new([wo.z, wi.z], [back.dot(n_g), direction.dot(n_g)]);
-        let eval = Lambert { albedo: rows.albedo.rgb(i) }.eval(wo, wi);
-        let pdf = rows.light_pdf[i];
-        let weight = if rows.light_is_delta[i] != 0 { 1.0 } else { power_heuristic(pdf, eval.pdf) };
-        let contribution = rows.throughput.rgb(i) * eval.value * rows.light_radiance.rgb(i) * (weight / pdf);
-        rows.contribution.set_rgb(i, contribution);
-        let is_lit = rows.light_at[i] != NO_LIGHT;
-        rows.shadow_found[i] = Found::code(is_lit & sides.agree() & !contribution.is_black(), is_lit & sides.hidden());
-
-        let start = start(rows, points, i);
-        let target = SpawnPoint { p: points.target_p.get(i), n: rows.target_n.get(i), error: rows.target_error[i] };
-        let (near, far) = (start.ray_to(&target), start.ray_along(direction));
-        let is_near = rows.light_at[i] == AT_POINT;
-        let choose = |a: Vec3, b: Vec3| {
-            let choose = |a: f32, b: f32| if is_near { a } else { b };
-            Vec3::new(choose(a.x, b.x), choose(a.y, b.y), choose(a.z, b.z))
-        };
-        rows.shadow_origin.set(i, choose(near.origin, far.origin));
-        rows.shadow_direction.set(i, choose(near.direction, far.direction));
-        rows.shadow_end[i] = if is_near { near.t_max } else { far.t_max };
-    }
-}
-
-struct Scatter<'a, const ROULETTE: bool>(&'a mut Lanes);
-
-impl<const ROULETTE: bool> Kernel for Scatter<'_, ROULETTE> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Lanes { count, rows, points } = self.0;
-        scatter::<ROULETTE>(rows, points, *count);
-    }
-}
-
-#[inline(always)]
-fn scatter<const ROULETTE: bool>(rows: &mut Rows, points: &mut LongRows, count: usize) {
-    for i in 0..count.min(BATCH) {
-        let (back, n_g) = (-rows.direction.get(i), rows.n_g.get(i));
-        let frame = Frame::from_normal(rows.n.get(i));
-        let wo = frame.to_local(back);
-        let lambert = Lambert { albedo: rows.albedo.rgb(i) };
-        let sample = lambert.direction(wo, [rows.u[0][i], rows.u[1][i]]);
-        let direction = frame.to_world(sample.wi);
-        let sides = Sides::new([wo.z, sample.wi.z], [back.dot(n_g), direction.dot(n_g)]);
-
-        let mut throughput = rows.throughput.rgb(i) * lambert.albedo;
-        let mut goes_on = sample.is_valid;
-        if ROULETTE {
-            let survival = throughput.max_channel() * rows.eta_squared[i];
-            let plays = survival < 1.0;
-            goes_on &= !plays | (rows.u[2][i] < survival);
-            throughput *= if plays { 1.0 / survival } else { 1.0 };
-        }
-        goes_on &= !throughput.is_black();
-        rows.throughput.set_rgb(i, throughput);
-        rows.next_pdf[i] = sample.pdf;
-        let ray = start(rows, points, i).ray_along(direction);
-        rows.next_origin.set(i, ray.origin);
-        rows.next_direction.set(i, direction);
-        rows.next_found[i] = Found::code(goes_on & sides.agree(), goes_on & sides.hidden());
-    }
+fn rgb(row: &Vectors, lane: usize) -> Rgb {
+    Rgb::from(row.get(lane).to_array())
 }

@@ -5,15 +5,16 @@ use std::ops::Range;
 use super::lanes::{Found, Lanes, Roulette};
 use super::{Path, PathIntegrator, Pending, Scratch};
 use crate::bsdf::{Bsdf, Lambert};
+use crate::color::Rgb;
 use crate::film::PixelSample;
-use crate::geometry::{Hit, Mesh, Shape};
+use crate::geometry::{Hit, Mesh, Shape, SurfaceInteraction};
 use crate::integrator::shading::turned_normal;
 use crate::integrator::vertex::Vertex;
 use crate::integrator::{Strategy, SurfaceNeeds, World, surface_sample};
 use crate::light::LightSample;
 use crate::material::Material;
 use crate::math::Ray;
-use crate::sampling::BATCH;
+use crate::math::rows::BATCH;
 
 /// No lane.
 const ALONE: u8 = u8::MAX;
@@ -22,6 +23,10 @@ const _: () = assert!(BATCH < ALONE as usize);
 /// A batch of vertices, of which some are shaded side by side.
 pub(super) struct Shaded {
     lanes: Box<Lanes>,
+    /// Vertices that are shaded alone, of which the places are found side by side.
+    places: Box<Lanes>,
+    /// By vertex: its lane of `places`.
+    place_of: [u8; BATCH],
     /// By vertex.
     lane_of: [u8; BATCH],
     /// By lane.
@@ -64,6 +69,8 @@ impl Default for Shaded {
     fn default() -> Self {
         Self {
             lanes: Box::default(),
+            places: Box::default(),
+            place_of: [ALONE; BATCH],
             lane_of: [ALONE; BATCH],
             vertex_of: [0; BATCH],
             others: Vec::with_capacity(BATCH),
@@ -75,7 +82,8 @@ impl Default for Shaded {
 impl Shaded {
     pub fn clear(&mut self) {
         self.lanes.clear();
-        self.lane_of = [ALONE; BATCH];
+        self.places.clear();
+        (self.lane_of, self.place_of) = ([ALONE; BATCH], [ALONE; BATCH]);
         self.others.clear();
     }
 
@@ -84,6 +92,16 @@ impl Shaded {
     pub fn lane(&self, vertex: usize) -> Option<usize> {
         let lane = self.lane_of[vertex];
         (lane != ALONE).then_some(usize::from(lane))
+    }
+
+    /// What the ray of a vertex meets, if that has been found.
+    #[inline(always)]
+    pub fn place(&self, world: &World, vertex: usize, hit: Option<Hit>, ray: &Ray) -> Option<SurfaceInteraction> {
+        let lane = self.place_of[vertex];
+        if lane == ALONE || !self.places.is_ahead(usize::from(lane)) {
+            return world.resolve(ray, hit);
+        }
+        Some(self.places.interaction(usize::from(lane), hit.as_ref()?, ray.time, world.scene.features.shading_normals))
     }
 
     #[inline(always)]
@@ -112,6 +130,7 @@ impl PathIntegrator {
         let smooth = world.scene.features.shading_normals;
         self.find_diffuse(world, bounce, batch.clone(), scratch);
         scratch.shaded.lanes.place(smooth);
+        scratch.shaded.places.place(smooth);
         self.settle(world, bounce, batch, out, scratch);
         let Scratch { shaded: Shaded { lanes, vertex_of, .. }, draws, .. } = scratch;
         if lanes.count() == 0 {
@@ -176,19 +195,27 @@ impl PathIntegrator {
             let Some(hit) = &hits[i] else { continue };
             let surface = scene.surface(hit.shape);
             let material = &scene.materials[surface.material.index()];
-            match (material, still_mesh(world, hit)) {
-                (Material::Constant(Bsdf::Lambert(lambert)), Some(mesh)) if places_suffice && surface.first_light.is_none() => {
-                    let normals = if scene.features.shading_normals { Some(mesh.corner_normals(hit.prim, 0.0)) } else { None };
-                    // Without normals of its own, a triangle is flat.
-                    let smooth = normals.map(|normals| (normals.unwrap_or_default(), [hit.u, hit.v]));
-                    let Path { throughput, eta_squared, .. } = paths[i];
-                    let points = mesh.triangle_points(hit.prim);
-                    let lane = shaded.lanes.push_triangle(&rays[i], &points, smooth, throughput, eta_squared, lambert.albedo);
+            let triangle = if places_suffice { still_mesh(world, hit) } else { None };
+            let albedo = match material {
+                Material::Constant(Bsdf::Lambert(lambert)) if surface.first_light.is_none() => Some(lambert.albedo),
+                _ => None,
+            };
+            let others = match material {
+                Material::Constant(bsdf) => matches!(bsdf, Bsdf::Lambert(_)),
+                Material::Varying(varying) => varying.is_diffuse(),
+                Material::Mix { .. } | Material::TwoSided { .. } => false,
+            };
+            match (triangle, albedo) {
+                (Some(mesh), Some(albedo)) => {
+                    let lane = push_triangle(world, &mut shaded.lanes, mesh, hit, (&rays[i], &paths[i]), albedo);
                     shaded.assign(vertex, lane);
                 }
-                (Material::Constant(Bsdf::Lambert(_)), _) => shaded.others.push(vertex as u8),
-                (Material::Varying(varying), _) if varying.is_diffuse() => shaded.others.push(vertex as u8),
-                _ => {}
+                _ if others => shaded.others.push(vertex as u8),
+                (Some(mesh), None) => {
+                    let lane = push_triangle(world, &mut shaded.places, mesh, hit, (&rays[i], &paths[i]), Rgb::BLACK);
+                    shaded.place_of[vertex] = lane as u8;
+                }
+                (None, _) => {}
             }
         }
     }
@@ -280,6 +307,15 @@ impl PathIntegrator {
             *alive += 1;
         }
     }
+}
+
+/// A vertex where a ray meets a triangle of a mesh.
+#[inline(always)]
+fn push_triangle(world: &World, lanes: &mut Lanes, mesh: &Mesh, hit: &Hit, (ray, path): (&Ray, &Path), albedo: Rgb) -> usize {
+    let normals = if world.scene.features.shading_normals { Some(mesh.corner_normals(hit.prim, 0.0)) } else { None };
+    // Without normals of its own, a triangle is flat.
+    let smooth = normals.map(|normals| (normals.unwrap_or_default(), [hit.u, hit.v]));
+    lanes.push_triangle(ray, &mesh.triangle_points(hit.prim), smooth, path.throughput, path.eta_squared, albedo)
 }
 
 /// The mesh of a hit that neither moves nor stands elsewhere than its vertices say.

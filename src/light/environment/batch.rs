@@ -4,8 +4,8 @@
 use super::{Chosen, EnvironmentMap, Location, far_away};
 use crate::light::{FoundBy, InfinityEval, LightSample};
 use crate::math::Vec3;
+use crate::math::rows::BATCH;
 use crate::math::vectorize::{Kernel, vectorize};
-use crate::sampling::BATCH;
 
 const NOWHERE: Location = Location { x: 0, y: 0, within: [0.0; 2] };
 

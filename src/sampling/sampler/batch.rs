@@ -1,10 +1,8 @@
 //! Numbers for many samples at once, the same as for each of them alone.
 
 use super::{PixelSeed, SOBOL_COLUMNS, Sampler, SamplerKind, SobolSeeds, owen_scramble, pcg_4d, unit};
+use crate::math::rows::BATCH;
 use crate::math::vectorize::{Kernel, vectorize};
-
-/// Samples that are worked on side by side at most: their numbers stay in the nearest cache.
-pub const BATCH: usize = 128;
 
 /// Samples of pixels for which numbers are wanted.
 #[derive(Clone, Debug)]
@@ -130,6 +128,7 @@ fn reversed(n: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::math::Rng;
+    use crate::math::rows::BATCH;
     use crate::math::vectorize::with_each;
 
     #[test]
