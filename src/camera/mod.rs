@@ -1,9 +1,11 @@
 //! Cameras: perspective (pinhole or thin lens), orthographic, and the environment camera that sees every direction.
 
+mod batch;
 mod lens;
 #[cfg(test)]
 mod tests;
 
+pub use batch::FilmRows;
 pub use lens::{Blades, Lens, lens_equation};
 
 use std::f64::consts::{PI, TAU};
@@ -183,7 +185,7 @@ impl Camera {
     }
 
     /// The point of a picture at z = -1.
-    #[inline]
+    #[inline(always)]
     fn on_picture(&self, film: Vec2, size: [u32; 2], half_height: f64) -> DVec3 {
         let (width, height) = (f64::from(size[0]), f64::from(size[1]));
         let scale = 2.0 * half_height / height;

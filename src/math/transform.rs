@@ -62,7 +62,7 @@ impl Transform {
     }
 
     /// A vector from object to world.
-    #[inline]
+    #[inline(always)]
     pub fn vector(&self, v: DVec3) -> DVec3 {
         self.world_from_object.transform_vector3(v)
     }

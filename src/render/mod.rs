@@ -16,12 +16,13 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::accel::Accelerator;
+use crate::camera::FilmRows;
 use crate::desc::IntegratorDesc;
 use crate::error::{Error, Result};
 use crate::film::{DroppedSample, Film, FilmTile, Filter, Image, LayerKind, PixelSample};
 use crate::integrator::{self, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
-use crate::math::Vec2;
 use crate::math::rows::BATCH;
+use crate::math::{Ray, Vec2};
 use crate::sampling::{Numbers, Requests, Sampler};
 use crate::scene::Scene;
 
@@ -117,10 +118,14 @@ impl<'a> Job<'a> {
             }
             self.sampler.sample_4d_batch(&batch.requests, count, dimensions::CAMERA, &mut batch.numbers);
             for i in 0..count {
-                let (sample, weight) = self.camera_sample(i, batch);
-                batch.samples.push(sample);
-                batch.weights[start + i] = weight;
+                let u = batch.numbers.of(i);
+                let filter = self.filter.sample([u[0], u[1]]);
+                batch.weights[start + i] = filter.weight;
+                for (k, offset) in filter.offset.to_array().into_iter().enumerate() {
+                    batch.film.film[k][i] = batch.pixels[i][k] as f32 + 0.5 + offset;
+                }
             }
+            self.camera_rays(count, batch);
         }
         self.integrator.render_batch(&self.world, &batch.samples, &mut batch.out, counts);
     }
@@ -138,18 +143,25 @@ impl<'a> Job<'a> {
         count
     }
 
-    /// The camera sample for a request, and the filter's weight.
+    /// Adds the rays through the points of the film.
     #[inline]
-    fn camera_sample(&self, i: usize, batch: &Batch) -> (CameraSample, f32) {
-        let ([x, y], u) = (batch.pixels[i], batch.numbers.of(i));
-        let (seed, sample) = (batch.requests.pixels[i], batch.requests.samples[i]);
-        let filter = self.filter.sample([u[0], u[1]]);
-        let film = Vec2::new(x as f32 + 0.5 + filter.offset.x, y as f32 + 0.5 + filter.offset.y);
-        let camera = &self.world.scene.camera;
-        let moves = self.world.scene.features.motion;
-        let time = if moves { camera.time(self.sampler.sample_4d(seed, sample, dimensions::TIME)[0]) } else { 0.0 };
-        let ray = camera.ray(film, self.size, [u[2], u[3]], time);
-        (CameraSample { ray: self.world.approach(ray), seed, sample }, filter.weight)
+    fn camera_rays(&self, count: usize, batch: &mut Batch) {
+        let Batch { samples, film, requests, numbers, .. } = batch;
+        let (camera, moves) = (&self.world.scene.camera, self.world.scene.features.motion);
+        let sample = |i: usize, ray: Ray| CameraSample { ray, seed: requests.pixels[i], sample: requests.samples[i] };
+        let time = |i: usize| {
+            let u = || self.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0];
+            if moves { camera.time(u()) } else { 0.0 }
+        };
+        if let Some(origin) = camera.pinhole().filter(|&origin| self.world.far_gap(origin).is_none()) {
+            camera.pinhole_directions(self.size, film, count);
+            samples.extend((0..count).map(|i| sample(i, Ray { time: time(i), ..Ray::new(origin, film.direction.get(i)) })));
+        } else {
+            samples.extend((0..count).map(|i| {
+                let (u, at) = (numbers.of(i), Vec2::new(film.film[0][i], film.film[1][i]));
+                sample(i, self.world.approach(camera.ray(at, self.size, [u[2], u[3]], time(i))))
+            }));
+        }
     }
 
     /// Renders the samples `first .. first + count` of every pixel of a tile.
@@ -184,6 +196,7 @@ struct Batch {
     weights: Vec<f32>,
     out: Vec<PixelSample>,
     pixels: [[u32; 2]; BATCH],
+    film: FilmRows,
     requests: Requests,
     numbers: Numbers,
 }
@@ -196,6 +209,7 @@ impl Batch {
             weights: vec![1.0; count],
             out: vec![PixelSample::default(); count],
             pixels: [[0; 2]; BATCH],
+            film: FilmRows::default(),
             requests: Requests::default(),
             numbers: Numbers::default(),
         }
