@@ -59,7 +59,7 @@ pub(super) fn bounds(scene: &Scene) -> Aabb {
     })
 }
 
-/// Whether a ray that came along `from` crosses the surface by going on along `to`; as in [`Vertex::shadowing`](super::path::Vertex).
+/// Whether a ray that came along `from` crosses the surface by going on along `to`; as in [`Vertex::shadowing`](super::vertex::Vertex).
 pub(super) fn crosses(at: &SurfaceInteraction, from: Vec3, to: Vec3) -> bool {
     let reflects = to.dot(at.n_g) * (-from).dot(at.n_g) > 0.0;
     !reflects

@@ -6,10 +6,12 @@
 
 mod cones;
 mod debug;
+mod guided;
 mod media;
 mod path;
 mod shading;
 mod strategy;
+mod vertex;
 mod whitted;
 mod world;
 
@@ -20,9 +22,12 @@ pub use strategy::Strategy;
 pub use whitted::Whitted;
 pub use world::World;
 
+use std::sync::Arc;
+
 use crate::desc::IntegratorDesc;
 use crate::film::{PixelSample, SurfaceSample};
 use crate::geometry::SurfaceInteraction;
+use crate::guiding::Guide;
 use crate::math::{Ray, Vec3};
 use crate::sampling::{PixelSeed, Sampler};
 use crate::texture::Footprint;
@@ -102,9 +107,14 @@ pub trait Integrator: Send + Sync {
 
 /// The integrator with these parameters, drawing from `sampler`.
 pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Box<dyn Integrator> {
+    build_guided(desc, sampler, needs, None)
+}
+
+/// The same; a path tracer follows the guide, if there is one.
+pub fn build_guided(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds, guide: Option<Arc<Guide>>) -> Box<dyn Integrator> {
     let view = |view| Box::new(DebugView { view, needs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, hide_emitters } => Box::new(PathIntegrator {
+        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, hide_emitters, .. } => Box::new(PathIntegrator {
             max_depth,
             rr_depth,
             strategy: strategy.into(),
@@ -112,6 +122,7 @@ pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds) -> Bo
             hide_emitters,
             sampler,
             needs,
+            guide,
         }),
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
             Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, needs })

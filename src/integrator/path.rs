@@ -4,20 +4,21 @@
 //! rays, drop dead paths. Each path draws its numbers from its own (pixel, sample, bounce), so a path is the same in any batch.
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
+use super::guided::{Steering, Turns};
 use super::media::MediaState;
-use super::shading::{facing_normal, raised_start, terminator_factor};
+use super::vertex::Vertex;
 use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions, surface_sample};
 use crate::accel::Coherence;
-use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
+use crate::guiding::Guide;
 use crate::light::{Light, Receiver};
-use crate::math::{DVec3, Frame, Ray, RayCone, Vec3};
+use crate::math::{DVec3, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
 use crate::sampling::{PixelSeed, Sampler, power_heuristic};
-use crate::texture::Footprint;
 
 /// Path tracing.
 #[derive(Clone, Debug)]
@@ -36,6 +37,8 @@ pub struct PathIntegrator {
     pub sampler: Sampler,
     /// What the layers need.
     pub needs: SurfaceNeeds,
+    /// What is known of the light, if directions are chosen by it too.
+    pub guide: Option<Arc<Guide>>,
 }
 
 /// A path under way.
@@ -45,7 +48,8 @@ struct Path {
     throughput: Rgb,
     /// Density with which the last direction was chosen, or infinity if light sampling could not have found it.
     pdf: f32,
-    /// Product of the squared relative indices of refraction passed: roulette must not mistake their radiance scaling for absorption.
+    /// Product of the squared relative indices of refraction passed: roulette must not mistake their radiance scaling for absorption. The same holds
+    /// of densities that a guide has raised above those of the surfaces.
     eta_squared: f32,
     /// Its place in the batch.
     slot: u32,
@@ -75,6 +79,8 @@ struct Scratch {
     media: Vec<MediaState>,
     /// Beside `paths`, in pictures of scenes with filtered textures; else empty.
     cones: Vec<RayCone>,
+    /// With a guide that learns.
+    turns: Turns,
 }
 
 thread_local! {
@@ -112,6 +118,8 @@ impl PathIntegrator {
         scratch.cones.clear();
         scratch.cones.extend(scratch.rays.iter().map_while(|ray| world.camera_cone(ray)));
 
+        scratch.turns.clear();
+
         for bounce in 0..self.max_depth {
             let count = scratch.rays.len();
             if count == 0 {
@@ -129,10 +137,11 @@ impl PathIntegrator {
                 counts.indirect += self.arrive_all(world, scratch);
             }
 
-            if in_media {
-                self.shade_all::<true>(world, bounce, out, scratch);
-            } else {
-                self.shade_all::<false>(world, bounce, out, scratch);
+            match (in_media, self.guide.is_some()) {
+                (false, false) => self.shade_all::<false, false>(world, bounce, out, scratch),
+                (true, false) => self.shade_all::<true, false>(world, bounce, out, scratch),
+                (false, true) => self.shade_all::<false, true>(world, bounce, out, scratch),
+                (true, true) => self.shade_all::<true, true>(world, bounce, out, scratch),
             }
 
             let shadows = scratch.shadow_rays.len();
@@ -147,7 +156,9 @@ impl PathIntegrator {
                     out[pending.slot as usize].radiance += pending.contribution;
                 }
             }
+            scratch.turns.settle(out);
         }
+        scratch.turns.record(self, out);
     }
 
     /// Takes every path through media to the next surface where something happens to it; says how many rays that took.
@@ -184,9 +195,9 @@ impl PathIntegrator {
     /// Shades every living path's hit; afterwards the scratch holds the paths that go on, their rays, and the shadow rays to trace.
     ///
     /// Large results stay where they were returned and are read through references: a copy would have to wait for them.
-    /// `MEDIA` is whether the scene has media.
-    fn shade_all<const MEDIA: bool>(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, .. } = scratch;
+    /// `MEDIA` is whether the scene has media, `GUIDED` whether there is a guide.
+    fn shade_all<const MEDIA: bool, const GUIDED: bool>(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, turns, .. } = scratch;
         shadow_rays.clear();
         pending.clear();
         let mut alive = 0;
@@ -219,7 +230,8 @@ impl PathIntegrator {
             if let Some(boundary) = &boundary {
                 vertex.bsdf = boundary;
             }
-            if let Some(mut shadow) = self.sample_light(world, path, &vertex, bounce) {
+            let steering = if GUIDED { Steering::new(self, &vertex) } else { None };
+            if let Some(mut shadow) = self.sample_light(world, path, &vertex, bounce, steering) {
                 if MEDIA {
                     let here = world.media_toward(at, ray.direction, shadow.ray.direction, &media[i].here);
                     shadow.contribution *= world.transmittance(&here, &shadow.ray);
@@ -227,7 +239,7 @@ impl PathIntegrator {
                 shadow_rays.push(shadow.ray);
                 pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
             }
-            if let Some((path, next)) = self.scatter(world, path, &vertex, bounce) {
+            if let Some((path, next)) = self.scatter(world, path, &vertex, bounce, steering, turns) {
                 if MEDIA {
                     let here = world.media_toward(at, ray.direction, next.direction, &media[i].here);
                     media[alive] = MediaState { here, ..media[i] };
@@ -300,7 +312,14 @@ impl PathIntegrator {
 
     /// A shadow ray towards a light, with what it brings if it is free.
     #[inline(always)]
-    fn sample_light(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32) -> Option<ShadowRay> {
+    fn sample_light(
+        &self,
+        world: &World,
+        path: &Path,
+        vertex: &Vertex,
+        bounce: u32,
+        steering: Option<Steering>,
+    ) -> Option<ShadowRay> {
         if vertex.bsdf.is_delta() || world.scene.lights.is_empty() {
             return None;
         }
@@ -316,7 +335,9 @@ impl PathIntegrator {
         let (eval, start) = vertex.eval_toward(world, sample.wi, &mut raised)?;
         let pdf = sample.pdf * choice.pmf;
         let weight = match self.strategy {
-            Strategy::Mis if !sample.is_delta => power_heuristic(pdf, eval.pdf),
+            Strategy::Mis if !sample.is_delta => {
+                power_heuristic(pdf, steering.map_or(eval.pdf, |steering| steering.pdf(sample.wi, eval.pdf)))
+            }
             _ => 1.0,
         };
         let contribution = path.throughput * eval.value * sample.radiance * (weight / pdf);
@@ -328,11 +349,23 @@ impl PathIntegrator {
 
     /// The path after its next scattering with its next ray, unless it ends here.
     #[inline(always)]
-    fn scatter(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32) -> Option<(Path, Ray)> {
+    fn scatter(
+        &self,
+        world: &World,
+        path: &Path,
+        vertex: &Vertex,
+        bounce: u32,
+        steering: Option<Steering>,
+        turns: &mut Turns,
+    ) -> Option<(Path, Ray)> {
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::bsdf(bounce));
-        let (sample, ray) = vertex.sample(world, u[0], [u[1], u[2]])?;
+        let (sample, ray, gain) = match steering {
+            None => vertex.sample(world, u[0], [u[1], u[2]]).map(|(sample, ray)| (sample, ray, 1.0))?,
+            Some(steering) => steering.sample(world, vertex, u[0], [u[1], u[2]])?,
+        };
         let mut throughput = path.throughput * sample.weight;
-        let eta_squared = path.eta_squared * (sample.eta * sample.eta);
+        let eta_squared = path.eta_squared * (sample.eta * sample.eta) * gain;
+        let unweighted = throughput;
 
         // Russian roulette: the survivors carry the weight of the dead. The chance is not capped, so a path that lost nothing goes on.
         if bounce + 1 >= self.rr_depth {
@@ -348,6 +381,9 @@ impl PathIntegrator {
             return None;
         }
 
+        if steering.is_some() && !sample.is_delta {
+            turns.push(vertex.at.p.as_vec3(), ray.direction, sample.pdf, unweighted, path.slot);
+        }
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
         Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, ray))
@@ -358,129 +394,4 @@ impl PathIntegrator {
 struct ShadowRay {
     ray: Ray,
     contribution: Rgb,
-}
-
-/// Reflection into a direction that the facet does not see.
-pub(super) struct RaisedEval {
-    eval: BsdfEval,
-    /// The point above the facet where a ray in that direction starts.
-    start: SurfaceInteraction,
-}
-
-/// A surface point with its scattering and the frame for it.
-pub(super) struct Vertex<'a> {
-    pub at: &'a SurfaceInteraction,
-    pub bsdf: &'a Bsdf,
-    pub frame: Frame,
-    /// The direction back, in the frame.
-    pub wo: Vec3,
-    /// Cosine between the direction back and the geometric normal.
-    cos_geometric: f32,
-    /// Cosine between the shading and the geometric normal, if they differ by a normal map or a bump map.
-    cos_normals: Option<f32>,
-}
-
-impl<'a> Vertex<'a> {
-    /// The vertex at `at`, where `ray` arrives, which stands for `footprint`; `bsdf` is the place for scattering that is not the same
-    /// everywhere.
-    #[inline(always)]
-    pub fn new(
-        world: &'a World,
-        at: &'a SurfaceInteraction,
-        ray: &Ray,
-        footprint: impl FnOnce() -> Footprint,
-        bsdf: &'a mut Option<Bsdf>,
-    ) -> Self {
-        let back = -ray.direction;
-        let cos_geometric = back.dot(at.n_g);
-        let n_s = if world.scene.features.shading_normals { facing_normal(back, at.n_s, at.n_g) } else { at.n_g };
-        let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
-        let bsdf = world.scene.bsdf(at, ray.direction, footprint, bsdf);
-        // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
-        let has_relief = world.scene.features.reliefs && world.scene.relief(at, ray.direction).is_some();
-        let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
-        Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric, cos_normals }
-    }
-
-    /// The point and the side of it that light must reach.
-    #[inline]
-    fn receiver(&self) -> Receiver {
-        let n = if self.bsdf.transmits() { Vec3::ZERO } else { self.frame.z * 1f32.copysign(self.wo.z) };
-        Receiver { p: self.at.p, n }
-    }
-
-    /// What the surface lets through of light from a direction, beyond its BSDF: nothing where the shading frame and the geometry disagree on
-    /// its side, for it would leak through, and less where only the shading normal sees it well. 1 for most.
-    #[inline]
-    pub fn shadowing(&self, local: Vec3, world: Vec3) -> f32 {
-        let cos = world.dot(self.at.n_g);
-        let reflected_in_frame = local.z * self.wo.z > 0.0;
-        let reflected_in_geometry = cos * self.cos_geometric > 0.0;
-        if reflected_in_frame != reflected_in_geometry {
-            return 0.0;
-        }
-        match self.cos_normals {
-            Some(cos_normals) if reflected_in_frame => terminator_factor(cos, local.z, cos_normals),
-            _ => 1.0,
-        }
-    }
-
-    #[inline(always)]
-    fn eval(&self, direction: Vec3) -> Option<BsdfEval> {
-        let wi = self.frame.to_local(direction);
-        let shadowing = self.shadowing(wi, direction);
-        if shadowing == 0.0 {
-            return None;
-        }
-        let BsdfEval { value, pdf } = self.bsdf.eval(self.wo, wi);
-        (!value.is_black()).then(|| BsdfEval { value: value * shadowing, pdf })
-    }
-
-    /// What is scattered from a direction, and where a ray in that direction starts: here, or above the facet if that hides it (then in `place`).
-    #[inline(always)]
-    pub fn eval_toward<'b>(
-        &'b self,
-        world: &World,
-        direction: Vec3,
-        place: &'b mut Option<RaisedEval>,
-    ) -> Option<(BsdfEval, &'b SurfaceInteraction)> {
-        if let Some(eval) = self.eval(direction) {
-            return Some((eval, self.at));
-        }
-        *place = self.eval_raised(world, direction);
-        place.as_ref().map(|raised| (raised.eval, &raised.start))
-    }
-
-    /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other directions, and where
-    /// [`raised_start`] finds no start.
-    #[inline]
-    fn eval_raised(&self, world: &World, direction: Vec3) -> Option<RaisedEval> {
-        let start = self.raised(world, direction)?;
-        Some(RaisedEval { eval: self.bsdf.eval(self.wo, self.frame.to_local(direction)), start })
-    }
-
-    /// Where a ray starts in a direction that the shading normal sees and the facet does not.
-    #[inline]
-    fn raised(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
-        let in_frame = direction.dot(self.frame.z) * self.wo.z > 0.0;
-        let hidden = in_frame && direction.dot(self.at.n_g) * self.cos_geometric <= 0.0;
-        // Under a relief, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
-        if !hidden || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.transmits() {
-            return None;
-        }
-        raised_start(world, self.at, self.receiver().n)
-    }
-
-    /// A scattered direction and the ray that follows it.
-    #[inline(always)]
-    fn sample(&self, world: &World, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray)> {
-        let mut sample = self.bsdf.sample(self.wo, u_lobe, u)?;
-        let direction = self.frame.to_world(sample.wi);
-        let shadowing = self.shadowing(sample.wi, direction);
-        if !sample.is_delta && shadowing > 0.0 {
-            sample.weight *= shadowing;
-        }
-        let ray = if shadowing > 0.0 { self.at.spawn(direction) } else { self.raised(world, direction)?.spawn(direction) };
-        Some((sample, ray))
-    }
 }

@@ -2,7 +2,7 @@
 //! Display").
 
 use super::media::MediaState;
-use super::path::Vertex;
+use super::vertex::Vertex;
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sample};
 use crate::color::Rgb;
 use crate::film::PixelSample;

@@ -4,6 +4,7 @@
 //! replayed alone, and any split of the work gives the same picture bit for bit.
 
 mod adaptive;
+mod guided;
 mod progress;
 mod settings;
 
@@ -75,6 +76,7 @@ struct Job<'a> {
     world: World<'a>,
     integrator: Box<dyn Integrator>,
     sampler: Sampler,
+    needs: SurfaceNeeds,
     filter: Filter,
     size: [u32; 2],
 }
@@ -92,6 +94,7 @@ impl<'a> Job<'a> {
             world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
             integrator: integrator::build(&settings.integrator, sampler, needs),
             sampler,
+            needs,
             filter: Filter::new(&settings.filter),
             size: settings.size,
         }
@@ -195,6 +198,9 @@ pub fn render(
         .build()
         .map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))?;
     let job = Job::new(scene, accel, settings);
+    if matches!(settings.integrator, IntegratorDesc::Path { guiding: true, .. }) {
+        return guided::render(job, &pool, settings, progress, stop);
+    }
     if let Some(target) = settings.target_error {
         return adaptive::render(&job, &pool, settings, target, progress, stop);
     }
@@ -266,6 +272,9 @@ pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel
     let [width, height] = settings.size;
     if pixel[0] >= width || pixel[1] >= height {
         return Err(Error::Usage(format!("--pixel {},{}: the film has {width}x{height} pixels", pixel[0], pixel[1])));
+    }
+    if matches!(settings.integrator, IntegratorDesc::Path { guiding: true, .. }) {
+        return Err(Error::Usage("--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off".into()));
     }
     let job = Job::new(scene, accel, settings);
     let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);

@@ -1,0 +1,134 @@
+//! A surface point that light is scattered at.
+
+use super::World;
+use super::shading::{facing_normal, raised_start, terminator_factor};
+use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
+use crate::geometry::SurfaceInteraction;
+use crate::light::Receiver;
+use crate::math::{Frame, Ray, Vec3};
+use crate::texture::Footprint;
+
+/// Reflection into a direction that the facet does not see.
+pub(super) struct RaisedEval {
+    eval: BsdfEval,
+    /// The point above the facet where a ray in that direction starts.
+    start: SurfaceInteraction,
+}
+
+/// A surface point with its scattering and the frame for it.
+pub(super) struct Vertex<'a> {
+    pub at: &'a SurfaceInteraction,
+    pub bsdf: &'a Bsdf,
+    pub frame: Frame,
+    /// The direction back, in the frame.
+    pub wo: Vec3,
+    /// Cosine between the direction back and the geometric normal.
+    cos_geometric: f32,
+    /// Cosine between the shading and the geometric normal, if they differ by a normal map or a bump map.
+    cos_normals: Option<f32>,
+}
+
+impl<'a> Vertex<'a> {
+    /// The vertex at `at`, where `ray` arrives, which stands for `footprint`; `bsdf` is the place for scattering that is not the same
+    /// everywhere.
+    #[inline(always)]
+    pub fn new(
+        world: &'a World,
+        at: &'a SurfaceInteraction,
+        ray: &Ray,
+        footprint: impl FnOnce() -> Footprint,
+        bsdf: &'a mut Option<Bsdf>,
+    ) -> Self {
+        let back = -ray.direction;
+        let cos_geometric = back.dot(at.n_g);
+        let n_s = if world.scene.features.shading_normals { facing_normal(back, at.n_s, at.n_g) } else { at.n_g };
+        let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
+        let bsdf = world.scene.bsdf(at, ray.direction, footprint, bsdf);
+        // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
+        let has_relief = world.scene.features.reliefs && world.scene.relief(at, ray.direction).is_some();
+        let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
+        Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric, cos_normals }
+    }
+
+    /// The point and the side of it that light must reach.
+    #[inline]
+    pub fn receiver(&self) -> Receiver {
+        let n = if self.bsdf.transmits() { Vec3::ZERO } else { self.frame.z * 1f32.copysign(self.wo.z) };
+        Receiver { p: self.at.p, n }
+    }
+
+    /// What the surface lets through of light from a direction, beyond its BSDF: nothing where the shading frame and the geometry disagree on
+    /// its side, for it would leak through, and less where only the shading normal sees it well. 1 for most.
+    #[inline]
+    pub fn shadowing(&self, local: Vec3, world: Vec3) -> f32 {
+        let cos = world.dot(self.at.n_g);
+        let reflected_in_frame = local.z * self.wo.z > 0.0;
+        let reflected_in_geometry = cos * self.cos_geometric > 0.0;
+        if reflected_in_frame != reflected_in_geometry {
+            return 0.0;
+        }
+        match self.cos_normals {
+            Some(cos_normals) if reflected_in_frame => terminator_factor(cos, local.z, cos_normals),
+            _ => 1.0,
+        }
+    }
+
+    #[inline(always)]
+    fn eval(&self, direction: Vec3) -> Option<BsdfEval> {
+        let wi = self.frame.to_local(direction);
+        let shadowing = self.shadowing(wi, direction);
+        if shadowing == 0.0 {
+            return None;
+        }
+        let BsdfEval { value, pdf } = self.bsdf.eval(self.wo, wi);
+        (!value.is_black()).then(|| BsdfEval { value: value * shadowing, pdf })
+    }
+
+    /// What is scattered from a direction, and where a ray in that direction starts: here, or above the facet if that hides it (then in `place`).
+    #[inline(always)]
+    pub fn eval_toward<'b>(
+        &'b self,
+        world: &World,
+        direction: Vec3,
+        place: &'b mut Option<RaisedEval>,
+    ) -> Option<(BsdfEval, &'b SurfaceInteraction)> {
+        if let Some(eval) = self.eval(direction) {
+            return Some((eval, self.at));
+        }
+        *place = self.eval_raised(world, direction);
+        place.as_ref().map(|raised| (raised.eval, &raised.start))
+    }
+
+    /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other directions, and where
+    /// [`raised_start`] finds no start.
+    #[inline]
+    fn eval_raised(&self, world: &World, direction: Vec3) -> Option<RaisedEval> {
+        let start = self.raised(world, direction)?;
+        Some(RaisedEval { eval: self.bsdf.eval(self.wo, self.frame.to_local(direction)), start })
+    }
+
+    /// Where a ray starts in a direction that the shading normal sees and the facet does not.
+    #[inline]
+    fn raised(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
+        let in_frame = direction.dot(self.frame.z) * self.wo.z > 0.0;
+        let hidden = in_frame && direction.dot(self.at.n_g) * self.cos_geometric <= 0.0;
+        // Under a relief, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
+        if !hidden || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.transmits() {
+            return None;
+        }
+        raised_start(world, self.at, self.receiver().n)
+    }
+
+    /// A scattered direction and the ray that follows it.
+    #[inline(always)]
+    pub fn sample(&self, world: &World, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray)> {
+        let mut sample = self.bsdf.sample(self.wo, u_lobe, u)?;
+        let direction = self.frame.to_world(sample.wi);
+        let shadowing = self.shadowing(sample.wi, direction);
+        if !sample.is_delta && shadowing > 0.0 {
+            sample.weight *= shadowing;
+        }
+        let ray = if shadowing > 0.0 { self.at.spawn(direction) } else { self.raised(world, direction)?.spawn(direction) };
+        Some((sample, ray))
+    }
+}

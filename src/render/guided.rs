@@ -1,0 +1,226 @@
+//! Renders whose paths learn where light comes from: in passes, each with as many samples as all before it, which follow what those have
+//! taught.
+//!
+//! Later passes are better than earlier ones, so samples count by the inverse of their pass's variance. A pass that met a bright path
+//! by luck has a larger variance for it; if that took weight from the path, the picture would be too dark. So what samples of a tile
+//! count depends on the other tiles alone.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats, TILE_SIZE, next_pass, render_pass};
+use crate::error::Result;
+use crate::film::{Film, FilmTile, LayerKind};
+use crate::guiding::Guide;
+use crate::integrator::{self, RayCounts};
+
+/// Samples per pixel of the first pass. One tells how bright the scene is, the other is learned from.
+const FIRST_PASS: u32 = 2;
+
+/// Passes of fewer samples do not decide whether guiding pays.
+const SAMPLES_TO_JUDGE: u32 = 4;
+
+/// What relative variances are related to beside the square of the colour.
+const FLOOR: f64 = 0.01;
+
+/// By this factor the weight of samples may change from one pass to the next.
+const LARGEST_CHANGE: f64 = 32.0;
+
+/// Time of a ray of a guided path over that of another, about.
+const GUIDED_COST: f64 = 1.2;
+
+/// Variance of a sample, by channel, mean over the pixels of a block.
+type BlockVariances = Vec<[f64; 3]>;
+
+/// What a pass was like.
+struct Pass {
+    /// By tile.
+    variances: Vec<BlockVariances>,
+    /// Rays of a sample.
+    rays: f64,
+}
+
+/// The picture so far.
+struct Picture {
+    film: Film,
+    /// What a sample of the last pass counts, by tile.
+    factors: Vec<f64>,
+    first: Option<Pass>,
+    last: Option<Pass>,
+}
+
+/// Blocks of a tile that reach the picture, each with its pixels' indices.
+fn blocks(tile: &FilmTile) -> impl Iterator<Item = Vec<usize>> + '_ {
+    let area = tile.active();
+    let step = BLOCK_SIZE as usize;
+    let (rows, columns) = (area.y..area.y + area.height, area.x..area.x + area.width);
+    rows.step_by(step).flat_map(move |y| {
+        columns.clone().step_by(step).map(move |x| {
+            let rows = y..(y + BLOCK_SIZE).min(area.y + area.height);
+            let columns = x..(x + BLOCK_SIZE).min(area.x + area.width);
+            rows.flat_map(|y| columns.clone().map(move |x| (x, y))).map(|(x, y)| tile.index(x, y)).collect()
+        })
+    })
+}
+
+/// Variance of a sample by block.
+fn block_variances(tile: &FilmTile, samples: u32) -> BlockVariances {
+    let of_block = |pixels: Vec<usize>| {
+        let scale = f64::from(samples) / pixels.len() as f64;
+        let mut sum = [0.0; 3];
+        for (_, variance) in pixels.iter().filter_map(|&pixel| tile.group_statistics(pixel)) {
+            sum = [0, 1, 2].map(|k| sum[k] + scale * variance[k]);
+        }
+        sum
+    };
+    blocks(tile).map(of_block).collect()
+}
+
+/// Mean colour by block.
+fn block_means(tile: &FilmTile) -> Vec<[f64; 3]> {
+    let of_block = |pixels: Vec<usize>| {
+        let mut sum = [0.0; 3];
+        for mean in pixels.iter().map(|&pixel| tile.mean(pixel)) {
+            sum = [0, 1, 2].map(|k| sum[k] + f64::from(mean[k]) / pixels.len() as f64);
+        }
+        sum
+    };
+    blocks(tile).map(of_block).collect()
+}
+
+/// Sum of the blocks' variances over the squares of their colours.
+fn relative(variances: &BlockVariances, colors: &[[f64; 3]]) -> f64 {
+    let of_block = |(v, c): (&[f64; 3], &[f64; 3])| (0..3).map(|k| v[k] / (c[k] * c[k] + FLOOR)).sum::<f64>();
+    variances.iter().zip(colors).map(of_block).sum()
+}
+
+/// `a / b`, where both are known.
+fn ratio(a: f64, b: f64) -> f64 {
+    if a > 0.0 && b > 0.0 && a < f64::INFINITY && b < f64::INFINITY { a / b } else { 1.0 }
+}
+
+impl Picture {
+    /// Adds a pass of so many samples per pixel; says by how much it is better than the first, variance times rays.
+    fn add(&mut self, film: &Film, samples: u32, rays: &RayCounts) -> f64 {
+        let variances: Vec<_> = film.tiles().iter().map(|tile| block_variances(tile, samples)).collect();
+        let pixels = film.crop().area() as f64;
+        let pass = Pass { variances, rays: rays.total() as f64 / (pixels * f64::from(samples)) };
+        let mut gain = 1.0;
+        if let (Some(first), Some(last), true) = (&self.first, &self.last, samples >= 2) {
+            // Colours are those of all samples, so that luck in one pass does not change the ratios.
+            let colors: Vec<Vec<[f64; 3]>> = self
+                .film
+                .tiles()
+                .iter()
+                .zip(film.tiles())
+                .map(|(a, b)| {
+                    let both = |(a, b): ([f64; 3], [f64; 3])| [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]));
+                    block_means(a).into_iter().zip(block_means(b)).map(both).collect()
+                })
+                .collect();
+            let by_tile = |pass: &Pass| -> Vec<f64> { pass.variances.iter().zip(&colors).map(|(v, c)| relative(v, c)).collect() };
+            let (now, before) = (by_tile(&pass), by_tile(last));
+            let total = |sums: &[f64]| sums.iter().sum::<f64>();
+            let (all_now, all_before) = (total(&now), total(&before));
+            for (t, factor) in self.factors.iter_mut().enumerate() {
+                *factor *= ratio(all_before - before[t], all_now - now[t]).clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE);
+            }
+            gain = ratio(total(&by_tile(first)) * first.rays, all_now * pass.rays);
+        }
+        for ((tile, other), factor) in self.film.tiles_mut().iter_mut().zip(film.tiles()).zip(&self.factors) {
+            tile.merge(other, *factor);
+        }
+        if samples >= 2 {
+            let kept = Pass { variances: pass.variances.clone(), rays: pass.rays };
+            self.first.get_or_insert(kept);
+            self.last = Some(pass);
+        }
+        gain
+    }
+
+    /// Mean of all channels of all pixels.
+    fn mean(film: &Film) -> f64 {
+        let of_tile = |tile: &FilmTile| {
+            let means = block_means(tile);
+            let count = means.len().max(1) as f64;
+            means.iter().flatten().map(|v| v.max(0.0)).sum::<f64>() / (3.0 * count)
+        };
+        film.tiles().iter().map(of_tile).sum::<f64>() / film.tiles().len().max(1) as f64
+    }
+}
+
+/// Renders all samples, or those that there is time for.
+pub(super) fn render(
+    mut job: Job,
+    pool: &rayon::ThreadPool,
+    settings: &Settings,
+    progress: &dyn Progress,
+    stop: &AtomicBool,
+) -> Result<RenderResult> {
+    let mut layers = settings.layers;
+    layers.insert(LayerKind::Variance);
+    let film = Film::new(settings.size, settings.crop, &layers, TILE_SIZE)?;
+    let factors = vec![1.0; film.tiles().len()];
+    let mut picture = Picture { film, factors, first: None, last: None };
+    let mut stats = Stats::default();
+    let pixels = settings.crop.area();
+    progress.start(settings.spp, pixels);
+    let bounds = job.world.accel.bounds();
+    let mut guide = Some(Arc::new(Guide::new(bounds, 0.0)));
+
+    let start = Instant::now();
+    let mut step = 1;
+    while stats.spp_done < settings.spp && !stats.interrupted && !stats.time_limited {
+        let count = stats.spp_done.max(FIRST_PASS).min(settings.spp - stats.spp_done);
+        let is_last = stats.spp_done + count >= settings.spp;
+        let mut film = Film::new(settings.size, settings.crop, &layers, TILE_SIZE)?;
+        let (mut done, mut rays) = (0, RayCounts::default());
+        while done < count {
+            if stop.load(Ordering::Relaxed) {
+                stats.interrupted = true;
+                break;
+            }
+            if settings.time_limit.is_some_and(|limit| stats.spp_done > 0 && start.elapsed() >= limit) {
+                stats.time_limited = true;
+                break;
+            }
+            job.integrator = integrator::build_guided(&settings.integrator, job.sampler, job.needs, guide.clone());
+            let pass_start = Instant::now();
+            // The very first sample tells how bright the scene is.
+            let samples = if stats.spp_done == 0 { 1 } else { step.min(count - done) };
+            rays.add(&render_pass(&job, pool, &mut film, stats.spp_done, samples, progress));
+            done += samples;
+            if stats.spp_done == 0 {
+                stats.first_pass_seconds = start.elapsed().as_secs_f64();
+                guide = Some(Arc::new(Guide::new(bounds, Picture::mean(&film) as f32)));
+            }
+            stats.spp_done += samples;
+            step = next_pass(samples, pass_start.elapsed(), settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed())));
+        }
+        stats.rays.add(&rays);
+        if done == 0 {
+            break;
+        }
+        let gain = picture.add(&film, done, &rays);
+        if std::env::var_os("GUIDE_DEBUG").is_some() {
+            let g = guide.as_deref();
+            tracing::warn!("pass {done}: gain {gain:.3}, rays/sample {:.2}, factor {:.3}, leaves {}, nodes {}, {:.2}s", rays.total() as f64 / (pixels as f64 * f64::from(done)), picture.factors[0], g.map_or(0, Guide::leaves), g.map_or(0, Guide::directional_nodes), start.elapsed().as_secs_f64());
+        }
+        let pays = stats.spp_done == done || done < SAMPLES_TO_JUDGE || gain > GUIDED_COST;
+        let after_next = 2 * stats.spp_done;
+        guide = guide.filter(|_| pays && !is_last).map(|guide| {
+            let next = if guide.learns() { guide.refined(done) } else { Guide::new(bounds, Picture::mean(&picture.film) as f32) };
+            Arc::new(if after_next >= settings.spp { next.finished() } else { next })
+        });
+    }
+    stats.render_seconds = start.elapsed().as_secs_f64();
+    progress.finish();
+
+    stats.samples = pixels * u64::from(stats.spp_done);
+    stats.nan_samples = picture.film.dropped_count();
+    stats.dropped = picture.film.dropped();
+    let mut image = picture.film.resolve();
+    image.layers.retain(|layer| settings.layers.contains(layer.kind));
+    Ok(RenderResult { image, stats })
+}
