@@ -18,6 +18,11 @@ use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::random::mix;
 use crate::math::{Aabb, Vec3};
 
+/// Knob.
+pub fn knob(name: &str, default: f64) -> f64 {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}
+
 /// Records of a leaf beyond which it is divided, in a pass of one sample per pixel; in one of `n` it is `sqrt(n)` times as many.
 const RECORDS_TO_DIVIDE: f64 = 4000.0;
 
@@ -65,6 +70,8 @@ pub struct Guide {
     leaves: Vec<Leaf>,
     /// From light to whole numbers; zero while nothing is learned.
     scale: f32,
+    pub normals: bool,
+    pub mode: u32,
 }
 
 impl Guide {
@@ -73,13 +80,14 @@ impl Guide {
         let size = bounds.size().max_element();
         let known = size > 0.0 && size < f32::INFINITY && bounds.min.is_finite();
         let (corner, inverse_size) = if known { (bounds.min, 1.0 / size) } else { (Vec3::ZERO, 0.0) };
-        let leaf = Leaf { directions: None, records: Records::default(), count: AtomicU64::new(0) };
         let scale = UNITS / typical;
         Self {
             corner,
             inverse_size,
-            nodes: vec![Node { children: [LEAF; 2], leaf: 0 }],
-            leaves: vec![leaf],
+            nodes: (0..6).map(|leaf| Node { children: [LEAF; 2], leaf }).collect(),
+            leaves: (0..6).map(|_| Leaf { directions: None, records: Records::default(), count: AtomicU64::new(0) }).collect(),
+            normals: knob("GN", 1.0) > 0.0,
+            mode: knob("GT", 1.0) as u32,
             scale: if scale > 0.0 && scale < f32::INFINITY { scale } else { 0.0 },
         }
     }
@@ -97,22 +105,23 @@ impl Guide {
 
     /// What is known of the light at a point; `None` if nothing.
     #[inline]
-    pub fn at(&self, p: Vec3) -> Option<&Directions> {
-        let (leaf, _) = self.find(self.normalized(p));
+    pub fn at(&self, p: Vec3, n: Vec3) -> Option<&Directions> {
+        let (leaf, _) = self.find(self.normalized(p), self.root(n));
         self.leaves[leaf].directions.as_deref()
     }
 
     /// Records `light` that arrived at a point from a direction, an estimate over its density. Light that is not a finite number above zero counts
     /// as none. Equal records are treated alike.
     #[inline]
-    pub fn record(&self, p: Vec3, direction: Vec3, light: f32) {
+    pub fn record(&self, p: Vec3, n: Vec3, direction: Vec3, light: f32) {
         let at = self.normalized(p);
-        let (mut leaf, depth) = self.find(at);
+        let root = self.root(n);
+        let (mut leaf, depth) = self.find(at, root);
         self.leaves[leaf].count.fetch_add(1, Ordering::Relaxed);
         if !(light > 0.0 && light < f32::INFINITY) {
             return;
         }
-        let amount = (light * self.scale).min(LARGEST * UNITS) as u64;
+        let amount = if self.mode == 2 { (light * self.scale * self.scale * (1.0 / 65536.0)).min(281474976710656.0) } else { (light * self.scale).min(LARGEST * UNITS) } as u64;
         // Random numbers of the record itself.
         let bits = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
         let first = mix(bits(at.x, direction.x) ^ mix(bits(at.y, direction.y) ^ mix(bits(at.z, light))));
@@ -124,7 +133,7 @@ impl Guide {
             size * (unit(first >> (20 * k)) - 0.5)
         }));
         if moved.min_element() >= 0.0 && moved.max_element() < 1.0 {
-            leaf = self.find(moved).0;
+            leaf = self.find(moved, root).0;
         }
         self.leaves[leaf].records.add(direction, [unit(second), unit(second >> 32)], amount);
     }
@@ -132,9 +141,9 @@ impl Guide {
     /// Learns from what a pass of so many samples per pixel recorded: the guide for the next pass.
     #[must_use]
     pub fn refined(&self, samples: u32) -> Self {
-        let most_records = (RECORDS_TO_DIVIDE * f64::from(samples).sqrt()) as u64;
+        let most_records = (knob("GC", RECORDS_TO_DIVIDE) * f64::from(samples).sqrt()) as u64;
         let mut next =
-            Self { corner: self.corner, inverse_size: self.inverse_size, nodes: self.nodes.clone(), leaves: Vec::new(), scale: self.scale };
+            Self { corner: self.corner, inverse_size: self.inverse_size, nodes: self.nodes.clone(), leaves: Vec::new(), scale: self.scale, normals: self.normals, mode: self.mode };
         let old_leaves = self.nodes.iter().enumerate().filter(|(_, node)| node.children[0] == LEAF);
         let depths = self.depths();
         let mut free = MAX_LEAVES.saturating_sub(self.leaves.len());
@@ -147,11 +156,11 @@ impl Guide {
         let leaves: usize = plans.iter().map(|(_, parts)| parts.len()).sum();
         let most_nodes = (MAX_NODES / leaves.max(1)).clamp(64, 1024);
         for (leaf, parts) in plans {
-            let directions = leaf.records.directions().map(Arc::new).or_else(|| leaf.directions.clone());
-            let records = leaf.records.refined(most_nodes);
+            let directions = leaf.records.directions(self.mode == 2).map(Arc::new).or_else(|| leaf.directions.clone());
+            let records = leaf.records.refined(most_nodes, self.mode == 2, knob("GA", 0.0) / parts.len() as f64);
             for part in parts {
                 next.nodes[part].leaf = next.leaves.len() as u32;
-                next.leaves.push(Leaf { directions: directions.clone(), records: records.emptied(), count: AtomicU64::new(0) });
+                next.leaves.push(Leaf { directions: directions.clone(), records: records.copied(), count: AtomicU64::new(0) });
             }
         }
         next
@@ -194,6 +203,16 @@ impl Guide {
         self.leaves.iter().map(|leaf| leaf.records.len()).sum()
     }
 
+    #[inline]
+    fn root(&self, n: Vec3) -> usize {
+        if !self.normals {
+            return 0;
+        }
+        let a = n.abs();
+        let axis = if a.x >= a.y && a.x >= a.z { 0 } else if a.y >= a.z { 1 } else { 2 };
+        2 * axis + usize::from(n[axis] < 0.0)
+    }
+
     /// A point within the unit cube.
     #[inline]
     fn normalized(&self, p: Vec3) -> Vec3 {
@@ -203,9 +222,9 @@ impl Guide {
 
     /// The leaf around a point of the unit cube, and its depth.
     #[inline]
-    fn find(&self, at: Vec3) -> (usize, u32) {
+    fn find(&self, at: Vec3, root: usize) -> (usize, u32) {
         let mut at = at.to_array();
-        let (mut index, mut depth, mut axis) = (0, 0, 0);
+        let (mut index, mut depth, mut axis) = (root, 0, 0);
         loop {
             let node = &self.nodes[index];
             if node.children[0] == LEAF {

@@ -174,9 +174,21 @@ impl Records {
     }
 
     /// The sums of all quarters, by node. Children come after their parents.
-    fn sums(&self) -> Vec<[f64; 4]> {
+    fn sums(&self, square: bool) -> Vec<[f64; 4]> {
         let mut sums: Vec<[f64; 4]> =
             self.nodes.iter().map(|node| [0, 1, 2, 3].map(|k| node.sums[k].load(Ordering::Relaxed) as f64)).collect();
+        if square {
+            let mut area = vec![0.25; sums.len()];
+            for index in 0..sums.len() {
+                for k in 0..4 {
+                    sums[index][k] = (area[index] * sums[index][k]).sqrt();
+                    let child = self.nodes[index].children[k];
+                    if child != LEAF {
+                        area[child as usize] = 0.25 * area[index];
+                    }
+                }
+            }
+        }
         for index in (0..self.nodes.len()).rev() {
             for k in 0..4 {
                 let child = self.nodes[index].children[k];
@@ -189,8 +201,8 @@ impl Records {
     }
 
     /// The distribution of what was recorded; `None` of nothing.
-    pub fn directions(&self) -> Option<Directions> {
-        let sums = self.sums();
+    pub fn directions(&self, square: bool) -> Option<Directions> {
+        let sums = self.sums(square);
         let total: f64 = sums[0].iter().sum();
         if total == 0.0 {
             return None;
@@ -209,21 +221,24 @@ impl Records {
     }
 
     /// Empty records, divided where there was light: every quarter with more than a hundredth of it, as far as `most` nodes go.
-    pub fn refined(&self, most: usize) -> Self {
-        let sums = self.sums();
-        let threshold = DIVIDED_SHARE * sums[0].iter().sum::<f64>();
+    pub fn refined(&self, most: usize, square: bool, keep: f64) -> Self {
+        let raw = self.sums(false);
+        let sums = self.sums(square);
+        let threshold = super::knob("GD", DIVIDED_SHARE) * sums[0].iter().sum::<f64>();
         let mut nodes = vec![RecordNode::default()];
         // Where each new node's sums come from: a node of old, or even parts of a cell.
-        let mut sources = vec![(Some(0), sums[0], 1)];
+        let mut sources = vec![(Some(0), sums[0], 1, raw[0])];
         let mut index = 0;
         while index < nodes.len() {
-            let (old, quarters, depth) = sources[index];
+            let (old, quarters, depth, old_raw) = sources[index];
+            nodes[index].sums = old_raw.map(|v| AtomicU64::new((v * keep) as u64));
             for (k, &sum) in quarters.iter().enumerate() {
                 if sum > threshold && depth < MAX_DEPTH && nodes.len() < most {
                     let child = old.map_or(LEAF, |old: usize| self.nodes[old].children[k]);
-                    let next = if child == LEAF { (None, [0.25 * sum; 4]) } else { (Some(child as usize), sums[child as usize]) };
+                    let next = if child == LEAF { (None, [0.25 * sum; 4], [0.25 * old_raw[k]; 4]) } else { (Some(child as usize), sums[child as usize], raw[child as usize]) };
                     nodes[index].children[k] = nodes.len() as u32;
-                    sources.push((next.0, next.1, depth + 1));
+                    sources.push((next.0, next.1, depth + 1, next.2));
+                    nodes[index].sums[k] = AtomicU64::new(0);
                     nodes.push(RecordNode::default());
                 }
             }
@@ -233,8 +248,8 @@ impl Records {
     }
 
     /// A copy without light.
-    pub fn emptied(&self) -> Self {
-        Self { nodes: self.nodes.iter().map(|node| RecordNode { children: node.children, ..RecordNode::default() }).collect() }
+    pub fn copied(&self) -> Self {
+        Self { nodes: self.nodes.iter().map(|node| RecordNode { children: node.children, sums: [0,1,2,3].map(|k| AtomicU64::new(node.sums[k].load(Ordering::Relaxed))) }).collect() }
     }
 
     /// Nodes of the tree.

@@ -10,6 +10,7 @@ use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Ray, Vec3};
 
 /// How many directions the surface chooses where something is known of the light; the light chooses the rest.
+#[allow(dead_code)]
 const BSDF_SHARE: f32 = 0.5;
 
 /// Roulette forgets at most that a direction was chosen so many times as often as the surface would have.
@@ -19,12 +20,19 @@ const LARGEST_GAIN: f32 = 1e6;
 #[derive(Clone, Copy)]
 pub(super) struct Steering<'a> {
     directions: Option<&'a Directions>,
+    share: f32,
+    gain: bool,
 }
+
+static SHARE: std::sync::LazyLock<f32> = std::sync::LazyLock::new(|| crate::guiding::knob("GS", 0.5) as f32);
+static GAIN: std::sync::LazyLock<bool> = std::sync::LazyLock::new(|| crate::guiding::knob("GR", 1.0) > 0.0);
 
 /// A direction that a path took.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Turn {
     p: Vec3,
+    n: Vec3,
+    weight: Rgb,
     direction: Vec3,
     /// Density of the direction.
     pdf: f32,
@@ -51,30 +59,35 @@ impl<'a> Steering<'a> {
         if vertex.bsdf.is_delta() || vertex.bsdf.transmits() {
             return None;
         }
-        Some(Self { directions: guide.at(vertex.at.p.as_vec3()) })
+        Some(Self { directions: guide.at(vertex.at.p.as_vec3(), vertex.frame.z * 1f32.copysign(vertex.wo.z)), share: *SHARE, gain: *GAIN })
     }
 
     /// The density of a direction that the surface chooses with density `pdf`.
     #[inline]
     pub fn pdf(&self, direction: Vec3, pdf: f32) -> f32 {
         match self.directions {
-            Some(directions) => BSDF_SHARE * pdf + (1.0 - BSDF_SHARE) * directions.pdf(direction),
+            Some(directions) => self.share * pdf + (1.0 - self.share) * directions.pdf(direction),
             None => pdf,
         }
     }
 
     /// A direction with the ray that follows it, and the density over that of the surface alone, which roulette had better not see.
     #[inline]
-    pub fn sample(&self, world: &World, vertex: &Vertex, mut u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray, f32)> {
+    pub fn sample(&self, world: &World, vertex: &Vertex, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray, f32)> {
+        self.sample_(world, vertex, u_lobe, u).map(|(a, b, c)| (a, b, if self.gain { c } else { 1.0 }))
+    }
+
+    #[inline]
+    pub fn sample_(&self, world: &World, vertex: &Vertex, mut u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray, f32)> {
         let Some(directions) = self.directions else {
             return vertex.sample(world, u_lobe, u).map(|(sample, ray)| (sample, ray, 1.0));
         };
-        if u_lobe < BSDF_SHARE {
-            u_lobe = (u_lobe / BSDF_SHARE).min(ONE_MINUS_EPSILON);
+        if u_lobe < self.share {
+            u_lobe = (u_lobe / self.share).min(ONE_MINUS_EPSILON);
             let (mut sample, ray) = vertex.sample(world, u_lobe, u)?;
             if sample.is_delta {
-                sample.weight *= 1.0 / BSDF_SHARE;
-                return Some((sample, ray, BSDF_SHARE));
+                sample.weight *= 1.0 / self.share;
+                return Some((sample, ray, self.share));
             }
             let pdf = self.pdf(ray.direction, sample.pdf);
             let gain = pdf / sample.pdf;
@@ -85,7 +98,7 @@ impl<'a> Steering<'a> {
         let GuideSample { direction, pdf } = directions.sample(u);
         let mut raised = None;
         let (BsdfEval { value, pdf: of_surface }, start) = vertex.eval_toward(world, direction, &mut raised)?;
-        let pdf = BSDF_SHARE * of_surface + (1.0 - BSDF_SHARE) * pdf;
+        let pdf = self.share * of_surface + (1.0 - self.share) * pdf;
         let sample = BsdfSample {
             wi: vertex.frame.to_local(direction),
             weight: value * (1.0 / pdf),
@@ -106,8 +119,8 @@ impl Turns {
 
     /// A path goes on from `p`; `throughput` is without roulette.
     #[inline]
-    pub fn push(&mut self, p: Vec3, direction: Vec3, pdf: f32, throughput: Rgb, slot: u32) {
-        self.turns.push(Turn { p, direction, pdf, throughput, before: Rgb::BLACK, slot });
+    pub fn push(&mut self, p: Vec3, n: Vec3, weight: Rgb, direction: Vec3, pdf: f32, throughput: Rgb, slot: u32) {
+        self.turns.push(Turn { p, n, weight, direction, pdf, throughput, before: Rgb::BLACK, slot });
     }
 
     /// All that the paths bring from here on comes from the directions they took.
@@ -127,7 +140,13 @@ impl Turns {
             let light = |brought: f32, throughput: f32| if throughput > 0.0 { (brought / throughput).max(0.0) } else { 0.0 };
             let t = turn.throughput;
             let light = (light(brought.r, t.r) + light(brought.g, t.g) + light(brought.b, t.b)) * (1.0 / 3.0);
-            guide.record(turn.p, turn.direction, light / turn.pdf);
+            let w = turn.weight;
+            let light = match guide.mode {
+                0 => light / turn.pdf,
+                1 => light * w.mean(),
+                _ => (light * w.mean()) * (light * w.mean()) * turn.pdf,
+            };
+            guide.record(turn.p, turn.n, turn.direction, light);
         }
     }
 }

@@ -382,7 +382,7 @@ impl PathIntegrator {
         }
 
         if steering.is_some() && !sample.is_delta {
-            turns.push(vertex.at.p.as_vec3(), ray.direction, sample.pdf, unweighted, path.slot);
+            turns.push(vertex.at.p.as_vec3(), vertex.frame.z * 1f32.copysign(vertex.wo.z), sample.weight, ray.direction, sample.pdf, unweighted, path.slot);
         }
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
