@@ -12,7 +12,7 @@ mod tests;
 pub use quadtree::{Directions, GuideSample, Records};
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::random::mix;
@@ -58,7 +58,12 @@ struct Leaf {
     directions: Option<Arc<Directions>>,
     records: Records,
     count: AtomicU64,
+    lit: AtomicU64,
+    share: f32,
+    gains: [AtomicI64; 4],
 }
+
+static SHARES: std::sync::LazyLock<[f32; 4]> = std::sync::LazyLock::new(|| [knob("S0", 0.15), knob("S1", 0.3), knob("S2", 0.7), knob("S3", 0.9)].map(|s| s as f32));
 
 /// What is known of the light that arrives at the points of a scene, and what is being learned of it.
 #[derive(Debug)]
@@ -85,7 +90,7 @@ impl Guide {
             corner,
             inverse_size,
             nodes: (0..6).map(|leaf| Node { children: [LEAF; 2], leaf }).collect(),
-            leaves: (0..6).map(|_| Leaf { directions: None, records: Records::default(), count: AtomicU64::new(0) }).collect(),
+            leaves: (0..6).map(|_| Leaf { directions: None, records: Records::default(), count: AtomicU64::new(0), lit: AtomicU64::new(0), share: 0.5, gains: Default::default() }).collect(),
             normals: knob("GN", 1.0) > 0.0,
             mode: knob("GT", 1.0) as u32,
             scale: if scale > 0.0 && scale < f32::INFINITY { scale } else { 0.0 },
@@ -105,15 +110,16 @@ impl Guide {
 
     /// What is known of the light at a point; `None` if nothing.
     #[inline]
-    pub fn at(&self, p: Vec3, n: Vec3) -> Option<&Directions> {
+    pub fn at(&self, p: Vec3, n: Vec3) -> Option<(&Directions, f32)> {
         let (leaf, _) = self.find(self.normalized(p), self.root(n));
-        self.leaves[leaf].directions.as_deref()
+        let leaf = &self.leaves[leaf];
+        leaf.directions.as_deref().map(|d| (d, leaf.share))
     }
 
     /// Records `light` that arrived at a point from a direction, an estimate over its density. Light that is not a finite number above zero counts
     /// as none. Equal records are treated alike.
     #[inline]
-    pub fn record(&self, p: Vec3, n: Vec3, direction: Vec3, light: f32) {
+    pub fn record(&self, p: Vec3, n: Vec3, direction: Vec3, light: f32, pdfs: [f32; 2]) {
         let at = self.normalized(p);
         let root = self.root(n);
         let (mut leaf, depth) = self.find(at, root);
@@ -122,6 +128,14 @@ impl Guide {
             return;
         }
         let amount = if self.mode == 2 { (light * self.scale * self.scale * (1.0 / 65536.0)).min(281474976710656.0) } else { (light * self.scale).min(LARGEST * UNITS) } as u64;
+        self.leaves[leaf].lit.fetch_add(1, Ordering::Relaxed);
+        if pdfs[1] >= 0.0 {
+            let middle = 0.5 * (pdfs[0] + pdfs[1]);
+            for (sum, share) in self.leaves[leaf].gains.iter().zip(*SHARES) {
+                let gain = ((share * pdfs[0] + (1.0 - share) * pdfs[1]) / middle).ln();
+                sum.fetch_add((amount as f32 * gain) as i64, Ordering::Relaxed);
+            }
+        }
         // Random numbers of the record itself.
         let bits = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
         let first = mix(bits(at.x, direction.x) ^ mix(bits(at.y, direction.y) ^ mix(bits(at.z, light))));
@@ -157,10 +171,17 @@ impl Guide {
         let most_nodes = (MAX_NODES / leaves.max(1)).clamp(64, 1024);
         for (leaf, parts) in plans {
             let directions = leaf.records.directions(self.mode == 2).map(Arc::new).or_else(|| leaf.directions.clone());
+            let best = leaf.gains.iter().map(|g| g.load(Ordering::Relaxed)).enumerate().max_by_key(|(_, g)| *g);
+            let share = match best {
+                Some((i, g)) if g > 0 && knob("GL", 1.0) > 0.0 => SHARES[i],
+                _ => knob("GS", 0.5) as f32,
+            };
+            let lit = leaf.lit.load(Ordering::Relaxed) as f64;
+            let most_nodes = most_nodes.min((lit / knob("GM", 8.0)) as usize + 1);
             let records = leaf.records.refined(most_nodes, self.mode == 2, knob("GA", 0.0) / parts.len() as f64);
             for part in parts {
                 next.nodes[part].leaf = next.leaves.len() as u32;
-                next.leaves.push(Leaf { directions: directions.clone(), records: records.copied(), count: AtomicU64::new(0) });
+                next.leaves.push(Leaf { directions: directions.clone(), records: records.copied(), count: AtomicU64::new(0), lit: AtomicU64::new(0), share, gains: Default::default() });
             }
         }
         next

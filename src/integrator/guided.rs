@@ -24,7 +24,7 @@ pub(super) struct Steering<'a> {
     gain: bool,
 }
 
-static SHARE: std::sync::LazyLock<f32> = std::sync::LazyLock::new(|| crate::guiding::knob("GS", 0.5) as f32);
+static BOUNCES: std::sync::LazyLock<u32> = std::sync::LazyLock::new(|| crate::guiding::knob("GB", 1000.0) as u32);
 static GAIN: std::sync::LazyLock<bool> = std::sync::LazyLock::new(|| crate::guiding::knob("GR", 1.0) > 0.0);
 
 /// A direction that a path took.
@@ -33,6 +33,7 @@ pub(super) struct Turn {
     p: Vec3,
     n: Vec3,
     weight: Rgb,
+    pdfs: [f32; 2],
     direction: Vec3,
     /// Density of the direction.
     pdf: f32,
@@ -54,12 +55,13 @@ pub(super) struct Turns {
 impl<'a> Steering<'a> {
     /// At a vertex; `None` where light does not choose: at mirrors and where light passes, for which roulette must know how it was refracted.
     #[inline]
-    pub fn new(integrator: &'a PathIntegrator, vertex: &Vertex) -> Option<Self> {
+    pub fn new(integrator: &'a PathIntegrator, vertex: &Vertex, bounce: u32) -> Option<Self> {
         let guide = integrator.guide.as_deref()?;
-        if vertex.bsdf.is_delta() || vertex.bsdf.transmits() {
+        if bounce >= *BOUNCES || vertex.bsdf.is_delta() || vertex.bsdf.transmits() {
             return None;
         }
-        Some(Self { directions: guide.at(vertex.at.p.as_vec3(), vertex.frame.z * 1f32.copysign(vertex.wo.z)), share: *SHARE, gain: *GAIN })
+        let known = guide.at(vertex.at.p.as_vec3(), vertex.frame.z * 1f32.copysign(vertex.wo.z));
+        Some(Self { directions: known.map(|k| k.0), share: known.map_or(1.0, |k| k.1), gain: *GAIN })
     }
 
     /// The density of a direction that the surface chooses with density `pdf`.
@@ -73,31 +75,33 @@ impl<'a> Steering<'a> {
 
     /// A direction with the ray that follows it, and the density over that of the surface alone, which roulette had better not see.
     #[inline]
-    pub fn sample(&self, world: &World, vertex: &Vertex, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray, f32)> {
-        self.sample_(world, vertex, u_lobe, u).map(|(a, b, c)| (a, b, if self.gain { c } else { 1.0 }))
+    pub fn sample(&self, world: &World, vertex: &Vertex, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray, f32, [f32; 2])> {
+        self.sample_(world, vertex, u_lobe, u).map(|(a, b, c, d)| (a, b, if self.gain { c } else { 1.0 }, d))
     }
 
     #[inline]
-    pub fn sample_(&self, world: &World, vertex: &Vertex, mut u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray, f32)> {
+    pub fn sample_(&self, world: &World, vertex: &Vertex, mut u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray, f32, [f32; 2])> {
         let Some(directions) = self.directions else {
-            return vertex.sample(world, u_lobe, u).map(|(sample, ray)| (sample, ray, 1.0));
+            return vertex.sample(world, u_lobe, u).map(|(sample, ray)| (sample, ray, 1.0, [0.0, -1.0]));
         };
         if u_lobe < self.share {
             u_lobe = (u_lobe / self.share).min(ONE_MINUS_EPSILON);
             let (mut sample, ray) = vertex.sample(world, u_lobe, u)?;
             if sample.is_delta {
                 sample.weight *= 1.0 / self.share;
-                return Some((sample, ray, self.share));
+                return Some((sample, ray, self.share, [0.0, -1.0]));
             }
-            let pdf = self.pdf(ray.direction, sample.pdf);
+            let pdfs = [sample.pdf, directions.pdf(ray.direction)];
+            let pdf = self.share * pdfs[0] + (1.0 - self.share) * pdfs[1];
             let gain = pdf / sample.pdf;
             sample.weight *= 1.0 / gain;
             sample.pdf = pdf;
-            return Some((sample, ray, gain.min(LARGEST_GAIN)));
+            return Some((sample, ray, gain.min(LARGEST_GAIN), pdfs));
         }
         let GuideSample { direction, pdf } = directions.sample(u);
         let mut raised = None;
         let (BsdfEval { value, pdf: of_surface }, start) = vertex.eval_toward(world, direction, &mut raised)?;
+        let pdfs = [of_surface, pdf];
         let pdf = self.share * of_surface + (1.0 - self.share) * pdf;
         let sample = BsdfSample {
             wi: vertex.frame.to_local(direction),
@@ -107,7 +111,7 @@ impl<'a> Steering<'a> {
             is_transmission: false,
             eta: 1.0,
         };
-        Some((sample, start.spawn(direction), (pdf / of_surface).min(LARGEST_GAIN)))
+        Some((sample, start.spawn(direction), (pdf / of_surface).min(LARGEST_GAIN), pdfs))
     }
 }
 
@@ -119,8 +123,8 @@ impl Turns {
 
     /// A path goes on from `p`; `throughput` is without roulette.
     #[inline]
-    pub fn push(&mut self, p: Vec3, n: Vec3, weight: Rgb, direction: Vec3, pdf: f32, throughput: Rgb, slot: u32) {
-        self.turns.push(Turn { p, n, weight, direction, pdf, throughput, before: Rgb::BLACK, slot });
+    pub fn push(&mut self, p: Vec3, n: Vec3, weight: Rgb, pdfs: [f32; 2], direction: Vec3, pdf: f32, throughput: Rgb, slot: u32) {
+        self.turns.push(Turn { p, n, weight, pdfs, direction, pdf, throughput, before: Rgb::BLACK, slot });
     }
 
     /// All that the paths bring from here on comes from the directions they took.
@@ -146,7 +150,7 @@ impl Turns {
                 1 => light * w.mean(),
                 _ => (light * w.mean()) * (light * w.mean()) * turn.pdf,
             };
-            guide.record(turn.p, turn.n, turn.direction, light);
+            guide.record(turn.p, turn.n, turn.direction, light, turn.pdfs);
         }
     }
 }

@@ -230,7 +230,7 @@ impl PathIntegrator {
             if let Some(boundary) = &boundary {
                 vertex.bsdf = boundary;
             }
-            let steering = if GUIDED { Steering::new(self, &vertex) } else { None };
+            let steering = if GUIDED { Steering::new(self, &vertex, bounce) } else { None };
             if let Some(mut shadow) = self.sample_light(world, path, &vertex, bounce, steering) {
                 if MEDIA {
                     let here = world.media_toward(at, ray.direction, shadow.ray.direction, &media[i].here);
@@ -359,8 +359,8 @@ impl PathIntegrator {
         turns: &mut Turns,
     ) -> Option<(Path, Ray)> {
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::bsdf(bounce));
-        let (sample, ray, gain) = match steering {
-            None => vertex.sample(world, u[0], [u[1], u[2]]).map(|(sample, ray)| (sample, ray, 1.0))?,
+        let (sample, ray, gain, pdfs) = match steering {
+            None => vertex.sample(world, u[0], [u[1], u[2]]).map(|(sample, ray)| (sample, ray, 1.0, [0.0; 2]))?,
             Some(steering) => steering.sample(world, vertex, u[0], [u[1], u[2]])?,
         };
         let mut throughput = path.throughput * sample.weight;
@@ -382,7 +382,7 @@ impl PathIntegrator {
         }
 
         if steering.is_some() && !sample.is_delta {
-            turns.push(vertex.at.p.as_vec3(), vertex.frame.z * 1f32.copysign(vertex.wo.z), sample.weight, ray.direction, sample.pdf, unweighted, path.slot);
+            turns.push(vertex.at.p.as_vec3(), vertex.frame.z * 1f32.copysign(vertex.wo.z), sample.weight, pdfs, ray.direction, sample.pdf, unweighted, path.slot);
         }
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
