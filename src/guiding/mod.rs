@@ -1,9 +1,9 @@
 //! Learning where light comes from while a picture is made ("Practical Path Guiding for Efficient Light-Transport Simulation", 2017, and
 //! "'Practical Path Guiding' in Production", 2019).
 //!
-//! A binary tree divides space; each of its leaves has a distribution of directions, in proportion to the light that arrived from them in the
-//! pass before. A pass records into sums of whole numbers, so what is learned does not depend on threads. Between passes, leaves that got many
-//! records are divided and the directions of each are divided where the light is.
+//! For surfaces that face each of six sides, a binary tree divides space; each of its leaves has a distribution of directions, in proportion to
+//! what light from them has brought to paths that were scattered there. Paths record into sums of whole numbers, so what is learned does not
+//! depend on threads. From time to time leaves with many records are divided, and the directions of each where the light is.
 
 mod quadtree;
 #[cfg(test)]
@@ -18,19 +18,18 @@ use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::random::mix;
 use crate::math::{Aabb, Vec3};
 
-/// Knob.
-pub fn knob(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}
-
-/// Records of a leaf beyond which it is divided, in a pass of one sample per pixel; in one of `n` it is `sqrt(n)` times as many.
+/// Records of a leaf beyond which it is divided, after one sample per pixel; after `n` it is `sqrt(n)` times as many.
 const RECORDS_TO_DIVIDE: f64 = 4000.0;
 
 /// Leaves at most.
 const MAX_LEAVES: usize = 1 << 13;
 
-/// Nodes of all distributions together at most, about. One takes 80 bytes, with its part of the records.
+/// Nodes of all distributions together at most. One takes 96 bytes, with its part of the records: 96 MiB, and twice as much while they are
+/// refined.
 const MAX_NODES: usize = 1 << 20;
+
+/// Nodes of a single distribution at most.
+const MAX_NODES_OF_LEAF: usize = 1024;
 
 /// Divisions of space in a row at most.
 const MAX_DEPTH: u32 = 48;
@@ -41,8 +40,14 @@ const UNITS: f32 = 65_536.0;
 /// What a single record counts at most, in typical ones: 2^27 such fit into a sum.
 const LARGEST: f32 = 1_048_576.0;
 
-/// What stands for "a leaf" in the tree over space: no node has the root as child.
+/// What stands for "a leaf" in the tree over space: no node has the first root as child.
 const LEAF: u32 = 0;
+
+/// The share of directions that surfaces choose where nothing says what is better; the light chooses the others.
+const SURFACE_SHARE: f32 = 0.5;
+
+/// The shares that are tried instead.
+const OTHER_SHARES: [f32; 4] = [0.15, 0.3, 0.7, 0.9];
 
 /// A node of the tree over space: two children, or none and the index of a leaf.
 #[derive(Clone, Copy, Debug)]
@@ -54,16 +59,58 @@ struct Node {
 /// A part of space.
 #[derive(Debug)]
 struct Leaf {
-    /// What the passes before have taught.
+    /// What has been learned.
     directions: Option<Arc<Directions>>,
+    surface_share: f32,
     records: Records,
     count: AtomicU64,
-    lit: AtomicU64,
-    share: f32,
+    /// How much better each of [`OTHER_SHARES`] is than half, as the mean logarithm of the density weighted by light.
     gains: [AtomicI64; 4],
 }
 
-static SHARES: std::sync::LazyLock<[f32; 4]> = std::sync::LazyLock::new(|| [knob("S0", 0.15), knob("S1", 0.3), knob("S2", 0.7), knob("S3", 0.9)].map(|s| s as f32));
+impl Default for Leaf {
+    fn default() -> Self {
+        Self {
+            directions: None,
+            surface_share: SURFACE_SHARE,
+            records: Records::default(),
+            count: AtomicU64::new(0),
+            gains: Default::default(),
+        }
+    }
+}
+
+impl Leaf {
+    /// The best share by the records.
+    fn best_share(&self) -> f32 {
+        let best = self.gains.iter().zip(OTHER_SHARES).max_by_key(|(gain, _)| gain.load(Ordering::Relaxed));
+        best.filter(|(gain, _)| gain.load(Ordering::Relaxed) > 0).map_or(SURFACE_SHARE, |(_, share)| share)
+    }
+}
+
+/// What is known of the light at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// Where it comes from.
+    pub directions: &'a Directions,
+    /// How many directions the surface had better choose.
+    pub surface_share: f32,
+}
+
+/// Light that a path found.
+#[derive(Clone, Copy, Debug)]
+pub struct Record {
+    /// Where it was scattered.
+    pub p: Vec3,
+    /// The normal there, on the side of the path.
+    pub n: Vec3,
+    /// The direction it came from.
+    pub direction: Vec3,
+    /// What was scattered towards the path, over the density with which the direction was chosen.
+    pub light: f32,
+    /// The densities with which the surface and the guide choose the direction, if the guide knew anything.
+    pub densities: Option<[f32; 2]>,
+}
 
 /// What is known of the light that arrives at the points of a scene, and what is being learned of it.
 #[derive(Debug)]
@@ -71,117 +118,115 @@ pub struct Guide {
     /// Of the box around the scene, a cube.
     corner: Vec3,
     inverse_size: f32,
+    /// The first six are roots.
     nodes: Vec<Node>,
     leaves: Vec<Leaf>,
-    /// From light to whole numbers; zero while nothing is learned.
+    /// From light to whole numbers.
     scale: f32,
-    pub normals: bool,
-    pub mode: u32,
+    learns: bool,
 }
 
 impl Guide {
-    /// Knows nothing yet. `typical` is how much light a typical record has, about: records far below it are lost, far above are cut.
+    /// Knows nothing yet. `typical` is how much light a typical record has, about: records far below it are lost, far above are cut. Without it
+    /// (zero), only places are learned, not light.
     pub fn new(bounds: Aabb, typical: f32) -> Self {
         let size = bounds.size().max_element();
         let known = size > 0.0 && size < f32::INFINITY && bounds.min.is_finite();
         let (corner, inverse_size) = if known { (bounds.min, 1.0 / size) } else { (Vec3::ZERO, 0.0) };
-        let scale = UNITS / typical;
-        Self {
-            corner,
-            inverse_size,
-            nodes: (0..6).map(|leaf| Node { children: [LEAF; 2], leaf }).collect(),
-            leaves: (0..6).map(|_| Leaf { directions: None, records: Records::default(), count: AtomicU64::new(0), lit: AtomicU64::new(0), share: 0.5, gains: Default::default() }).collect(),
-            normals: knob("GN", 1.0) > 0.0,
-            mode: knob("GT", 1.0) as u32,
-            scale: if scale > 0.0 && scale < f32::INFINITY { scale } else { 0.0 },
-        }
+        let nodes = (0..6).map(|leaf| Node { children: [LEAF; 2], leaf }).collect();
+        Self { corner, inverse_size, nodes, leaves: (0..6).map(|_| Leaf::default()).collect(), scale: scale_of(typical), learns: true }
+    }
+
+    /// With another [typical](Self::new) light.
+    #[must_use]
+    pub fn with_typical(self, typical: f32) -> Self {
+        Self { scale: scale_of(typical), ..self }
+    }
+
+    /// Whether light is learned, not places alone.
+    pub fn knows_brightness(&self) -> bool {
+        self.scale > 0.0
     }
 
     /// Whether records are taken.
     pub fn learns(&self) -> bool {
-        self.scale > 0.0
+        self.learns
     }
 
     /// Takes no more records.
     #[must_use]
     pub fn finished(self) -> Self {
-        Self { scale: 0.0, ..self }
+        Self { learns: false, ..self }
     }
 
-    /// What is known of the light at a point; `None` if nothing.
+    /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.
     #[inline]
-    pub fn at(&self, p: Vec3, n: Vec3) -> Option<(&Directions, f32)> {
-        let (leaf, _) = self.find(self.normalized(p), self.root(n));
-        let leaf = &self.leaves[leaf];
-        leaf.directions.as_deref().map(|d| (d, leaf.share))
+    pub fn at(&self, p: Vec3, n: Vec3) -> Option<Known<'_>> {
+        let leaf = &self.leaves[self.find(root(n), self.normalized(p)).0];
+        let directions = leaf.directions.as_deref()?;
+        Some(Known { directions, surface_share: leaf.surface_share })
     }
 
-    /// Records `light` that arrived at a point from a direction, an estimate over its density. Light that is not a finite number above zero counts
-    /// as none. Equal records are treated alike.
+    /// Learns from light. What is not a finite number above zero counts as no light. Equal records are treated alike.
     #[inline]
-    pub fn record(&self, p: Vec3, n: Vec3, direction: Vec3, light: f32, pdfs: [f32; 2]) {
-        let at = self.normalized(p);
-        let root = self.root(n);
-        let (mut leaf, depth) = self.find(at, root);
+    pub fn record(&self, record: &Record) {
+        let Record { p, n, direction, light, densities } = *record;
+        let (at, root) = (self.normalized(p), root(n));
+        let (leaf, depth) = self.find(root, at);
         self.leaves[leaf].count.fetch_add(1, Ordering::Relaxed);
-        if !(light > 0.0 && light < f32::INFINITY) {
+        if !(light > 0.0 && light < f32::INFINITY && direction.is_finite()) {
             return;
         }
-        let amount = if self.mode == 2 { (light * self.scale * self.scale * (1.0 / 65536.0)).min(281474976710656.0) } else { (light * self.scale).min(LARGEST * UNITS) } as u64;
-        self.leaves[leaf].lit.fetch_add(1, Ordering::Relaxed);
-        if pdfs[1] >= 0.0 {
-            let middle = 0.5 * (pdfs[0] + pdfs[1]);
-            for (sum, share) in self.leaves[leaf].gains.iter().zip(*SHARES) {
-                let gain = ((share * pdfs[0] + (1.0 - share) * pdfs[1]) / middle).ln();
-                sum.fetch_add((amount as f32 * gain) as i64, Ordering::Relaxed);
+        let amount = (light * self.scale).min(LARGEST * UNITS);
+        if let Some([surface, guide]) = densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0) {
+            let usual = SURFACE_SHARE * surface + (1.0 - SURFACE_SHARE) * guide;
+            for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_SHARES) {
+                let gain = ((share * surface + (1.0 - share) * guide) / usual).ln();
+                sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
             }
         }
+
         // Random numbers of the record itself.
         let bits = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
         let first = mix(bits(at.x, direction.x) ^ mix(bits(at.y, direction.y) ^ mix(bits(at.z, light))));
         let second = mix(first);
-        let unit = |bits: u64| (bits & 0xff_ffff) as f32 * (1.0 / 16_777_216.0);
+        let unit = |bits: u64| (bits & 0xf_ffff) as f32 * (1.0 / 1_048_576.0);
         // Moved by up to half a leaf: what leaves learn does not jump at their borders then.
-        let moved = at + Vec3::from_array([0, 1, 2].map(|k| {
-            let size = 0.5f32.powi(((depth + 2 - k) / 3) as i32);
-            size * (unit(first >> (20 * k)) - 0.5)
-        }));
-        if moved.min_element() >= 0.0 && moved.max_element() < 1.0 {
-            leaf = self.find(moved, root).0;
-        }
-        self.leaves[leaf].records.add(direction, [unit(second), unit(second >> 32)], amount);
+        let jitter = |k: u32| 0.5f32.powi(((depth + 2 - k) / 3) as i32) * (unit(first >> (20 * k)) - 0.5);
+        let moved = at + Vec3::new(jitter(0), jitter(1), jitter(2));
+        let is_inside = moved.min_element() >= 0.0 && moved.max_element() < 1.0;
+        let leaf = if is_inside { self.find(root, moved).0 } else { leaf };
+        self.leaves[leaf].records.add(direction, [unit(second), unit(second >> 32)], amount as u64);
     }
 
-    /// Learns from what a pass of so many samples per pixel recorded: the guide for the next pass.
+    /// What is known after so many samples per pixel, with all that was recorded.
     #[must_use]
     pub fn refined(&self, samples: u32) -> Self {
-        let most_records = (knob("GC", RECORDS_TO_DIVIDE) * f64::from(samples).sqrt()) as u64;
-        let mut next =
-            Self { corner: self.corner, inverse_size: self.inverse_size, nodes: self.nodes.clone(), leaves: Vec::new(), scale: self.scale, normals: self.normals, mode: self.mode };
-        let old_leaves = self.nodes.iter().enumerate().filter(|(_, node)| node.children[0] == LEAF);
+        let most_records = (RECORDS_TO_DIVIDE * f64::from(samples).sqrt()) as u64;
+        let mut next = Self { nodes: self.nodes.clone(), leaves: Vec::new(), ..*self };
         let depths = self.depths();
         let mut free = MAX_LEAVES.saturating_sub(self.leaves.len());
         let mut plans = Vec::new();
-        for (index, node) in old_leaves {
+        for (index, node) in self.nodes.iter().enumerate().filter(|(_, node)| node.children[0] == LEAF) {
             let leaf = &self.leaves[node.leaf as usize];
-            let parts = next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records, &mut free);
-            plans.push((leaf, parts));
+            plans.push((leaf, next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records, &mut free)));
         }
         let leaves: usize = plans.iter().map(|(_, parts)| parts.len()).sum();
-        let most_nodes = (MAX_NODES / leaves.max(1)).clamp(64, 1024);
+        let most_nodes = (MAX_NODES / leaves.max(1)).min(MAX_NODES_OF_LEAF);
         for (leaf, parts) in plans {
-            let directions = leaf.records.directions(self.mode == 2).map(Arc::new).or_else(|| leaf.directions.clone());
-            let best = leaf.gains.iter().map(|g| g.load(Ordering::Relaxed)).enumerate().max_by_key(|(_, g)| *g);
-            let share = match best {
-                Some((i, g)) if g > 0 && knob("GL", 1.0) > 0.0 => SHARES[i],
-                _ => knob("GS", 0.5) as f32,
-            };
-            let lit = leaf.lit.load(Ordering::Relaxed) as f64;
-            let most_nodes = most_nodes.min((lit / knob("GM", 8.0)) as usize + 1);
-            let records = leaf.records.refined(most_nodes, self.mode == 2, knob("GA", 0.0) / parts.len() as f64);
-            for part in parts {
+            let directions = leaf.records.directions().map(Arc::new);
+            let records = leaf.records.refined(most_nodes, parts.len());
+            let (count, surface_share) = (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
+            for &part in &parts {
                 next.nodes[part].leaf = next.leaves.len() as u32;
-                next.leaves.push(Leaf { directions: directions.clone(), records: records.copied(), count: AtomicU64::new(0), lit: AtomicU64::new(0), share, gains: Default::default() });
+                next.leaves.push(Leaf {
+                    directions: directions.clone(),
+                    surface_share,
+                    records: records.copied(),
+                    count: AtomicU64::new(count),
+                    // What was better before need not be it for what is known now.
+                    gains: [0, 1, 2, 3].map(|k| AtomicI64::new(leaf.gains[k].load(Ordering::Relaxed) / (2 * parts.len() as i64))),
+                });
             }
         }
         next
@@ -219,31 +264,25 @@ impl Guide {
         self.leaves.len()
     }
 
-    /// Nodes of all distributions, records included.
+    /// Nodes of all distributions.
     pub fn directional_nodes(&self) -> usize {
         self.leaves.iter().map(|leaf| leaf.records.len()).sum()
-    }
-
-    #[inline]
-    fn root(&self, n: Vec3) -> usize {
-        if !self.normals {
-            return 0;
-        }
-        let a = n.abs();
-        let axis = if a.x >= a.y && a.x >= a.z { 0 } else if a.y >= a.z { 1 } else { 2 };
-        2 * axis + usize::from(n[axis] < 0.0)
     }
 
     /// A point within the unit cube.
     #[inline]
     fn normalized(&self, p: Vec3) -> Vec3 {
-        // The order of the comparisons makes a NaN zero.
-        ((p - self.corner) * self.inverse_size).max(Vec3::ZERO).min(Vec3::splat(ONE_MINUS_EPSILON))
+        let inside = |k: usize| {
+            let x = (p[k] - self.corner[k]) * self.inverse_size;
+            // NaN is not above zero either.
+            if x > 0.0 { x.min(ONE_MINUS_EPSILON) } else { 0.0 }
+        };
+        Vec3::new(inside(0), inside(1), inside(2))
     }
 
     /// The leaf around a point of the unit cube, and its depth.
     #[inline]
-    fn find(&self, at: Vec3, root: usize) -> (usize, u32) {
+    fn find(&self, root: usize, at: Vec3) -> (usize, u32) {
         let mut at = at.to_array();
         let (mut index, mut depth, mut axis) = (root, 0, 0);
         loop {
@@ -259,4 +298,18 @@ impl Guide {
             depth += 1;
         }
     }
+}
+
+/// Whole numbers per light; zero if nothing is known of the light.
+fn scale_of(typical: f32) -> f32 {
+    let scale = UNITS / typical;
+    if scale > 0.0 && scale < f32::INFINITY { scale } else { 0.0 }
+}
+
+/// The tree for surfaces with this normal: walls have two sides, and light below a surface does not reach it.
+#[inline]
+fn root(n: Vec3) -> usize {
+    let a = n.abs();
+    let axis = if a.x >= a.y && a.x >= a.z { 0 } else { 1 + usize::from(a.y < a.z) };
+    2 * axis + usize::from(n[axis] < 0.0)
 }

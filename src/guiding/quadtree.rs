@@ -1,12 +1,15 @@
 //! Distributions of directions that are learned: quadtrees over the unit square, which an octahedron maps to the sphere.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec3, vec3};
 
 /// A quarter that holds more than this share of a tree's light is divided.
 const DIVIDED_SHARE: f64 = 0.01;
+
+/// As long as it got fewer records it is not: single ones tell of chance.
+const RECORDS_TO_DIVIDE: f64 = 16.0;
 
 /// Divisions in a row at most: a cell is then about 0.0005 radians wide.
 const MAX_DEPTH: u32 = 12;
@@ -131,7 +134,15 @@ fn choose(u: &mut f32, first: f32, second: f32) -> usize {
 #[derive(Debug, Default)]
 struct RecordNode {
     sums: [AtomicU64; 4],
+    counts: [AtomicU32; 4],
     children: [u32; 4],
+}
+
+/// What quarters hold together with all below them.
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    light: f64,
+    count: f64,
 }
 
 /// Light by direction as it is recorded. Sums are whole numbers, so they do not depend on the order in which threads add.
@@ -157,6 +168,7 @@ impl Records {
         let is_inside = moved.iter().all(|c| (0.0..1.0).contains(c));
         let (index, which, _) = if is_inside { self.find(moved) } else { (index, which, size) };
         self.nodes[index].sums[which].fetch_add(amount, Ordering::Relaxed);
+        self.nodes[index].counts[which].fetch_add(1, Ordering::Relaxed);
     }
 
     /// The node and the quarter of it that is the cell around a point, and the cell's size.
@@ -173,42 +185,37 @@ impl Records {
         }
     }
 
-    /// The sums of all quarters, by node. Children come after their parents.
-    fn sums(&self, square: bool) -> Vec<[f64; 4]> {
-        let mut sums: Vec<[f64; 4]> =
-            self.nodes.iter().map(|node| [0, 1, 2, 3].map(|k| node.sums[k].load(Ordering::Relaxed) as f64)).collect();
-        if square {
-            let mut area = vec![0.25; sums.len()];
-            for index in 0..sums.len() {
-                for k in 0..4 {
-                    sums[index][k] = (area[index] * sums[index][k]).sqrt();
-                    let child = self.nodes[index].children[k];
-                    if child != LEAF {
-                        area[child as usize] = 0.25 * area[index];
-                    }
-                }
-            }
-        }
+    /// What all quarters hold, by node. Children come after their parents.
+    fn held(&self) -> Vec<[Held; 4]> {
+        let own = |node: &RecordNode| {
+            [0, 1, 2, 3].map(|k| Held {
+                light: node.sums[k].load(Ordering::Relaxed) as f64,
+                count: f64::from(node.counts[k].load(Ordering::Relaxed)),
+            })
+        };
+        let mut held: Vec<[Held; 4]> = self.nodes.iter().map(own).collect();
         for index in (0..self.nodes.len()).rev() {
             for k in 0..4 {
                 let child = self.nodes[index].children[k];
                 if child != LEAF {
-                    sums[index][k] = sums[child as usize].iter().sum();
+                    let below = held[child as usize];
+                    held[index][k] = Held { light: below.iter().map(|h| h.light).sum(), count: below.iter().map(|h| h.count).sum() };
                 }
             }
         }
-        sums
+        held
     }
 
     /// The distribution of what was recorded; `None` of nothing.
-    pub fn directions(&self, square: bool) -> Option<Directions> {
-        let sums = self.sums(square);
-        let total: f64 = sums[0].iter().sum();
+    pub fn directions(&self) -> Option<Directions> {
+        let held = self.held();
+        let total: f64 = held[0].iter().map(|h| h.light).sum();
         if total == 0.0 {
             return None;
         }
-        let node = |(node, sums): (&RecordNode, &[f64; 4])| Node { shares: sums.map(|s| (s / total) as f32), children: node.children };
-        let mut nodes: Vec<Node> = self.nodes.iter().zip(&sums).map(node).collect();
+        let of_node =
+            |(node, held): (&RecordNode, &[Held; 4])| Node { shares: held.map(|h| (h.light / total) as f32), children: node.children };
+        let mut nodes: Vec<Node> = self.nodes.iter().zip(&held).map(of_node).collect();
         // A quarter so dark that nothing is left of it in `f32` is a cell like any other without light.
         for node in &mut nodes {
             for k in 0..4 {
@@ -220,36 +227,45 @@ impl Records {
         Some(Directions { nodes })
     }
 
-    /// Empty records, divided where there was light: every quarter with more than a hundredth of it, as far as `most` nodes go.
-    pub fn refined(&self, most: usize, square: bool, keep: f64) -> Self {
-        let raw = self.sums(false);
-        let sums = self.sums(square);
-        let threshold = super::knob("GD", DIVIDED_SHARE) * sums[0].iter().sum::<f64>();
+    /// The same records, for each of so many parts of space, in a tree of at most so many nodes that is divided where the light is: every quarter
+    /// with more than a hundredth of it, if enough records tell so.
+    pub fn refined(&self, most: usize, parts: usize) -> Self {
+        let held = self.held();
+        let threshold = DIVIDED_SHARE * held[0].iter().map(|h| h.light).sum::<f64>();
+        let share = 1.0 / parts.max(1) as f64;
         let mut nodes = vec![RecordNode::default()];
-        // Where each new node's sums come from: a node of old, or even parts of a cell.
-        let mut sources = vec![(Some(0), sums[0], 1, raw[0])];
+        // The node of old that each new one continues, unless it is a part of a cell; what it holds; its depth.
+        let mut sources = vec![(Some(0), held[0], 1)];
         let mut index = 0;
         while index < nodes.len() {
-            let (old, quarters, depth, old_raw) = sources[index];
-            nodes[index].sums = old_raw.map(|v| AtomicU64::new((v * keep) as u64));
-            for (k, &sum) in quarters.iter().enumerate() {
-                if sum > threshold && depth < MAX_DEPTH && nodes.len() < most {
-                    let child = old.map_or(LEAF, |old: usize| self.nodes[old].children[k]);
-                    let next = if child == LEAF { (None, [0.25 * sum; 4], [0.25 * old_raw[k]; 4]) } else { (Some(child as usize), sums[child as usize], raw[child as usize]) };
-                    nodes[index].children[k] = nodes.len() as u32;
-                    sources.push((next.0, next.1, depth + 1, next.2));
-                    nodes[index].sums[k] = AtomicU64::new(0);
-                    nodes.push(RecordNode::default());
+            let (old, quarters, depth) = sources[index];
+            for (k, &quarter) in quarters.iter().enumerate() {
+                let divided = quarter.light > threshold && quarter.count >= RECORDS_TO_DIVIDE && depth < MAX_DEPTH && nodes.len() < most;
+                if !divided {
+                    nodes[index].sums[k] = AtomicU64::new((share * quarter.light) as u64);
+                    nodes[index].counts[k] = AtomicU32::new((share * quarter.count) as u32);
+                    continue;
                 }
+                nodes[index].children[k] = nodes.len() as u32;
+                let part = Held { light: 0.25 * quarter.light, count: 0.25 * quarter.count };
+                let child = old.map(|old: usize| self.nodes[old].children[k]).filter(|child| *child != LEAF);
+                let below = child.map_or([part; 4], |child| held[child as usize]);
+                sources.push((child.map(|child| child as usize), below, depth + 1));
+                nodes.push(RecordNode::default());
             }
             index += 1;
         }
         Self { nodes }
     }
 
-    /// A copy without light.
+    /// A copy.
     pub fn copied(&self) -> Self {
-        Self { nodes: self.nodes.iter().map(|node| RecordNode { children: node.children, sums: [0,1,2,3].map(|k| AtomicU64::new(node.sums[k].load(Ordering::Relaxed))) }).collect() }
+        let copy = |node: &RecordNode| RecordNode {
+            sums: [0, 1, 2, 3].map(|k| AtomicU64::new(node.sums[k].load(Ordering::Relaxed))),
+            counts: [0, 1, 2, 3].map(|k| AtomicU32::new(node.counts[k].load(Ordering::Relaxed))),
+            children: node.children,
+        };
+        Self { nodes: self.nodes.iter().map(copy).collect() }
     }
 
     /// Nodes of the tree.

@@ -6,7 +6,7 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use super::guided::{Steering, Turns};
+use super::guided::{Steered, Steering, Turns};
 use super::media::MediaState;
 use super::vertex::Vertex;
 use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions, surface_sample};
@@ -158,7 +158,7 @@ impl PathIntegrator {
             }
             scratch.turns.settle(out);
         }
-        scratch.turns.record(self, out);
+        scratch.turns.teach(self, out);
     }
 
     /// Takes every path through media to the next surface where something happens to it; says how many rays that took.
@@ -230,7 +230,7 @@ impl PathIntegrator {
             if let Some(boundary) = &boundary {
                 vertex.bsdf = boundary;
             }
-            let steering = if GUIDED { Steering::new(self, &vertex, bounce) } else { None };
+            let steering = if GUIDED { Steering::new(self, &vertex) } else { None };
             if let Some(mut shadow) = self.sample_light(world, path, &vertex, bounce, steering) {
                 if MEDIA {
                     let here = world.media_toward(at, ray.direction, shadow.ray.direction, &media[i].here);
@@ -312,14 +312,7 @@ impl PathIntegrator {
 
     /// A shadow ray towards a light, with what it brings if it is free.
     #[inline(always)]
-    fn sample_light(
-        &self,
-        world: &World,
-        path: &Path,
-        vertex: &Vertex,
-        bounce: u32,
-        steering: Option<Steering>,
-    ) -> Option<ShadowRay> {
+    fn sample_light(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32, steering: Option<Steering>) -> Option<ShadowRay> {
         if vertex.bsdf.is_delta() || world.scene.lights.is_empty() {
             return None;
         }
@@ -359,13 +352,16 @@ impl PathIntegrator {
         turns: &mut Turns,
     ) -> Option<(Path, Ray)> {
         let u = self.sampler.sample_4d(path.seed, path.sample, dimensions::bsdf(bounce));
-        let (sample, ray, gain, pdfs) = match steering {
-            None => vertex.sample(world, u[0], [u[1], u[2]]).map(|(sample, ray)| (sample, ray, 1.0, [0.0; 2]))?,
+        let steered = match steering {
+            None => {
+                let (sample, ray) = vertex.sample(world, u[0], [u[1], u[2]])?;
+                Steered { sample, ray, gain: 1.0, densities: None }
+            }
             Some(steering) => steering.sample(world, vertex, u[0], [u[1], u[2]])?,
         };
+        let Steered { sample, ray, gain, .. } = &steered;
         let mut throughput = path.throughput * sample.weight;
         let eta_squared = path.eta_squared * (sample.eta * sample.eta) * gain;
-        let unweighted = throughput;
 
         // Russian roulette: the survivors carry the weight of the dead. The chance is not capped, so a path that lost nothing goes on.
         if bounce + 1 >= self.rr_depth {
@@ -381,12 +377,12 @@ impl PathIntegrator {
             return None;
         }
 
-        if steering.is_some() && !sample.is_delta {
-            turns.push(vertex.at.p.as_vec3(), vertex.frame.z * 1f32.copysign(vertex.wo.z), sample.weight, pdfs, ray.direction, sample.pdf, unweighted, path.slot);
+        if steering.is_some() {
+            turns.push(vertex, &steered, path.throughput * sample.weight, path.slot);
         }
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, ray))
+        Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, *ray))
     }
 }
 

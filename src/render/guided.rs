@@ -19,7 +19,10 @@ use crate::integrator::{self, RayCounts};
 const FIRST_PASS: u32 = 2;
 
 /// Passes of fewer samples do not decide whether guiding pays.
-const SAMPLES_TO_JUDGE: u32 = 4;
+const SAMPLES_TO_JUDGE: u32 = 8;
+
+/// How often the guide is refined while the samples double, at most.
+const REFINEMENTS: u32 = 4;
 
 /// What relative variances are related to beside the square of the colour.
 const FLOOR: f64 = 0.01;
@@ -100,6 +103,16 @@ fn ratio(a: f64, b: f64) -> f64 {
     if a > 0.0 && b > 0.0 && a < f64::INFINITY && b < f64::INFINITY { a / b } else { 1.0 }
 }
 
+/// Mean of all channels of all blocks.
+fn mean(film: &Film) -> f64 {
+    let of_tile = |tile: &FilmTile| {
+        let means = block_means(tile);
+        let count = means.len().max(1) as f64;
+        means.iter().flatten().map(|v| v.max(0.0)).sum::<f64>() / (3.0 * count)
+    };
+    film.tiles().iter().map(of_tile).sum::<f64>() / film.tiles().len().max(1) as f64
+}
+
 impl Picture {
     /// Adds a pass of so many samples per pixel; says by how much it is better than the first, variance times rays.
     fn add(&mut self, film: &Film, samples: u32, rays: &RayCounts) -> f64 {
@@ -139,14 +152,41 @@ impl Picture {
         gain
     }
 
-    /// Mean of all channels of all pixels.
-    fn mean(film: &Film) -> f64 {
-        let of_tile = |tile: &FilmTile| {
-            let means = block_means(tile);
-            let count = means.len().max(1) as f64;
-            means.iter().flatten().map(|v| v.max(0.0)).sum::<f64>() / (3.0 * count)
-        };
-        film.tiles().iter().map(of_tile).sum::<f64>() / film.tiles().len().max(1) as f64
+    fn new(film: Film) -> Self {
+        let factors = vec![1.0; film.tiles().len()];
+        Self { film, factors, first: None, last: None }
+    }
+}
+
+/// The guide and when it learns.
+struct Lessons {
+    guide: Option<Guide>,
+    /// Samples per pixel since it was refined.
+    since: u32,
+}
+
+impl Lessons {
+    /// How many samples it takes to the next refinement, after `done`.
+    fn interval(done: u32) -> u32 {
+        (done / REFINEMENTS).max(1)
+    }
+
+    /// How many samples follow with the guide as it is.
+    fn left(&self, done: u32) -> u32 {
+        if self.guide.is_some() { Self::interval(done - self.since).saturating_sub(self.since).max(1) } else { u32::MAX }
+    }
+
+    /// Learns from `samples` more, after which `done` are done; `film` has them and all others.
+    fn learn(&mut self, guide: Option<Arc<Guide>>, samples: u32, done: u32, brightness: impl FnOnce() -> f64) {
+        self.since += samples;
+        self.guide = guide.and_then(Arc::into_inner).map(|guide| {
+            if self.since < Self::interval(done - self.since) {
+                return guide;
+            }
+            self.since = 0;
+            let next = guide.refined(done);
+            if next.knows_brightness() { next } else { next.with_typical(brightness() as f32) }
+        });
     }
 }
 
@@ -160,21 +200,18 @@ pub(super) fn render(
 ) -> Result<RenderResult> {
     let mut layers = settings.layers;
     layers.insert(LayerKind::Variance);
-    let film = Film::new(settings.size, settings.crop, &layers, TILE_SIZE)?;
-    let factors = vec![1.0; film.tiles().len()];
-    let mut picture = Picture { film, factors, first: None, last: None };
+    let new_film = || Film::new(settings.size, settings.crop, &layers, TILE_SIZE);
+    let mut picture = Picture::new(new_film()?);
     let mut stats = Stats::default();
     let pixels = settings.crop.area();
     progress.start(settings.spp, pixels);
-    let bounds = job.world.accel.bounds();
-    let mut guide = Some(Arc::new(Guide::new(bounds, 0.0)));
+    let mut lessons = Lessons { guide: Some(Guide::new(job.world.accel.bounds(), 0.0)), since: 0 };
 
     let start = Instant::now();
     let mut step = 1;
     while stats.spp_done < settings.spp && !stats.interrupted && !stats.time_limited {
         let count = stats.spp_done.max(FIRST_PASS).min(settings.spp - stats.spp_done);
-        let is_last = stats.spp_done + count >= settings.spp;
-        let mut film = Film::new(settings.size, settings.crop, &layers, TILE_SIZE)?;
+        let mut film = new_film()?;
         let (mut done, mut rays) = (0, RayCounts::default());
         while done < count {
             if stop.load(Ordering::Relaxed) {
@@ -185,17 +222,21 @@ pub(super) fn render(
                 stats.time_limited = true;
                 break;
             }
-            job.integrator = integrator::build_guided(&settings.integrator, job.sampler, job.needs, guide.clone());
             let pass_start = Instant::now();
-            // The very first sample tells how bright the scene is.
-            let samples = if stats.spp_done == 0 { 1 } else { step.min(count - done) };
+            let to_refinement = lessons.left(stats.spp_done);
+            let samples = step.min(count - done).min(to_refinement);
+            let is_last = to_refinement >= settings.spp - stats.spp_done;
+            let guide = lessons.guide.take().map(|guide| Arc::new(if is_last { guide.finished() } else { guide }));
+            job.integrator = integrator::build_guided(&settings.integrator, job.sampler, job.needs, guide.clone());
             rays.add(&render_pass(&job, pool, &mut film, stats.spp_done, samples, progress));
+            // Drops its part of the guide.
+            job.integrator = integrator::build(&settings.integrator, job.sampler, job.needs);
             done += samples;
-            if stats.spp_done == 0 {
-                stats.first_pass_seconds = start.elapsed().as_secs_f64();
-                guide = Some(Arc::new(Guide::new(bounds, Picture::mean(&film) as f32)));
-            }
             stats.spp_done += samples;
+            lessons.learn(guide, samples, stats.spp_done, || mean(&film));
+            if stats.first_pass_seconds == 0.0 {
+                stats.first_pass_seconds = start.elapsed().as_secs_f64();
+            }
             step = next_pass(samples, pass_start.elapsed(), settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed())));
         }
         stats.rays.add(&rays);
@@ -203,16 +244,13 @@ pub(super) fn render(
             break;
         }
         let gain = picture.add(&film, done, &rays);
-        if std::env::var_os("GUIDE_DEBUG").is_some() {
-            let g = guide.as_deref();
-            tracing::warn!("pass {done}: gain {gain:.3}, rays/sample {:.2}, factor {:.3}, leaves {}, nodes {}, {:.2}s", rays.total() as f64 / (pixels as f64 * f64::from(done)), picture.factors[0], g.map_or(0, Guide::leaves), g.map_or(0, Guide::directional_nodes), start.elapsed().as_secs_f64());
+        if let Some(guide) = &lessons.guide {
+            let (leaves, nodes) = (guide.leaves(), guide.directional_nodes());
+            tracing::debug!("guided: pass of {done} samples, {gain:.2} times as good as the first; {leaves} leaves, {nodes} nodes");
         }
-        let pays = stats.spp_done == done || done < SAMPLES_TO_JUDGE || gain > GUIDED_COST;
-        let after_next = 2 * stats.spp_done;
-        guide = guide.filter(|_| pays && !is_last).map(|guide| {
-            let next = if guide.learns() { guide.refined(done) } else { Guide::new(bounds, Picture::mean(&picture.film) as f32) };
-            Arc::new(if after_next >= settings.spp { next.finished() } else { next })
-        });
+        if stats.spp_done > done && done >= SAMPLES_TO_JUDGE && gain < GUIDED_COST && lessons.guide.take().is_some() {
+            tracing::info!("guiding does not pay and is given up after {} samples per pixel", stats.spp_done);
+        }
     }
     stats.render_seconds = start.elapsed().as_secs_f64();
     progress.finish();

@@ -324,8 +324,14 @@ mod tests {
         assert_eq!((s.size, s.crop, s.threads), ([200, 80], Crop { x: 0, y: 0, width: 5, height: 6 }, 3));
         assert_eq!((s.sampler, s.spp, s.seed, s.accel), (SamplerKind::Sobol, 7, 1, AccelKind::Linear));
         // The same integrator: parameters that are not changed stay the scene's.
-        let changed =
-            IntegratorDesc::Path { max_depth: 4, rr_depth: 3, strategy: StrategyDesc::Light, clamp: Some(2.5), hide_emitters: false, guiding: false };
+        let changed = IntegratorDesc::Path {
+            max_depth: 4,
+            rr_depth: 3,
+            strategy: StrategyDesc::Light,
+            clamp: Some(2.5),
+            hide_emitters: false,
+            guiding: false,
+        };
         assert_eq!(s.integrator, changed);
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));
         assert_eq!(
