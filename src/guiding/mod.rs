@@ -24,11 +24,11 @@ const RECORDS_TO_DIVIDE: f64 = 4000.0;
 /// Leaves at most.
 const MAX_LEAVES: usize = 1 << 13;
 
-/// Nodes of all distributions together at most. One takes 96 bytes, with its part of the records: 96 MiB, and twice as much while they are
+/// Nodes of all distributions together at most. One takes 80 bytes, with its part of the records: 80 MiB, and twice as much while they are
 /// refined.
 const MAX_NODES: usize = 1 << 20;
 
-/// Nodes of a single distribution at most.
+/// Nodes of a single distribution at most: its indices have 16 bits.
 const MAX_NODES_OF_LEAF: usize = 1024;
 
 /// Divisions of space in a row at most.
@@ -40,44 +40,41 @@ const UNITS: f32 = 65_536.0;
 /// What a single record counts at most, in typical ones: 2^27 such fit into a sum.
 const LARGEST: f32 = 1_048_576.0;
 
-/// What stands for "a leaf" in the tree over space: no node has the first root as child.
-const LEAF: u32 = 0;
-
 /// The share of directions that surfaces choose where nothing says what is better; the light chooses the others.
 const SURFACE_SHARE: f32 = 0.5;
 
 /// The shares that are tried instead.
 const OTHER_SHARES: [f32; 4] = [0.15, 0.3, 0.7, 0.9];
 
-/// A node of the tree over space: two children, or none and the index of a leaf.
+/// A node of the tree over space: the index of the first of two children or, with [`IS_LEAF`], that of a leaf. Small, for paths ask at every turn.
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    children: [u32; 2],
-    leaf: u32,
+struct Node(u32);
+
+const IS_LEAF: u32 = 1 << 31;
+
+impl Node {
+    /// The leaf, if it is one.
+    #[inline]
+    fn leaf(self) -> Option<usize> {
+        (self.0 & IS_LEAF != 0).then_some((self.0 & !IS_LEAF) as usize)
+    }
 }
 
-/// A part of space.
-#[derive(Debug)]
-struct Leaf {
-    /// What has been learned.
+/// What has been learned of a part of space. Apart from what is being learned: a thread that writes one would slow down those that read the
+/// other.
+#[derive(Clone, Debug)]
+struct Learned {
     directions: Option<Arc<Directions>>,
     surface_share: f32,
+}
+
+/// What is being learned of a part of space.
+#[derive(Debug, Default)]
+struct Leaf {
     records: Records,
     count: AtomicU64,
     /// How much better each of [`OTHER_SHARES`] is than half, as the mean logarithm of the density weighted by light.
     gains: [AtomicI64; 4],
-}
-
-impl Default for Leaf {
-    fn default() -> Self {
-        Self {
-            directions: None,
-            surface_share: SURFACE_SHARE,
-            records: Records::default(),
-            count: AtomicU64::new(0),
-            gains: Default::default(),
-        }
-    }
 }
 
 impl Leaf {
@@ -120,6 +117,7 @@ pub struct Guide {
     inverse_size: f32,
     /// The first six are roots.
     nodes: Vec<Node>,
+    learned: Vec<Learned>,
     leaves: Vec<Leaf>,
     /// From light to whole numbers.
     scale: f32,
@@ -133,8 +131,15 @@ impl Guide {
         let size = bounds.size().max_element();
         let known = size > 0.0 && size < f32::INFINITY && bounds.min.is_finite();
         let (corner, inverse_size) = if known { (bounds.min, 1.0 / size) } else { (Vec3::ZERO, 0.0) };
-        let nodes = (0..6).map(|leaf| Node { children: [LEAF; 2], leaf }).collect();
-        Self { corner, inverse_size, nodes, leaves: (0..6).map(|_| Leaf::default()).collect(), scale: scale_of(typical), learns: true }
+        Self {
+            corner,
+            inverse_size,
+            nodes: (0..6).map(|leaf| Node(leaf | IS_LEAF)).collect(),
+            learned: vec![Learned { directions: None, surface_share: SURFACE_SHARE }; 6],
+            leaves: (0..6).map(|_| Leaf::default()).collect(),
+            scale: scale_of(typical),
+            learns: true,
+        }
     }
 
     /// With another [typical](Self::new) light.
@@ -162,9 +167,9 @@ impl Guide {
     /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.
     #[inline]
     pub fn at(&self, p: Vec3, n: Vec3) -> Option<Known<'_>> {
-        let leaf = &self.leaves[self.find(root(n), self.normalized(p)).0];
-        let directions = leaf.directions.as_deref()?;
-        Some(Known { directions, surface_share: leaf.surface_share })
+        let learned = &self.learned[self.find(root(n), self.normalized(p)).0];
+        let directions = learned.directions.as_deref()?;
+        Some(Known { directions, surface_share: learned.surface_share })
     }
 
     /// Learns from light. What is not a finite number above zero counts as no light. Equal records are treated alike.
@@ -203,12 +208,12 @@ impl Guide {
     #[must_use]
     pub fn refined(&self, samples: u32) -> Self {
         let most_records = (RECORDS_TO_DIVIDE * f64::from(samples).sqrt()) as u64;
-        let mut next = Self { nodes: self.nodes.clone(), leaves: Vec::new(), ..*self };
+        let mut next = Self { nodes: self.nodes.clone(), learned: Vec::new(), leaves: Vec::new(), ..*self };
         let depths = self.depths();
         let mut free = MAX_LEAVES.saturating_sub(self.leaves.len());
         let mut plans = Vec::new();
-        for (index, node) in self.nodes.iter().enumerate().filter(|(_, node)| node.children[0] == LEAF) {
-            let leaf = &self.leaves[node.leaf as usize];
+        for (index, leaf) in self.nodes.iter().enumerate().filter_map(|(index, node)| Some((index, node.leaf()?))) {
+            let leaf = &self.leaves[leaf];
             plans.push((leaf, next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records, &mut free)));
         }
         let leaves: usize = plans.iter().map(|(_, parts)| parts.len()).sum();
@@ -218,10 +223,9 @@ impl Guide {
             let records = leaf.records.refined(most_nodes, parts.len());
             let (count, surface_share) = (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
             for &part in &parts {
-                next.nodes[part].leaf = next.leaves.len() as u32;
+                next.nodes[part] = Node(next.leaves.len() as u32 | IS_LEAF);
+                next.learned.push(Learned { directions: directions.clone(), surface_share });
                 next.leaves.push(Leaf {
-                    directions: directions.clone(),
-                    surface_share,
                     records: records.copied(),
                     count: AtomicU64::new(count),
                     // What was better before need not be it for what is known now.
@@ -239,8 +243,8 @@ impl Guide {
         }
         *free -= 1;
         let first = self.nodes.len();
-        self.nodes.extend([Node { children: [LEAF; 2], leaf: 0 }; 2]);
-        self.nodes[index].children = [first as u32, first as u32 + 1];
+        self.nodes.extend([Node(IS_LEAF); 2]);
+        self.nodes[index] = Node(first as u32);
         let mut parts = self.divide(first, depth + 1, count / 2, most, free);
         parts.extend(self.divide(first + 1, depth + 1, count / 2, most, free));
         parts
@@ -250,10 +254,10 @@ impl Guide {
     fn depths(&self) -> Vec<u32> {
         let mut depths = vec![0; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate() {
-            if node.children[0] != LEAF {
-                for child in node.children {
-                    depths[child as usize] = depths[index] + 1;
-                }
+            if node.leaf().is_none() {
+                let first = node.0 as usize;
+                depths[first] = depths[index] + 1;
+                depths[first + 1] = depths[index] + 1;
             }
         }
         depths
@@ -286,14 +290,14 @@ impl Guide {
         let mut at = at.to_array();
         let (mut index, mut depth, mut axis) = (root, 0, 0);
         loop {
-            let node = &self.nodes[index];
-            if node.children[0] == LEAF {
-                return (node.leaf as usize, depth);
+            let node = self.nodes[index];
+            if let Some(leaf) = node.leaf() {
+                return (leaf, depth);
             }
             let x = 2.0 * at[axis];
             let upper = x >= 1.0;
             at[axis] = if upper { x - 1.0 } else { x };
-            index = node.children[usize::from(upper)] as usize;
+            index = node.0 as usize + usize::from(upper);
             axis = if axis == 2 { 0 } else { axis + 1 };
             depth += 1;
         }

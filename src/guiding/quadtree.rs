@@ -55,11 +55,26 @@ fn quarter([u, v]: [f32; 2]) -> (usize, [f32; 2]) {
     (usize::from(right) + 2 * usize::from(lower), [if right { u - 1.0 } else { u }, if lower { v - 1.0 } else { v }])
 }
 
-/// Four quarters with their shares of all light and their own nodes.
+/// Four quarters with their shares of the node's light, in whole numbers, and their own nodes. Small, for all of them are visited at random.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    shares: [f32; 4],
-    children: [u32; 4],
+    shares: [u16; 4],
+    children: [u16; 4],
+}
+
+impl Node {
+    /// With the light that each quarter holds. Light never rounds to nothing.
+    fn new(light: [f64; 4], children: [u32; 4]) -> Self {
+        let total: f64 = light.iter().sum();
+        let share = |k: usize| if light[k] > 0.0 { (light[k] / total * 65_000.0).ceil() as u16 } else { 0 };
+        let child = |k: usize| if light[k] > 0.0 { children[k] as u16 } else { LEAF as u16 };
+        Self { shares: [0, 1, 2, 3].map(share), children: [0, 1, 2, 3].map(child) }
+    }
+
+    #[inline]
+    fn shares(&self) -> [f32; 4] {
+        self.shares.map(f32::from)
+    }
 }
 
 /// A distribution of directions, constant on each cell of a quadtree over the square.
@@ -74,7 +89,8 @@ impl Directions {
     pub fn sample(&self, [mut u, mut v]: [f32; 2]) -> GuideSample {
         let (mut corner, mut size, mut density, mut index) = ([0.0; 2], 0.5, 1.0, 0);
         loop {
-            let Node { shares, children } = self.nodes[index];
+            let node = &self.nodes[index];
+            let shares = node.shares();
             let (upper, lower) = (shares[0] + shares[1], shares[2] + shares[3]);
             let total = upper + lower;
             let row = choose(&mut v, upper, lower);
@@ -82,7 +98,7 @@ impl Directions {
             let column = choose(&mut u, pair[0], pair[1]);
             density *= 4.0 * pair[column] / total;
             corner = [corner[0] + size * column as f32, corner[1] + size * row as f32];
-            index = children[2 * row + column] as usize;
+            index = usize::from(node.children[2 * row + column]);
             if index == LEAF as usize {
                 break;
             }
@@ -99,10 +115,11 @@ impl Directions {
         let (mut at, per_angle) = square_of(direction);
         let (mut density, mut index) = (per_angle, 0);
         loop {
-            let Node { shares, children } = &self.nodes[index];
+            let node = &self.nodes[index];
+            let shares = node.shares();
             let (which, within) = quarter(at);
             density *= 4.0 * shares[which] / (shares[0] + shares[1] + (shares[2] + shares[3]));
-            index = children[which] as usize;
+            index = usize::from(node.children[which]);
             if index == LEAF as usize || density == 0.0 {
                 return density;
             }
@@ -209,21 +226,12 @@ impl Records {
     /// The distribution of what was recorded; `None` of nothing.
     pub fn directions(&self) -> Option<Directions> {
         let held = self.held();
-        let total: f64 = held[0].iter().map(|h| h.light).sum();
-        if total == 0.0 {
+        let light = |held: &[Held; 4]| held.map(|h| h.light);
+        if light(&held[0]).iter().sum::<f64>() == 0.0 {
             return None;
         }
-        let of_node =
-            |(node, held): (&RecordNode, &[Held; 4])| Node { shares: held.map(|h| (h.light / total) as f32), children: node.children };
-        let mut nodes: Vec<Node> = self.nodes.iter().zip(&held).map(of_node).collect();
-        // A quarter so dark that nothing is left of it in `f32` is a cell like any other without light.
-        for node in &mut nodes {
-            for k in 0..4 {
-                if node.shares[k] == 0.0 {
-                    node.children[k] = LEAF;
-                }
-            }
-        }
+        // What holds no light is never entered, so its shares do not matter.
+        let nodes = self.nodes.iter().zip(&held).map(|(node, held)| Node::new(light(held), node.children)).collect();
         Some(Directions { nodes })
     }
 

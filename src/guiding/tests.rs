@@ -89,10 +89,12 @@ fn a_known_distribution_is_learned() {
         inside += f64::from(u8::from(chosen.dot(axis) > 0.97)) / f64::from(n);
     }
     let expected = light / all;
-    assert!(expected > 0.1 && (inside / expected - 1.0).abs() < 0.15, "{inside} {expected}");
-    // Uniform directions would meet the peak with a density of 0.08; the lobes have 6.4 times that share of it.
-    let peak = lobes(axis) / (all / f64::from(n) * 4.0 * std::f64::consts::PI) as f32;
-    assert!((known.directions.pdf(axis) / peak - 1.0).abs() < 0.5, "{} {peak}", known.directions.pdf(axis));
+    // Blurred by the sizes of cells.
+    assert!(expected > 0.1 && (inside / expected - 1.0).abs() < 0.25, "{inside} {expected}");
+    let mean = (all / f64::from(n)) as f32;
+    let (peak, uniform) = (lobes(axis) / mean, 4.0 * std::f64::consts::PI as f32);
+    let learned = known.directions.pdf(axis) * uniform;
+    assert!(peak > 20.0 && learned > 0.4 * peak && learned < 1.5 * peak, "{learned} {peak}");
 }
 
 #[test]
