@@ -16,7 +16,7 @@
 //! | 0 | `id`, `error` |
 //! | 1 | `math`, `desc` |
 //! | 2 | `color`, `sampling`, `import` |
-//! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film` |
+//! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
 //! | 5 | `scene` |
 //! | 6 | `integrator`, `compile` |
@@ -34,6 +34,7 @@ pub mod desc;
 pub mod error;
 pub mod film;
 pub mod geometry;
+pub mod guiding;
 pub mod id;
 pub mod import;
 pub mod integrator;

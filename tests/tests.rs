@@ -43,6 +43,7 @@ mod gallery;
 mod glassware;
 /// glTF files as they look: which way up images, normals and glass are.
 mod gltf_looks;
+mod guiding;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
 /// Measured and textured lights, lamps in objects, groups, clamping.

@@ -8,7 +8,7 @@ const LAYERS: &[(u32, &[&str])] = &[
     (0, &["id", "error"]),
     (1, &["math", "desc"]),
     (2, &["color", "sampling", "import"]),
-    (3, &["geometry", "texture", "bsdf", "camera", "film"]),
+    (3, &["geometry", "texture", "bsdf", "camera", "film", "guiding"]),
     (4, &["accel", "material", "medium", "opacity", "relief", "light", "output"]),
     (5, &["scene", "convert"]),
     (6, &["integrator", "compile"]),

@@ -152,6 +152,10 @@ pub enum IntegratorDesc {
         /// infinity, where alpha is 0. Light, mirror images and what is seen through glass stay. Default: false.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         hide_emitters: bool,
+        /// Whether paths learn from earlier ones where light comes from: less noise where most of it comes by few ways, such as through a door ajar,
+        /// for some time of learning. Default: false.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        guiding: bool,
     },
     /// Whitted's ray tracing: mirror reflection, refraction, hard shadows, and an ambient term.
     Whitted {
@@ -196,6 +200,7 @@ impl Default for IntegratorDesc {
             strategy: StrategyDesc::default(),
             clamp: None,
             hide_emitters: false,
+            guiding: false,
         }
     }
 }

@@ -28,6 +28,13 @@ struct Spread {
     squares: [f64; 3],
 }
 
+/// A pixel of samples that do not all count the same.
+#[derive(Clone, Copy, Debug, Default)]
+struct Merged {
+    count: f64,
+    variance: [f64; 3],
+}
+
 /// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own.
 ///
 /// A sample's order of arrival at its pixel is the order of summation: whoever adds samples in the order of their indices gets the same
@@ -48,6 +55,8 @@ pub struct FilmTile {
     hits: Vec<u32>,
     /// Empty unless the variance is asked for.
     spread: Vec<Spread>,
+    /// What each pixel's samples count together and the variance of their mean. Empty while each counts once.
+    merged: Vec<Merged>,
     dropped_count: u64,
     dropped: Vec<DroppedSample>,
 }
@@ -66,6 +75,7 @@ impl FilmTile {
             beside: vec![0.0; pixels * stride],
             hits: vec![0; if stride > 0 { pixels } else { 0 }],
             spread: vec![Spread::default(); if layers.contains(LayerKind::Variance) { pixels } else { 0 }],
+            merged: Vec::new(),
             dropped_count: 0,
             dropped: Vec::new(),
         }
@@ -151,6 +161,46 @@ impl FilmTile {
         Some((mean, variance))
     }
 
+    /// The mean radiance of a pixel's samples so far.
+    pub fn mean(&self, pixel: usize) -> [f32; 3] {
+        let [r, g, b, _] = self.color_at(pixel);
+        [r, g, b]
+    }
+
+    /// Adds all samples of another tile of the same pixels and layers. For the colour, each counts `factor` times as much as a single one; to the
+    /// layers of surfaces all are alike. Nothing may be added to this tile but by merging.
+    pub fn merge(&mut self, other: &Self, factor: f64) {
+        self.merged.resize(self.samples.len(), Merged::default());
+        for pixel in 0..self.samples.len() {
+            let count = f64::from(other.samples[pixel]) * factor;
+            let merged = &mut self.merged[pixel];
+            let (ours, theirs) = (merged.count, count);
+            merged.count += count;
+            if merged.count > 0.0 {
+                // Where a pixel's variance is not known, its samples are taken to be as good as the others.
+                let known = other.group_statistics(pixel).map(|(_, variance)| variance);
+                for k in 0..3 {
+                    let own = merged.variance[k];
+                    let other = known.map_or(own * ours / theirs.max(f64::MIN_POSITIVE), |variance| variance[k]);
+                    merged.variance[k] = (ours * ours * own + theirs * theirs * other) / (merged.count * merged.count);
+                }
+            }
+        }
+        add_scaled(self.color.as_flattened_mut(), other.color.as_flattened(), factor);
+        if !other.corrections.is_empty() {
+            self.corrections.resize(self.samples.len(), [0.0; 5]);
+            add_scaled(self.corrections.as_flattened_mut(), other.corrections.as_flattened(), factor);
+        }
+        add_scaled(&mut self.beside, &other.beside, 1.0);
+        for (sums, counts) in [(&mut self.samples, &other.samples), (&mut self.hits, &other.hits)] {
+            for (sum, count) in sums.iter_mut().zip(counts) {
+                *sum += count;
+            }
+        }
+        self.dropped_count += other.dropped_count;
+        self.dropped.extend(other.dropped.iter().take(DROPPED_KEPT - self.dropped.len().min(DROPPED_KEPT)));
+    }
+
     /// Adds to the layers beside the colour; `false` (and nothing is added) if a value is not finite.
     fn add_beside(&mut self, pixel: usize, value: &PixelSample) -> bool {
         if value.alpha <= 0.0 {
@@ -202,7 +252,7 @@ impl FilmTile {
     /// mean. With negative lobes a constant stays exactly constant, as it does when dividing by the sum of weights, with the same bias of
     /// order `1 / n`, but without a sum of weights near zero in a denominator.
     fn color_at(&self, pixel: usize) -> [f32; 4] {
-        let n = f64::from(self.samples[pixel]);
+        let n = self.merged.get(pixel).map_or(f64::from(self.samples[pixel]), |merged| merged.count);
         if n == 0.0 {
             return [0.0; 4];
         }
@@ -222,7 +272,8 @@ impl FilmTile {
             LayerKind::Color => out.copy_from_slice(&self.color_at(pixel)),
             LayerKind::Samples => out[0] = self.samples[pixel] as f32,
             _ => {
-                let (_, variance) = self.group_statistics(pixel).unwrap_or_default();
+                let merged = self.merged.get(pixel).map(|merged| merged.variance);
+                let variance = merged.unwrap_or_else(|| self.group_statistics(pixel).unwrap_or_default().1);
                 out.copy_from_slice(&variance.map(to_f32));
             }
         }
@@ -245,6 +296,12 @@ impl FilmTile {
                 *out = to_f32(sum / divisor);
             }
         }
+    }
+}
+
+fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += factor * value;
     }
 }
 

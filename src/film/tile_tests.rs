@@ -102,3 +102,31 @@ fn impossible_films_are_refused() {
     let huge = [2_000_000_000, 2_000_000_000];
     assert!(matches!(Film::new(huge, Crop::full(huge), &LayerSet::COLOR, 16), Err(Error::OutOfMemory(_))));
 }
+
+/// Films whose samples count differently: the mean is the weighted one, the variance that of a weighted mean, all else is as of one film.
+#[test]
+fn merged_films_weigh_their_samples() {
+    let layers: LayerSet = [LayerKind::Variance, LayerKind::Samples].into_iter().collect();
+    let film = |values: &[f32]| {
+        let mut film = one_pixel(layers);
+        for (i, &v) in (0..).zip(values) {
+            let tile = &mut film.tiles_mut()[0];
+            assert!(tile.add(0, i, &gray(v), 1.0));
+            tile.add_group(0, [f64::from(v); 3], 1.0);
+        }
+        film
+    };
+    let (a, b) = (film(&[1.0, 3.0]), film(&[2.0, 4.0, 6.0, 8.0]));
+    let mut merged = one_pixel(layers);
+    merged.tiles_mut()[0].merge(&a.tiles()[0], 1.0);
+    assert_eq!(color(&merged)[0], 2.0);
+    assert_eq!(merged.resolve().pixel(LayerKind::Variance, 0, 0), a.resolve().pixel(LayerKind::Variance, 0, 0));
+    merged.tiles_mut()[0].merge(&b.tiles()[0], 3.0);
+    // Two samples that count once and four that count three times.
+    assert!((color(&merged)[0] - (4.0 + 3.0 * 20.0) / 14.0).abs() < 1e-6, "{:?}", color(&merged));
+    let of = |film: &Film| film.tiles()[0].group_statistics(0).unwrap().1[0];
+    let expected = (4.0 * of(&a) + 144.0 * of(&b)) / 196.0;
+    let image = merged.resolve();
+    assert!((f64::from(image.pixel(LayerKind::Variance, 0, 0).unwrap()[0]) - expected).abs() < 1e-6);
+    assert_eq!(image.pixel(LayerKind::Samples, 0, 0).unwrap(), [6.0]);
+}

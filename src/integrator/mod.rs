@@ -6,6 +6,7 @@
 
 mod cones;
 mod debug;
+mod guided;
 mod media;
 mod path;
 mod shading;
@@ -21,9 +22,12 @@ pub use strategy::Strategy;
 pub use whitted::Whitted;
 pub use world::World;
 
+use std::sync::Arc;
+
 use crate::desc::IntegratorDesc;
 use crate::film::{PixelSample, SurfaceSample};
 use crate::geometry::SurfaceInteraction;
+use crate::guiding::Guide;
 use crate::math::{Ray, Vec3};
 use crate::sampling::{PixelSeed, Sampler};
 use crate::texture::Footprint;
@@ -101,11 +105,25 @@ pub trait Integrator: Send + Sync {
     fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts);
 }
 
-/// The integrator with these parameters, drawing from `sampler`; `side_by_side` as in [`PathIntegrator`].
-pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds, side_by_side: bool) -> Box<dyn Integrator> {
+/// What integrators need to know beside their parameters.
+#[derive(Clone)]
+pub struct Setup {
+    /// Where random numbers come from.
+    pub sampler: Sampler,
+    /// What the layers need.
+    pub needs: SurfaceNeeds,
+    /// As in [`PathIntegrator`].
+    pub side_by_side: bool,
+    /// What a path tracer follows beside the surfaces.
+    pub guide: Option<Arc<Guide>>,
+}
+
+/// The integrator with these parameters.
+pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
+    let Setup { sampler, needs, side_by_side, guide } = setup;
     let view = |view| Box::new(DebugView { view, needs }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, hide_emitters } => Box::new(PathIntegrator {
+        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, hide_emitters, .. } => Box::new(PathIntegrator {
             max_depth,
             rr_depth,
             strategy: strategy.into(),
@@ -114,6 +132,7 @@ pub fn build(desc: &IntegratorDesc, sampler: Sampler, needs: SurfaceNeeds, side_
             sampler,
             needs,
             side_by_side,
+            guide,
         }),
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
             Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, needs })

@@ -8,7 +8,9 @@ mod lanes;
 mod side_by_side;
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
+use super::guided::{Steered, Steering, Turns};
 use super::media::MediaState;
 use super::vertex::Vertex;
 use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions, surface_sample};
@@ -16,6 +18,7 @@ use crate::accel::Coherence;
 use crate::color::Rgb;
 use crate::film::PixelSample;
 use crate::geometry::{Hit, SurfaceInteraction};
+use crate::guiding::Guide;
 use crate::light::{InfinityEval, Light, Receiver};
 use crate::math::rows::BATCH;
 use crate::math::{DVec3, Ray, RayCone, Vec3};
@@ -43,6 +46,8 @@ pub struct PathIntegrator {
     pub needs: SurfaceNeeds,
     /// Whether diffuse surfaces are shaded side by side where that is possible: faster, with the same result bit for bit.
     pub side_by_side: bool,
+    /// What is known of the light, if directions are chosen by it too.
+    pub guide: Option<Arc<Guide>>,
 }
 
 /// A path under way.
@@ -52,7 +57,8 @@ struct Path {
     throughput: Rgb,
     /// Density with which the last direction was chosen, or infinity if light sampling could not have found it.
     pdf: f32,
-    /// Product of the squared relative indices of refraction passed: roulette must not mistake their radiance scaling for absorption.
+    /// Product of the squared relative indices of refraction passed: roulette must not mistake their radiance scaling for absorption. The same
+    /// holds of densities that a guide has raised above those of the surfaces.
     eta_squared: f32,
     /// Its place in the batch.
     slot: u32,
@@ -85,6 +91,8 @@ struct Scratch {
     draws: Draws,
     escapes: Escapes,
     shaded: Shaded,
+    /// With a guide that learns.
+    turns: Turns,
 }
 
 /// Random numbers for the vertices that are shaded next.
@@ -143,6 +151,8 @@ impl PathIntegrator {
         scratch.cones.clear();
         scratch.cones.extend(scratch.rays.iter().map_while(|ray| world.camera_cone(ray)));
 
+        scratch.turns.clear();
+
         for bounce in 0..self.max_depth {
             let count = scratch.rays.len();
             if count == 0 {
@@ -160,10 +170,11 @@ impl PathIntegrator {
                 counts.indirect += self.arrive_all(world, scratch);
             }
 
-            if in_media {
-                self.shade_all::<true>(world, bounce, out, scratch);
-            } else {
-                self.shade_all::<false>(world, bounce, out, scratch);
+            match (in_media, self.guide.is_some()) {
+                (false, false) => self.shade_all::<false, false>(world, bounce, out, scratch),
+                (true, false) => self.shade_all::<true, false>(world, bounce, out, scratch),
+                (false, true) => self.shade_all::<false, true>(world, bounce, out, scratch),
+                (true, true) => self.shade_all::<true, true>(world, bounce, out, scratch),
             }
 
             let shadows = scratch.shadow_rays.len();
@@ -178,7 +189,9 @@ impl PathIntegrator {
                     out[pending.slot as usize].radiance += pending.contribution;
                 }
             }
+            scratch.turns.settle(out);
         }
+        scratch.turns.teach(self, out);
     }
 
     /// Takes every path through media to the next surface where something happens to it; says how many rays that took.
@@ -215,13 +228,13 @@ impl PathIntegrator {
     /// Shades every living path's hit; afterwards the scratch holds the paths that go on, their rays, and the shadow rays to trace.
     ///
     /// Large results stay where they were returned and are read through references: a copy would have to wait for them.
-    /// `MEDIA` is whether the scene has media.
-    fn shade_all<const MEDIA: bool>(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
+    /// `MEDIA` is whether the scene has media, `GUIDED` whether there is a guide.
+    fn shade_all<const MEDIA: bool, const GUIDED: bool>(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
         scratch.shadow_rays.clear();
         scratch.pending.clear();
         let count = scratch.paths.len();
         let is_last = bounce + 1 >= self.max_depth;
-        let side_by_side = !MEDIA && !is_last && self.shades_side_by_side(world);
+        let side_by_side = !MEDIA && !GUIDED && !is_last && self.shades_side_by_side(world);
         let mut alive = 0;
         for first in (0..count).step_by(BATCH) {
             let last = count.min(first + BATCH);
@@ -237,7 +250,7 @@ impl PathIntegrator {
                 if let Some(lane) = scratch.shaded.lane(i - first) {
                     self.collect(world, bounce, [i, first], lane, out, scratch, &mut alive);
                 } else {
-                    self.shade::<MEDIA>(world, bounce, [i, first], out, scratch, &mut alive);
+                    self.shade::<MEDIA, GUIDED>(world, bounce, [i, first], out, scratch, &mut alive);
                 }
             }
         }
@@ -247,7 +260,7 @@ impl PathIntegrator {
 
     /// Shades the hit of the path `i`, of the batch that starts with `first`.
     #[inline(always)]
-    fn shade<const MEDIA: bool>(
+    fn shade<const MEDIA: bool, const GUIDED: bool>(
         &self,
         world: &World,
         bounce: u32,
@@ -256,7 +269,7 @@ impl PathIntegrator {
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, shaded, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, shaded, turns, .. } = scratch;
         let (path, ray) = (&paths[i], &rays[i]);
         let sample = &mut out[path.slot as usize];
         let found = shaded.place(world, i - first, hits[i], ray);
@@ -286,7 +299,8 @@ impl PathIntegrator {
         if let Some(boundary) = &boundary {
             vertex.bsdf = boundary;
         }
-        if let Some(mut shadow) = self.sample_light(world, path, &vertex, draws.light.of(i - first)) {
+        let steering = if GUIDED { Steering::new(self, &vertex) } else { None };
+        if let Some(mut shadow) = self.sample_light(world, path, &vertex, steering, draws.light.of(i - first)) {
             if MEDIA {
                 let here = world.media_toward(at, ray.direction, shadow.ray.direction, &media[i].here);
                 shadow.contribution *= world.transmittance(&here, &shadow.ray);
@@ -294,7 +308,7 @@ impl PathIntegrator {
             shadow_rays.push(shadow.ray);
             pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
         }
-        if let Some((path, next)) = self.scatter(world, path, &vertex, bounce, draws.bsdf.of(i - first)) {
+        if let Some((path, next)) = self.scatter(world, path, &vertex, bounce, (steering, turns), draws.bsdf.of(i - first)) {
             if MEDIA {
                 let here = world.media_toward(at, ray.direction, next.direction, &media[i].here);
                 media[*alive] = MediaState { here, ..media[i] };
@@ -364,7 +378,7 @@ impl PathIntegrator {
 
     /// A shadow ray towards a light, with what it brings if it is free.
     #[inline(always)]
-    fn sample_light(&self, world: &World, path: &Path, vertex: &Vertex, u: [f32; 4]) -> Option<ShadowRay> {
+    fn sample_light(&self, world: &World, path: &Path, vertex: &Vertex, steering: Option<Steering>, u: [f32; 4]) -> Option<ShadowRay> {
         if vertex.bsdf.is_delta() || world.scene.lights.is_empty() {
             return None;
         }
@@ -379,7 +393,9 @@ impl PathIntegrator {
         let (eval, start) = vertex.eval_toward(world, sample.wi, &mut raised)?;
         let pdf = sample.pdf * choice.pmf;
         let weight = match self.strategy {
-            Strategy::Mis if !sample.is_delta => power_heuristic(pdf, eval.pdf),
+            Strategy::Mis if !sample.is_delta => {
+                power_heuristic(pdf, steering.map_or(eval.pdf, |steering| steering.pdf(sample.wi, eval.pdf)))
+            }
             _ => 1.0,
         };
         let contribution = path.throughput * eval.value * sample.radiance * (weight / pdf);
@@ -391,10 +407,25 @@ impl PathIntegrator {
 
     /// The path after its next scattering with its next ray, unless it ends here.
     #[inline(always)]
-    fn scatter(&self, world: &World, path: &Path, vertex: &Vertex, bounce: u32, u: [f32; 4]) -> Option<(Path, Ray)> {
-        let (sample, ray) = vertex.sample(world, u[0], [u[1], u[2]])?;
+    fn scatter(
+        &self,
+        world: &World,
+        path: &Path,
+        vertex: &Vertex,
+        bounce: u32,
+        (steering, turns): (Option<Steering>, &mut Turns),
+        u: [f32; 4],
+    ) -> Option<(Path, Ray)> {
+        let steered = match steering {
+            None => {
+                let (sample, ray) = vertex.sample(world, u[0], [u[1], u[2]])?;
+                Steered { sample, ray, gain: 1.0, densities: None }
+            }
+            Some(steering) => steering.sample(world, vertex, u[0], [u[1], u[2]])?,
+        };
+        let Steered { sample, ray, gain, .. } = &steered;
         let mut throughput = path.throughput * sample.weight;
-        let eta_squared = path.eta_squared * (sample.eta * sample.eta);
+        let eta_squared = path.eta_squared * (sample.eta * sample.eta) * gain;
 
         // Russian roulette: the survivors carry the weight of the dead. The chance is not capped, so a path that lost nothing goes on.
         if bounce + 1 >= self.rr_depth {
@@ -410,9 +441,12 @@ impl PathIntegrator {
             return None;
         }
 
+        if steering.is_some() {
+            turns.push(vertex, &steered, path.throughput * sample.weight, path.slot);
+        }
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, ray))
+        Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, *ray))
     }
 }
 

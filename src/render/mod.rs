@@ -4,6 +4,7 @@
 //! replayed alone, and any split of the work gives the same picture bit for bit.
 
 mod adaptive;
+mod guided;
 mod progress;
 mod settings;
 
@@ -20,7 +21,7 @@ use crate::camera::FilmRows;
 use crate::desc::IntegratorDesc;
 use crate::error::{Error, Result};
 use crate::film::{DroppedSample, Film, FilmTile, Filter, Image, LayerKind, PixelSample};
-use crate::integrator::{self, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
+use crate::integrator::{self, CameraSample, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::math::rows::BATCH;
 use crate::math::{Ray, Vec2};
 use crate::sampling::{Numbers, Requests, Sampler};
@@ -76,7 +77,7 @@ pub struct RenderResult {
 struct Job<'a> {
     world: World<'a>,
     integrator: Box<dyn Integrator>,
-    sampler: Sampler,
+    setup: Setup,
     filter: Filter,
     size: [u32; 2],
 }
@@ -89,11 +90,12 @@ impl<'a> Job<'a> {
             geometry: wanted(LayerKind::Z) || wanted(LayerKind::N) || wanted(LayerKind::P),
             albedo: wanted(LayerKind::Albedo),
         };
+        let setup = Setup { sampler, needs, side_by_side: settings.side_by_side, guide: None };
         let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
         Self {
             world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
-            integrator: integrator::build(&settings.integrator, sampler, needs, settings.side_by_side),
-            sampler,
+            integrator: integrator::build(&settings.integrator, setup.clone()),
+            setup,
             filter: Filter::new(&settings.filter),
             size: settings.size,
         }
@@ -116,7 +118,7 @@ impl<'a> Job<'a> {
             if count == 0 {
                 break;
             }
-            self.sampler.sample_4d_batch(&batch.requests, count, dimensions::CAMERA, &mut batch.numbers);
+            self.setup.sampler.sample_4d_batch(&batch.requests, count, dimensions::CAMERA, &mut batch.numbers);
             for i in 0..count {
                 let u = batch.numbers.of(i);
                 let filter = self.filter.sample([u[0], u[1]]);
@@ -136,7 +138,7 @@ impl<'a> Job<'a> {
         let mut count = 0;
         for ([x, y], sample) in samples.take(BATCH) {
             batch.pixels[count] = [x, y];
-            batch.requests.pixels[count] = self.sampler.pixel(x, y);
+            batch.requests.pixels[count] = self.setup.sampler.pixel(x, y);
             batch.requests.samples[count] = sample;
             count += 1;
         }
@@ -150,7 +152,7 @@ impl<'a> Job<'a> {
         let (camera, moves) = (&self.world.scene.camera, self.world.scene.features.motion);
         let sample = |i: usize, ray: Ray| CameraSample { ray, seed: requests.pixels[i], sample: requests.samples[i] };
         let time = |i: usize| {
-            let u = || self.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0];
+            let u = || self.setup.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0];
             if moves { camera.time(u()) } else { 0.0 }
         };
         if let Some(origin) = camera.pinhole().filter(|&origin| self.world.far_gap(origin).is_none()) {
@@ -248,6 +250,9 @@ pub fn render(
         .build()
         .map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))?;
     let job = Job::new(scene, accel, settings);
+    if matches!(settings.integrator, IntegratorDesc::Path { guiding: true, .. }) {
+        return guided::render(job, &pool, settings, progress, stop);
+    }
     if let Some(target) = settings.target_error {
         return adaptive::render(&job, &pool, settings, target, progress, stop);
     }
@@ -319,6 +324,9 @@ pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel
     let [width, height] = settings.size;
     if pixel[0] >= width || pixel[1] >= height {
         return Err(Error::Usage(format!("--pixel {},{}: the film has {width}x{height} pixels", pixel[0], pixel[1])));
+    }
+    if matches!(settings.integrator, IntegratorDesc::Path { guiding: true, .. }) {
+        return Err(Error::Usage("--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off".into()));
     }
     let job = Job::new(scene, accel, settings);
     let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);

@@ -81,6 +81,8 @@ pub struct Overrides {
     pub strategy: Option<StrategyDesc>,
     /// `--clamp`; infinity stands for no limit.
     pub clamp: Option<f32>,
+    /// `--guiding`.
+    pub guiding: Option<bool>,
     /// `--time-limit`, in seconds.
     pub time_limit: Option<f64>,
     /// `--output`: these files in place of the scene's.
@@ -187,6 +189,15 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
             return Err(usage(format!("--clamp {limit}: a number above 0, or inf for no limit")));
         }
         *clamp = Some(limit).filter(|limit| limit.is_finite());
+    }
+    if let Some(wanted) = overrides.guiding {
+        let IntegratorDesc::Path { guiding, .. } = &mut integrator else {
+            return Err(usage("--guiding: only the integrator path can be guided"));
+        };
+        *guiding = wanted;
+    }
+    if matches!(integrator, IntegratorDesc::Path { guiding: true, .. }) && overrides.target_error.is_some() {
+        return Err(usage("--target-error: not with guiding; give --guiding off, or --spp or --time-limit in its place"));
     }
     Ok(integrator)
 }
@@ -316,8 +327,14 @@ mod tests {
         assert_eq!((s.size, s.crop, s.threads), ([200, 80], Crop { x: 0, y: 0, width: 5, height: 6 }, 3));
         assert_eq!((s.sampler, s.spp, s.seed, s.accel), (SamplerKind::Sobol, 7, 1, AccelKind::Linear));
         // The same integrator: parameters that are not changed stay the scene's.
-        let changed =
-            IntegratorDesc::Path { max_depth: 4, rr_depth: 3, strategy: StrategyDesc::Light, clamp: Some(2.5), hide_emitters: false };
+        let changed = IntegratorDesc::Path {
+            max_depth: 4,
+            rr_depth: 3,
+            strategy: StrategyDesc::Light,
+            clamp: Some(2.5),
+            hide_emitters: false,
+            guiding: false,
+        };
         assert_eq!(s.integrator, changed);
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));
         assert_eq!(

@@ -92,28 +92,32 @@ fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>
     for integrator in choices(&arguments.integrator) {
         for sampler in choices(&arguments.sampler) {
             for strategy in choices(&arguments.strategy) {
-                for accel in choices(&arguments.accel) {
-                    let overrides = Overrides {
-                        integrator,
-                        sampler,
-                        strategy,
-                        accel,
-                        size: arguments.size,
-                        max_depth: arguments.max_depth,
-                        clamp: arguments.clamp,
-                        threads: arguments.threads,
-                        outputs: vec!["unused.exr".into()],
-                        ..Overrides::default()
-                    };
-                    let parts = [
-                        part(&arguments.integrator, integrator.and_then(name)),
-                        part(&arguments.sampler, sampler.and_then(name)),
-                        part(&arguments.strategy, strategy.and_then(name)),
-                        part(&arguments.accel, accel.map(|accel| accel.to_string())),
-                    ];
-                    let parts: Vec<String> = parts.into_iter().flatten().collect();
-                    let name = if parts.is_empty() { "steradian".to_owned() } else { parts.join(", ") };
-                    variants.push(Variant { name, subject: Subject::Ours(Box::new(Settings::new(desc, &overrides)?)) });
+                for guiding in choices(&arguments.guiding) {
+                    for accel in choices(&arguments.accel) {
+                        let overrides = Overrides {
+                            integrator,
+                            sampler,
+                            strategy,
+                            guiding,
+                            accel,
+                            size: arguments.size,
+                            max_depth: arguments.max_depth,
+                            clamp: arguments.clamp,
+                            threads: arguments.threads,
+                            outputs: vec!["unused.exr".into()],
+                            ..Overrides::default()
+                        };
+                        let parts = [
+                            part(&arguments.integrator, integrator.and_then(name)),
+                            part(&arguments.sampler, sampler.and_then(name)),
+                            part(&arguments.strategy, strategy.and_then(name)),
+                            part(&arguments.guiding, guiding.map(|on| if on { "guided".to_owned() } else { "not guided".to_owned() })),
+                            part(&arguments.accel, accel.map(|accel| accel.to_string())),
+                        ];
+                        let parts: Vec<String> = parts.into_iter().flatten().collect();
+                        let name = if parts.is_empty() { "steradian".to_owned() } else { parts.join(", ") };
+                        variants.push(Variant { name, subject: Subject::Ours(Box::new(Settings::new(desc, &overrides)?)) });
+                    }
                 }
             }
         }

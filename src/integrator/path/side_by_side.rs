@@ -316,7 +316,7 @@ impl PathIntegrator {
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, cones, draws, shaded, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, cones, draws, shaded, turns, .. } = scratch;
         let lanes = &shaded.lanes;
         let (path, time) = (paths[i], rays[i].time);
         if bounce == 0 {
@@ -334,7 +334,7 @@ impl PathIntegrator {
         let shadow = match (shadow, &vertex) {
             (Found::Ray, _) => Some((Ray { time, ..shadow_ray }, lanes.contribution(lane))),
             (Found::Hidden, Some(vertex)) => {
-                self.sample_light(world, &path, vertex, draws.light.of(i - first)).map(|shadow| (shadow.ray, shadow.contribution))
+                self.sample_light(world, &path, vertex, None, draws.light.of(i - first)).map(|shadow| (shadow.ray, shadow.contribution))
             }
             _ => None,
         };
@@ -349,7 +349,7 @@ impl PathIntegrator {
                 let path = Path { throughput: lanes.throughput(lane), pdf, from: lanes.receiver(lane), ..path };
                 Some((path, Ray { time, ..next_ray }))
             }
-            (Found::Hidden, Some(vertex)) => self.scatter(world, &path, vertex, bounce, draws.bsdf.of(i - first)),
+            (Found::Hidden, Some(vertex)) => self.scatter(world, &path, vertex, bounce, (None, turns), draws.bsdf.of(i - first)),
             _ => None,
         };
         if let Some((path, ray)) = next {

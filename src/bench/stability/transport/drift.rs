@@ -5,7 +5,7 @@ use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::Plot;
 use crate::film::{Crop, Film, LayerSet, PixelSample};
-use crate::integrator::{self, CameraSample, RayCounts, SurfaceNeeds, World, dimensions};
+use crate::integrator::{self, CameraSample, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
 use crate::sampling::Sampler;
@@ -80,7 +80,8 @@ fn checkpoint(film: &Film, sums: &[Sum], squares: f64, spp: u32) -> Checkpoint {
 
 fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let sampler = Sampler::new(settings.sampler, settings.seed);
-    let integrator = integrator::build(&settings.integrator, sampler, SurfaceNeeds::default(), settings.side_by_side);
+    let setup = Setup { sampler, needs: SurfaceNeeds::default(), side_by_side: settings.side_by_side, guide: None };
+    let integrator = integrator::build(&settings.integrator, setup);
     let mut film = Film::new([WIDTH; 2], Crop::full([WIDTH; 2]), &LayerSet::COLOR, WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
     let mut out = vec![PixelSample::default(); COUNT * AT_ONCE as usize];

@@ -7,7 +7,7 @@ use steradian::accel::AccelKind;
 use steradian::desc::{IntegratorDesc, SamplerKindDesc, StrategyDesc};
 
 use super::import::ImportArgs;
-use super::{accel_help, parse_size};
+use super::{accel_help, parse_size, parse_switch};
 use crate::names;
 
 pub const ABOUT: &str = "\
@@ -64,6 +64,9 @@ pub struct BenchErrorArgs {
     /// How directions towards lights are found
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = names::plain::<StrategyDesc>(), help_heading = "Variants")]
     pub strategy: Vec<StrategyDesc>,
+    /// Whether paths learn where light comes from: on, off or both
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_switch, help_heading = "Variants")]
+    pub guiding: Vec<bool>,
     /// What finds hits
     #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = accel_help(), help_heading = "Variants")]
     pub accel: Vec<AccelKind>,

@@ -144,6 +144,12 @@ pub struct RenderArgs {
     /// Limit what a single path of indirect light brings: less noise, but biased (too dark). Off unless given; inf for no limit
     #[arg(long, value_name = "LIMIT", help_heading = "Algorithm")]
     pub clamp: Option<f32>,
+    /// Whether paths learn from earlier ones where light comes from: on or off
+    ///
+    /// For scenes whose light comes by few ways, such as through a door ajar. Passes double; each follows what those before have taught, and their
+    /// samples count by how good they are. It is given up where it does not pay.
+    #[arg(long, value_name = "SWITCH", value_parser = parse_switch, help_heading = "Algorithm")]
+    pub guiding: Option<bool>,
     /// How samples are chosen
     #[arg(long, value_name = "NAME", value_parser = names::plain::<SamplerKindDesc>(), help_heading = "Algorithm")]
     pub sampler: Option<SamplerKindDesc>,
@@ -226,6 +232,7 @@ impl RenderArgs {
             max_depth: self.max_depth,
             strategy: self.strategy,
             clamp: self.clamp,
+            guiding: self.guiding,
             time_limit: self.time_limit,
             outputs: self.output.clone(),
             default_outputs,
@@ -233,6 +240,14 @@ impl RenderArgs {
             float: self.float,
             exposure: self.exposure,
         }
+    }
+}
+
+fn parse_switch(text: &str) -> Result<bool, String> {
+    match text.trim() {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("expected on or off".to_owned()),
     }
 }
 
@@ -276,7 +291,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_overrides() {
         let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path --accel linear \
-                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 -vv";
+                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 -vv";
         let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
         let o = arguments.overrides(vec!["d.exr".to_owned()]);
         assert_eq!((o.spp, o.size, o.crop, o.threads, o.seed), (Some(5), Some([20, 10]), Some([1, 2, 3, 4]), Some(2), Some(9)));
@@ -287,6 +302,7 @@ mod tests {
         assert_eq!((o.integrator, o.max_depth, o.clamp, o.time_limit), (Some(IntegratorDesc::default()), Some(3), Some(2.5), Some(1.5)));
         assert_eq!((o.layers, o.float, o.exposure), (vec![LayerDesc::Z, LayerDesc::Albedo], true, Some(-1.5)));
         assert_eq!((o.outputs, o.default_outputs), (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()]));
+        assert_eq!(o.guiding, Some(true));
         assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
     }
 
@@ -301,6 +317,7 @@ mod tests {
             "--integrator pathh",
             "--pixel 1,2",
             "--sample 3",
+            "--guiding yes",
             "-q -v",
             "--nonsense",
         ] {

@@ -15,7 +15,7 @@ pub(super) fn unlimited_path() -> IntegratorDesc {
 }
 
 fn path(max_depth: u32, rr_depth: u32) -> IntegratorDesc {
-    IntegratorDesc::Path { max_depth, rr_depth, strategy: StrategyDesc::Mis, clamp: None, hide_emitters: false }
+    IntegratorDesc::Path { max_depth, rr_depth, strategy: StrategyDesc::Mis, clamp: None, hide_emitters: false, guiding: false }
 }
 
 impl Reader<'_> {

@@ -171,7 +171,13 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
     }
     // pbrt counts bounces, we count segments: one bounce is the light that arrives over two.
     let max_depth = u32::try_from(max_depth.max(0)).unwrap_or(u32::MAX).saturating_add(1);
-    draft.desc.integrator =
-        IntegratorDesc::Path { max_depth, rr_depth: 5, strategy: StrategyDesc::default(), clamp: None, hide_emitters: false };
+    draft.desc.integrator = IntegratorDesc::Path {
+        max_depth,
+        rr_depth: 5,
+        strategy: StrategyDesc::default(),
+        clamp: None,
+        hide_emitters: false,
+        guiding: false,
+    };
     Ok(())
 }

@@ -1,0 +1,319 @@
+//! Learning where light comes from while a picture is made ("Practical Path Guiding for Efficient Light-Transport Simulation", 2017, and
+//! "'Practical Path Guiding' in Production", 2019).
+//!
+//! For surfaces that face each of six sides, a binary tree divides space; each of its leaves has a distribution of directions, in proportion to
+//! what light from them has brought to paths that were scattered there. Paths record into sums of whole numbers, so what is learned does not
+//! depend on threads. From time to time leaves with many records are divided, and the directions of each where the light is.
+
+mod quadtree;
+#[cfg(test)]
+mod tests;
+
+pub use quadtree::{Directions, GuideSample, Records};
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+
+use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::random::mix;
+use crate::math::{Aabb, Vec3};
+
+/// Records of a leaf beyond which it is divided, after one sample per pixel; after `n` it is `sqrt(n)` times as many.
+const RECORDS_TO_DIVIDE: f64 = 4000.0;
+
+/// Leaves at most.
+const MAX_LEAVES: usize = 1 << 13;
+
+/// Nodes of all distributions together at most. One takes 80 bytes, with its part of the records: 80 MiB, and twice as much while they are
+/// refined.
+const MAX_NODES: usize = 1 << 20;
+
+/// Nodes of a single distribution at most: its indices have 16 bits.
+const MAX_NODES_OF_LEAF: usize = 1024;
+
+/// Divisions of space in a row at most.
+const MAX_DEPTH: u32 = 48;
+
+/// Whole numbers that a typical record is worth.
+const UNITS: f32 = 65_536.0;
+
+/// What a single record counts at most, in typical ones: 2^27 such fit into a sum.
+const LARGEST: f32 = 1_048_576.0;
+
+/// The share of directions that surfaces choose where nothing says what is better; the light chooses the others.
+const SURFACE_SHARE: f32 = 0.5;
+
+/// The shares that are tried instead.
+const OTHER_SHARES: [f32; 4] = [0.15, 0.3, 0.7, 0.9];
+
+/// A node of the tree over space: the index of the first of two children or, with [`IS_LEAF`], that of a leaf. Small, for paths ask at every turn.
+#[derive(Clone, Copy, Debug)]
+struct Node(u32);
+
+const IS_LEAF: u32 = 1 << 31;
+
+impl Node {
+    /// The leaf, if it is one.
+    #[inline]
+    fn leaf(self) -> Option<usize> {
+        (self.0 & IS_LEAF != 0).then_some((self.0 & !IS_LEAF) as usize)
+    }
+}
+
+/// What has been learned of a part of space. Apart from what is being learned: a thread that writes one would slow down those that read the
+/// other.
+#[derive(Clone, Debug)]
+struct Learned {
+    directions: Option<Arc<Directions>>,
+    surface_share: f32,
+}
+
+/// What is being learned of a part of space.
+#[derive(Debug, Default)]
+struct Leaf {
+    records: Records,
+    count: AtomicU64,
+    /// How much better each of [`OTHER_SHARES`] is than half, as the mean logarithm of the density weighted by light.
+    gains: [AtomicI64; 4],
+}
+
+impl Leaf {
+    /// The best share by the records.
+    fn best_share(&self) -> f32 {
+        let best = self.gains.iter().zip(OTHER_SHARES).max_by_key(|(gain, _)| gain.load(Ordering::Relaxed));
+        best.filter(|(gain, _)| gain.load(Ordering::Relaxed) > 0).map_or(SURFACE_SHARE, |(_, share)| share)
+    }
+}
+
+/// What is known of the light at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// Where it comes from.
+    pub directions: &'a Directions,
+    /// How many directions the surface had better choose.
+    pub surface_share: f32,
+}
+
+/// Light that a path found.
+#[derive(Clone, Copy, Debug)]
+pub struct Record {
+    /// Where it was scattered.
+    pub p: Vec3,
+    /// The normal there, on the side of the path.
+    pub n: Vec3,
+    /// The direction it came from.
+    pub direction: Vec3,
+    /// What was scattered towards the path, over the density with which the direction was chosen.
+    pub light: f32,
+    /// The densities with which the surface and the guide choose the direction, if the guide knew anything.
+    pub densities: Option<[f32; 2]>,
+}
+
+/// What is known of the light that arrives at the points of a scene, and what is being learned of it.
+#[derive(Debug)]
+pub struct Guide {
+    /// Of the box around the scene, a cube.
+    corner: Vec3,
+    inverse_size: f32,
+    /// The first six are roots.
+    nodes: Vec<Node>,
+    learned: Vec<Learned>,
+    leaves: Vec<Leaf>,
+    /// From light to whole numbers.
+    scale: f32,
+    learns: bool,
+}
+
+impl Guide {
+    /// Knows nothing yet. `typical` is how much light a typical record has, about: records far below it are lost, far above are cut. Without it
+    /// (zero), only places are learned, not light.
+    pub fn new(bounds: Aabb, typical: f32) -> Self {
+        let size = bounds.size().max_element();
+        let known = size > 0.0 && size < f32::INFINITY && bounds.min.is_finite();
+        let (corner, inverse_size) = if known { (bounds.min, 1.0 / size) } else { (Vec3::ZERO, 0.0) };
+        Self {
+            corner,
+            inverse_size,
+            nodes: (0..6).map(|leaf| Node(leaf | IS_LEAF)).collect(),
+            learned: vec![Learned { directions: None, surface_share: SURFACE_SHARE }; 6],
+            leaves: (0..6).map(|_| Leaf::default()).collect(),
+            scale: scale_of(typical),
+            learns: true,
+        }
+    }
+
+    /// With another [typical](Self::new) light.
+    #[must_use]
+    pub fn with_typical(self, typical: f32) -> Self {
+        Self { scale: scale_of(typical), ..self }
+    }
+
+    /// Whether light is learned, not places alone.
+    pub fn knows_brightness(&self) -> bool {
+        self.scale > 0.0
+    }
+
+    /// Whether records are taken.
+    pub fn learns(&self) -> bool {
+        self.learns
+    }
+
+    /// Takes no more records.
+    #[must_use]
+    pub fn finished(self) -> Self {
+        Self { learns: false, ..self }
+    }
+
+    /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.
+    #[inline]
+    pub fn at(&self, p: Vec3, n: Vec3) -> Option<Known<'_>> {
+        let learned = &self.learned[self.find(root(n), self.normalized(p)).0];
+        let directions = learned.directions.as_deref()?;
+        Some(Known { directions, surface_share: learned.surface_share })
+    }
+
+    /// Learns from light. What is not a finite number above zero counts as no light. Equal records are treated alike.
+    #[inline]
+    pub fn record(&self, record: &Record) {
+        let Record { p, n, direction, light, densities } = *record;
+        let (at, root) = (self.normalized(p), root(n));
+        let (leaf, depth) = self.find(root, at);
+        self.leaves[leaf].count.fetch_add(1, Ordering::Relaxed);
+        if !(light > 0.0 && light < f32::INFINITY && direction.is_finite()) {
+            return;
+        }
+        let amount = (light * self.scale).min(LARGEST * UNITS);
+        if let Some([surface, guide]) = densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0) {
+            let usual = SURFACE_SHARE * surface + (1.0 - SURFACE_SHARE) * guide;
+            for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_SHARES) {
+                let gain = ((share * surface + (1.0 - share) * guide) / usual).ln();
+                sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
+            }
+        }
+
+        // Random numbers of the record itself.
+        let bits = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
+        let first = mix(bits(at.x, direction.x) ^ mix(bits(at.y, direction.y) ^ mix(bits(at.z, light))));
+        let second = mix(first);
+        let unit = |bits: u64| (bits & 0xf_ffff) as f32 * (1.0 / 1_048_576.0);
+        // Moved by up to half a leaf: what leaves learn does not jump at their borders then.
+        let jitter = |k: u32| 0.5f32.powi(((depth + 2 - k) / 3) as i32) * (unit(first >> (20 * k)) - 0.5);
+        let moved = at + Vec3::new(jitter(0), jitter(1), jitter(2));
+        let is_inside = moved.min_element() >= 0.0 && moved.max_element() < 1.0;
+        let leaf = if is_inside { self.find(root, moved).0 } else { leaf };
+        self.leaves[leaf].records.add(direction, [unit(second), unit(second >> 32)], amount as u64);
+    }
+
+    /// What is known after so many samples per pixel, with all that was recorded.
+    #[must_use]
+    pub fn refined(&self, samples: u32) -> Self {
+        let most_records = (RECORDS_TO_DIVIDE * f64::from(samples).sqrt()) as u64;
+        let mut next = Self { nodes: self.nodes.clone(), learned: Vec::new(), leaves: Vec::new(), ..*self };
+        let depths = self.depths();
+        let mut free = MAX_LEAVES.saturating_sub(self.leaves.len());
+        let mut plans = Vec::new();
+        for (index, leaf) in self.nodes.iter().enumerate().filter_map(|(index, node)| Some((index, node.leaf()?))) {
+            let leaf = &self.leaves[leaf];
+            plans.push((leaf, next.divide(index, depths[index], leaf.count.load(Ordering::Relaxed), most_records, &mut free)));
+        }
+        let leaves: usize = plans.iter().map(|(_, parts)| parts.len()).sum();
+        let most_nodes = (MAX_NODES / leaves.max(1)).min(MAX_NODES_OF_LEAF);
+        for (leaf, parts) in plans {
+            let directions = leaf.records.directions().map(Arc::new);
+            let records = leaf.records.refined(most_nodes, parts.len());
+            let (count, surface_share) = (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
+            for &part in &parts {
+                next.nodes[part] = Node(next.leaves.len() as u32 | IS_LEAF);
+                next.learned.push(Learned { directions: directions.clone(), surface_share });
+                next.leaves.push(Leaf {
+                    records: records.copied(),
+                    count: AtomicU64::new(count),
+                    // What was better before need not be it for what is known now.
+                    gains: [0, 1, 2, 3].map(|k| AtomicI64::new(leaf.gains[k].load(Ordering::Relaxed) / (2 * parts.len() as i64))),
+                });
+            }
+        }
+        next
+    }
+
+    /// Divides a leaf with so many records until its parts have few enough; gives the nodes of the parts.
+    fn divide(&mut self, index: usize, depth: u32, count: u64, most: u64, free: &mut usize) -> Vec<usize> {
+        if count <= most || depth >= MAX_DEPTH || *free == 0 {
+            return vec![index];
+        }
+        *free -= 1;
+        let first = self.nodes.len();
+        self.nodes.extend([Node(IS_LEAF); 2]);
+        self.nodes[index] = Node(first as u32);
+        let mut parts = self.divide(first, depth + 1, count / 2, most, free);
+        parts.extend(self.divide(first + 1, depth + 1, count / 2, most, free));
+        parts
+    }
+
+    /// The depth of every node. Children come after their parents.
+    fn depths(&self) -> Vec<u32> {
+        let mut depths = vec![0; self.nodes.len()];
+        for (index, node) in self.nodes.iter().enumerate() {
+            if node.leaf().is_none() {
+                let first = node.0 as usize;
+                depths[first] = depths[index] + 1;
+                depths[first + 1] = depths[index] + 1;
+            }
+        }
+        depths
+    }
+
+    /// Parts of space that have their own distribution.
+    pub fn leaves(&self) -> usize {
+        self.leaves.len()
+    }
+
+    /// Nodes of all distributions.
+    pub fn directional_nodes(&self) -> usize {
+        self.leaves.iter().map(|leaf| leaf.records.len()).sum()
+    }
+
+    /// A point within the unit cube.
+    #[inline]
+    fn normalized(&self, p: Vec3) -> Vec3 {
+        let inside = |k: usize| {
+            let x = (p[k] - self.corner[k]) * self.inverse_size;
+            // NaN is not above zero either.
+            if x > 0.0 { x.min(ONE_MINUS_EPSILON) } else { 0.0 }
+        };
+        Vec3::new(inside(0), inside(1), inside(2))
+    }
+
+    /// The leaf around a point of the unit cube, and its depth.
+    #[inline]
+    fn find(&self, root: usize, at: Vec3) -> (usize, u32) {
+        let mut at = at.to_array();
+        let (mut index, mut depth, mut axis) = (root, 0, 0);
+        loop {
+            let node = self.nodes[index];
+            if let Some(leaf) = node.leaf() {
+                return (leaf, depth);
+            }
+            let x = 2.0 * at[axis];
+            let upper = x >= 1.0;
+            at[axis] = if upper { x - 1.0 } else { x };
+            index = node.0 as usize + usize::from(upper);
+            axis = if axis == 2 { 0 } else { axis + 1 };
+            depth += 1;
+        }
+    }
+}
+
+/// Whole numbers per light; zero if nothing is known of the light.
+fn scale_of(typical: f32) -> f32 {
+    let scale = UNITS / typical;
+    if scale > 0.0 && scale < f32::INFINITY { scale } else { 0.0 }
+}
+
+/// The tree for surfaces with this normal: walls have two sides, and light below a surface does not reach it.
+#[inline]
+fn root(n: Vec3) -> usize {
+    let a = n.abs();
+    let axis = if a.x >= a.y && a.x >= a.z { 0 } else { 1 + usize::from(a.y < a.z) };
+    2 * axis + usize::from(n[axis] < 0.0)
+}

@@ -1,0 +1,132 @@
+//! Guided paths: the same picture, with less noise where light comes by few ways, and the same bits for any number of threads.
+
+use serde_json::{Value, json};
+use steradian::accel::{self, AccelKind};
+use steradian::error::Error;
+use steradian::film::{Image, LayerKind};
+use steradian::render::{self, Overrides, RenderResult, Silent};
+
+use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
+
+/// A room lit through a gap beside a wall: the lamp behind it shines on a stripe of the floor, which lights all else.
+fn room() -> Value {
+    let quad = |material: &str, origin: [f64; 3], u: [f64; 3], v: [f64; 3]| json!({ "type": "quad", "material": material, "origin": origin, "edge_u": u, "edge_v": v });
+    json!({
+        "camera": { "position": [-0.6, 1.0, 1.8], "look_at": [-1.2, 0.8, -1.0], "vertical_fov_degrees": 60 },
+        "film": { "width": 72, "height": 72, "filter": { "type": "box" } },
+        "integrator": { "type": "path", "max_depth": 12 },
+        "materials": { "white": { "type": "diffuse", "albedo": 0.7 }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 } },
+        "shapes": [
+            quad("white", [-2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0]),
+            quad("white", [-2.0, 2.0, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0]),
+            quad("white", [-2.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
+            quad("white", [-2.0, 0.0, 2.0], [0.0, 2.0, 0.0], [4.0, 0.0, 0.0]),
+            quad("white", [-2.0, 0.0, -2.0], [0.0, 2.0, 0.0], [0.0, 0.0, 4.0]),
+            quad("white", [2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [0.0, 2.0, 0.0]),
+            quad("white", [0.4, 0.0, -2.0], [0.0, 0.0, 3.7], [0.0, 2.0, 0.0]),
+            { "type": "sphere", "material": "gold", "radius": 0.3, "transform": [{ "translate": [-1.1, 0.3, -0.4] }] },
+            { "type": "quad", "material": "white", "origin": [1.6, 1.8, -1.6], "edge_u": [0.3, 0, 0], "edge_v": [0, 0, 0.3],
+              "emission": { "radiance": [90, 80, 60] } }
+        ]
+    })
+}
+
+fn run(scene: &Value, guiding: bool, overrides: &Overrides) -> RenderResult {
+    let overrides = Overrides { guiding: Some(guiding), ..overrides.clone() };
+    let prepared = prepare(scene, &overrides);
+    let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
+    render::render(&prepared.scene, &*accel, &prepared.settings, &Silent, &false.into()).unwrap()
+}
+
+fn of_seed(guiding: bool, seed: u64, spp: u32) -> Image {
+    run(&room(), guiding, &Overrides { seed: Some(seed), spp: Some(spp), ..Overrides::default() }).image
+}
+
+/// Mean over the pixels of the variance over the seeds, relative.
+fn noise(pictures: &[Image]) -> f64 {
+    let n = pictures.len() as f64;
+    let values: Vec<Vec<f64>> =
+        pictures.iter().map(|picture| picture.layer(LayerKind::Color).unwrap().pixels().map(|p| f64::from(p[1])).collect()).collect();
+    let of_pixel = |i: usize| {
+        let mean = values.iter().map(|v| v[i]).sum::<f64>() / n;
+        values.iter().map(|v| (v[i] - mean).powi(2)).sum::<f64>() / ((n - 1.0) * (mean * mean + 1e-4))
+    };
+    (0..values[0].len()).map(of_pixel).sum::<f64>() / values[0].len() as f64
+}
+
+/// By Welch's test on blocks of pixels, and with less than two thirds of the variance, at the same number of samples, learning included.
+#[test]
+fn guided_pictures_have_the_same_mean_and_less_noise() {
+    let pictures = |guiding: bool| -> Vec<Image> { (0..8).map(|seed| of_seed(guiding, seed + 100 * u64::from(guiding), 64)).collect() };
+    let (guided, plain) = (pictures(true), pictures(false));
+    let blocks = |pictures: &[Image]| pictures.iter().map(block_means).collect::<Vec<_>>();
+    assert_blocks_agree(&blocks(&guided), &blocks(&plain), "guided against not");
+    let (a, b) = (noise(&guided), noise(&plain));
+    assert!(a < 0.67 * b, "{a} guided, {b} not");
+}
+
+#[test]
+fn guided_pictures_do_not_depend_on_threads() {
+    let images: Vec<Image> = [1, 2, 3]
+        .map(|threads| {
+            let overrides = Overrides { threads: Some(threads), guiding: Some(true), spp: Some(24), ..Overrides::default() };
+            render_with(&prepare(&room(), &overrides), AccelKind::EMBREE).image
+        })
+        .into();
+    assert!(images.windows(2).all(|pair| pair[0] == pair[1]));
+    assert_ne!(images[0], of_seed(false, 0, 24));
+}
+
+#[test]
+fn crops_limits_and_layers_hold() {
+    let crop = run(&room(), true, &Overrides { crop: Some([30, 17, 13, 9]), spp: Some(16), ..Overrides::default() });
+    assert_eq!((crop.stats.samples, crop.image.crop.area()), (16 * 13 * 9, 13 * 9));
+    let limited = run(&room(), true, &Overrides { time_limit: Some(0.05), spp: Some(1 << 20), ..Overrides::default() });
+    assert!(limited.stats.time_limited && limited.stats.spp_done >= 2 && limited.stats.spp_done < 1 << 20);
+    for spp in [1, 2, 3, 7] {
+        assert_eq!(run(&room(), true, &Overrides { spp: Some(spp), ..Overrides::default() }).stats.spp_done, spp);
+    }
+    let mut layered = room();
+    layered["outputs"] = json!([{ "file": "unused.exr", "layers": ["Z", "N", "albedo", "samples", "variance"] }]);
+    let [guided, plain] = [true, false].map(|guiding| run(&layered, guiding, &Overrides { spp: Some(16), ..Overrides::default() }).image);
+    for kind in [LayerKind::Z, LayerKind::N, LayerKind::Albedo, LayerKind::Samples] {
+        let (a, b) = (guided.layer(kind).unwrap(), plain.layer(kind).unwrap());
+        assert!(a.data.iter().zip(&b.data).all(|(a, b)| (a - b).abs() <= 1e-5 * a.abs()), "{kind:?}");
+    }
+    assert!(guided.layer(LayerKind::Variance).unwrap().data.iter().all(|v| v.is_finite() && *v >= 0.0));
+}
+
+/// Under an even sky there is nothing to learn, and guiding is given up: later samples are those of other renders.
+#[test]
+fn scenes_without_lamps_stay_what_they_are() {
+    let mut open = room();
+    open["shapes"] = json!([open["shapes"][0].clone()]);
+    open["lights"] = json!([{ "type": "environment", "radiance": [1, 1, 1] }]);
+    let [guided, plain] = [true, false].map(|guiding| run(&open, guiding, &Overrides { spp: Some(32), ..Overrides::default() }));
+    let means = [&guided.image, &plain.image].map(|image| block_means(image).iter().sum::<f64>());
+    assert!((means[0] / means[1] - 1.0).abs() < 0.01, "{means:?}");
+    // Black scenes teach nothing and are no trouble.
+    open["lights"] = json!([]);
+    let black = run(&open, true, &Overrides { spp: Some(8), ..Overrides::default() });
+    assert!(black.image.layer(LayerKind::Color).unwrap().pixels().all(|p| p[..3] == [0.0; 3]));
+}
+
+#[test]
+fn what_guiding_cannot_do_is_refused() {
+    let refusal = |scene: &Value, overrides: &Overrides| {
+        let desc = serde_json::from_value(scene.clone()).unwrap();
+        match render::Settings::new(&desc, overrides) {
+            Err(Error::Usage(message)) => message,
+            other => panic!("{other:?}"),
+        }
+    };
+    let on = Overrides { guiding: Some(true), ..Overrides::default() };
+    assert!(refusal(&room(), &Overrides { target_error: Some(0.01), ..on.clone() }).starts_with("--target-error"));
+    let mut normals = room();
+    normals["integrator"] = json!({ "type": "normal" });
+    assert!(refusal(&normals, &on).starts_with("--guiding"));
+    let prepared = prepare(&room(), &on);
+    let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
+    let error = render::replay(&prepared.scene, &*accel, &prepared.settings, [1, 1], 0).unwrap_err();
+    assert!(error.to_string().contains("--guiding off"), "{error}");
+}
