@@ -160,6 +160,12 @@ impl Camera {
         Ray { time, ..Ray::new(origin.as_vec3(), direction.normalize().as_vec3()) }
     }
 
+    /// Where a pinhole camera's ray starts in the camera's space that goes `toward` a point at z = -1.
+    #[inline(always)]
+    fn pinhole_start(&self, toward: DVec3) -> DVec3 {
+        if self.near > 0.0 { DVec3::ZERO + toward * (self.near / -toward.z) } else { DVec3::ZERO }
+    }
+
     /// The cone of a pixel around one of the camera's rays, which may start further along: as wide as the root of the pixel's area across the
     /// ray, without what a lens or the camera's motion adds.
     pub fn pixel_cone(&self, ray: &Ray, size: [u32; 2]) -> RayCone {

@@ -129,21 +129,16 @@ impl<'a> World<'a> {
     /// in `f32` and lose as many digits as the origin is far away.
     #[inline]
     pub fn approach(&self, ray: Ray) -> Ray {
-        let Some(gap) = self.far_gap(ray.origin) else { return ray };
+        let nearest = ray.origin.clamp(self.bounds.min, self.bounds.max);
+        let gap = (nearest - ray.origin).length();
         let extent = self.bounds.size().max_element();
+        // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
+        if !(gap > extent && gap < f32::INFINITY) {
+            return ray;
+        }
         let origin = ray.origin.as_dvec3();
         let direction = ray.direction.as_dvec3();
         let distance = f64::from(gap - 0.5 * extent) / direction.length();
         Ray { origin: (origin + direction * distance).as_vec3(), ..ray }
-    }
-
-    /// How far a point is from the scene's box, if that is so far that rays from there are to [approach](Self::approach) it.
-    #[inline]
-    pub fn far_gap(&self, origin: Vec3) -> Option<f32> {
-        let nearest = origin.clamp(self.bounds.min, self.bounds.max);
-        let gap = (nearest - origin).length();
-        let extent = self.bounds.size().max_element();
-        // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
-        (gap > extent && gap < f32::INFINITY).then_some(gap)
     }
 }

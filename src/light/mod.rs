@@ -13,7 +13,7 @@ mod spot;
 mod test_support;
 mod tree;
 
-pub use area::{AreaLight, Emission, EmitterBatch, EmitterRows, EvenRectangle};
+pub use area::{AreaLight, Emission};
 pub use directional::DirectionalLight;
 pub use environment::{Environment, EnvironmentMap, EnvironmentMapError};
 pub use groups::LightGroups;

@@ -56,7 +56,7 @@ impl Transform {
     }
 
     /// A point from object to world.
-    #[inline]
+    #[inline(always)]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.world_from_object.transform_point3(p)
     }

@@ -155,9 +155,12 @@ impl<'a> Job<'a> {
             let u = || self.setup.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0];
             if moves { camera.time(u()) } else { 0.0 }
         };
-        if let Some(origin) = camera.pinhole().filter(|&origin| self.world.far_gap(origin).is_none()) {
-            camera.pinhole_directions(self.size, film, count);
-            samples.extend((0..count).map(|i| sample(i, Ray { time: time(i), ..Ray::new(origin, film.direction.get(i)) })));
+        if camera.is_pinhole() {
+            camera.pinhole_rays(self.size, film, count);
+            samples.extend((0..count).map(|i| {
+                let ray = Ray { time: time(i), ..Ray::new(film.origin.get(i), film.direction.get(i)) };
+                sample(i, self.world.approach(ray))
+            }));
         } else {
             samples.extend((0..count).map(|i| {
                 let (u, at) = (numbers.of(i), Vec2::new(film.film[0][i], film.film[1][i]));

@@ -8,7 +8,7 @@ use crate::geometry::{Hit, SurfaceInteraction, TrianglePoints};
 use crate::light::{LightSample, Receiver, ShadowTarget};
 use crate::math::rows::{BATCH, Points, Row, Vectors};
 use crate::math::vectorize::vectorize;
-use crate::math::{DVec3, Ray, Vec2, Vec3};
+use crate::math::{Ray, Vec2, Vec3};
 use kernels::{Face, Illuminate, Place, Scatter};
 
 /// What has become of a ray that a loop was to find.
@@ -280,12 +280,6 @@ impl Lanes {
         } else {
             vectorize(Face::<false>(self));
         }
-    }
-
-    /// Where a vertex is.
-    #[inline(always)]
-    pub fn point(&self, lane: usize) -> DVec3 {
-        self.points.p.get(lane)
     }
 
     /// The point and the side of it that light must reach.

@@ -11,7 +11,7 @@ use crate::geometry::{Hit, Mesh, Shape, SurfaceInteraction};
 use crate::integrator::shading::turned_normal;
 use crate::integrator::vertex::Vertex;
 use crate::integrator::{Strategy, SurfaceNeeds, World, surface_sample};
-use crate::light::{EmitterBatch, Light, LightChoice, LightSample, LightSelection};
+use crate::light::LightSample;
 use crate::material::Material;
 use crate::math::Ray;
 use crate::math::rows::BATCH;
@@ -34,11 +34,6 @@ pub(super) struct Shaded {
     /// Vertices on diffuse surfaces of which more is to be found out.
     others: Vec<u8>,
     sky: SkySamples,
-    /// Lanes that look at one of few lights.
-    choices: Vec<(u8, LightChoice)>,
-    /// Lanes that look at the same light.
-    group: Vec<u8>,
-    emitter: Box<EmitterBatch>,
 }
 
 /// Lanes that look at an image around the scene.
@@ -80,9 +75,6 @@ impl Default for Shaded {
             vertex_of: [0; BATCH],
             others: Vec::with_capacity(BATCH),
             sky: SkySamples::default(),
-            choices: Vec::with_capacity(BATCH),
-            group: Vec::with_capacity(BATCH),
-            emitter: Box::default(),
         }
     }
 }
@@ -159,14 +151,11 @@ impl PathIntegrator {
 
     /// Lets vertices look at lights.
     fn light_lanes(&self, world: &World, scratch: &mut Scratch) {
-        let Scratch { shaded: Shaded { lanes, vertex_of, lane_of, sky, choices, .. }, draws, .. } = scratch;
+        let Scratch { shaded: Shaded { lanes, vertex_of, lane_of, sky, .. }, draws, .. } = scratch;
         let lights = &world.scene.lights;
         let found_by = self.strategy.found_by();
         let image = lights.image_at_infinity();
-        // With few lights, many vertices look at the same one.
-        let few = lights.selection() == LightSelection::Power;
         sky.clear();
-        choices.clear();
         for (lane, &vertex) in vertex_of[..lanes.count()].iter().enumerate() {
             let vertex = usize::from(vertex);
             if usize::from(lane_of[vertex]) != lane {
@@ -177,18 +166,13 @@ impl PathIntegrator {
             let Some(choice) = lights.choose(&receiver, [u[0], u[3]], found_by) else { continue };
             if image.is_some_and(|(id, _)| id == choice.id) {
                 sky.push(lane, choice.pmf, [u[1], u[2]]);
-            } else if few {
-                choices.push((lane as u8, choice));
-            } else {
-                let light = lights.get(choice.id);
-                let sample = light.sample(&world.scene.geometry, &world.scene.textures, receiver.p, [u[1], u[2]], found_by);
-                if let Some(sample) = &sample {
-                    lanes.set_light(lane, sample, choice.pmf);
-                }
+                continue;
+            }
+            let sample = lights.get(choice.id).sample(&world.scene.geometry, &world.scene.textures, receiver.p, [u[1], u[2]], found_by);
+            if let Some(sample) = &sample {
+                lanes.set_light(lane, sample, choice.pmf);
             }
         }
-        self.light_groups(world, scratch);
-        let Scratch { shaded: Shaded { lanes, sky, .. }, .. } = scratch;
         if let Some((_, image)) = image {
             let count = sky.lanes.len();
             image.sample_batch(&sky.us, found_by, &mut sky.samples[..count]);
@@ -199,44 +183,6 @@ impl PathIntegrator {
             }
         }
         lanes.illuminate();
-    }
-
-    /// Lets vertices look at the lights that have been chosen, all those together that look at the same one.
-    fn light_groups(&self, world: &World, scratch: &mut Scratch) {
-        let Scratch { shaded: Shaded { lanes, vertex_of, choices, group, emitter, .. }, draws, .. } = scratch;
-        while let Some(&(_, LightChoice { id, pmf })) = choices.first() {
-            group.clear();
-            choices.retain(|&(lane, choice)| {
-                if choice.id == id {
-                    group.push(lane);
-                }
-                choice.id != id
-            });
-            let light = world.scene.lights.get(id);
-            let rectangle = if let Light::Area(area) = light { area.as_even_rectangle() } else { None };
-            if let Some(rectangle) = &rectangle {
-                for (k, &lane) in group.iter().enumerate() {
-                    let u = draws.light.of(usize::from(vertex_of[usize::from(lane)]));
-                    emitter.p.set(k, lanes.point(usize::from(lane)));
-                    (emitter.rows.u[0][k], emitter.rows.u[1][k]) = (u[1], u[2]);
-                }
-                rectangle.sample_batch(emitter, group.len());
-            }
-            for (k, &lane) in group.iter().enumerate() {
-                let lane = usize::from(lane);
-                let sample = match &rectangle {
-                    Some(rectangle) => emitter.sample(k, rectangle),
-                    None => {
-                        let (u, p) = (draws.light.of(usize::from(vertex_of[lane])), lanes.point(lane));
-                        let found_by = self.strategy.found_by();
-                        light.sample(&world.scene.geometry, &world.scene.textures, p, [u[1], u[2]], found_by)
-                    }
-                };
-                if let Some(sample) = &sample {
-                    lanes.set_light(lane, sample, pmf);
-                }
-            }
-        }
     }
 
     /// Looks for vertices on diffuse surfaces: on triangles of which nothing but their place is to be found out, and others.

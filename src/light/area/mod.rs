@@ -17,7 +17,6 @@ use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Mesh, Placed, Shape, SpawnPoint, SurfaceInteraction};
 use crate::id::{PrimId, ShapeId, TextureId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::rows::{BATCH, Points, Row, Vectors};
 use crate::math::{DVec3, Ray, Vec2, Vec3};
 use crate::texture::Texture;
 
@@ -98,60 +97,6 @@ enum Form {
     Placed {
         area: f64,
     },
-}
-
-/// Points that look at one emitter, and what they see of it.
-#[derive(Clone, Debug)]
-pub struct EmitterBatch {
-    /// The points that look.
-    pub p: Points,
-    /// The points that were chosen.
-    pub q: Points,
-    /// All else.
-    pub rows: EmitterRows,
-}
-
-/// Rows of an [`EmitterBatch`].
-#[derive(Clone, Debug)]
-pub struct EmitterRows {
-    /// Numbers in the unit square.
-    pub u: [Row; 2],
-    /// Unit directions to the points that were chosen.
-    pub direction: Vectors,
-    /// Densities per solid angle; 0 where there is nothing.
-    pub pdf: Row,
-}
-
-impl Default for EmitterBatch {
-    fn default() -> Self {
-        let rows = EmitterRows { u: [[0.0; BATCH]; 2], direction: Vectors::ZERO, pdf: [0.0; BATCH] };
-        Self { p: Points::ZERO, q: Points::ZERO, rows }
-    }
-}
-
-impl EmitterBatch {
-    /// What the point `i` sees of `light`.
-    #[inline(always)]
-    pub fn sample(&self, i: usize, light: &EvenRectangle) -> Option<LightSample> {
-        let target = SpawnPoint { p: self.q.get(i), n: light.quad.normal(), error: light.quad.error };
-        let pdf = self.rows.pdf[i];
-        let (wi, radiance, target) = (self.rows.direction.get(i), light.radiance, ShadowTarget::Point(target));
-        (pdf > 0.0).then_some(LightSample { wi, radiance, pdf, is_delta: false, target })
-    }
-}
-
-/// A parallelogram of which every point gives off the same light: many points look at it at once.
-pub struct EvenRectangle<'a> {
-    quad: &'a ParallelogramEmitter,
-    radiance: Rgb,
-    two_sided: bool,
-}
-
-impl EvenRectangle<'_> {
-    /// [`AreaLight::sample`] for the first `count` points of a batch.
-    pub fn sample_batch(&self, batch: &mut EmitterBatch, count: usize) {
-        self.quad.sample_batch(self.two_sided, batch, count);
-    }
 }
 
 /// A point of an emitter as seen from another point.
@@ -235,17 +180,6 @@ impl AreaLight {
     #[inline]
     pub fn radiance(&self, textures: &[Texture], at: &SurfaceInteraction, wo: Vec3) -> Rgb {
         if self.emission.two_sided || at.n_g.dot(wo) > 0.0 { self.emission.at(textures, || at.uv) } else { Rgb::BLACK }
-    }
-
-    /// This light if many points look at it at once.
-    #[inline]
-    pub fn as_even_rectangle(&self) -> Option<EvenRectangle<'_>> {
-        match &self.form {
-            Form::Parallelogram(quad) if self.emission.is_even() => {
-                Some(EvenRectangle { quad, radiance: self.emission.radiance, two_sided: self.emission.two_sided })
-            }
-            _ => None,
-        }
     }
 
     /// Light that arrives at `p` from a chosen point of the surface; `None` where `p` sees the dark side.

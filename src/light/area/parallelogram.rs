@@ -1,13 +1,9 @@
 //! Parallelograms: rectangles are sampled by the solid angle they fill (Ureña, Fajardo, King, "An Area-Preserving Parametrization for
 //! Spherical Rectangles"), all others by area.
 
-use std::f32::consts::TAU;
-
-use super::{EmitterBatch, EmitterRows, SurfaceSample};
+use super::SurfaceSample;
 use crate::math::float::F64_CHAIN_ERROR;
-use crate::math::rows::{BATCH, Points};
-use crate::math::vectorize::{Kernel, vectorize};
-use crate::math::{DVec3, Vec3, angle_of, sin_cos_turns};
+use crate::math::{DVec3, Vec3};
 use crate::sampling::Piecewise2d;
 
 /// A parallelogram in the world.
@@ -85,12 +81,12 @@ impl ParallelogramEmitter {
     }
 
     /// Whether `p` sees the front.
-    #[inline(always)]
+    #[inline]
     pub fn sees_front(&self, p: DVec3) -> bool {
         self.normal.dot(p - self.corner) > 0.0
     }
 
-    #[inline(always)]
+    #[inline]
     fn view(&self, p: DVec3) -> View {
         let d = self.corner - p;
         let (x0, y0) = (d.dot(self.axis_u), d.dot(self.axis_v));
@@ -122,7 +118,8 @@ impl ParallelogramEmitter {
         }
         let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };
         let Some(solid_angle) = by_solid_angle else {
-            return SurfaceSample::from_area(p, self.uniform(u), self.normal, 1.0 / self.area);
+            let q = self.point(f64::from(u[0]) * self.length_u, f64::from(u[1]) * self.length_v);
+            return SurfaceSample::from_area(p, q, self.normal, 1.0 / self.area);
         };
         let [x, y] = view.sample(solid_angle, u);
         let q = self.point(x - view.x0, y - view.y0);
@@ -132,21 +129,9 @@ impl ParallelogramEmitter {
     }
 
     /// The point at distances from the corner along the edges.
-    #[inline(always)]
+    #[inline]
     fn point(&self, along_u: f64, along_v: f64) -> DVec3 {
         self.corner + self.axis_u * along_u + self.axis_v * along_v
-    }
-
-    /// [`Self::sample`] for `count` points at once, of those that see the front or if `both` sides shine. The density is 0 where there is
-    /// no sample.
-    pub fn sample_batch(&self, both: bool, batch: &mut EmitterBatch, count: usize) {
-        vectorize(SampleBatch { quad: self, both, batch, count });
-    }
-
-    /// A point chosen by area.
-    #[inline(always)]
-    fn uniform(&self, u: [f32; 2]) -> DVec3 {
-        self.point(f64::from(u[0]) * self.length_u, f64::from(u[1]) * self.length_v)
     }
 
     /// Density per solid angle with which `sample` from `p` finds the point `q`.
@@ -182,53 +167,9 @@ impl ParallelogramEmitter {
     }
 }
 
-struct SampleBatch<'a> {
-    quad: &'a ParallelogramEmitter,
-    both: bool,
-    batch: &'a mut EmitterBatch,
-    count: usize,
-}
-
-impl Kernel for SampleBatch<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let EmitterBatch { p, q, rows } = self.batch;
-        sample_rows(self.quad, self.both, p, q, rows, self.count);
-    }
-}
-
-/// Rows of 32 and of 64 bits come as separate parameters: the compiler then knows that they do not overlap.
-#[inline(always)]
-fn sample_rows(quad: &ParallelogramEmitter, both: bool, points: &Points, found: &mut Points, rows: &mut EmitterRows, count: usize) {
-    let pdf_area = 1.0 / quad.area;
-    for i in 0..count.min(BATCH) {
-        let (p, u) = (points.get(i), [rows.u[0][i], rows.u[1][i]]);
-        let view = quad.view(p);
-        let is_seen = (both | quad.sees_front(p)) & !view.is_edge_on(quad.corner);
-        let solid_angle = view.solid_angle();
-        let by_solid_angle = quad.is_rectangle & !view.is_far() & (solid_angle > SMALLEST_SOLID_ANGLE);
-
-        let [x, y] = view.sample(solid_angle, u);
-        let (near, far) = (quad.point(x - view.x0, y - view.y0), quad.uniform(u));
-        let choose = |near: f64, far: f64| if by_solid_angle { near } else { far };
-        let q = DVec3::new(choose(near.x, far.x), choose(near.y, far.y), choose(near.z, far.z));
-        let toward = q - p;
-        let distance_squared = toward.length_squared();
-        let distance = distance_squared.sqrt();
-        let area_pdf = pdf_area * distance_squared * distance / quad.normal.dot(toward).abs();
-        let pdf = choose(1.0 / solid_angle, area_pdf) as f32;
-        let is_found = is_seen & (by_solid_angle | ((pdf > 0.0) & (pdf < f32::INFINITY)));
-        rows.pdf[i] = if is_found { pdf } else { 0.0 };
-        rows.direction.set(i, (toward * (1.0 / distance)).as_vec3());
-        found.set(i, q);
-    }
-}
-
 impl View {
     /// Whether the point is in the plane, within the rounding of itself and of the rectangle, whose corner is `corner`: the surface does not shine on itself, and nothing is seen of it from there.
-    #[inline(always)]
+    #[inline]
     fn is_edge_on(&self, corner: DVec3) -> bool {
         let reach = self.x1.max(-self.x0) + self.y1.max(-self.y0);
         self.height <= F64_CHAIN_ERROR * (reach + corner.abs().max_element())
@@ -236,7 +177,7 @@ impl View {
 
     /// Solid angle of the rectangle, to `f32` precision at any size: Van Oosterom and Strackee's formula for both of its triangles, whose
     /// half-angles add up as the arguments of complex numbers, so that nothing cancels.
-    #[inline(always)]
+    #[inline]
     fn solid_angle(&self) -> f64 {
         let View { x0, x1, y0, y1, height, corners } = *self;
         let h2 = height * height;
@@ -251,31 +192,25 @@ impl View {
         let real = lower * upper - volume * volume;
         // Scaled into the range of f32.
         let scale = 1.0 / imaginary.abs().max(real.abs());
-        2.0 * f64::from(angle_of((imaginary * scale) as f32, (real * scale) as f32))
+        2.0 * f64::from(((imaginary * scale) as f32).atan2((real * scale) as f32))
     }
 
     /// The solid angle if the parametrisation is to be used.
     #[inline(never)]
     fn usable_solid_angle(&self) -> Option<f64> {
-        if self.is_far() {
+        // Along each axis the rectangle reaches from 0 or the nearer side to the farther side.
+        let (near_x, near_y) = (self.x0.max(-self.x1).max(0.0), self.y0.max(-self.y1).max(0.0));
+        let nearest = near_x * near_x + near_y * near_y + self.height * self.height;
+        let [a, b, c, d] = self.corners;
+        if a.max(b).max(c.max(d)) < FAR_RATIO * nearest {
             return None;
         }
         let solid_angle = self.solid_angle();
         (solid_angle > SMALLEST_SOLID_ANGLE).then_some(solid_angle)
     }
 
-    /// Whether the rectangle is so far away that sampling by area does.
-    #[inline(always)]
-    fn is_far(&self) -> bool {
-        // Along each axis the rectangle reaches from 0 or the nearer side to the farther side.
-        let (near_x, near_y) = (self.x0.max(-self.x1).max(0.0), self.y0.max(-self.y1).max(0.0));
-        let nearest = near_x * near_x + near_y * near_y + self.height * self.height;
-        let [a, b, c, d] = self.corners;
-        a.max(b).max(c.max(d)) < FAR_RATIO * nearest
-    }
-
     /// A point distributed uniformly by solid angle.
-    #[inline(always)]
+    #[inline]
     fn sample(&self, solid_angle: f64, u: [f32; 2]) -> [f64; 2] {
         let View { x0, x1, y0, y1, height, corners } = *self;
         let h2 = height * height;
@@ -294,7 +229,7 @@ impl View {
         let sin_k = -(sin_2 * cos_3 + cos_2 * sin_3);
 
         // The angle a = k + u S, by half-angles so that small ones keep their digits.
-        let (s, c) = sin_cos_turns(u[0] * solid_angle as f32 * (0.5 / TAU));
+        let (s, c) = (0.5 * u[0] * solid_angle as f32).sin_cos();
         let (s, c) = (f64::from(s), f64::from(c));
         let norm = 1.5 - 0.5 * (s * s + c * c);
         let (s, c) = (s * norm, c * norm);
@@ -307,7 +242,7 @@ impl View {
         let s_y0 = height * r_y0;
         let excess = f * f - s_y0 * s_y0;
         let x = if excess > 0.0 { (height / excess.sqrt()).copysign(f) } else { f64::INFINITY.copysign(f) };
-        let x = x.max(x0).min(x1);
+        let x = x.clamp(x0, x1);
 
         // y: uniform in the sine of the elevation. In f32: it rounds the choice of the point, not the point.
         let (d2, y0, y1) = ((x * x + h2) as f32, y0 as f32, y1 as f32);
