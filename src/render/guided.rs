@@ -18,8 +18,8 @@ use crate::integrator::{self, RayCounts, Setup};
 /// Samples per pixel of the first pass. One tells how bright the scene is, the other is learned from.
 const FIRST_PASS: u32 = 2;
 
-/// Passes of fewer samples do not decide whether guiding pays.
-const SAMPLES_TO_JUDGE: u32 = 8;
+/// Passes of so many samples or more decide whether guiding goes on: their variance times rays must be so much less than without.
+const PAYS: [(u32, f64); 2] = [(8, 1.2), (16, GUIDED_COST)];
 
 /// How often the guide is refined while the samples double, at most.
 const REFINEMENTS: u32 = 4;
@@ -30,8 +30,8 @@ const FLOOR: f64 = 0.01;
 /// By this factor the weight of samples may change from one pass to the next.
 const LARGEST_CHANGE: f64 = 32.0;
 
-/// Time of a ray of a guided path over that of another, about.
-const GUIDED_COST: f64 = 1.2;
+/// Time of a ray of a guided path over that of another, about, learning included.
+const GUIDED_COST: f64 = 2.0;
 
 /// Variance of a sample, by channel, mean over the pixels of a block.
 type BlockVariances = Vec<[f64; 3]>;
@@ -248,7 +248,8 @@ pub(super) fn render(
             let (leaves, nodes) = (guide.leaves(), guide.directional_nodes());
             tracing::debug!("guided: pass of {done} samples, {gain:.2} times as good as the first; {leaves} leaves, {nodes} nodes");
         }
-        if stats.spp_done > done && done >= SAMPLES_TO_JUDGE && gain < GUIDED_COST && lessons.guide.take().is_some() {
+        let pays = PAYS.iter().all(|&(samples, least)| done < samples || gain >= least);
+        if stats.spp_done > done && !pays && lessons.guide.take().is_some() {
             tracing::info!("guiding does not pay and is given up after {} samples per pixel", stats.spp_done);
         }
     }
