@@ -101,9 +101,9 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Renders one sample of every pixel of the tile with this origin; `out` is in [slot order](pixel_of_slot).
+    /// Renders one sample of every pixel of the tile with this origin; `out` is in the order of [`slots`].
     fn render_batch(&self, origin: [u32; 2], sample: u32, batch: &mut Batch, counts: &mut RayCounts) {
-        let pixels = (0..TILE_SIZE * TILE_SIZE).map(pixel_of_slot);
+        let pixels = slots(self.size, origin).map(pixel_of_slot);
         self.render_samples(pixels.map(|[dx, dy]| ([origin[0] + dx, origin[1] + dy], sample)), batch, counts);
     }
 
@@ -175,7 +175,7 @@ impl<'a> Job<'a> {
         let active = tile.active();
         for sample in first..first + count {
             self.render_batch(tile.origin(), sample, batch, &mut counts);
-            for (slot, (out, &weight)) in (0..).zip(batch.out.iter().zip(&batch.weights)) {
+            for (slot, (out, &weight)) in slots(self.size, tile.origin()).zip(batch.out.iter().zip(&batch.weights)) {
                 let [dx, dy] = pixel_of_slot(slot);
                 let (x, y) = (tile.origin()[0] + dx, tile.origin()[1] + dy);
                 if active.contains(x, y) {
@@ -227,6 +227,15 @@ fn pixel_of_slot(slot: u32) -> [u32; 2] {
     let (block, within) = (slot / (BLOCK_SIZE * BLOCK_SIZE), slot % (BLOCK_SIZE * BLOCK_SIZE));
     let blocks = TILE_SIZE / BLOCK_SIZE;
     [block % blocks * BLOCK_SIZE + within % BLOCK_SIZE, block / blocks * BLOCK_SIZE + within / BLOCK_SIZE]
+}
+
+/// The slots of a batch: all of a tile, but at the edges of the full picture only blocks that reach into it.
+fn slots(size: [u32; 2], origin: [u32; 2]) -> impl Iterator<Item = u32> {
+    let blocks = [0, 1].map(|k| (size[k] - origin[k]).div_ceil(BLOCK_SIZE));
+    (0..TILE_SIZE * TILE_SIZE).filter(move |slot| {
+        let [dx, dy] = pixel_of_slot(*slot);
+        dx / BLOCK_SIZE < blocks[0] && dy / BLOCK_SIZE < blocks[1]
+    })
 }
 
 /// The slot of a pixel within its tile; inverts [`pixel_of_slot`].
@@ -335,7 +344,9 @@ pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel
     let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
     let mut batch = Batch::new();
     job.render_batch(origin, sample, &mut batch, &mut RayCounts::default());
-    Ok(batch.out[slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]) as usize])
+    let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
+    let place = slots(settings.size, origin).position(|other| other == slot);
+    place.map(|place| batch.out[place]).ok_or_else(|| Error::Internal(format!("pixel {pixel:?} has no slot")))
 }
 
 #[cfg(test)]
@@ -349,6 +360,19 @@ mod tests {
         }
         let first_block: Vec<_> = (0..16).map(pixel_of_slot).collect();
         assert!(first_block.iter().all(|p| p[0] < 4 && p[1] < 4));
+    }
+
+    #[test]
+    fn batches_have_every_pixel_of_the_picture_and_hardly_more() {
+        let count = |size, origin| slots(size, origin).count();
+        assert_eq!([count([64, 64], [32, 32]), count([50, 37], [0, 0]), count([50, 37], [32, 32])], [1024, 1024, 5 * 2 * 16]);
+        for size in [[1, 1], [50, 37], [33, 64]] {
+            for pixel in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y])) {
+                let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
+                let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
+                assert!(slots(size, origin).any(|other| other == slot), "{size:?} {pixel:?}");
+            }
+        }
     }
 
     #[test]
