@@ -30,8 +30,8 @@ const FLOOR: f64 = 0.01;
 /// By this factor the weight of samples may change from one pass to the next.
 const LARGEST_CHANGE: f64 = 32.0;
 
-/// Time of a ray of a guided path over that of another, about, learning included.
-const GUIDED_COST: f64 = 2.0;
+/// Time of a ray of a guided path over that of another, about, learning included: from 2.5 in a room seen through a door to 3.7 in a Cornell box.
+const GUIDED_COST: f64 = 2.5;
 
 /// Variance of a sample, by channel, mean over the pixels of a block.
 type BlockVariances = Vec<[f64; 3]>;
