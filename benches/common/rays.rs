@@ -1,7 +1,7 @@
 //! Rays as a path tracer sends them: from a camera, one diffuse bounce on, and from there to a light.
 
 use steradian::accel::{Accelerator, Coherence};
-use steradian::geometry::SpawnTarget;
+use steradian::geometry::SpawnPoint;
 use steradian::math::{Ray, Rng, Vec3};
 
 use super::models::Model;
@@ -30,7 +30,7 @@ pub fn ray_sets(model: &Model, accel: &dyn Accelerator, resolution: usize) -> Ve
         bounce.push(si.spawn(random.cosine_around(n.as_dvec3()).as_vec3()));
         // A light of a tenth of the model's size, above and beside it.
         let on_light = center + size * steradian::math::DVec3::new(0.8 + 0.1 * random.unit(), 1.5, 0.5 + 0.1 * random.unit());
-        shadow.push(si.spawn_to(&SpawnTarget { p: on_light, n: Vec3::ZERO, error: 0.0 }));
+        shadow.push(si.spawn_to(&SpawnPoint { p: on_light, n: Vec3::ZERO, error: 0.0 }));
     }
     vec![
         RaySet { name: "camera", any: false, coherence: Coherence::Coherent, rays: camera },
