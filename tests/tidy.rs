@@ -181,3 +181,15 @@ fn every_known_flaw_has_its_tests() {
     }
     assert!(faults.is_empty(), "no such test:\n{}", faults.join("\n"));
 }
+
+#[test]
+fn every_deliberate_fault_has_its_place() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let faults: Vec<serde_json::Value> = serde_json::from_str(include_str!("mutants.json")).unwrap();
+    assert!(faults.len() >= 50);
+    for fault in &faults {
+        let text = fs::read_to_string(root.join(fault["file"].as_str().unwrap())).unwrap();
+        let places = text.matches(fault["old"].as_str().unwrap()).count();
+        assert_eq!(places, 1, "{}", fault["name"]);
+    }
+}
