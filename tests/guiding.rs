@@ -31,6 +31,33 @@ fn room() -> Value {
     })
 }
 
+/// A room with a lamp at the bottom of a shaft, which lights nothing but a spot of the ceiling: only paths that happen to meet it bring light.
+fn room_with_shaft() -> Value {
+    let quad = |material: &str, origin: [f64; 3], u: [f64; 3], v: [f64; 3]| json!({ "type": "quad", "material": material, "origin": origin, "edge_u": u, "edge_v": v });
+    let (bottom, height, half) = (0.4, 1.1, 0.15);
+    let wall = |x: f64, z: f64, along: [f64; 3]| quad("black", [x, bottom, z], along, [0.0, height, 0.0]);
+    json!({
+        "camera": { "position": [-1.6, 1.2, 1.7], "look_at": [0.8, 0.2, -1.0], "vertical_fov_degrees": 60 },
+        "film": { "width": 240, "height": 240, "filter": { "type": "box" } },
+        "integrator": { "type": "path", "max_depth": 8 },
+        "materials": { "white": { "type": "diffuse", "albedo": 0.6 }, "black": { "type": "diffuse", "albedo": 0 } },
+        "shapes": [
+            quad("white", [-2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0]),
+            quad("white", [-2.0, 2.0, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0]),
+            quad("white", [-2.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
+            quad("white", [-2.0, 0.0, 2.0], [0.0, 2.0, 0.0], [4.0, 0.0, 0.0]),
+            quad("white", [-2.0, 0.0, -2.0], [0.0, 2.0, 0.0], [0.0, 0.0, 4.0]),
+            quad("white", [2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [0.0, 2.0, 0.0]),
+            wall(-half, -half, [2.0 * half, 0.0, 0.0]),
+            wall(-half, half, [2.0 * half, 0.0, 0.0]),
+            wall(-half, -half, [0.0, 0.0, 2.0 * half]),
+            wall(half, -half, [0.0, 0.0, 2.0 * half]),
+            { "type": "quad", "material": "black", "origin": [-half, bottom, -half], "edge_u": [0, 0, 2.0 * half], "edge_v": [2.0 * half, 0, 0],
+              "emission": { "radiance": [400, 400, 400] } }
+        ]
+    })
+}
+
 fn run(scene: &Value, guiding: bool, overrides: &Overrides) -> RenderResult {
     let overrides = Overrides { guiding: Some(guiding), ..overrides.clone() };
     let prepared = prepare(scene, &overrides);
@@ -49,6 +76,22 @@ fn guided_pictures_have_the_same_mean() {
         (0..8).map(|seed| block_means(&of_seed(guiding, seed + 100 * u64::from(guiding), 64))).collect()
     };
     assert_blocks_agree(&blocks(true), &blocks(false), "guided against not");
+}
+
+/// Two renders differ by twice the variance of one.
+#[test]
+fn guiding_lowers_the_error_where_light_is_hard_to_find() {
+    let difference = |guiding: bool| {
+        let image = |seed| {
+            let overrides = Overrides { seed: Some(seed), spp: Some(32), threads: Some(2), ..Overrides::default() };
+            run(&room_with_shaft(), guiding, &overrides).image
+        };
+        let (a, b) = (image(1), image(2));
+        let (a, b) = (a.layer(LayerKind::Color).unwrap(), b.layer(LayerKind::Color).unwrap());
+        a.data.iter().zip(&b.data).map(|(a, b)| f64::from(a - b).powi(2) / (f64::from(*b).powi(2) + 0.01)).sum::<f64>()
+    };
+    let (guided, plain) = (difference(true), difference(false));
+    assert!(guided < 0.6 * plain, "{guided} {plain}");
 }
 
 #[test]
