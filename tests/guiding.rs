@@ -8,32 +8,41 @@ use steradian::render::{self, Overrides, RenderResult, Silent};
 
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
 
+fn quad(material: &str, origin: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Value {
+    json!({ "type": "quad", "material": material, "origin": origin, "edge_u": u, "edge_v": v })
+}
+
+/// The insides of a box of 4 x 2 x 4 with these shapes in it.
+fn walls_and(shapes: Vec<Value>) -> Value {
+    let walls = vec![
+        quad("white", [-2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0]),
+        quad("white", [-2.0, 2.0, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0]),
+        quad("white", [-2.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
+        quad("white", [-2.0, 0.0, 2.0], [0.0, 2.0, 0.0], [4.0, 0.0, 0.0]),
+        quad("white", [-2.0, 0.0, -2.0], [0.0, 2.0, 0.0], [0.0, 0.0, 4.0]),
+        quad("white", [2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [0.0, 2.0, 0.0]),
+    ];
+    Value::Array([walls, shapes].concat())
+}
+
 /// A room lit through a gap beside a wall: the lamp behind it shines on a stripe of the floor, which lights all else.
 fn room() -> Value {
-    let quad = |material: &str, origin: [f64; 3], u: [f64; 3], v: [f64; 3]| json!({ "type": "quad", "material": material, "origin": origin, "edge_u": u, "edge_v": v });
     json!({
         "camera": { "position": [-0.6, 1.0, 1.8], "look_at": [-1.2, 0.8, -1.0], "vertical_fov_degrees": 60 },
         "film": { "width": 72, "height": 72, "filter": { "type": "box" } },
         "integrator": { "type": "path", "max_depth": 12 },
         "materials": { "white": { "type": "diffuse", "albedo": 0.7 }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 } },
-        "shapes": [
-            quad("white", [-2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0]),
-            quad("white", [-2.0, 2.0, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0]),
-            quad("white", [-2.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
-            quad("white", [-2.0, 0.0, 2.0], [0.0, 2.0, 0.0], [4.0, 0.0, 0.0]),
-            quad("white", [-2.0, 0.0, -2.0], [0.0, 2.0, 0.0], [0.0, 0.0, 4.0]),
-            quad("white", [2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [0.0, 2.0, 0.0]),
+        "shapes": walls_and(vec![
             quad("white", [0.4, 0.0, -2.0], [0.0, 0.0, 3.7], [0.0, 2.0, 0.0]),
-            { "type": "sphere", "material": "gold", "radius": 0.3, "transform": [{ "translate": [-1.1, 0.3, -0.4] }] },
-            { "type": "quad", "material": "white", "origin": [1.6, 1.8, -1.6], "edge_u": [0.3, 0, 0], "edge_v": [0, 0, 0.3],
-              "emission": { "radiance": [90, 80, 60] } }
-        ]
+            json!({ "type": "sphere", "material": "gold", "radius": 0.3, "transform": [{ "translate": [-1.1, 0.3, -0.4] }] }),
+            json!({ "type": "quad", "material": "white", "origin": [1.6, 1.8, -1.6], "edge_u": [0.3, 0, 0], "edge_v": [0, 0, 0.3],
+              "emission": { "radiance": [90, 80, 60] } }),
+        ])
     })
 }
 
 /// A room with a lamp at the bottom of a shaft, which lights nothing but a spot of the ceiling: only paths that happen to meet it bring light.
 fn room_with_shaft() -> Value {
-    let quad = |material: &str, origin: [f64; 3], u: [f64; 3], v: [f64; 3]| json!({ "type": "quad", "material": material, "origin": origin, "edge_u": u, "edge_v": v });
     let (bottom, height, half) = (0.4, 1.1, 0.15);
     let wall = |x: f64, z: f64, along: [f64; 3]| quad("black", [x, bottom, z], along, [0.0, height, 0.0]);
     json!({
@@ -41,20 +50,14 @@ fn room_with_shaft() -> Value {
         "film": { "width": 240, "height": 240, "filter": { "type": "box" } },
         "integrator": { "type": "path", "max_depth": 8 },
         "materials": { "white": { "type": "diffuse", "albedo": 0.6 }, "black": { "type": "diffuse", "albedo": 0 } },
-        "shapes": [
-            quad("white", [-2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0]),
-            quad("white", [-2.0, 2.0, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0]),
-            quad("white", [-2.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
-            quad("white", [-2.0, 0.0, 2.0], [0.0, 2.0, 0.0], [4.0, 0.0, 0.0]),
-            quad("white", [-2.0, 0.0, -2.0], [0.0, 2.0, 0.0], [0.0, 0.0, 4.0]),
-            quad("white", [2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [0.0, 2.0, 0.0]),
+        "shapes": walls_and(vec![
             wall(-half, -half, [2.0 * half, 0.0, 0.0]),
             wall(-half, half, [2.0 * half, 0.0, 0.0]),
             wall(-half, -half, [0.0, 0.0, 2.0 * half]),
             wall(half, -half, [0.0, 0.0, 2.0 * half]),
-            { "type": "quad", "material": "black", "origin": [-half, bottom, -half], "edge_u": [0, 0, 2.0 * half], "edge_v": [2.0 * half, 0, 0],
-              "emission": { "radiance": [400, 400, 400] } }
-        ]
+            json!({ "type": "quad", "material": "black", "origin": [-half, bottom, -half], "edge_u": [0, 0, 2.0 * half], "edge_v": [2.0 * half, 0, 0],
+              "emission": { "radiance": [400, 400, 400] } }),
+        ])
     })
 }
 

@@ -386,20 +386,12 @@ impl Accelerator for Timed<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    struct Patient;
-
-    impl Watch for Patient {
-        fn step(&self, _: &str) {}
-        fn is_stopped(&self) -> bool {
-            false
-        }
-    }
+    use crate::bench::Unwatched;
 
     #[test]
     fn every_accelerator_draws_the_same_picture_and_trees_test_less() {
         let options = ReportsOptions { size: [60, 40], rounds: 1, tests: 2_000_000 };
-        let report = bench_reports(&options, &Patient).unwrap();
+        let report = bench_reports(&options, &Unwatched).unwrap();
         assert_eq!(report.comparisons.iter().map(|c| c.triangles).collect::<Vec<_>>(), [968, 1_000, 70_000]);
         for comparison in &report.comparisons {
             let linear = comparison.rows[0].tests_per_ray.unwrap();

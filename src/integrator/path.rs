@@ -57,9 +57,9 @@ struct Path {
     throughput: Rgb,
     /// Density with which the last direction was chosen, or infinity if light sampling could not have found it.
     pdf: f32,
-    /// Product of the squared relative indices of refraction passed: roulette must not mistake their radiance scaling for absorption. The same
-    /// holds of densities that a guide has raised above those of the surfaces.
-    eta_squared: f32,
+    /// What roulette multiplies the throughput by, lest it mistakes for absorption what is none: the squares of the relative indices of refraction
+    /// passed, which scale radiance, and how far a guide has raised densities above those of the surfaces.
+    roulette_scale: f32,
     /// Its place in the batch.
     slot: u32,
     seed: PixelSeed,
@@ -134,7 +134,7 @@ impl PathIntegrator {
         scratch.paths.extend((0..).zip(samples).map(|(slot, sample)| Path {
             throughput: Rgb::WHITE,
             pdf: f32::INFINITY,
-            eta_squared: 1.0,
+            roulette_scale: 1.0,
             slot,
             seed: sample.seed,
             sample: sample.sample,
@@ -269,10 +269,10 @@ impl PathIntegrator {
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, shaded, turns, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, turns, .. } = scratch;
         let (path, ray) = (&paths[i], &rays[i]);
         let sample = &mut out[path.slot as usize];
-        let found = shaded.place(world, i - first, hits[i], ray);
+        let found = world.resolve(ray, hits[i]);
         let Some(at) = &found else {
             if bounce > 0 || !self.hide_emitters {
                 sample.radiance +=
@@ -425,11 +425,11 @@ impl PathIntegrator {
         };
         let Steered { sample, ray, gain, .. } = &steered;
         let mut throughput = path.throughput * sample.weight;
-        let eta_squared = path.eta_squared * (sample.eta * sample.eta) * gain;
+        let roulette_scale = path.roulette_scale * (sample.eta * sample.eta) * gain;
 
         // Russian roulette: the survivors carry the weight of the dead. The chance is not capped, so a path that lost nothing goes on.
         if bounce + 1 >= self.rr_depth {
-            let survival = throughput.max_channel() * eta_squared;
+            let survival = throughput.max_channel() * roulette_scale;
             if survival < 1.0 {
                 if u[3] >= survival {
                     return None;
@@ -446,7 +446,7 @@ impl PathIntegrator {
         }
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        Some((Path { throughput, pdf, eta_squared, from: vertex.receiver(), ..*path }, *ray))
+        Some((Path { throughput, pdf, roulette_scale, from: vertex.receiver(), ..*path }, *ray))
     }
 }
 

@@ -9,11 +9,12 @@
 //! too dark where such paths are rare. So what a block gets depends on the blocks around it alone. In the first stage its samples
 //! are thus independent of their number; later ones depend on it only through how precisely its neighbours know their variance.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::limits::Limits;
 use super::{BLOCK_SIZE, Batch, Job, Progress, RenderResult, Settings, Stats, TILE_SIZE, next_pass, weighted};
 use crate::error::Result;
 use crate::film::{Crop, Film, FilmTile, LayerKind};
@@ -59,23 +60,6 @@ struct Blocks {
     done: Vec<u32>,
     /// Groups that each block is to have.
     wanted: Vec<u32>,
-}
-
-/// When a render ends whatever its error is.
-struct Limits<'a> {
-    start: Instant,
-    time: Option<Duration>,
-    stop: &'a AtomicBool,
-}
-
-impl Limits<'_> {
-    fn remaining(&self) -> Option<Duration> {
-        self.time.map(|limit| limit.saturating_sub(self.start.elapsed()))
-    }
-
-    fn is_over(&self) -> bool {
-        self.stop.load(Ordering::Relaxed) || self.remaining().is_some_and(|left| left.is_zero())
-    }
 }
 
 /// What the picture's samples say of it.
@@ -259,13 +243,9 @@ pub(super) fn render(
     let mut blocks = Blocks::new(settings.crop);
     progress.start(PILOT * GROUP, pixels);
 
-    let limits = Limits { start: Instant::now(), time: settings.time_limit, stop };
+    let limits = Limits::new(settings, stop);
     loop {
         let finished = render_stage(job, pool, &mut film, &mut blocks, &mut stats, &limits, progress);
-        if !finished {
-            stats.interrupted = stop.load(Ordering::Relaxed);
-            stats.time_limited = !stats.interrupted;
-        }
         let estimate = blocks.estimate(&film);
         stats.estimated_error = Some(estimate.error);
         let reached = estimate.error + CONFIDENCE * estimate.deviation <= target;
@@ -284,7 +264,7 @@ pub(super) fn render(
         debug_assert!(wanted >= done, "samples are never taken back");
         progress.plan(wanted, estimate.error, target);
     }
-    stats.render_seconds = limits.start.elapsed().as_secs_f64();
+    stats.render_seconds = limits.elapsed().as_secs_f64();
     progress.finish();
 
     stats.samples = blocks.samples(&film)[0];
@@ -310,7 +290,7 @@ fn render_stage(
     while blocks.done.iter().zip(&blocks.wanted).any(|(done, wanted)| done < wanted) {
         // Fewer groups than the pilot's would say nothing of the error.
         let has_pilot = blocks.done.iter().all(|&n| n >= PILOT);
-        if has_pilot && limits.is_over() {
+        if has_pilot && limits.end(stats, true) {
             return false;
         }
         let pass_start = Instant::now();
@@ -319,7 +299,7 @@ fn render_stage(
             *done = (*done + step).min(*wanted);
         }
         if stats.first_pass_seconds == 0.0 {
-            stats.first_pass_seconds = limits.start.elapsed().as_secs_f64();
+            stats.first_pass_seconds = limits.elapsed().as_secs_f64();
         }
         step = next_pass(step, pass_start.elapsed(), limits.remaining());
     }

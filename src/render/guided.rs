@@ -6,9 +6,10 @@
 //! count depends on the other tiles alone.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use super::limits::Limits;
 use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats, TILE_SIZE, next_pass, render_pass};
 use crate::error::Result;
 use crate::film::{Film, FilmTile, LayerKind};
@@ -207,19 +208,15 @@ pub(super) fn render(
     progress.start(settings.spp, pixels);
     let mut lessons = Lessons { guide: Some(Guide::new(job.world.accel.bounds(), 0.0)), since: 0 };
 
-    let start = Instant::now();
+    let limits = Limits::new(settings, stop);
     let mut step = 1;
     while stats.spp_done < settings.spp && !stats.interrupted && !stats.time_limited {
         let count = stats.spp_done.max(FIRST_PASS).min(settings.spp - stats.spp_done);
         let mut film = new_film()?;
         let (mut done, mut rays) = (0, RayCounts::default());
         while done < count {
-            if stop.load(Ordering::Relaxed) {
-                stats.interrupted = true;
-                break;
-            }
-            if settings.time_limit.is_some_and(|limit| stats.spp_done > 0 && start.elapsed() >= limit) {
-                stats.time_limited = true;
+            let has_picture = stats.spp_done > 0;
+            if limits.end(&mut stats, has_picture) {
                 break;
             }
             let pass_start = Instant::now();
@@ -235,9 +232,9 @@ pub(super) fn render(
             stats.spp_done += samples;
             lessons.learn(guide, samples, stats.spp_done, || mean(&film));
             if stats.first_pass_seconds == 0.0 {
-                stats.first_pass_seconds = start.elapsed().as_secs_f64();
+                stats.first_pass_seconds = limits.elapsed().as_secs_f64();
             }
-            step = next_pass(samples, pass_start.elapsed(), settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed())));
+            step = next_pass(samples, pass_start.elapsed(), limits.remaining());
         }
         stats.rays.add(&rays);
         if done == 0 {
@@ -253,7 +250,7 @@ pub(super) fn render(
             tracing::info!("guiding does not pay and is given up after {} samples per pixel", stats.spp_done);
         }
     }
-    stats.render_seconds = start.elapsed().as_secs_f64();
+    stats.render_seconds = limits.elapsed().as_secs_f64();
     progress.finish();
 
     stats.samples = pixels * u64::from(stats.spp_done);

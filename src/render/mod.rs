@@ -5,13 +5,14 @@
 
 mod adaptive;
 mod guided;
+mod limits;
 mod progress;
 mod settings;
 
 pub use progress::{Progress, Silent};
 pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings};
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
@@ -26,6 +27,7 @@ use crate::math::rows::BATCH;
 use crate::math::{Ray, Vec2};
 use crate::sampling::{Numbers, Requests, Sampler};
 use crate::scene::Scene;
+use limits::Limits;
 
 /// Width and height of a tile in pixels: a batch has 1,024 paths. Of a Cornell box, batches of 256 paths take 3 % longer.
 pub const TILE_SIZE: u32 = 32;
@@ -273,15 +275,11 @@ pub fn render(
     let pixels = u64::from(settings.crop.width) * u64::from(settings.crop.height);
     progress.start(settings.spp, pixels);
 
-    let start = Instant::now();
+    let limits = Limits::new(settings, stop);
     let mut pass_samples = 1;
     while stats.spp_done < settings.spp {
-        if stop.load(Ordering::Relaxed) {
-            stats.interrupted = true;
-            break;
-        }
-        if settings.time_limit.is_some_and(|limit| stats.spp_done > 0 && start.elapsed() >= limit) {
-            stats.time_limited = true;
+        let has_picture = stats.spp_done > 0;
+        if limits.end(&mut stats, has_picture) {
             break;
         }
         let count = pass_samples.min(settings.spp - stats.spp_done);
@@ -289,12 +287,11 @@ pub fn render(
         stats.rays.add(&render_pass(&job, &pool, &mut film, stats.spp_done, count, progress));
         stats.spp_done += count;
         if stats.first_pass_seconds == 0.0 {
-            stats.first_pass_seconds = start.elapsed().as_secs_f64();
+            stats.first_pass_seconds = limits.elapsed().as_secs_f64();
         }
-        let remaining = settings.time_limit.map(|limit| limit.saturating_sub(start.elapsed()));
-        pass_samples = next_pass(count, pass_start.elapsed(), remaining);
+        pass_samples = next_pass(count, pass_start.elapsed(), limits.remaining());
     }
-    stats.render_seconds = start.elapsed().as_secs_f64();
+    stats.render_seconds = limits.elapsed().as_secs_f64();
     progress.finish();
 
     stats.samples = pixels * u64::from(stats.spp_done);

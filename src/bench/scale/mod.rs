@@ -74,15 +74,7 @@ fn in_a_process(mut program: Command, case: &Case, stop: &AtomicBool) -> Result<
 mod tests {
     use super::*;
     use crate::accel::AccelKind;
-
-    struct Patient;
-
-    impl Watch for Patient {
-        fn step(&self, _: &str) {}
-        fn is_stopped(&self) -> bool {
-            false
-        }
-    }
+    use crate::bench::Unwatched;
 
     fn options(sweep: &str) -> ScaleOptions {
         ScaleOptions {
@@ -112,7 +104,7 @@ mod tests {
             shell.args(["-c", &script]);
             shell
         };
-        let report = bench_scale(&options("depth"), program, &Patient, &AtomicBool::new(false), |_| Ok(())).unwrap();
+        let report = bench_scale(&options("depth"), program, &Unwatched, &AtomicBool::new(false), |_| Ok(())).unwrap();
         let failures = report.failures();
         assert!(failures.len() == 1 && failures[0].starts_with("depth 4: ") && failures[0].ends_with("no memory"), "{failures:?}");
         assert!(!report.interrupted && report.markdown().contains("Failed: depth 4"));

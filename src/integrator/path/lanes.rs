@@ -4,11 +4,11 @@
 mod kernels;
 
 use crate::color::Rgb;
-use crate::geometry::{Hit, SurfaceInteraction, TrianglePoints};
+use crate::geometry::{SurfaceInteraction, TrianglePoints};
 use crate::light::{LightSample, Receiver, ShadowTarget};
 use crate::math::rows::{BATCH, Points, Row, Vectors};
 use crate::math::vectorize::vectorize;
-use crate::math::{Ray, Vec2, Vec3};
+use crate::math::{Ray, Vec3};
 use kernels::{Face, Illuminate, Place, Scatter};
 
 /// What has become of a ray that a loop was to find.
@@ -93,7 +93,7 @@ struct Rows {
 
     // The path so far, and the surface.
     throughput: Vectors,
-    eta_squared: Row,
+    roulette_scale: Row,
     albedo: Vectors,
 
     // Light that was chosen.
@@ -145,7 +145,7 @@ impl Default for Rows {
             is_facing: bits,
             side: row,
             throughput: vectors.clone(),
-            eta_squared: row,
+            roulette_scale: row,
             albedo: vectors.clone(),
             light_at: bits,
             light_is_delta: bits,
@@ -186,12 +186,12 @@ impl Lanes {
 
     /// A new vertex, of a path with this throughput and product of relative indices, on a surface of this albedo.
     #[inline(always)]
-    fn push(&mut self, ray: &Ray, throughput: Rgb, eta_squared: f32, albedo: Rgb) -> usize {
+    fn push(&mut self, ray: &Ray, throughput: Rgb, roulette_scale: f32, albedo: Rgb) -> usize {
         let lane = self.count;
         self.count += 1;
         self.rows.direction.set(lane, ray.direction);
         self.rows.throughput.set(lane, throughput.to_array().into());
-        self.rows.eta_squared[lane] = eta_squared;
+        self.rows.roulette_scale[lane] = roulette_scale;
         self.rows.albedo.set(lane, albedo.to_array().into());
         (self.rows.light_at[lane], self.rows.shadow_found[lane]) = (NO_LIGHT, Found::NOTHING);
         lane
@@ -205,10 +205,10 @@ impl Lanes {
         points: &TrianglePoints,
         smooth: Option<([Vec3; 3], [f32; 2])>,
         throughput: Rgb,
-        eta_squared: f32,
+        roulette_scale: f32,
         albedo: Rgb,
     ) -> usize {
-        let lane = self.push(ray, throughput, eta_squared, albedo);
+        let lane = self.push(ray, throughput, roulette_scale, albedo);
         self.rows.origin.set(lane, ray.origin);
         for (corner, p) in self.rows.corners.iter_mut().zip([points.a, points.b, points.c]) {
             corner.set(lane, p);
@@ -223,8 +223,8 @@ impl Lanes {
     }
 
     /// A vertex at a place that is known.
-    pub fn push_known(&mut self, ray: &Ray, at: &SurfaceInteraction, throughput: Rgb, eta_squared: f32, albedo: Rgb) -> usize {
-        let lane = self.push(ray, throughput, eta_squared, albedo);
+    pub fn push_known(&mut self, ray: &Ray, at: &SurfaceInteraction, throughput: Rgb, roulette_scale: f32, albedo: Rgb) -> usize {
+        let lane = self.push(ray, throughput, roulette_scale, albedo);
         self.points.p.set(lane, at.p);
         (self.rows.t[lane], self.rows.error[lane]) = (at.t, at.error);
         self.rows.n_g.set(lane, at.n_g);
@@ -238,24 +238,6 @@ impl Lanes {
             vectorize(Place::<true>(self));
         } else {
             vectorize(Place::<false>(self));
-        }
-    }
-
-    /// The place that was found for `hit` of a ray at this time, without parameters.
-    pub fn interaction(&self, lane: usize, hit: &Hit, time: f32, smooth: bool) -> SurfaceInteraction {
-        let n_g = self.rows.n_g.get(lane);
-        SurfaceInteraction {
-            p: self.points.p.get(lane),
-            t: self.rows.t[lane],
-            error: self.rows.error[lane],
-            n_g,
-            n_s: if smooth { self.rows.n_s.get(lane) } else { n_g },
-            dp_du: Vec3::ZERO,
-            uv: Vec2::ZERO,
-            shape: hit.shape,
-            prim: hit.prim,
-            instance: hit.instance,
-            time,
         }
     }
 

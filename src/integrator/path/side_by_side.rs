@@ -7,7 +7,7 @@ use super::{Path, PathIntegrator, Pending, Scratch};
 use crate::bsdf::{Bsdf, Lambert};
 use crate::color::Rgb;
 use crate::film::PixelSample;
-use crate::geometry::{Hit, Mesh, Shape, SurfaceInteraction};
+use crate::geometry::{Hit, Mesh, Shape};
 use crate::integrator::shading::turned_normal;
 use crate::integrator::vertex::Vertex;
 use crate::integrator::{Strategy, SurfaceNeeds, World, surface_sample};
@@ -23,10 +23,6 @@ const _: () = assert!(BATCH < ALONE as usize);
 /// A batch of vertices, of which some are shaded side by side.
 pub(super) struct Shaded {
     lanes: Box<Lanes>,
-    /// Vertices that are shaded alone, of which the places are found side by side.
-    places: Box<Lanes>,
-    /// By vertex: its lane of `places`.
-    place_of: [u8; BATCH],
     /// By vertex.
     lane_of: [u8; BATCH],
     /// By lane.
@@ -69,8 +65,6 @@ impl Default for Shaded {
     fn default() -> Self {
         Self {
             lanes: Box::default(),
-            places: Box::default(),
-            place_of: [ALONE; BATCH],
             lane_of: [ALONE; BATCH],
             vertex_of: [0; BATCH],
             others: Vec::with_capacity(BATCH),
@@ -82,8 +76,7 @@ impl Default for Shaded {
 impl Shaded {
     pub fn clear(&mut self) {
         self.lanes.clear();
-        self.places.clear();
-        (self.lane_of, self.place_of) = ([ALONE; BATCH], [ALONE; BATCH]);
+        self.lane_of = [ALONE; BATCH];
         self.others.clear();
     }
 
@@ -92,16 +85,6 @@ impl Shaded {
     pub fn lane(&self, vertex: usize) -> Option<usize> {
         let lane = self.lane_of[vertex];
         (lane != ALONE).then_some(usize::from(lane))
-    }
-
-    /// What the ray of a vertex meets, if that has been found.
-    #[inline(always)]
-    pub fn place(&self, world: &World, vertex: usize, hit: Option<Hit>, ray: &Ray) -> Option<SurfaceInteraction> {
-        let lane = self.place_of[vertex];
-        if lane == ALONE || !self.places.is_ahead(usize::from(lane)) {
-            return world.resolve(ray, hit);
-        }
-        Some(self.places.interaction(usize::from(lane), hit.as_ref()?, ray.time, world.scene.features.shading_normals))
     }
 
     #[inline(always)]
@@ -130,7 +113,6 @@ impl PathIntegrator {
         let smooth = world.scene.features.shading_normals;
         self.find_diffuse(world, bounce, batch.clone(), scratch);
         scratch.shaded.lanes.place(smooth);
-        scratch.shaded.places.place(smooth);
         self.settle(world, bounce, batch, out, scratch);
         let Scratch { shaded: Shaded { lanes, vertex_of, .. }, draws, .. } = scratch;
         if lanes.count() == 0 {
@@ -195,27 +177,18 @@ impl PathIntegrator {
             let Some(hit) = &hits[i] else { continue };
             let surface = scene.surface(hit.shape);
             let material = &scene.materials[surface.material.index()];
-            let triangle = if places_suffice { still_mesh(world, hit) } else { None };
-            let albedo = match material {
-                Material::Constant(Bsdf::Lambert(lambert)) if surface.first_light.is_none() => Some(lambert.albedo),
-                _ => None,
+            let (is_diffuse, albedo) = match material {
+                Material::Constant(Bsdf::Lambert(lambert)) => (true, surface.first_light.is_none().then_some(lambert.albedo)),
+                Material::Varying(varying) => (varying.is_diffuse(), None),
+                Material::Constant(_) | Material::Mix { .. } | Material::TwoSided { .. } => (false, None),
             };
-            let others = match material {
-                Material::Constant(bsdf) => matches!(bsdf, Bsdf::Lambert(_)),
-                Material::Varying(varying) => varying.is_diffuse(),
-                Material::Mix { .. } | Material::TwoSided { .. } => false,
-            };
-            match (triangle, albedo) {
-                (Some(mesh), Some(albedo)) => {
+            match (albedo, still_mesh(world, hit)) {
+                (Some(albedo), Some(mesh)) if places_suffice => {
                     let lane = push_triangle(world, &mut shaded.lanes, mesh, hit, (&rays[i], &paths[i]), albedo);
                     shaded.assign(vertex, lane);
                 }
-                _ if others => shaded.others.push(vertex as u8),
-                (Some(mesh), None) => {
-                    let lane = push_triangle(world, &mut shaded.places, mesh, hit, (&rays[i], &paths[i]), Rgb::BLACK);
-                    shaded.place_of[vertex] = lane as u8;
-                }
-                (None, _) => {}
+                _ if is_diffuse => shaded.others.push(vertex as u8),
+                _ => {}
             }
         }
     }
@@ -244,7 +217,7 @@ impl PathIntegrator {
                 sample.surface = surface_sample(world, self.needs, at, ray.direction, footprint);
             }
             sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
-            let lane = shaded.lanes.push_known(ray, at, path.throughput, path.eta_squared, albedo);
+            let lane = shaded.lanes.push_known(ray, at, path.throughput, path.roulette_scale, albedo);
             shaded.assign(vertex, lane);
         }
     }
@@ -274,8 +247,10 @@ impl PathIntegrator {
         let hidden = shadow == Found::Hidden || next == Found::Hidden;
         let found = if hidden { world.resolve(&rays[i], hits[i]) } else { None };
         let cone = cones.get(i).copied();
-        let footprint = || world.footprint(cone.as_ref(), &rays[i], hits[i].as_ref(), found.as_ref().expect("a vertex that was found"));
-        let vertex = found.as_ref().map(|at| Vertex::new(world, at, &rays[i], footprint, &mut bsdf));
+        let vertex = found.as_ref().map(|at| {
+            let footprint = || world.footprint(cone.as_ref(), &rays[i], hits[i].as_ref(), at);
+            Vertex::new(world, at, &rays[i], footprint, &mut bsdf)
+        });
 
         let shadow = match (shadow, &vertex) {
             (Found::Ray, _) => Some((Ray { time, ..shadow_ray }, lanes.contribution(lane))),
@@ -315,7 +290,7 @@ fn push_triangle(world: &World, lanes: &mut Lanes, mesh: &Mesh, hit: &Hit, (ray,
     let normals = if world.scene.features.shading_normals { Some(mesh.corner_normals(hit.prim, 0.0)) } else { None };
     // Without normals of its own, a triangle is flat.
     let smooth = normals.map(|normals| (normals.unwrap_or_default(), [hit.u, hit.v]));
-    lanes.push_triangle(ray, &mesh.triangle_points(hit.prim), smooth, path.throughput, path.eta_squared, albedo)
+    lanes.push_triangle(ray, &mesh.triangle_points(hit.prim), smooth, path.throughput, path.roulette_scale, albedo)
 }
 
 /// The mesh of a hit that neither moves nor stands elsewhere than its vertices say.

@@ -50,44 +50,29 @@ impl Sampler {
     pub fn sample_4d_batch(&self, requests: &Requests, count: usize, set: u32, numbers: &mut Numbers) {
         let count = count.min(BATCH);
         match self.kind {
-            SamplerKind::Sobol => vectorize(SobolBatch { requests, count, set, numbers }),
-            SamplerKind::Independent => vectorize(IndependentBatch { requests, count, set, numbers }),
+            SamplerKind::Sobol => vectorize(Draw::<true> { requests, count, set, numbers }),
+            SamplerKind::Independent => vectorize(Draw::<false> { requests, count, set, numbers }),
         }
     }
 }
 
-struct SobolBatch<'a> {
+/// Draws Sobol points or independent numbers.
+struct Draw<'a, const SOBOL: bool> {
     requests: &'a Requests,
     count: usize,
     set: u32,
     numbers: &'a mut Numbers,
 }
 
-impl Kernel for SobolBatch<'_> {
+impl<const SOBOL: bool> Kernel for Draw<'_, SOBOL> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
         for i in 0..self.count.min(BATCH) {
-            self.numbers.set(i, sobol_4d_by_columns(self.requests.pixels[i], self.requests.samples[i], self.set));
-        }
-    }
-}
-
-struct IndependentBatch<'a> {
-    requests: &'a Requests,
-    count: usize,
-    set: u32,
-    numbers: &'a mut Numbers,
-}
-
-impl Kernel for IndependentBatch<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for i in 0..self.count.min(BATCH) {
-            self.numbers.set(i, pcg_4d([self.requests.samples[i], self.set, self.requests.pixels[i].0, 0]));
+            let (pixel, sample) = (self.requests.pixels[i], self.requests.samples[i]);
+            let bits = if SOBOL { sobol_4d_by_columns(pixel, sample, self.set) } else { pcg_4d([sample, self.set, pixel.0, 0]) };
+            self.numbers.set(i, bits);
         }
     }
 }
@@ -149,10 +134,10 @@ mod tests {
                 let mut others = others.iter_mut();
                 match kind {
                     SamplerKind::Sobol => {
-                        with_each(|| SobolBatch { requests: &requests, count, set, numbers: others.next().unwrap() });
+                        with_each(|| Draw::<true> { requests: &requests, count, set, numbers: others.next().unwrap() });
                     }
                     SamplerKind::Independent => {
-                        with_each(|| IndependentBatch { requests: &requests, count, set, numbers: others.next().unwrap() });
+                        with_each(|| Draw::<false> { requests: &requests, count, set, numbers: others.next().unwrap() });
                     }
                 }
                 let run = 4 - others.len();

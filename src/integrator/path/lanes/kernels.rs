@@ -141,7 +141,7 @@ fn scatter<const ROULETTE: bool>(rows: &mut Rows, points: &mut LongRows, count: 
         let mut throughput = rgb(&rows.throughput, i) * lambert.albedo;
         let mut goes_on = sample.is_valid;
         if ROULETTE {
-            let survival = throughput.max_channel() * rows.eta_squared[i];
+            let survival = throughput.max_channel() * rows.roulette_scale[i];
             let plays = survival < 1.0;
             goes_on &= !plays | (rows.u[2][i] < survival);
             throughput *= if plays { 1.0 / survival } else { 1.0 };
