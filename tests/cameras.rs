@@ -1,7 +1,7 @@
 //! What the cameras of the scene file see.
 
 use serde_json::{Value, json};
-use steradian::film::{Image, LayerKind};
+use steradian::film::{Crop, Image, LayerKind};
 
 use crate::util::folder::Folder;
 use crate::util::render::{merge, pixels, render};
@@ -214,4 +214,27 @@ fn the_shutter_chooses_a_part_of_the_motion() {
     assert_alike(&still, &blurred(json!({}), flight([0.0, 1.0], [0.25, 0.25])), "a moment");
     let from_camera = blurred(json!({ "shutter": [0.75, 0.75], "motion": flight([0.0, 1.0], [0.5, -0.5]) }), json!([]));
     assert_alike(&still, &from_camera, "a moment of a moving camera");
+}
+
+/// What is rendered around the picture leaves the picture as it is, bit for bit, and continues it.
+#[test]
+fn overscan_surrounds_the_picture() {
+    let with = |overscan: u32, lens: Value| {
+        let mut scene = scene(json!({ "vertical_fov_degrees": 30 }));
+        merge(&mut scene["camera"], lens);
+        scene["film"] = json!({ "width": 37, "height": 21, "overscan": overscan });
+        scene["sampler"]["spp"] = json!(4);
+        render(&scene)
+    };
+    for lens in [json!({}), json!({ "lens": { "radius": 0.3, "focus_distance": 5 } })] {
+        let (plain, around) = (with(0, lens.clone()), with(9, lens));
+        assert_eq!((around.size, around.crop, around.overscan), ([55, 39], Crop::full([55, 39]), 9));
+        for (x, y) in (0..21).flat_map(|y| (0..37).map(move |x| (x, y))) {
+            for kind in [LayerKind::Color, LayerKind::Z, LayerKind::P] {
+                assert_eq!(plain.pixel(kind, x, y), around.pixel(kind, x + 9, y + 9), "{kind:?} {x} {y}");
+            }
+        }
+        // The box is higher than what the camera shows.
+        assert!((0..55).any(|x| around.rgb(x, 2).unwrap() != [0.0; 3]));
+    }
 }

@@ -54,13 +54,13 @@ fn a_replayed_sample_is_the_one_in_the_picture() {
     let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
     for pixel in [[0, 0], [20, 17], [49, 34], [25, 20]] {
         let sample = render::replay(&prepared.scene, &*accel, &prepared.settings, pixel, 0).unwrap();
-        assert_eq!(sample.radiance.to_array(), image.rgb(pixel[0], pixel[1]).unwrap(), "{pixel:?}");
+        assert_eq!(sample.pixel.radiance.to_array(), image.rgb(pixel[0], pixel[1]).unwrap(), "{pixel:?}");
     }
     // Later samples: the sum of the replayed ones is the picture.
     let prepared = one(7);
     let image = render_with(&prepared, AccelKind::EMBREE).image;
     let mean = (0..7)
-        .map(|s| f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [20, 17], s).unwrap().radiance.g))
+        .map(|s| f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [20, 17], s).unwrap().pixel.radiance.g))
         .sum::<f64>()
         / 7.0;
     assert_eq!(image.rgb(20, 17).unwrap()[1], mean as f32);

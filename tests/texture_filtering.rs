@@ -113,7 +113,7 @@ fn filtered_images_are_the_same_for_any_number_of_threads_and_in_a_replay() {
 
     let prepared = prepared(&folder, &scene, 1);
     let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
-    let sample = |s| f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [41, 30], s).unwrap().radiance.g);
+    let sample = |s| f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [41, 30], s).unwrap().pixel.radiance.g);
     assert_eq!(images[0].rgb(41, 30).unwrap()[1], ((0..3).map(sample).sum::<f64>() / 3.0) as f32);
 }
 

@@ -14,13 +14,21 @@ pub struct FilmDesc {
     /// Render only `[x, y, width, height]`, in pixels from the upper left corner.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crop: Option<[u32; 4]>,
+    /// Render this many pixels more on each side, for whoever moves or distorts the picture later; at most the shorter side. Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub overscan: u32,
     /// The pixel filter.
     pub filter: FilterDesc,
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_zero(x: &u32) -> bool {
+    *x == 0
+}
+
 impl Default for FilmDesc {
     fn default() -> Self {
-        Self { width: 640, height: 360, crop: None, filter: FilterDesc::default() }
+        Self { width: 640, height: 360, crop: None, overscan: 0, filter: FilterDesc::default() }
     }
 }
 

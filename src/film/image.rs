@@ -1,9 +1,9 @@
 //! A finished picture with its layers.
 
-use super::LayerKind;
+use super::{Coverage, LayerKind};
 
 /// A rectangle of pixels; `x` and `y` count from the upper left corner of the full picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Crop {
     /// First column.
     pub x: u32,
@@ -56,11 +56,24 @@ impl Crop {
 pub struct Layer {
     /// Which layer; the table knows its name and channels.
     pub kind: LayerKind,
+    /// Of layers of [groups of lights](LayerKind::LightGroups): the group's name.
+    pub group: Option<String>,
     /// `width * height * channels` values.
     pub data: Vec<f32>,
 }
 
 impl Layer {
+    /// A layer with this data, of no group of lights.
+    pub fn new(kind: LayerKind, data: Vec<f32>) -> Self {
+        Self { kind, group: None, data }
+    }
+
+    /// The channels' full names in a file.
+    pub fn channel_names(&self) -> Vec<String> {
+        let prefix = self.group.as_ref().map(|group| format!("light_{group}.")).unwrap_or_default();
+        self.kind.info().channels.iter().map(|name| format!("{prefix}{name}")).collect()
+    }
+
     /// Channels of a pixel.
     pub fn channels(&self) -> usize {
         self.kind.info().channels.len()
@@ -78,17 +91,26 @@ impl Layer {
 }
 
 /// A finished picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image {
-    /// Width and height of the full picture.
+    /// Width and height of the full picture, with what was rendered around it.
     pub size: [u32; 2],
     /// The part that the layers hold.
     pub crop: Crop,
+    /// Pixels on each side of `size` that lie around the picture to be shown, whose upper left corner is thus this pixel.
+    pub overscan: u32,
     /// The layers; the first is [`LayerKind::Color`].
     pub layers: Vec<Layer>,
+    /// Which shapes each pixel shows, if layers need it.
+    pub coverage: Option<Coverage>,
 }
 
 impl Image {
+    /// A whole picture of one layer, the colour: red, green, blue and alpha of each pixel.
+    pub fn of_color(size: [u32; 2], data: Vec<f32>) -> Self {
+        Self { size, crop: Crop::full(size), layers: vec![Layer::new(LayerKind::Color, data)], ..Self::default() }
+    }
+
     /// A layer, if the picture has it.
     pub fn layer(&self, kind: LayerKind) -> Option<&Layer> {
         self.layers.iter().find(|layer| layer.kind == kind)
@@ -126,8 +148,8 @@ mod tests {
     #[test]
     fn pixels_are_found_by_their_place_in_the_full_picture() {
         let crop = Crop { x: 4, y: 5, width: 2, height: 2 };
-        let layer = Layer { kind: LayerKind::Z, data: vec![0.0, 1.0, 2.0, 3.0] };
-        let image = Image { size: [8, 8], crop, layers: vec![layer] };
+        let layer = Layer::new(LayerKind::Z, vec![0.0, 1.0, 2.0, 3.0]);
+        let image = Image { size: [8, 8], crop, layers: vec![layer], ..Image::default() };
         assert_eq!(image.pixel(LayerKind::Z, 5, 6), Some(&[3.0][..]));
         assert_eq!(image.pixel(LayerKind::Z, 6, 6), None);
         assert_eq!(image.pixel(LayerKind::N, 5, 6), None);

@@ -1,6 +1,6 @@
 //! The layers of a picture: one table from kind to name, channels and what fills them.
 
-use super::SurfaceSample;
+use super::{Part, SurfaceSample};
 use crate::desc::LayerDesc;
 
 /// A layer of a picture.
@@ -12,14 +12,86 @@ pub enum LayerKind {
     Z,
     /// Shading normal, world.
     N,
+    /// Geometric normal, world.
+    Ng,
     /// Position, world.
     P,
+    /// Surface parameters.
+    Uv,
+    /// Motion in the picture.
+    Motion,
     /// Fraction of light scattered.
     Albedo,
+    /// [`Part::DiffuseDirect`].
+    DiffuseDirect,
+    /// [`Part::DiffuseIndirect`].
+    DiffuseIndirect,
+    /// [`Part::SpecularDirect`].
+    SpecularDirect,
+    /// [`Part::SpecularIndirect`].
+    SpecularIndirect,
+    /// [`Part::TransmissionDirect`].
+    TransmissionDirect,
+    /// [`Part::TransmissionIndirect`].
+    TransmissionIndirect,
+    /// [`Part::Emission`].
+    Emission,
+    /// [`Part::Background`].
+    Background,
+    /// What each group of lights gives to the picture: a layer for each.
+    LightGroups,
     /// Variance of the picture.
     Variance,
     /// Number of samples.
     Samples,
+    /// Albedo of the first surface that is no mirror and no clear glass, for denoisers.
+    FeatureAlbedo,
+    /// Normal of that surface, for denoisers.
+    FeatureNormal,
+    /// The picture before it was denoised.
+    Noisy,
+    /// Number of the object that covers most of the pixel.
+    ObjectId,
+    /// Number of the material that covers most of the pixel.
+    MaterialId,
+    /// Number of the instance that covers most of the pixel.
+    InstanceId,
+    /// Cryptomatte of objects.
+    CryptoObject,
+    /// Cryptomatte of materials.
+    CryptoMaterial,
+    /// Cryptomatte of assets.
+    CryptoAsset,
+}
+
+/// Where a layer's numbers come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Source {
+    /// The picture itself.
+    Color,
+    /// First surfaces: how a sample's values are read, one for each channel, and how they are averaged.
+    Surface(fn(&SurfaceSample, &mut [f32]), Average),
+    /// A part of the radiance.
+    Part(Part),
+    /// The parts by groups of lights.
+    LightGroups,
+    /// Counts of the film.
+    Film,
+    /// Which shapes cover the pixel: made when a file is written.
+    Coverage,
+    /// A denoiser.
+    Denoiser,
+}
+
+/// How a pixel's value comes from those of its samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Average {
+    /// The mean over samples that hit something.
+    Hits,
+    /// The mean over all samples.
+    Samples,
+    /// The direction of the mean.
+    Direction,
 }
 
 /// What the table says of a layer.
@@ -29,68 +101,169 @@ pub struct LayerInfo {
     pub kind: LayerKind,
     /// The name users ask for it by.
     pub name: &'static str,
-    /// Its channels' full names in a file, in the order of the pixel data.
+    /// Its channels' full names in a file, in the order of the pixel data; of groups of lights what follows their layers' names; none of
+    /// layers made from [coverage](Source::Coverage).
     pub channels: &'static [&'static str],
     /// Stored as 32-bit floats whatever the pixel type: 16 bits would spoil it.
     pub always_float: bool,
     /// What the file's comment says of it.
     pub comment: &'static str,
-    /// Writes a sample's values, one for each channel; absent where samples have none.
-    pub(super) read: Option<fn(&SurfaceSample, &mut [f32])>,
+    /// Where its numbers come from.
+    pub source: Source,
+}
+
+impl LayerInfo {
+    const fn new(kind: LayerKind, name: &'static str, channels: &'static [&'static str], source: Source, comment: &'static str) -> Self {
+        Self { kind, name, channels, always_float: false, comment, source }
+    }
+
+    const fn float(self) -> Self {
+        Self { always_float: true, ..self }
+    }
+}
+
+/// A table's row for a part of the radiance.
+macro_rules! part {
+    ($part:ident, $name:literal, $comment:literal) => {
+        LayerInfo::new(
+            LayerKind::$part,
+            $name,
+            &[concat!($name, ".R"), concat!($name, ".G"), concat!($name, ".B")],
+            Source::Part(Part::$part),
+            concat!($name, ": ", $comment),
+        )
+    };
 }
 
 impl LayerKind {
     /// Every layer, in the order of files and of memory.
-    pub const ALL: [LayerInfo; 7] = [
-        LayerInfo { kind: Self::Color, name: "color", channels: &["R", "G", "B", "A"], always_float: false, comment: "", read: None },
-        LayerInfo {
-            kind: Self::Z,
-            name: "Z",
-            channels: &["Z"],
-            always_float: true,
-            comment: "Z: depth along the view axis; 1e10 where nothing was hit",
-            read: Some(|s, out| out[0] = s.depth),
-        },
-        LayerInfo {
-            kind: Self::N,
-            name: "N",
-            channels: &["N.X", "N.Y", "N.Z"],
-            always_float: false,
-            comment: "N: shading normal, world; 0 where nothing was hit",
-            read: Some(|s, out| out.copy_from_slice(&s.normal.to_array())),
-        },
-        LayerInfo {
-            kind: Self::P,
-            name: "P",
-            channels: &["P.X", "P.Y", "P.Z"],
-            always_float: true,
-            comment: "P: position, world; 0 where nothing was hit",
-            read: Some(|s, out| out.copy_from_slice(&s.position.to_array())),
-        },
-        LayerInfo {
-            kind: Self::Albedo,
-            name: "albedo",
-            channels: &["albedo.R", "albedo.G", "albedo.B"],
-            always_float: false,
-            comment: "albedo: fraction of light scattered by the first surface",
-            read: Some(|s, out| out.copy_from_slice(&s.albedo.to_array())),
-        },
-        LayerInfo {
-            kind: Self::Variance,
-            name: "variance",
-            channels: &["variance.R", "variance.G", "variance.B"],
-            always_float: true,
-            comment: "variance: of the picture's R, G and B, their expected squared error",
-            read: None,
-        },
-        LayerInfo {
-            kind: Self::Samples,
-            name: "samples",
-            channels: &["stats.samples"],
-            always_float: true,
-            comment: "stats.samples: samples of the pixel",
-            read: None,
-        },
+    pub const ALL: [LayerInfo; 28] = [
+        LayerInfo::new(Self::Color, "color", &["R", "G", "B", "A"], Source::Color, ""),
+        LayerInfo::new(
+            Self::Z,
+            "Z",
+            &["Z"],
+            Source::Surface(|s, out| out[0] = s.depth, Average::Hits),
+            "Z: depth along the view axis; 1e10 where nothing was hit",
+        )
+        .float(),
+        LayerInfo::new(
+            Self::N,
+            "N",
+            &["N.X", "N.Y", "N.Z"],
+            Source::Surface(|s, out| out.copy_from_slice(&s.normal.to_array()), Average::Direction),
+            "N: shading normal, world; 0 where nothing was hit",
+        ),
+        LayerInfo::new(
+            Self::Ng,
+            "Ng",
+            &["Ng.X", "Ng.Y", "Ng.Z"],
+            Source::Surface(|s, out| out.copy_from_slice(&s.geometric_normal.to_array()), Average::Direction),
+            "Ng: geometric normal, world; 0 where nothing was hit",
+        ),
+        LayerInfo::new(
+            Self::P,
+            "P",
+            &["P.X", "P.Y", "P.Z"],
+            Source::Surface(|s, out| out.copy_from_slice(&s.position.to_array()), Average::Hits),
+            "P: position, world; 0 where nothing was hit",
+        )
+        .float(),
+        LayerInfo::new(
+            Self::Uv,
+            "uv",
+            &["uv.U", "uv.V"],
+            Source::Surface(|s, out| out.copy_from_slice(&s.uv), Average::Hits),
+            "uv: surface parameters; 0 where nothing was hit",
+        )
+        .float(),
+        LayerInfo::new(
+            Self::Motion,
+            "motion",
+            &["motion.X", "motion.Y"],
+            Source::Surface(|s, out| out.copy_from_slice(&s.motion), Average::Samples),
+            "motion: from where the surface is when the shutter opens to where it is when it closes, in pixels to the right and down",
+        )
+        .float(),
+        LayerInfo::new(
+            Self::Albedo,
+            "albedo",
+            &["albedo.R", "albedo.G", "albedo.B"],
+            Source::Surface(|s, out| out.copy_from_slice(&s.albedo.to_array()), Average::Samples),
+            "albedo: fraction of light scattered by the first surface",
+        ),
+        part!(DiffuseDirect, "diffuse_direct", "light scattered once, by diffuse reflection"),
+        part!(DiffuseIndirect, "diffuse_indirect", "light scattered more than once, last by diffuse reflection"),
+        part!(SpecularDirect, "specular_direct", "light scattered once, by specular reflection"),
+        part!(SpecularIndirect, "specular_indirect", "light scattered more than once, last by specular reflection"),
+        part!(TransmissionDirect, "transmission_direct", "light scattered once, through a surface"),
+        part!(TransmissionIndirect, "transmission_indirect", "light scattered more than once, last through a surface"),
+        part!(Emission, "emission", "light given off by what is seen; sums with the seven others to RGB"),
+        part!(Background, "background", "light from infinity that is seen directly"),
+        LayerInfo::new(
+            Self::LightGroups,
+            "light_groups",
+            &["R", "G", "B"],
+            Source::LightGroups,
+            "light_*: what each group of lights gives; they sum to RGB",
+        ),
+        LayerInfo::new(
+            Self::Variance,
+            "variance",
+            &["variance.R", "variance.G", "variance.B"],
+            Source::Film,
+            "variance: of the picture's R, G and B, their expected squared error",
+        )
+        .float(),
+        LayerInfo::new(Self::Samples, "samples", &["stats.samples"], Source::Film, "stats.samples: samples of the pixel").float(),
+        LayerInfo::new(
+            Self::FeatureAlbedo,
+            "feature_albedo",
+            &["feature_albedo.R", "feature_albedo.G", "feature_albedo.B"],
+            Source::Surface(|s, out| out.copy_from_slice(&s.feature_albedo.to_array()), Average::Samples),
+            "feature_albedo: fraction of light scattered by the first surface that is no mirror and no clear glass",
+        ),
+        LayerInfo::new(
+            Self::FeatureNormal,
+            "feature_normal",
+            &["feature_normal.X", "feature_normal.Y", "feature_normal.Z"],
+            Source::Surface(|s, out| out.copy_from_slice(&s.feature_normal.to_array()), Average::Samples),
+            "feature_normal: mean shading normal of that surface, world, not of unit length",
+        ),
+        LayerInfo::new(
+            Self::Noisy,
+            "noisy",
+            &["noisy.R", "noisy.G", "noisy.B", "noisy.A"],
+            Source::Denoiser,
+            "noisy: the picture before it was denoised",
+        ),
+        LayerInfo::new(
+            Self::ObjectId,
+            "object_id",
+            &["object_id.id"],
+            Source::Coverage,
+            "object_id: the object that covers most of the pixel",
+        )
+        .float(),
+        LayerInfo::new(
+            Self::MaterialId,
+            "material_id",
+            &["material_id.id"],
+            Source::Coverage,
+            "material_id: the material that covers most of the pixel",
+        )
+        .float(),
+        LayerInfo::new(
+            Self::InstanceId,
+            "instance_id",
+            &["instance_id.id"],
+            Source::Coverage,
+            "instance_id: the instance that covers most of the pixel",
+        )
+        .float(),
+        LayerInfo::new(Self::CryptoObject, "crypto_object", &[], Source::Coverage, "").float(),
+        LayerInfo::new(Self::CryptoMaterial, "crypto_material", &[], Source::Coverage, "").float(),
+        LayerInfo::new(Self::CryptoAsset, "crypto_asset", &[], Source::Coverage, "").float(),
     ];
 
     /// What the table says of this layer.
@@ -106,10 +279,30 @@ impl From<LayerDesc> for LayerKind {
         match desc {
             LayerDesc::Z => Self::Z,
             LayerDesc::N => Self::N,
+            LayerDesc::Ng => Self::Ng,
             LayerDesc::P => Self::P,
+            LayerDesc::Uv => Self::Uv,
+            LayerDesc::Motion => Self::Motion,
             LayerDesc::Albedo => Self::Albedo,
+            LayerDesc::DiffuseDirect => Self::DiffuseDirect,
+            LayerDesc::DiffuseIndirect => Self::DiffuseIndirect,
+            LayerDesc::SpecularDirect => Self::SpecularDirect,
+            LayerDesc::SpecularIndirect => Self::SpecularIndirect,
+            LayerDesc::TransmissionDirect => Self::TransmissionDirect,
+            LayerDesc::TransmissionIndirect => Self::TransmissionIndirect,
+            LayerDesc::Emission => Self::Emission,
+            LayerDesc::Background => Self::Background,
+            LayerDesc::LightGroups => Self::LightGroups,
             LayerDesc::Variance => Self::Variance,
             LayerDesc::Samples => Self::Samples,
+            LayerDesc::FeatureAlbedo => Self::FeatureAlbedo,
+            LayerDesc::FeatureNormal => Self::FeatureNormal,
+            LayerDesc::ObjectId => Self::ObjectId,
+            LayerDesc::MaterialId => Self::MaterialId,
+            LayerDesc::InstanceId => Self::InstanceId,
+            LayerDesc::CryptoObject => Self::CryptoObject,
+            LayerDesc::CryptoMaterial => Self::CryptoMaterial,
+            LayerDesc::CryptoAsset => Self::CryptoAsset,
         }
     }
 }
@@ -117,43 +310,59 @@ impl From<LayerDesc> for LayerKind {
 /// A set of layers. The colour is always part of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LayerSet {
-    bits: u8,
+    bits: u32,
+}
+
+/// The layers, as bits, whose source a test accepts.
+macro_rules! layers_from {
+    ($source:pat) => {{
+        let (mut bits, mut i) = (0u32, 0);
+        while i < LayerKind::ALL.len() {
+            bits |= (matches!(LayerKind::ALL[i].source, $source) as u32) << i;
+            i += 1;
+        }
+        bits
+    }};
 }
 
 impl LayerSet {
     /// Only the colour.
     pub const COLOR: Self = Self { bits: 0 };
-    /// Every layer.
-    pub const FULL: Self = Self { bits: (1 << LayerKind::ALL.len()) - 1 };
+    /// Every layer that a render fills.
+    pub const FULL: Self = Self { bits: ((1 << LayerKind::ALL.len()) - 1) & !layers_from!(Source::Denoiser) };
 
     /// Adds a layer.
     pub const fn insert(&mut self, kind: LayerKind) {
-        self.bits |= 1 << kind as u8;
+        self.bits |= 1 << kind as u32;
     }
 
     /// Whether the layer is part of the set.
     #[inline]
     pub const fn contains(self, kind: LayerKind) -> bool {
-        matches!(kind, LayerKind::Color) || self.bits & (1 << kind as u8) != 0
+        matches!(kind, LayerKind::Color) || self.bits & (1 << kind as u32) != 0
     }
 
     /// Whether any layer is part of the set that [`SurfaceSample`] is needed for.
     #[inline]
     pub const fn needs_surface(self) -> bool {
-        const OF_SURFACES: u8 = {
-            let (mut bits, mut i) = (0, 0);
-            while i < LayerKind::ALL.len() {
-                bits |= (LayerKind::ALL[i].read.is_some() as u8) << i;
-                i += 1;
-            }
-            bits
-        };
-        self.bits & OF_SURFACES != 0
+        self.bits & layers_from!(Source::Surface(..) | Source::Coverage) != 0
     }
 
-    /// The layers that samples have values for beside the colour, in the table's order.
+    /// Whether any layer is part of the set that needs the shapes that samples show.
+    #[inline]
+    pub const fn needs_coverage(self) -> bool {
+        self.bits & layers_from!(Source::Coverage) != 0
+    }
+
+    /// Whether any layer is part of the set that is a [`Part`] of the radiance.
+    #[inline]
+    pub const fn needs_parts(self) -> bool {
+        self.bits & layers_from!(Source::Part(_)) != 0
+    }
+
+    /// The layers of first surfaces, in the table's order.
     pub fn of_surfaces(self) -> impl Iterator<Item = &'static LayerInfo> {
-        LayerKind::ALL.iter().filter(move |info| info.read.is_some() && self.contains(info.kind))
+        self.iter().filter(|info| matches!(info.source, Source::Surface(..)))
     }
 
     /// All layers, in the table's order.
@@ -198,6 +407,8 @@ mod tests {
         assert!(LayerSet::COLOR.contains(LayerKind::Color));
         assert_eq!([LayerDesc::Albedo, LayerDesc::Samples].iter().collect::<LayerSet>().of_surfaces().count(), 1);
         assert!(!LayerSet::from_iter(&[LayerDesc::Variance, LayerDesc::Samples]).needs_surface());
-        assert_eq!(LayerSet::FULL.iter().count(), LayerKind::ALL.len());
+        assert_eq!(LayerSet::FULL.iter().count(), LayerKind::ALL.len() - 1);
+        assert!(LayerSet::from_iter(&[LayerDesc::CryptoObject]).needs_coverage() && !set.needs_coverage());
+        assert!(LayerSet::from_iter(&[LayerDesc::Emission]).needs_parts() && !set.needs_parts());
     }
 }

@@ -1,16 +1,16 @@
-//! The film as independent tiles that sum samples in double precision.
+//! A rectangle of the film, which sums samples.
 
-use super::{Crop, Image, Layer, LayerInfo, LayerKind, LayerSet, PixelSample};
-use crate::error::{Error, Result};
+use super::sum::{Sums, slice};
+use super::{Average, CoverageCounts, Crop, FilmLayers, LayerInfo, LayerKind, PixelSample, Sample, Source};
 
 /// How many dropped samples a tile remembers; it counts all of them.
-const DROPPED_KEPT: usize = 16;
+pub(super) const DROPPED_KEPT: usize = 16;
 
 /// Depth where nothing was hit.
 const MISS_DEPTH: f32 = 1e10;
 
 /// A sample that was dropped because it was not finite; it can be replayed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DroppedSample {
     /// Column in the full picture.
     pub x: u32,
@@ -21,61 +21,68 @@ pub struct DroppedSample {
 }
 
 /// How far groups of a pixel's samples lie apart.
-#[derive(Clone, Copy, Debug, Default)]
-struct Spread {
-    groups: u32,
-    sums: [f64; 3],
-    squares: [f64; 3],
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Spread {
+    pub groups: u32,
+    pub sums: Sums<3>,
+    pub squares: Sums<3>,
 }
 
 /// A pixel of samples that do not all count the same.
 #[derive(Clone, Copy, Debug, Default)]
-struct Merged {
+pub(super) struct Weighed {
     count: f64,
     variance: [f64; 3],
 }
 
 /// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own.
 ///
-/// A sample's order of arrival at its pixel is the order of summation: whoever adds samples in the order of their indices gets the same
-/// picture with any number of threads.
+/// [`Sums`] do not depend on the order of samples: whoever adds the same samples gets the same picture, in one tile or merged from several.
 #[derive(Clone, Debug)]
 pub struct FilmTile {
-    area: Crop,
-    active: Crop,
-    layers: LayerSet,
+    pub(super) area: Crop,
+    pub(super) active: Crop,
+    layers: FilmLayers,
     /// Radiance and alpha.
-    color: Vec<[f64; 4]>,
+    pub(super) color: Vec<Sums<4>>,
     /// Samples of each pixel that were kept.
-    samples: Vec<u32>,
+    pub(super) samples: Vec<u32>,
     /// With `w` the weight: sums of `(w - 1)` times radiance and alpha, then of `w - 1`. Empty until a weight differs from 1.
-    corrections: Vec<[f64; 5]>,
-    /// All other layers, a pixel's values side by side. Empty without such layers, and so is `hits`.
-    beside: Vec<f64>,
-    hits: Vec<u32>,
+    pub(super) corrections: Vec<Sums<5>>,
+    /// The parts of the radiance, a pixel's [values](slice) side by side, and beside `corrections` the same of `(w - 1)` times them.
+    pub(super) parts: Vec<f64>,
+    pub(super) part_corrections: Vec<f64>,
+    /// Layers of surfaces, a pixel's [values](slice) side by side. Empty without such layers, and so is `hits`.
+    pub(super) surfaces: Vec<f64>,
+    pub(super) hits: Vec<u32>,
+    /// Only of layers that need it.
+    pub(super) coverage: Option<CoverageCounts>,
     /// Empty unless the variance is asked for.
-    spread: Vec<Spread>,
+    pub(super) spread: Vec<Spread>,
     /// What each pixel's samples count together and the variance of their mean. Empty while each counts once.
-    merged: Vec<Merged>,
-    dropped_count: u64,
-    dropped: Vec<DroppedSample>,
+    pub(super) weighed: Vec<Weighed>,
+    pub(super) dropped_count: u64,
+    pub(super) dropped: Vec<DroppedSample>,
 }
 
 impl FilmTile {
-    fn new(area: Crop, active: Crop, layers: LayerSet) -> Self {
+    pub(super) fn new(area: Crop, active: Crop, layers: FilmLayers) -> Self {
         let pixels = area.area() as usize;
-        let stride = channels_beside(layers);
+        let hits = if layers.surface_channels > 0 { pixels } else { 0 };
         Self {
             area,
             active,
             layers,
-            color: vec![[0.0; 4]; pixels],
+            color: vec![Sums::default(); pixels],
             samples: vec![0; pixels],
             corrections: Vec::new(),
-            beside: vec![0.0; pixels * stride],
-            hits: vec![0; if stride > 0 { pixels } else { 0 }],
-            spread: vec![Spread::default(); if layers.contains(LayerKind::Variance) { pixels } else { 0 }],
-            merged: Vec::new(),
+            parts: vec![0.0; pixels * layers.part_stride()],
+            part_corrections: Vec::new(),
+            surfaces: vec![0.0; pixels * layers.surface_stride()],
+            hits: vec![0; hits],
+            coverage: layers.set.needs_coverage().then(|| CoverageCounts::new(pixels)),
+            spread: vec![Spread::default(); if layers.set.contains(LayerKind::Variance) { pixels } else { 0 }],
+            weighed: Vec::new(),
             dropped_count: 0,
             dropped: Vec::new(),
         }
@@ -105,23 +112,29 @@ impl FilmTile {
     /// Adds a sample to the pixel with this index (row by row within the tile); `sample` is the sample's index, `weight` the filter's.
     /// A sample that is not finite is dropped and counted, and `false` returned.
     #[inline]
-    pub fn add(&mut self, pixel: usize, sample: u32, value: &PixelSample, weight: f32) -> bool {
-        let color = [value.radiance.r, value.radiance.g, value.radiance.b, value.alpha];
+    pub fn add<'a>(&mut self, pixel: usize, sample: u32, value: impl Into<Sample<'a>>, weight: f32) -> bool {
+        let Sample { pixel: PixelSample { radiance, alpha }, surface, parts } = value.into();
+        let color = [radiance.r, radiance.g, radiance.b, *alpha];
         // A sum is finite only if every term is, save for an overflow, which is no use either.
         if !(color[0] + color[1] + color[2] + color[3] + weight).is_finite() {
             self.drop_sample(pixel, sample);
             return false;
         }
-        if self.layers.needs_surface() && !self.add_beside(pixel, value) {
-            self.drop_sample(pixel, sample);
-            return false;
+        if self.layers.beside_color() {
+            let finite = parts.iter().all(|part| part.is_finite());
+            if !finite || !surface.is_none_or(|surface| self.add_surface(pixel, surface, *alpha)) {
+                self.drop_sample(pixel, sample);
+                return false;
+            }
+            let parts = parts.iter().flat_map(|part| part.to_array()).map(f64::from);
+            let stride = self.layers.part_stride();
+            if stride > 0 {
+                add_each(&mut self.parts[pixel * stride..(pixel + 1) * stride], parts);
+            }
         }
-        let sum = &mut self.color[pixel];
-        for (sum, value) in sum.iter_mut().zip(color) {
-            *sum += f64::from(value);
-        }
+        self.color[pixel].add(color.map(f64::from));
         if weight != 1.0 {
-            self.correct(pixel, color, f64::from(weight) - 1.0);
+            self.correct(pixel, color, parts, weight - 1.0);
         }
         self.samples[pixel] += 1;
         true
@@ -140,10 +153,8 @@ impl FilmTile {
         }
         let Some(spread) = self.spread.get_mut(pixel) else { return };
         spread.groups += 1;
-        for (k, value) in mean.into_iter().enumerate() {
-            spread.sums[k] += value;
-            spread.squares[k] += value * value;
-        }
+        spread.sums.add(mean);
+        spread.squares.add(mean.map(|value| value * value));
     }
 
     /// Whether [`add_group`](Self::add_group) does anything.
@@ -156,8 +167,9 @@ impl FilmTile {
     pub fn group_statistics(&self, pixel: usize) -> Option<([f64; 3], [f64; 3])> {
         let spread = self.spread.get(pixel).filter(|spread| spread.groups >= 2)?;
         let n = f64::from(spread.groups);
-        let mean = spread.sums.map(|sum| sum / n);
-        let variance = [0, 1, 2].map(|k| ((spread.squares[k] / n - mean[k] * mean[k]) / (n - 1.0)).max(0.0));
+        let mean = spread.sums.values().map(|sum| sum / n);
+        let squares = spread.squares.values();
+        let variance = [0, 1, 2].map(|k| ((squares[k] / n - mean[k] * mean[k]) / (n - 1.0)).max(0.0));
         Some((mean, variance))
     }
 
@@ -167,62 +179,99 @@ impl FilmTile {
         [r, g, b]
     }
 
-    /// Adds all samples of another tile of the same pixels and layers. For the colour, each counts `factor` times as much as a single one; to the
-    /// layers of surfaces all are alike. Nothing may be added to this tile but by merging.
-    pub fn merge(&mut self, other: &Self, factor: f64) {
-        self.merged.resize(self.samples.len(), Merged::default());
+    /// Adds all samples of another tile of the same pixels and layers.
+    pub fn merge(&mut self, other: &Self) {
+        for (sums, others) in self.color.iter_mut().zip(&other.color) {
+            sums.merge(others);
+        }
+        if !other.corrections.is_empty() {
+            self.begin_corrections();
+            for (sums, others) in self.corrections.iter_mut().zip(&other.corrections) {
+                sums.merge(others);
+            }
+        }
+        let (part_stride, surface_stride) = (self.layers.part_stride(), self.layers.surface_stride());
+        merge_each(&mut self.parts, &other.parts, part_stride);
+        merge_each(&mut self.part_corrections, &other.part_corrections, part_stride);
+        merge_each(&mut self.surfaces, &other.surfaces, surface_stride);
+        for (spread, others) in self.spread.iter_mut().zip(&other.spread) {
+            spread.groups += others.groups;
+            spread.sums.merge(&others.sums);
+            spread.squares.merge(&others.squares);
+        }
+        self.merge_counts(other);
+    }
+
+    /// Adds all samples of another tile of the same pixels and layers. For the colour and its parts, each counts `factor` times as much as a single
+    /// one; to the layers of surfaces all are alike. Nothing may be added to this tile but by this.
+    pub fn merge_weighed(&mut self, other: &Self, factor: f64) {
+        self.weighed.resize(self.samples.len(), Weighed::default());
         for pixel in 0..self.samples.len() {
             let count = f64::from(other.samples[pixel]) * factor;
-            let merged = &mut self.merged[pixel];
-            let (ours, theirs) = (merged.count, count);
-            merged.count += count;
-            if merged.count > 0.0 {
+            let weighed = &mut self.weighed[pixel];
+            let (ours, theirs) = (weighed.count, count);
+            weighed.count += count;
+            if weighed.count > 0.0 {
                 // Where a pixel's variance is not known, its samples are taken to be as good as the others.
                 let known = other.group_statistics(pixel).map(|(_, variance)| variance);
                 for k in 0..3 {
-                    let own = merged.variance[k];
+                    let own = weighed.variance[k];
                     let other = known.map_or(own * ours / theirs.max(f64::MIN_POSITIVE), |variance| variance[k]);
-                    merged.variance[k] = (ours * ours * own + theirs * theirs * other) / (merged.count * merged.count);
+                    weighed.variance[k] = (ours * ours * own + theirs * theirs * other) / (weighed.count * weighed.count);
                 }
             }
+            self.color[pixel].add(other.color[pixel].values().map(|sum| factor * sum));
         }
-        add_scaled(self.color.as_flattened_mut(), other.color.as_flattened(), factor);
         if !other.corrections.is_empty() {
-            self.corrections.resize(self.samples.len(), [0.0; 5]);
-            add_scaled(self.corrections.as_flattened_mut(), other.corrections.as_flattened(), factor);
+            self.begin_corrections();
+            for (sums, others) in self.corrections.iter_mut().zip(&other.corrections) {
+                sums.add(others.values().map(|sum| factor * sum));
+            }
         }
-        add_scaled(&mut self.beside, &other.beside, 1.0);
+        let (part_stride, surface_stride) = (self.layers.part_stride(), self.layers.surface_stride());
+        let scaled = |sums: &[f64]| -> Vec<f64> { sums.iter().map(|sum| factor * sum).collect() };
+        merge_each(&mut self.parts, &scaled(&other.parts), part_stride);
+        merge_each(&mut self.part_corrections, &scaled(&other.part_corrections), part_stride);
+        merge_each(&mut self.surfaces, &other.surfaces, surface_stride);
+        self.merge_counts(other);
+    }
+
+    fn merge_counts(&mut self, other: &Self) {
         for (sums, counts) in [(&mut self.samples, &other.samples), (&mut self.hits, &other.hits)] {
             for (sum, count) in sums.iter_mut().zip(counts) {
                 *sum += count;
             }
         }
+        if let (Some(coverage), Some(other)) = (&mut self.coverage, &other.coverage) {
+            coverage.merge(other);
+        }
         self.dropped_count += other.dropped_count;
         self.dropped.extend(other.dropped.iter().take(DROPPED_KEPT - self.dropped.len().min(DROPPED_KEPT)));
     }
 
-    /// Adds to the layers beside the colour; `false` (and nothing is added) if a value is not finite.
-    fn add_beside(&mut self, pixel: usize, value: &PixelSample) -> bool {
-        if value.alpha <= 0.0 {
-            return true;
-        }
-        let stride = channels_beside(self.layers);
-        let mut values = [0.0; MAX_CHANNELS_BESIDE];
-        let mut start = 0;
-        for info in self.layers.of_surfaces() {
-            if let Some(read) = info.read {
-                read(&value.surface, &mut values[start..start + info.channels.len()]);
+    /// Adds to the layers of surfaces; `false` (and nothing is added) if a value is not finite.
+    fn add_surface(&mut self, pixel: usize, surface: &super::SurfaceSample, alpha: f32) -> bool {
+        let channels = self.layers.surface_channels;
+        if channels > 0 {
+            let mut values = [0.0; MAX_SURFACE_CHANNELS];
+            let mut start = 0;
+            for info in self.layers.set.of_surfaces() {
+                if let Source::Surface(read, _) = info.source {
+                    read(surface, &mut values[start..start + info.channels.len()]);
+                }
+                start += info.channels.len();
             }
-            start += info.channels.len();
+            if !values.iter().all(|v| v.is_finite()) {
+                return false;
+            }
+            let stride = self.layers.surface_stride();
+            let sums = &mut self.surfaces[pixel * stride..(pixel + 1) * stride];
+            slice::add(sums, values[..channels].iter().map(|v| f64::from(*v)));
+            self.hits[pixel] += u32::from(alpha > 0.0);
         }
-        if !values.iter().all(|v| v.is_finite()) {
-            return false;
+        if let (Some(coverage), true) = (&mut self.coverage, alpha > 0.0) {
+            coverage.add(pixel, surface.shown, 1);
         }
-        let sums = &mut self.beside[pixel * stride..(pixel + 1) * stride];
-        for (sum, value) in sums.iter_mut().zip(values) {
-            *sum += f64::from(value);
-        }
-        self.hits[pixel] += 1;
         true
     }
 
@@ -235,15 +284,27 @@ impl FilmTile {
         }
     }
 
-    fn correct(&mut self, pixel: usize, color: [f32; 4], excess: f64) {
+    pub(super) fn begin_corrections(&mut self) {
         if self.corrections.is_empty() {
-            self.corrections = vec![[0.0; 5]; self.samples.len()];
+            self.corrections = vec![Sums::default(); self.samples.len()];
+            self.part_corrections = vec![0.0; self.parts.len()];
         }
-        let sums = &mut self.corrections[pixel];
-        for (sum, value) in sums.iter_mut().zip(color) {
-            *sum += excess * f64::from(value);
+    }
+
+    fn correct(&mut self, pixel: usize, color: [f32; 4], parts: &[crate::color::Rgb], excess: f32) {
+        self.begin_corrections();
+        let [r, g, b, a] = color.map(|value| f64::from(excess * value));
+        self.corrections[pixel].add([r, g, b, a, f64::from(excess)]);
+        let stride = self.layers.part_stride();
+        if stride > 0 {
+            let parts = parts.iter().flat_map(|part| part.to_array()).map(|value| f64::from(excess * value));
+            add_each(&mut self.part_corrections[pixel * stride..(pixel + 1) * stride], parts);
         }
-        sums[4] += excess;
+    }
+
+    /// What a pixel's samples count together.
+    fn count_at(&self, pixel: usize) -> f64 {
+        self.weighed.get(pixel).map_or(f64::from(self.samples[pixel]), |weighed| weighed.count)
     }
 
     /// The pixel's radiance and alpha.
@@ -252,12 +313,13 @@ impl FilmTile {
     /// mean. With negative lobes a constant stays exactly constant, as it does when dividing by the sum of weights, with the same bias of
     /// order `1 / n`, but without a sum of weights near zero in a denominator.
     fn color_at(&self, pixel: usize) -> [f32; 4] {
-        let n = self.merged.get(pixel).map_or(f64::from(self.samples[pixel]), |merged| merged.count);
+        let n = self.count_at(pixel);
         if n == 0.0 {
             return [0.0; 4];
         }
-        let mut mean = self.color[pixel].map(|sum| sum / n);
+        let mut mean = self.color[pixel].values().map(|sum| sum / n);
         if let Some(sums) = self.corrections.get(pixel) {
+            let sums = sums.values();
             let excess = sums[4] / n;
             for (mean, sum) in mean.iter_mut().zip(sums) {
                 *mean += sum / n - excess * *mean;
@@ -266,42 +328,74 @@ impl FilmTile {
         mean.map(to_f32)
     }
 
-    /// What the film itself knows of a pixel, for layers that samples have no values for.
-    fn own_at(&self, pixel: usize, kind: LayerKind, out: &mut [f32]) {
-        match kind {
-            LayerKind::Color => out.copy_from_slice(&self.color_at(pixel)),
-            LayerKind::Samples => out[0] = self.samples[pixel] as f32,
-            _ => {
-                let merged = self.merged.get(pixel).map(|merged| merged.variance);
-                let variance = merged.unwrap_or_else(|| self.group_statistics(pixel).unwrap_or_default().1);
-                out.copy_from_slice(&variance.map(to_f32));
+    /// A part of the pixel's radiance, estimated as the whole is.
+    fn part_at(&self, pixel: usize, part: usize, out: &mut [f32]) {
+        let n = self.count_at(pixel);
+        let stride = self.layers.part_stride();
+        let at = pixel * stride..(pixel + 1) * stride;
+        for (k, out) in out.iter_mut().enumerate() {
+            let mut mean = if n == 0.0 { 0.0 } else { slice::value(&self.parts[at.clone()], part * 3 + k) / n };
+            if let (Some(sums), true) = (self.corrections.get(pixel), n != 0.0) {
+                let excess = sums.values()[4] / n;
+                mean += slice::value(&self.part_corrections[at.clone()], part * 3 + k) / n - excess * mean;
             }
+            *out = to_f32(mean);
         }
     }
 
-    /// A layer's values at a pixel; `first` is the layer's first channel within those beside the colour.
-    fn beside_at(&self, pixel: usize, info: &LayerInfo, first: usize, out: &mut [f32]) {
-        let hits = f64::from(self.hits[pixel]);
-        let first = pixel * channels_beside(self.layers) + first;
-        let sums = &self.beside[first..first + info.channels.len()];
-        let divisor = match info.kind {
-            LayerKind::Z | LayerKind::P => hits,
-            LayerKind::N => sums.iter().map(|sum| sum * sum).sum::<f64>().sqrt(),
-            _ => f64::from(self.samples[pixel]),
+    /// A layer's values at a pixel; `first` is the layer's first channel among those of surfaces, or its place among the parts.
+    pub(super) fn layer_at(&self, pixel: usize, info: &LayerInfo, first: usize, out: &mut [f32]) {
+        match info.source {
+            Source::Color => out.copy_from_slice(&self.color_at(pixel)),
+            Source::Surface(_, average) => self.surface_at(pixel, info, average, first, out),
+            Source::Part(_) | Source::LightGroups => self.part_at(pixel, first, out),
+            Source::Film if info.kind == LayerKind::Samples => out[0] = self.samples[pixel] as f32,
+            Source::Film => {
+                let weighed = self.weighed.get(pixel).map(|weighed| weighed.variance);
+                let variance = weighed.unwrap_or_else(|| self.group_statistics(pixel).unwrap_or_default().1);
+                out.copy_from_slice(&variance.map(to_f32));
+            }
+            Source::Coverage | Source::Denoiser => {}
+        }
+    }
+
+    fn surface_at(&self, pixel: usize, info: &LayerInfo, average: Average, first: usize, out: &mut [f32]) {
+        let stride = self.layers.surface_stride();
+        let all = &self.surfaces[pixel * stride..(pixel + 1) * stride];
+        let sum = |k: usize| slice::value(all, first + k);
+        let divisor = match average {
+            Average::Hits => f64::from(self.hits[pixel]),
+            Average::Samples => f64::from(self.samples[pixel]),
+            Average::Direction => (0..out.len()).map(|k| sum(k) * sum(k)).sum::<f64>().sqrt(),
         };
-        if info.kind == LayerKind::Z && hits == 0.0 {
+        if info.kind == LayerKind::Z && divisor == 0.0 {
             out.fill(MISS_DEPTH);
         } else if divisor > 0.0 {
-            for (out, sum) in out.iter_mut().zip(sums) {
-                *out = to_f32(sum / divisor);
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = to_f32(sum(k) / divisor);
             }
         }
     }
 }
 
-fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
-    for (sum, value) in sums.iter_mut().zip(values) {
-        *sum += factor * value;
+/// As [`slice::add`], of terms whose number is half that of the sums.
+#[inline]
+fn add_each(sums: &mut [f64], terms: impl Iterator<Item = f64>) {
+    let mut values = [0.0; 48];
+    let half = sums.len() / 2;
+    if half <= values.len() {
+        values.iter_mut().zip(terms).for_each(|(to, from)| *to = from);
+        slice::add(sums, values[..half].iter().copied());
+    } else {
+        slice::add(sums, terms.collect::<Vec<_>>().into_iter());
+    }
+}
+
+fn merge_each(sums: &mut [f64], others: &[f64], stride: usize) {
+    if stride > 0 {
+        for (sums, others) in sums.chunks_exact_mut(stride).zip(others.chunks_exact(stride)) {
+            slice::merge(sums, others);
+        }
     }
 }
 
@@ -310,136 +404,13 @@ fn to_f32(x: f64) -> f32 {
     (x as f32).clamp(f32::MIN, f32::MAX)
 }
 
-const MAX_CHANNELS_BESIDE: usize = {
-    let (mut total, mut i) = (0, 1);
+const MAX_SURFACE_CHANNELS: usize = {
+    let (mut total, mut i) = (0, 0);
     while i < LayerKind::ALL.len() {
-        total += LayerKind::ALL[i].channels.len();
+        if matches!(LayerKind::ALL[i].source, Source::Surface(..)) {
+            total += LayerKind::ALL[i].channels.len();
+        }
         i += 1;
     }
     total
 };
-
-fn channels_beside(layers: LayerSet) -> usize {
-    layers.of_surfaces().map(|info| info.channels.len()).sum()
-}
-
-/// The film: the tiles that a picture's crop touches.
-#[derive(Clone, Debug)]
-pub struct Film {
-    size: [u32; 2],
-    crop: Crop,
-    layers: LayerSet,
-    tiles: Vec<FilmTile>,
-}
-
-impl Film {
-    /// A black film for the part `crop` of a picture of `size` pixels. Tiles of `tile_size` pixels (at least 1) lie on the full picture's
-    /// grid, so a pixel's tile does not depend on the crop.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if the crop is empty or reaches beyond the picture; [`Error::OutOfMemory`] if the film cannot be held.
-    pub fn new(size: [u32; 2], crop: Crop, layers: &LayerSet, tile_size: u32) -> Result<Self> {
-        if !crop.fits(size) {
-            let Crop { x, y, width, height } = crop;
-            return Err(Error::Usage(format!("crop {x},{y},{width},{height} does not fit a picture of {}x{} pixels", size[0], size[1])));
-        }
-        let layers = *layers;
-        let tile_size = tile_size.max(1);
-        check_memory(&crop, layers)?;
-        let mut tiles = Vec::new();
-        for row in crop.y / tile_size..=(crop.y + crop.height - 1) / tile_size {
-            for column in crop.x / tile_size..=(crop.x + crop.width - 1) / tile_size {
-                let cell = Crop { x: column * tile_size, y: row * tile_size, width: tile_size, height: tile_size };
-                let area = cell.intersection(&Crop::full(size));
-                tiles.push(FilmTile::new(area, area.intersection(&crop), layers));
-            }
-        }
-        Ok(Self { size, crop, layers, tiles })
-    }
-
-    /// Width and height of the full picture.
-    pub fn size(&self) -> [u32; 2] {
-        self.size
-    }
-
-    /// The part that is rendered.
-    pub fn crop(&self) -> Crop {
-        self.crop
-    }
-
-    /// What is stored.
-    pub fn layers(&self) -> LayerSet {
-        self.layers
-    }
-
-    /// The tiles, row by row.
-    pub fn tiles(&self) -> &[FilmTile] {
-        &self.tiles
-    }
-
-    /// The tiles, row by row, to be filled.
-    pub fn tiles_mut(&mut self) -> &mut [FilmTile] {
-        &mut self.tiles
-    }
-
-    /// How many samples were not finite and therefore dropped.
-    pub fn dropped_count(&self) -> u64 {
-        self.tiles.iter().map(|tile| tile.dropped_count).sum()
-    }
-
-    /// The first dropped samples, in the order of the tiles.
-    pub fn dropped(&self) -> Vec<DroppedSample> {
-        self.tiles.iter().flat_map(|tile| &tile.dropped).take(DROPPED_KEPT).copied().collect()
-    }
-
-    /// The picture of the samples so far; a pixel without samples is black and without a surface.
-    ///
-    /// Colour and alpha are means over all samples and albedo is too (a miss counts as black); depth and position are means over the
-    /// samples that hit something; normals are averaged over those and normalised. Layers beside the colour have the filter's absolute
-    /// value as weight.
-    pub fn resolve(&self) -> Image {
-        let pixels = self.crop.area() as usize;
-        let mut layers: Vec<Layer> =
-            self.layers.iter().map(|info| Layer { kind: info.kind, data: vec![0.0; pixels * info.channels.len()] }).collect();
-        for tile in &self.tiles {
-            let active = tile.active;
-            for y in active.y..active.y + active.height {
-                for x in active.x..active.x + active.width {
-                    let from = tile.index(x, y);
-                    let to = (y - self.crop.y) as usize * self.crop.width as usize + (x - self.crop.x) as usize;
-                    let mut first = 0;
-                    for layer in &mut layers {
-                        let info = layer.kind.info();
-                        let out = &mut layer.data[to * info.channels.len()..(to + 1) * info.channels.len()];
-                        if info.read.is_some() {
-                            tile.beside_at(from, info, first, out);
-                            first += info.channels.len();
-                        } else {
-                            tile.own_at(from, layer.kind, out);
-                        }
-                    }
-                }
-            }
-        }
-        Image { size: self.size, crop: self.crop, layers }
-    }
-}
-
-/// Bytes that a film with these layers holds for each pixel; 40 more with a filter that has negative lobes.
-pub fn bytes_per_pixel(layers: LayerSet) -> usize {
-    let beside = channels_beside(layers);
-    let spread = if layers.contains(LayerKind::Variance) { size_of::<Spread>() } else { 0 };
-    spread + size_of::<[f64; 4]>() + size_of::<u32>() * (1 + usize::from(beside > 0)) + size_of::<f64>() * beside
-}
-
-/// Asks for the film's memory in one piece first: many small requests would be granted long past what the machine has.
-fn check_memory(crop: &Crop, layers: LayerSet) -> Result<()> {
-    let bytes = usize::try_from(u128::from(crop.area()) * bytes_per_pixel(layers) as u128).unwrap_or(usize::MAX);
-    Vec::<u8>::new()
-        .try_reserve_exact(bytes)
-        .map_err(|_| Error::OutOfMemory(format!("a film of {}x{} pixels needs {} MiB", crop.width, crop.height, bytes >> 20)))
-}
-
-#[cfg(test)]
-#[path = "tile_tests.rs"]
-mod tests;

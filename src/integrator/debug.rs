@@ -3,7 +3,7 @@
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions, surface_sample};
 use crate::accel::Coherence;
 use crate::color::Rgb;
-use crate::film::PixelSample;
+use crate::film::{PartNeeds, PixelSample, SampleBatch};
 use crate::geometry::SurfaceInteraction;
 use crate::math::{Frame, Ray, Vec3};
 use crate::sampling::{Sampler, warp};
@@ -55,15 +55,13 @@ pub struct DebugView {
     pub view: View,
     /// What the layers need.
     pub needs: SurfaceNeeds,
+    /// Which parts of the radiance layers need.
+    pub parts: PartNeeds,
 }
 
 impl Integrator for DebugView {
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
-        for_each_first_surface(world, samples, out, counts, |_, ray, at| PixelSample {
-            radiance: self.view.color(world, at),
-            alpha: 1.0,
-            surface: surface_sample(world, self.needs, at, ray.direction, || world.scene.texture_point(at)),
-        });
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts) {
+        for_each_first_surface(world, samples, (self.needs, self.parts), out, counts, |_, _, at| self.view.color(world, at));
     }
 }
 
@@ -75,12 +73,14 @@ pub struct AmbientOcclusion {
     pub sampler: Sampler,
     /// What the layers need.
     pub needs: SurfaceNeeds,
+    /// Which parts of the radiance layers need.
+    pub parts: PartNeeds,
 }
 
 impl Integrator for AmbientOcclusion {
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts) {
         let mut shadow_rays = 0;
-        for_each_first_surface(world, samples, out, counts, |sample, ray, at| {
+        for_each_first_surface(world, samples, (self.needs, self.parts), out, counts, |sample, ray, at| {
             let u = self.sampler.sample_4d(sample.seed, sample.sample, dimensions::bsdf(0));
             let side = if at.n_g.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
             let direction = Frame::from_normal(at.n_s * side).to_world(warp::cosine_hemisphere([u[1], u[2]]));
@@ -88,11 +88,7 @@ impl Integrator for AmbientOcclusion {
             let above = direction.dot(at.n_g) * side > 0.0;
             shadow_rays += u64::from(above);
             let free = above && !world.accel.occluded(&Ray { t_max: self.distance, ..at.spawn(direction) });
-            PixelSample {
-                radiance: Rgb::splat(f32::from(u8::from(free))),
-                alpha: 1.0,
-                surface: surface_sample(world, self.needs, at, ray.direction, || world.scene.texture_point(at)),
-            }
+            Rgb::splat(f32::from(u8::from(free)))
         });
         counts.shadow += shadow_rays;
     }
@@ -102,15 +98,22 @@ impl Integrator for AmbientOcclusion {
 fn for_each_first_surface(
     world: &World,
     samples: &[CameraSample],
-    out: &mut [PixelSample],
+    (needs, parts): (SurfaceNeeds, PartNeeds),
+    out: &mut SampleBatch,
     counts: &mut RayCounts,
-    mut shade: impl FnMut(&CameraSample, &Ray, &SurfaceInteraction) -> PixelSample,
+    mut shade: impl FnMut(&CameraSample, &Ray, &SurfaceInteraction) -> Rgb,
 ) {
     let rays: Vec<Ray> = samples.iter().map(|sample| sample.ray).collect();
     let mut hits = vec![None; rays.len()];
     world.accel.intersect_batch(&rays, &mut hits, Coherence::Coherent);
     counts.camera += rays.len() as u64;
-    for (((sample, ray), hit), out) in samples.iter().zip(&rays).zip(hits).zip(out) {
-        *out = world.resolve(ray, hit).map_or_else(PixelSample::default, |at| shade(sample, ray, &at));
+    let wants_surface = needs != SurfaceNeeds::default();
+    out.reset(samples.len(), wants_surface, parts);
+    for (i, ((sample, ray), hit)) in samples.iter().zip(&rays).zip(hits).enumerate() {
+        let Some(at) = world.resolve(ray, hit) else { continue };
+        out.pixels[i] = PixelSample { radiance: shade(sample, ray, &at), alpha: 1.0 };
+        if wants_surface {
+            out.surfaces[i] = surface_sample(world, needs, &at, ray.direction, || world.scene.texture_point(&at));
+        }
     }
 }

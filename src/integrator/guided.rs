@@ -4,7 +4,7 @@ use super::vertex::Vertex;
 use super::{PathIntegrator, World};
 use crate::bsdf::{BsdfEval, BsdfSample};
 use crate::color::Rgb;
-use crate::film::PixelSample;
+use crate::film::SampleBatch;
 use crate::guiding::{GuideSample, Known, Record};
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Ray, Vec3};
@@ -143,18 +143,18 @@ impl Turns {
     }
 
     /// All that the paths bring from here on comes from the directions they took.
-    pub fn settle(&mut self, out: &[PixelSample]) {
+    pub fn settle(&mut self, out: &SampleBatch) {
         for turn in &mut self.turns[self.settled..] {
-            turn.before = out[turn.slot as usize].radiance;
+            turn.before = out.pixels[turn.slot as usize].radiance;
         }
         self.settled = self.turns.len();
     }
 
     /// Tells the guide what came from all directions taken.
-    pub fn teach(&mut self, integrator: &PathIntegrator, out: &[PixelSample]) {
+    pub fn teach(&mut self, integrator: &PathIntegrator, out: &SampleBatch) {
         let Some(guide) = integrator.guide.as_deref().filter(|guide| guide.learns()) else { return };
         for turn in &mut self.turns {
-            let brought = out[turn.slot as usize].radiance - turn.before;
+            let brought = out.pixels[turn.slot as usize].radiance - turn.before;
             // What a channel brings that nothing is left of is rounding.
             let of_channel = |brought: f32, weight: f32, all: f32| if all > 0.0 { (brought * (weight / all)).max(0.0) } else { 0.0 };
             let (w, t) = (turn.weight, turn.throughput);

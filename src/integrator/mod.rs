@@ -25,7 +25,7 @@ pub use world::World;
 use std::sync::Arc;
 
 use crate::desc::IntegratorDesc;
-use crate::film::{PixelSample, SurfaceSample};
+use crate::film::{PartNeeds, SampleBatch, ShapeKey, SurfaceSample};
 use crate::geometry::SurfaceInteraction;
 use crate::guiding::Guide;
 use crate::math::{Ray, Vec3};
@@ -93,7 +93,7 @@ impl RayCounts {
 /// Which parts of [`SurfaceSample`] are wanted; the rest is not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SurfaceNeeds {
-    /// Any of depth, normal, position.
+    /// Any of depth, normals, position, uv and the shape.
     pub geometry: bool,
     /// Albedo.
     pub albedo: bool,
@@ -101,8 +101,8 @@ pub struct SurfaceNeeds {
 
 /// Computes what each camera sample brings.
 pub trait Integrator: Send + Sync {
-    /// Fills `out`, one entry for each of `samples`, and counts rays.
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts);
+    /// Fills `out` with one entry for each of `samples`, and counts rays.
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts);
 }
 
 /// What integrators need to know beside their parameters.
@@ -112,6 +112,8 @@ pub struct Setup {
     pub sampler: Sampler,
     /// What the layers need.
     pub needs: SurfaceNeeds,
+    /// Which parts of the radiance layers need.
+    pub parts: PartNeeds,
     /// As in [`PathIntegrator`].
     pub side_by_side: bool,
     /// What a path tracer follows beside the surfaces.
@@ -120,8 +122,8 @@ pub struct Setup {
 
 /// The integrator with these parameters.
 pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
-    let Setup { sampler, needs, side_by_side, guide } = setup;
-    let view = |view| Box::new(DebugView { view, needs }) as Box<dyn Integrator>;
+    let Setup { sampler, needs, parts, side_by_side, guide } = setup;
+    let view = |view| Box::new(DebugView { view, needs, parts }) as Box<dyn Integrator>;
     match *desc {
         IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, hide_emitters, .. } => Box::new(PathIntegrator {
             max_depth,
@@ -131,11 +133,12 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
             hide_emitters,
             sampler,
             needs,
+            parts,
             side_by_side,
             guide,
         }),
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
-            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, needs })
+            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, needs, parts })
         }
         IntegratorDesc::Normal => view(View::Normal),
         IntegratorDesc::ShadingNormal => view(View::ShadingNormal),
@@ -143,7 +146,7 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
         IntegratorDesc::Depth => view(View::Depth),
         IntegratorDesc::PrimitiveId => view(View::PrimitiveId),
         IntegratorDesc::AmbientOcclusion { distance } => {
-            Box::new(AmbientOcclusion { distance: distance.unwrap_or(f32::INFINITY), sampler, needs })
+            Box::new(AmbientOcclusion { distance: distance.unwrap_or(f32::INFINITY), sampler, needs, parts })
         }
     }
 }
@@ -160,6 +163,9 @@ fn surface_sample(
     if needs.geometry {
         sample.depth = world.scene.camera.depth(at.p, at.time);
         sample.normal = at.n_s;
+        sample.geometric_normal = at.n_g;
+        sample.uv = at.uv.to_array();
+        sample.shown = ShapeKey { instance: at.instance.0, shape: at.shape.0 };
         sample.position = at.p.as_vec3();
     }
     if needs.albedo {

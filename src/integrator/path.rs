@@ -16,7 +16,7 @@ use super::vertex::Vertex;
 use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions, surface_sample};
 use crate::accel::Coherence;
 use crate::color::Rgb;
-use crate::film::PixelSample;
+use crate::film::{PartNeeds, SampleBatch};
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::guiding::Guide;
 use crate::light::{InfinityEval, Light, Receiver};
@@ -44,6 +44,8 @@ pub struct PathIntegrator {
     pub sampler: Sampler,
     /// What the layers need.
     pub needs: SurfaceNeeds,
+    /// Which parts of the radiance layers need.
+    pub parts: PartNeeds,
     /// Whether diffuse surfaces are shaded side by side where that is possible: faster, with the same result bit for bit.
     pub side_by_side: bool,
     /// What is known of the light, if directions are chosen by it too.
@@ -121,13 +123,13 @@ thread_local! {
 }
 
 impl Integrator for PathIntegrator {
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts) {
         SCRATCH.with_borrow_mut(|scratch| self.render(world, samples, out, counts, scratch));
     }
 }
 
 impl PathIntegrator {
-    fn render(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts, scratch: &mut Scratch) {
+    fn render(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts, scratch: &mut Scratch) {
         scratch.paths.clear();
         scratch.rays.clear();
         scratch.rays.extend(samples.iter().map(|sample| sample.ray));
@@ -140,7 +142,7 @@ impl PathIntegrator {
             sample: sample.sample,
             from: Receiver { p: DVec3::ZERO, n: Vec3::ZERO },
         }));
-        out[..samples.len()].fill(PixelSample::default());
+        out.reset(samples.len(), self.needs != SurfaceNeeds::default(), self.parts);
 
         let in_media = world.scene.features.media;
         if in_media {
@@ -186,7 +188,7 @@ impl PathIntegrator {
             world.accel.occluded_batch(&scratch.shadow_rays, &mut scratch.occluded, coherence);
             for (pending, occluded) in scratch.pending.iter().zip(&scratch.occluded) {
                 if !occluded {
-                    out[pending.slot as usize].radiance += pending.contribution;
+                    out.pixels[pending.slot as usize].radiance += pending.contribution;
                 }
             }
             scratch.turns.settle(out);
@@ -229,7 +231,7 @@ impl PathIntegrator {
     ///
     /// Large results stay where they were returned and are read through references: a copy would have to wait for them.
     /// `MEDIA` is whether the scene has media, `GUIDED` whether there is a guide.
-    fn shade_all<const MEDIA: bool, const GUIDED: bool>(&self, world: &World, bounce: u32, out: &mut [PixelSample], scratch: &mut Scratch) {
+    fn shade_all<const MEDIA: bool, const GUIDED: bool>(&self, world: &World, bounce: u32, out: &mut SampleBatch, scratch: &mut Scratch) {
         scratch.shadow_rays.clear();
         scratch.pending.clear();
         let count = scratch.paths.len();
@@ -265,13 +267,13 @@ impl PathIntegrator {
         world: &World,
         bounce: u32,
         [i, first]: [usize; 2],
-        out: &mut [PixelSample],
+        out: &mut SampleBatch,
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
         let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, turns, .. } = scratch;
         let (path, ray) = (&paths[i], &rays[i]);
-        let sample = &mut out[path.slot as usize];
+        let sample = &mut out.pixels[path.slot as usize];
         let found = world.resolve(ray, hits[i]);
         let Some(at) = &found else {
             if bounce > 0 || !self.hide_emitters {
@@ -285,7 +287,7 @@ impl PathIntegrator {
         if bounce == 0 {
             sample.alpha = 1.0;
             if self.needs != SurfaceNeeds::default() {
-                sample.surface = surface_sample(world, self.needs, at, ray.direction, footprint);
+                out.surfaces[path.slot as usize] = surface_sample(world, self.needs, at, ray.direction, footprint);
             }
         }
         sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);

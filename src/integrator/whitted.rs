@@ -5,7 +5,7 @@ use super::media::MediaState;
 use super::vertex::Vertex;
 use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sample};
 use crate::color::Rgb;
-use crate::film::PixelSample;
+use crate::film::{PartNeeds, PixelSample, SampleBatch};
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::light::{FoundBy, Light};
 use crate::math::float::ONE_MINUS_EPSILON;
@@ -24,12 +24,16 @@ pub struct Whitted {
     pub hide_emitters: bool,
     /// What the layers need.
     pub needs: SurfaceNeeds,
+    /// Which parts of the radiance layers need.
+    pub parts: PartNeeds,
 }
 
 impl Integrator for Whitted {
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut [PixelSample], counts: &mut RayCounts) {
+    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts) {
         counts.camera += samples.len() as u64;
-        for (sample, out) in samples.iter().zip(out) {
+        let wants_surface = self.needs != SurfaceNeeds::default();
+        out.reset(samples.len(), wants_surface, self.parts);
+        for (i, sample) in samples.iter().enumerate() {
             let in_media = world.scene.features.media;
             let here = if in_media { world.media_at_start(&sample.ray) } else { Interior::default() };
             let mut ray = sample.ray;
@@ -38,14 +42,15 @@ impl Integrator for Whitted {
                 counts.camera += 1 + world.pass_emitters(&mut ray, &mut hit);
             }
             let segment = Segment::trace(world, ray, world.camera_cone(&ray), here, counts);
-            *out = match &segment.end {
-                Some(at) => PixelSample {
-                    radiance: self.shade(world, &segment, at, 1, counts) * segment.transmittance,
-                    alpha: 1.0,
-                    surface: surface_sample(world, self.needs, at, segment.ray.direction, || segment.footprint(world, at)),
-                },
+            out.pixels[i] = match &segment.end {
+                Some(at) => {
+                    if wants_surface {
+                        out.surfaces[i] = surface_sample(world, self.needs, at, segment.ray.direction, || segment.footprint(world, at));
+                    }
+                    PixelSample { radiance: self.shade(world, &segment, at, 1, counts) * segment.transmittance, alpha: 1.0 }
+                }
                 None if self.hide_emitters => PixelSample::default(),
-                None => PixelSample { radiance: segment.escaped(world), ..PixelSample::default() },
+                None => PixelSample { radiance: segment.escaped(world), alpha: 0.0 },
             };
         }
     }

@@ -111,12 +111,11 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Crop, Layer};
 
     fn picture(values: &[[f32; 3]]) -> Image {
         let size = [values.len() as u32, 1];
         let data = values.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).collect();
-        Image { size, crop: Crop::full(size), layers: vec![Layer { kind: LayerKind::Color, data }] }
+        Image::of_color(size, data)
     }
 
     #[test]

@@ -11,7 +11,7 @@ use ::exr::prelude::{
 use super::{RenderInfo, write_atomically};
 use crate::desc::{CompressionDesc, OutputDesc, PixelTypeDesc};
 use crate::error::{Error, Result};
-use crate::film::{Crop, Image, Layer, LayerInfo, LayerKind, LayerSet};
+use crate::film::{Crop, Image, Layer, LayerKind, LayerSet};
 
 /// Rec.709 primaries and white, as OpenEXR assumes without the attribute.
 const REC709: Chromaticities =
@@ -40,12 +40,11 @@ pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderI
 }
 
 fn channels(layer: &Layer, pixel_type: PixelTypeDesc) -> impl Iterator<Item = AnyChannel<FlatSamples>> + '_ {
-    let info: &LayerInfo = layer.kind.info();
-    let half = pixel_type == PixelTypeDesc::Half && !info.always_float;
-    info.channels.iter().enumerate().map(move |(i, name)| {
+    let half = pixel_type == PixelTypeDesc::Half && !layer.kind.info().always_float;
+    layer.channel_names().into_iter().enumerate().map(move |(i, name)| {
         let samples =
             if half { FlatSamples::F16(layer.channel(i).map(to_half).collect()) } else { FlatSamples::F32(layer.channel(i).collect()) };
-        AnyChannel::new(*name, samples)
+        AnyChannel::new(name.as_str(), samples)
     })
 }
 
@@ -106,7 +105,7 @@ pub fn read_exr(path: &Path) -> Result<Image> {
             }
         }
         let (size, crop) = windows(&file.attributes.display_window, part.attributes.layer_position, part.size);
-        return Ok(Image { size, crop, layers: vec![Layer { kind: LayerKind::Color, data }] });
+        return Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() });
     }
     let names: Vec<String> = file.layer_data.iter().flat_map(|part| &part.channel_data.list).map(|c| c.name.to_string()).collect();
     Err(malformed(format!("there are no channels R, G and B and no Y; it has {}", names.join(", "))))

@@ -6,15 +6,19 @@ use crate::desc::LayerDesc;
 
 const LAYERS: [LayerDesc; 6] = [LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo, LayerDesc::Variance, LayerDesc::Samples];
 
-/// A cropped picture of every layer with numbers that 16 bits hold, save where a layer is always of 32.
+/// The layers of the pictures below.
+const LAYERS_OF_PICTURE: [LayerKind; 7] =
+    [LayerKind::Color, LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo, LayerKind::Variance, LayerKind::Samples];
+
+/// A cropped picture of several layers with numbers that 16 bits hold, save where a layer is always of 32.
 fn picture() -> Image {
     let crop = Crop { x: 3, y: 2, width: 33, height: 21 };
-    let layer = |info: &'static LayerInfo| {
+    let layer = |info: &'static crate::film::LayerInfo| {
         let values = crop.area() as usize * info.channels.len();
         let scale = if info.always_float { std::f32::consts::PI } else { 1.0 / 64.0 };
-        Layer { kind: info.kind, data: (0..values).map(|i| ((i * 37) % 1999) as f32 * scale - 3.0).collect() }
+        Layer::new(info.kind, (0..values).map(|i| ((i * 37) % 1999) as f32 * scale - 3.0).collect())
     };
-    Image { size: [40, 30], crop, layers: LayerKind::ALL.iter().map(layer).collect() }
+    Image { size: [40, 30], crop, layers: LAYERS_OF_PICTURE.iter().map(|kind| layer(kind.info())).collect(), ..Image::default() }
 }
 
 fn info() -> RenderInfo {

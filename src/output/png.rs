@@ -8,7 +8,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use super::write_atomically;
 use crate::color::srgb_from_linear;
 use crate::error::Result;
-use crate::film::{Image, LayerKind};
+use crate::film::{Crop, Image, LayerKind};
 
 /// Writes the picture's colour as 8-bit sRGB after `exposure` stops. Colour is premultiplied, so leaving out alpha shows the picture over
 /// black. Ordered dithering hides the steps of dark gradients; a value that 8 bits hold exactly is not dithered.
@@ -16,21 +16,33 @@ use crate::film::{Image, LayerKind};
 /// # Errors
 /// [`Error::Output`](crate::Error::Output) if the file cannot be written.
 pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<()> {
-    let bytes = encode(image, exposure);
+    let shown = shown(image);
+    let bytes = encode(image, &shown, exposure);
     write_atomically(path, |out| {
         let encoder = PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive);
-        encoder.write_image(&bytes, image.crop.width, image.crop.height, ExtendedColorType::Rgb8).map_err(|e| e.to_string())
+        encoder.write_image(&bytes, shown.width, shown.height, ExtendedColorType::Rgb8).map_err(|e| e.to_string())
     })
 }
 
-fn encode(image: &Image, exposure: f32) -> Vec<u8> {
+/// The part of the data that is to be shown: all but the overscan.
+fn shown(image: &Image) -> Crop {
+    let o = image.overscan;
+    let [width, height] = image.size.map(|side| side - 2 * o);
+    image.crop.intersection(&Crop { x: o, y: o, width, height })
+}
+
+fn encode(image: &Image, shown: &Crop, exposure: f32) -> Vec<u8> {
     let scale = exposure.exp2();
     let width = image.crop.width.max(1);
-    let mut bytes = Vec::with_capacity(image.crop.area() as usize * 3);
+    let mut bytes = Vec::with_capacity(shown.area() as usize * 3);
     let pixels = image.layer(LayerKind::Color).map(|layer| layer.pixels()).into_iter().flatten();
     for (i, pixel) in pixels.enumerate() {
+        let (x, y) = (image.crop.x + i as u32 % width, image.crop.y + i as u32 / width);
+        if !shown.contains(x, y) {
+            continue;
+        }
         // The place in the full picture, so that a crop equals the same part of the whole.
-        let threshold = dither(image.crop.x + i as u32 % width, image.crop.y + i as u32 / width);
+        let threshold = dither(x - image.overscan, y - image.overscan);
         bytes.extend(pixel[..3].iter().map(|linear| {
             let encoded = srgb_from_linear((linear * scale).clamp(0.0, 1.0));
             (encoded * 255.0 + threshold) as u8
@@ -50,22 +62,33 @@ fn dither(x: u32, y: u32) -> f32 {
 mod tests {
     use super::*;
     use crate::color::linear_from_srgb;
-    use crate::film::{Crop, Layer};
 
     fn picture(size: [u32; 2], value: impl Fn(u32) -> f32) -> Image {
         let data = (0..size[0] * size[1]).flat_map(|i| [value(i), value(i), value(i), 1.0]).collect();
-        Image { size, crop: Crop::full(size), layers: vec![Layer { kind: LayerKind::Color, data }] }
+        Image::of_color(size, data)
+    }
+
+    fn encode_all(image: &Image, exposure: f32) -> Vec<u8> {
+        encode(image, &shown(image), exposure)
+    }
+
+    #[test]
+    fn what_lies_around_the_picture_is_not_shown() {
+        let image = Image { overscan: 1, ..picture([4, 3], |i| i as f32) };
+        assert_eq!(encode_all(&image, -40.0).len(), 2 * 3);
+        let inner = Image { overscan: 1, ..picture([4, 3], |i| if i == 5 || i == 6 { 0.25 } else { 9.0 }) };
+        assert_eq!(encode_all(&inner, 0.0), encode_all(&picture([2, 1], |_| 0.25), 0.0));
     }
 
     #[test]
     fn dithering_keeps_the_mean_and_exposure_is_in_stops() {
         let between = linear_from_srgb(100.3 / 255.0);
-        let bytes = encode(&picture([64, 64], |_| between), 0.0);
+        let bytes = encode_all(&picture([64, 64], |_| between), 0.0);
         let mean = bytes.iter().map(|b| f64::from(*b)).sum::<f64>() / bytes.len() as f64;
         assert!((mean - 100.3).abs() < 0.01, "{mean}");
         assert!(bytes.iter().all(|b| (100..=101).contains(b)));
-        assert_eq!(encode(&picture([8, 8], |_| 0.25), 1.0), encode(&picture([8, 8], |_| 0.5), 0.0));
-        assert!(encode(&picture([8, 8], |_| -1.0), 0.0).iter().all(|b| *b == 0));
-        assert!(encode(&picture([8, 8], |_| 1e30), 0.0).iter().all(|b| *b == 255));
+        assert_eq!(encode_all(&picture([8, 8], |_| 0.25), 1.0), encode_all(&picture([8, 8], |_| 0.5), 0.0));
+        assert!(encode_all(&picture([8, 8], |_| -1.0), 0.0).iter().all(|b| *b == 0));
+        assert!(encode_all(&picture([8, 8], |_| 1e30), 0.0).iter().all(|b| *b == 255));
     }
 }

@@ -234,9 +234,7 @@ pub(super) fn render(
     progress: &dyn Progress,
     stop: &AtomicBool,
 ) -> Result<RenderResult> {
-    let mut layers = settings.layers;
-    layers.insert(LayerKind::Variance);
-    let mut film = Film::new(settings.size, settings.crop, &layers, TILE_SIZE)?;
+    let mut film = job.film(Some(LayerKind::Variance))?;
     let mut stats = Stats::default();
     let pixels = settings.crop.area();
     let most = settings.spp.div_ceil(GROUP).max(PILOT);
@@ -261,6 +259,9 @@ pub(super) fn render(
             blocks.add_to_all(most);
             [done, wanted] = blocks.samples(&film);
         }
+        if progress.wants_picture() {
+            progress.picture(&job.picture(&film), (done / pixels) as u32);
+        }
         debug_assert!(wanted >= done, "samples are never taken back");
         progress.plan(wanted, estimate.error, target);
     }
@@ -271,9 +272,7 @@ pub(super) fn render(
     stats.spp_done = (stats.samples as f64 / pixels as f64).round() as u32;
     stats.nan_samples = film.dropped_count();
     stats.dropped = film.dropped();
-    let mut image = film.resolve();
-    image.layers.retain(|layer| settings.layers.contains(layer.kind));
-    Ok(RenderResult { image, stats })
+    Ok(RenderResult { image: job.picture(&film), stats })
 }
 
 /// Renders what is wanted, in passes that end soon when asked to; says whether all of it is there.
@@ -353,9 +352,9 @@ fn render_groups(job: &Job, tile: &mut FilmTile, groups: &[([u32; 2], u32)], bat
             let (mut sum, mut weights, mut kept) = ([0.0; 3], 0.0, 0.0);
             for i in 0..GROUP {
                 let slot = g * (BLOCK_PIXELS * GROUP) as usize + (i * BLOCK_PIXELS + within) as usize;
-                let (sample, weight) = (&batch.out[slot], batch.weights[slot]);
+                let (sample, weight) = (batch.out.sample(slot), batch.weights[slot]);
                 if tile.add(index, group * GROUP + i, sample, weight) {
-                    let value = weighted(sample, weight);
+                    let value = weighted(sample.pixel, weight);
                     sum = [0, 1, 2].map(|k| sum[k] + value[k]);
                     weights += f64::from(weight);
                     kept += 1.0;

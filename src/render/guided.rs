@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::limits::Limits;
-use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats, TILE_SIZE, next_pass, render_pass};
+use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats, next_pass, render_pass};
 use crate::error::Result;
 use crate::film::{Film, FilmTile, LayerKind};
 use crate::guiding::Guide;
@@ -143,7 +143,7 @@ impl Picture {
             gain = ratio(total(&by_tile(first)) * first.rays, all_now * pass.rays);
         }
         for ((tile, other), factor) in self.film.tiles_mut().iter_mut().zip(film.tiles()).zip(&self.factors) {
-            tile.merge(other, *factor);
+            tile.merge_weighed(other, *factor);
         }
         if samples >= 2 {
             let kept = Pass { variances: pass.variances.clone(), rays: pass.rays };
@@ -199,10 +199,7 @@ pub(super) fn render(
     progress: &dyn Progress,
     stop: &AtomicBool,
 ) -> Result<RenderResult> {
-    let mut layers = settings.layers;
-    layers.insert(LayerKind::Variance);
-    let new_film = || Film::new(settings.size, settings.crop, &layers, TILE_SIZE);
-    let mut picture = Picture::new(new_film()?);
+    let mut picture = Picture::new(job.film(Some(LayerKind::Variance))?);
     let mut stats = Stats::default();
     let pixels = settings.crop.area();
     progress.start(settings.spp, pixels);
@@ -212,7 +209,7 @@ pub(super) fn render(
     let mut step = 1;
     while stats.spp_done < settings.spp && !stats.interrupted && !stats.time_limited {
         let count = stats.spp_done.max(FIRST_PASS).min(settings.spp - stats.spp_done);
-        let mut film = new_film()?;
+        let mut film = job.film(Some(LayerKind::Variance))?;
         let (mut done, mut rays) = (0, RayCounts::default());
         while done < count {
             let has_picture = stats.spp_done > 0;
@@ -241,6 +238,9 @@ pub(super) fn render(
             break;
         }
         let gain = picture.add(&film, done, &rays);
+        if progress.wants_picture() && stats.spp_done < settings.spp {
+            progress.picture(&job.picture(&picture.film), stats.spp_done);
+        }
         if let Some(guide) = &lessons.guide {
             let (leaves, nodes) = (guide.leaves(), guide.directional_nodes());
             tracing::debug!("guided: pass of {done} samples, {gain:.2} times as good as the first; {leaves} leaves, {nodes} nodes");
@@ -256,7 +256,5 @@ pub(super) fn render(
     stats.samples = pixels * u64::from(stats.spp_done);
     stats.nan_samples = picture.film.dropped_count();
     stats.dropped = picture.film.dropped();
-    let mut image = picture.film.resolve();
-    image.layers.retain(|layer| settings.layers.contains(layer.kind));
-    Ok(RenderResult { image, stats })
+    Ok(RenderResult { image: job.picture(&picture.film), stats })
 }

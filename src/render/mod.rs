@@ -21,7 +21,9 @@ use crate::accel::Accelerator;
 use crate::camera::FilmRows;
 use crate::desc::IntegratorDesc;
 use crate::error::{Error, Result};
-use crate::film::{DroppedSample, Film, FilmTile, Filter, Image, LayerKind, PixelSample};
+use crate::film::{
+    Crop, DroppedSample, Film, FilmTile, Filter, Image, LayerKind, LayerSet, PartNeeds, PixelSample, SampleBatch, SurfaceSample,
+};
 use crate::integrator::{self, CameraSample, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::math::rows::BATCH;
 use crate::math::{Ray, Vec2};
@@ -81,7 +83,24 @@ struct Job<'a> {
     integrator: Box<dyn Integrator>,
     setup: Setup,
     filter: Filter,
+    /// Names of the groups of lights, the last for lights in no group.
+    light_groups: Vec<String>,
+    layers: LayerSet,
+    crop: Crop,
+    /// Pixels on each side of what the camera shows.
+    overscan: u32,
+    /// Width and height of what the camera shows.
+    view: [u32; 2],
+    /// Width and height of the film.
     size: [u32; 2],
+}
+
+/// The group of lights that are in none.
+const DEFAULT_GROUP: &str = "default";
+
+/// Names of the groups of lights that a picture of the scene may tell apart.
+fn light_groups(scene: &Scene) -> Vec<String> {
+    scene.light_groups.names().iter().map(String::as_str).chain([DEFAULT_GROUP]).map(str::to_owned).collect()
 }
 
 impl<'a> Job<'a> {
@@ -89,18 +108,43 @@ impl<'a> Job<'a> {
         let sampler = Sampler::new(settings.sampler, settings.seed);
         let wanted = |kind| settings.layers.contains(kind);
         let needs = SurfaceNeeds {
-            geometry: wanted(LayerKind::Z) || wanted(LayerKind::N) || wanted(LayerKind::P),
+            geometry: [LayerKind::Z, LayerKind::N, LayerKind::Ng, LayerKind::P, LayerKind::Uv].into_iter().any(wanted)
+                || settings.layers.needs_coverage(),
             albedo: wanted(LayerKind::Albedo),
         };
-        let setup = Setup { sampler, needs, side_by_side: settings.side_by_side, guide: None };
+        let light_groups = light_groups(scene);
+        let parts = PartNeeds {
+            by_scattering: settings.layers.needs_parts(),
+            light_groups: if wanted(LayerKind::LightGroups) { light_groups.len() as u32 } else { 0 },
+        };
+        let setup = Setup { sampler, needs, parts, side_by_side: settings.side_by_side, guide: None };
         let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
         Self {
-            world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
+            world: if settings.integrator == IntegratorDesc::Uv || wanted(LayerKind::Uv) { world.in_full() } else { world },
             integrator: integrator::build(&settings.integrator, setup.clone()),
             setup,
             filter: Filter::new(&settings.filter),
-            size: settings.size,
+            light_groups,
+            layers: settings.layers,
+            crop: settings.crop,
+            overscan: settings.overscan,
+            view: settings.size,
+            size: settings.film_size(),
         }
+    }
+
+    /// A film for the picture, of the settings' layers and another.
+    fn film(&self, besides: Option<LayerKind>) -> Result<Film> {
+        let mut layers = self.layers;
+        besides.into_iter().for_each(|kind| layers.insert(kind));
+        Film::with_light_groups(self.size, self.crop, &layers, self.light_groups.clone(), TILE_SIZE)
+    }
+
+    /// The picture of a film, in the settings' layers.
+    fn picture(&self, film: &Film) -> Image {
+        let mut image = film.resolve();
+        image.layers.retain(|layer| self.layers.contains(layer.kind));
+        Image { overscan: self.overscan, ..image }
     }
 
     /// Renders one sample of every pixel of the tile with this origin; `out` is in the order of [`slots`].
@@ -126,7 +170,7 @@ impl<'a> Job<'a> {
                 let filter = self.filter.sample([u[0], u[1]]);
                 batch.weights[start + i] = filter.weight;
                 for (k, offset) in filter.offset.to_array().into_iter().enumerate() {
-                    batch.film.film[k][i] = batch.pixels[i][k] as f32 + 0.5 + offset;
+                    batch.film.film[k][i] = batch.pixels[i][k] as i32 as f32 + 0.5 + offset;
                 }
             }
             self.camera_rays(count, batch);
@@ -139,6 +183,8 @@ impl<'a> Job<'a> {
     fn request(&self, samples: &mut impl Iterator<Item = ([u32; 2], u32)>, batch: &mut Batch) -> usize {
         let mut count = 0;
         for ([x, y], sample) in samples.take(BATCH) {
+            // Of what the camera shows; beyond its left and upper edge coordinates wrap.
+            let [x, y] = [x, y].map(|x| x.wrapping_sub(self.overscan));
             batch.pixels[count] = [x, y];
             batch.requests.pixels[count] = self.setup.sampler.pixel(x, y);
             batch.requests.samples[count] = sample;
@@ -158,7 +204,7 @@ impl<'a> Job<'a> {
             if moves { camera.time(u()) } else { 0.0 }
         };
         if camera.is_pinhole() {
-            camera.pinhole_rays(self.size, film, count);
+            camera.pinhole_rays(self.view, film, count);
             samples.extend((0..count).map(|i| {
                 let ray = Ray { time: time(i), ..Ray::new(film.origin.get(i), film.direction.get(i)) };
                 sample(i, self.world.approach(ray))
@@ -166,7 +212,7 @@ impl<'a> Job<'a> {
         } else {
             samples.extend((0..count).map(|i| {
                 let (u, at) = (numbers.of(i), Vec2::new(film.film[0][i], film.film[1][i]));
-                sample(i, self.world.approach(camera.ray(at, self.size, [u[2], u[3]], time(i))))
+                sample(i, self.world.approach(camera.ray(at, self.view, [u[2], u[3]], time(i))))
             }));
         }
     }
@@ -177,13 +223,13 @@ impl<'a> Job<'a> {
         let active = tile.active();
         for sample in first..first + count {
             self.render_batch(tile.origin(), sample, batch, &mut counts);
-            for (slot, (out, &weight)) in slots(self.size, tile.origin()).zip(batch.out.iter().zip(&batch.weights)) {
+            for (i, slot) in slots(self.size, tile.origin()).enumerate() {
                 let [dx, dy] = pixel_of_slot(slot);
                 let (x, y) = (tile.origin()[0] + dx, tile.origin()[1] + dy);
                 if active.contains(x, y) {
-                    let pixel = tile.index(x, y);
+                    let (pixel, out, weight) = (tile.index(x, y), batch.out.sample(i), batch.weights[i]);
                     if tile.add(pixel, sample, out, weight) && tile.wants_groups() {
-                        tile.add_group(pixel, weighted(out, weight), f64::from(weight));
+                        tile.add_group(pixel, weighted(out.pixel, weight), f64::from(weight));
                     }
                 }
             }
@@ -201,7 +247,7 @@ fn weighted(sample: &PixelSample, weight: f32) -> [f64; 3] {
 struct Batch {
     samples: Vec<CameraSample>,
     weights: Vec<f32>,
-    out: Vec<PixelSample>,
+    out: SampleBatch,
     pixels: [[u32; 2]; BATCH],
     film: FilmRows,
     requests: Requests,
@@ -214,7 +260,7 @@ impl Batch {
         Self {
             samples: Vec::with_capacity(count),
             weights: vec![1.0; count],
-            out: vec![PixelSample::default(); count],
+            out: SampleBatch::default(),
             pixels: [[0; 2]; BATCH],
             film: FilmRows::default(),
             requests: Requests::default(),
@@ -270,7 +316,7 @@ pub fn render(
     if let Some(target) = settings.target_error {
         return adaptive::render(&job, &pool, settings, target, progress, stop);
     }
-    let mut film = Film::new(settings.size, settings.crop, &settings.layers, TILE_SIZE)?;
+    let mut film = job.film(None)?;
     let mut stats = Stats::default();
     let pixels = u64::from(settings.crop.width) * u64::from(settings.crop.height);
     progress.start(settings.spp, pixels);
@@ -290,6 +336,9 @@ pub fn render(
             stats.first_pass_seconds = limits.elapsed().as_secs_f64();
         }
         pass_samples = next_pass(count, pass_start.elapsed(), limits.remaining());
+        if progress.wants_picture() && stats.spp_done < settings.spp {
+            progress.picture(&job.picture(&film), stats.spp_done);
+        }
     }
     stats.render_seconds = limits.elapsed().as_secs_f64();
     progress.finish();
@@ -297,7 +346,7 @@ pub fn render(
     stats.samples = pixels * u64::from(stats.spp_done);
     stats.nan_samples = film.dropped_count();
     stats.dropped = film.dropped();
-    Ok(RenderResult { image: film.resolve(), stats })
+    Ok(RenderResult { image: job.picture(&film), stats })
 }
 
 /// Renders `count` samples of every pixel, from sample `first` on.
@@ -325,12 +374,21 @@ fn next_pass(count: u32, elapsed: Duration, remaining: Option<Duration>) -> u32 
     (fitting as u32).clamp(1, count.saturating_mul(4))
 }
 
+/// What a replayed sample brings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Replayed {
+    /// For the picture.
+    pub pixel: PixelSample,
+    /// Of its first surface; zero where there is none, and where no layer of surfaces is wanted.
+    pub surface: SurfaceSample,
+}
+
 /// What one sample of one pixel brings, before the filter's weight: exactly what it brought to the picture.
 ///
 /// # Errors
 /// If the pixel lies outside the film.
-pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel: [u32; 2], sample: u32) -> Result<PixelSample> {
-    let [width, height] = settings.size;
+pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel: [u32; 2], sample: u32) -> Result<Replayed> {
+    let [width, height] = settings.film_size();
     if pixel[0] >= width || pixel[1] >= height {
         return Err(Error::Usage(format!("--pixel {},{}: the film has {width}x{height} pixels", pixel[0], pixel[1])));
     }
@@ -342,8 +400,10 @@ pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel
     let mut batch = Batch::new();
     job.render_batch(origin, sample, &mut batch, &mut RayCounts::default());
     let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
-    let place = slots(settings.size, origin).position(|other| other == slot);
-    place.map(|place| batch.out[place]).ok_or_else(|| Error::Internal(format!("pixel {pixel:?} has no slot")))
+    let place = slots(job.size, origin).position(|other| other == slot);
+    let replayed =
+        |place: usize| Replayed { pixel: batch.out.pixels[place], surface: batch.out.surfaces.get(place).copied().unwrap_or_default() };
+    place.map(replayed).ok_or_else(|| Error::Internal(format!("pixel {pixel:?} has no slot")))
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! How a render tells what it is doing.
 
+use crate::film::Image;
+
 /// Listens to a render. Every method may be called from any thread; all do nothing by default.
 pub trait Progress: Sync {
     /// The render starts: so many samples per pixel at most, of so many pixels.
@@ -15,6 +17,16 @@ pub trait Progress: Sync {
     /// A tile got this many more samples, all pixels together.
     fn tile_done(&self, samples: u64) {
         let _ = samples;
+    }
+
+    /// Whether a picture of what there is so far is wanted: asked between passes. Making one takes time.
+    fn wants_picture(&self) -> bool {
+        false
+    }
+
+    /// The picture so far, of so many samples per pixel (their mean, rounded down).
+    fn picture(&self, image: &Image, samples_per_pixel: u32) {
+        let _ = (image, samples_per_pixel);
     }
 
     /// No more samples will come. The picture is not written yet.

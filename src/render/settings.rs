@@ -26,7 +26,9 @@ const MAX_THREADS: usize = 4096;
 pub struct Settings {
     /// Width and height of the full picture in pixels.
     pub size: [u32; 2],
-    /// The part that is rendered.
+    /// Pixels that are rendered on each side beyond the picture.
+    pub overscan: u32,
+    /// The part that is rendered, of the picture with its overscan.
     pub crop: Crop,
     /// The pixel filter.
     pub filter: FilterDesc,
@@ -65,6 +67,8 @@ pub struct Overrides {
     pub size: Option<[u32; 2]>,
     /// `--crop`: x, y, width, height.
     pub crop: Option<[u32; 4]>,
+    /// `--overscan`, in pixels.
+    pub overscan: Option<u32>,
     /// `--threads`; 0 stands for all.
     pub threads: Option<usize>,
     /// `--seed`.
@@ -104,6 +108,7 @@ impl Settings {
     /// [`Error::Usage`] naming the option if a change is impossible.
     pub fn new(desc: &SceneDesc, overrides: &Overrides) -> Result<Self> {
         let size = size(desc, overrides)?;
+        let overscan = overscan(desc, overrides, size)?;
         let outputs = outputs(desc, overrides)?;
         let layers = outputs.iter().flat_map(|output| &output.layers).collect();
         let sampler = match overrides.sampler.unwrap_or(desc.sampler.kind) {
@@ -115,7 +120,8 @@ impl Settings {
         }
         Ok(Self {
             size,
-            crop: crop(desc, overrides, size)?,
+            overscan,
+            crop: crop(desc, overrides, size, overscan)?,
             filter: desc.film.filter,
             sampler,
             spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() { MOST_SAMPLES } else { desc.sampler.spp }),
@@ -130,6 +136,24 @@ impl Settings {
             layers,
         })
     }
+
+    /// Width and height of what is rendered: the picture with its overscan.
+    pub fn film_size(&self) -> [u32; 2] {
+        grown(self.size, self.overscan)
+    }
+}
+
+/// Width and height of a picture with its overscan.
+fn grown(size: [u32; 2], overscan: u32) -> [u32; 2] {
+    size.map(|side| side + 2 * overscan)
+}
+
+fn overscan(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2]) -> Result<u32> {
+    let overscan = overrides.overscan.unwrap_or(desc.film.overscan);
+    if overscan > size[0].min(size[1]) {
+        return Err(usage(format!("--overscan {overscan}: at most the picture's shorter side, {}", size[0].min(size[1]))));
+    }
+    Ok(overscan)
 }
 
 fn usage(message: impl Into<String>) -> Error {
@@ -145,8 +169,11 @@ fn size(desc: &SceneDesc, overrides: &Overrides) -> Result<[u32; 2]> {
 }
 
 /// A crop that the scene alone is to blame for is left to the scene's own checks, which name its place.
-fn crop(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2]) -> Result<Crop> {
-    let Some([x, y, width, height]) = overrides.crop.or(desc.film.crop) else { return Ok(Crop::full(size)) };
+fn crop(desc: &SceneDesc, overrides: &Overrides, size: [u32; 2], overscan: u32) -> Result<Crop> {
+    let Some([x, y, width, height]) = overrides.crop.or(desc.film.crop) else { return Ok(Crop::full(grown(size, overscan))) };
+    if overscan > 0 {
+        return Err(usage("--overscan: a crop leaves nothing around the picture; give one of them, or --overscan 0"));
+    }
     let crop = Crop { x, y, width, height };
     if !crop.fits(size) {
         let numbers = format!("{x},{y},{width},{height}");

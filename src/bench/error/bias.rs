@@ -59,14 +59,13 @@ fn luminance(pixel: &[f32]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Crop, Layer};
     use crate::math::Rng;
 
     fn picture(value: impl FnMut(usize) -> f32) -> Image {
         let size = [64, 32];
         let values: Vec<f32> = (0..64 * 32).map(value).collect();
         let data = values.into_iter().flat_map(|v| [v, v, v, 1.0]).collect();
-        Image { size, crop: Crop::full(size), layers: vec![Layer { kind: LayerKind::Color, data }] }
+        Image::of_color(size, data)
     }
 
     #[test]

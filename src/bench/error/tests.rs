@@ -1,12 +1,11 @@
 use super::*;
 use crate::accel::{Accelerator, Coherence, EmbreeAccel, EmbreeReplay};
 use crate::bench::mesh::sphere_geometry;
-use crate::film::{Crop, Layer, LayerKind};
 use crate::math::{Ray, Rng, Vec3};
 
 fn picture(size: [u32; 2], mut value: impl FnMut(usize) -> f32) -> Image {
     let data = (0..size[0] as usize * size[1] as usize).flat_map(|i| [value(i); 4]).collect();
-    Image { size, crop: Crop::full(size), layers: vec![Layer { kind: LayerKind::Color, data }] }
+    Image::of_color(size, data)
 }
 
 fn measured(image: Image, seconds: f64) -> Measured {

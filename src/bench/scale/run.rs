@@ -136,7 +136,7 @@ pub fn run_case(case: &Case) -> Result<Measured> {
         rays: stats.rays.total(),
         mesh_bytes: summary.geometry_bytes as u64,
         accelerator_bytes: accel.memory_bytes() as u64,
-        film_bytes_per_pixel: film::bytes_per_pixel(settings.layers) as u64,
+        film_bytes_per_pixel: film::bytes_per_pixel(settings.layers, scene.light_groups.names().len() + 1) as u64,
         memory,
     })
 }

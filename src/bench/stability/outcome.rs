@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::film::{Crop, Image, Layer, LayerKind};
+use crate::film::Image;
 
 /// What a number must be.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -164,7 +164,7 @@ fn gray(width: usize, values: &[f64]) -> Image {
     let size = [width as u32, values.len().div_ceil(width.max(1)) as u32];
     let mut data: Vec<f32> = values.iter().flat_map(|&v| [v as f32, v as f32, v as f32, 1.0]).collect();
     data.resize(4 * size[0] as usize * size[1] as usize, 0.0);
-    Image { size, crop: Crop::full(size), layers: vec![Layer { kind: LayerKind::Color, data }] }
+    Image::of_color(size, data)
 }
 
 #[cfg(test)]

@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use steradian::accel::{self, Accelerator};
 use steradian::camera::Camera;
-use steradian::film::{LayerSet, PixelSample};
+use steradian::film::LayerSet;
 use steradian::math::Vec3;
 use steradian::output::{self, RenderInfo};
-use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Settings, Stats};
+use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Replayed, Settings, Stats};
 use steradian::{Result, compile};
 use tracing_subscriber::filter::LevelFilter;
 
@@ -136,12 +136,12 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
     }
 }
 
-fn describe_sample(sample: &PixelSample) -> String {
+fn describe_sample(sample: &Replayed) -> String {
     let triple = |values: [f32; 3]| format!("{} {} {}", values[0], values[1], values[2]);
-    let surface = &sample.surface;
+    let (pixel, surface) = (&sample.pixel, &sample.surface);
     [
-        format!("radiance  {}", triple(sample.radiance.to_array())),
-        format!("alpha     {}", sample.alpha),
+        format!("radiance  {}", triple(pixel.radiance.to_array())),
+        format!("alpha     {}", pixel.alpha),
         format!("depth     {}", surface.depth),
         format!("normal    {}", triple(surface.normal.to_array())),
         format!("position  {}", triple(surface.position.to_array())),

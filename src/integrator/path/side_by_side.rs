@@ -6,7 +6,7 @@ use super::lanes::{Found, Lanes, Roulette};
 use super::{Path, PathIntegrator, Pending, Scratch};
 use crate::bsdf::{Bsdf, Lambert};
 use crate::color::Rgb;
-use crate::film::PixelSample;
+use crate::film::SampleBatch;
 use crate::geometry::{Hit, Mesh, Shape};
 use crate::integrator::shading::turned_normal;
 use crate::integrator::vertex::Vertex;
@@ -102,14 +102,7 @@ impl PathIntegrator {
     }
 
     /// Shades the vertices of a batch that can be shaded side by side, up to [`collect`](Self::collect).
-    pub(super) fn shade_side_by_side(
-        &self,
-        world: &World,
-        bounce: u32,
-        batch: Range<usize>,
-        out: &mut [PixelSample],
-        scratch: &mut Scratch,
-    ) {
+    pub(super) fn shade_side_by_side(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut SampleBatch, scratch: &mut Scratch) {
         let smooth = world.scene.features.shading_normals;
         self.find_diffuse(world, bounce, batch.clone(), scratch);
         scratch.shaded.lanes.place(smooth);
@@ -194,7 +187,7 @@ impl PathIntegrator {
     }
 
     /// Leaves those that turn out to be elsewhere, and adds other vertices on diffuse surfaces.
-    fn settle(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut [PixelSample], scratch: &mut Scratch) {
+    fn settle(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut SampleBatch, scratch: &mut Scratch) {
         let Scratch { paths, rays, hits, cones, shaded, .. } = scratch;
         let first = batch.start;
         for lane in 0..shaded.lanes.count() {
@@ -212,11 +205,10 @@ impl PathIntegrator {
             let footprint = || world.footprint(cone.as_ref(), ray, hits[i].as_ref(), at);
             let mut place = None;
             let Bsdf::Lambert(Lambert { albedo }) = *world.scene.bsdf(at, ray.direction, footprint, &mut place) else { continue };
-            let sample = &mut out[path.slot as usize];
             if bounce == 0 && self.needs != SurfaceNeeds::default() {
-                sample.surface = surface_sample(world, self.needs, at, ray.direction, footprint);
+                out.surfaces[path.slot as usize] = surface_sample(world, self.needs, at, ray.direction, footprint);
             }
-            sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
+            out.pixels[path.slot as usize].radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
             let lane = shaded.lanes.push_known(ray, at, path.throughput, path.roulette_scale, albedo);
             shaded.assign(vertex, lane);
         }
@@ -231,7 +223,7 @@ impl PathIntegrator {
         bounce: u32,
         [i, first]: [usize; 2],
         lane: usize,
-        out: &mut [PixelSample],
+        out: &mut SampleBatch,
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
@@ -239,7 +231,7 @@ impl PathIntegrator {
         let lanes = &shaded.lanes;
         let (path, time) = (paths[i], rays[i].time);
         if bounce == 0 {
-            out[path.slot as usize].alpha = 1.0;
+            out.pixels[path.slot as usize].alpha = 1.0;
         }
         let (shadow, shadow_ray) = lanes.shadow_ray(lane);
         let (next, next_ray) = lanes.next_ray(lane);

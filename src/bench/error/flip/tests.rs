@@ -1,12 +1,11 @@
 use super::*;
-use crate::film::{Crop, Layer};
 
 const SIZE: [u32; 2] = [48, 32];
 
 fn picture(size: [u32; 2], value: impl Fn(u32, u32) -> [f32; 3]) -> Image {
     let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
     let data = pixels.flat_map(|(x, y)| value(x, y).into_iter().chain([1.0])).collect();
-    Image { size, crop: Crop::full(size), layers: vec![Layer { kind: LayerKind::Color, data }] }
+    Image::of_color(size, data)
 }
 
 fn reference(x: u32, y: u32) -> [f32; 3] {

@@ -18,9 +18,9 @@ fn picture(rng: &mut Rng) -> Image {
     let mut number = || (rng.magnitude(-9.0, 6.0) * rng.range(-1.0, 1.0).signum()) as f32;
     let mut layer = |info: &'static LayerInfo| {
         let values = crop.area() as usize * info.channels.len();
-        Layer { kind: info.kind, data: (0..values).map(|_| number()).collect() }
+        Layer::new(info.kind, (0..values).map(|_| number()).collect())
     };
-    Image { size: [40, 30], crop, layers: LayerKind::ALL.iter().map(&mut layer).collect() }
+    Image { size: [40, 30], crop, layers: LayerKind::ALL.iter().map(&mut layer).collect(), ..Image::default() }
 }
 
 /// How many of the pictures end in a PNG of other bytes than the first. (An EXR tells the seconds it took.)
@@ -59,7 +59,7 @@ fn changed_codes(folder: &std::path::Path) -> usize {
     let ramp = |i: u32| linear_from_srgb((i % 256) as f32 / 255.0);
     let size = [256, 9];
     let data = (0..size[0] * size[1]).flat_map(|i| [ramp(i), ramp(i + 85), ramp(i + 170), 1.0]).collect();
-    let image = Image { size, crop: Crop::full(size), layers: vec![Layer { kind: LayerKind::Color, data }] };
+    let image = Image::of_color(size, data);
     let Some(read) = write_png(&path, &image, 0.0).ok().and_then(|()| image::open(&path).ok()) else { return 256 };
     let code = |x: u32, shift: u32| ((x + shift) % 256) as u8;
     read.into_rgb8().enumerate_pixels().filter(|(x, _, pixel)| pixel.0 != [code(*x, 0), code(*x, 85), code(*x, 170)]).count()

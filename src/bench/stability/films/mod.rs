@@ -14,7 +14,7 @@ use super::render::{Estimate, pixels, prepare, render, render_with};
 use super::{Effort, Outcome, sidak_level};
 use crate::accel::AccelKind;
 use crate::color::Rgb;
-use crate::film::{Crop, Film, Filter, Image, LayerKind, LayerSet, PixelSample, SurfaceSample};
+use crate::film::{Crop, Film, Filter, Image, LayerKind, LayerSet, PixelSample, Sample, SurfaceSample};
 use crate::render::Overrides;
 
 checks! {
@@ -36,7 +36,7 @@ checks! {
 }
 
 fn gray(v: f32) -> PixelSample {
-    PixelSample { radiance: Rgb::splat(v), alpha: 1.0, surface: SurfaceSample::default() }
+    PixelSample { radiance: Rgb::splat(v), alpha: 1.0 }
 }
 
 fn film(size: [u32; 2], crop: Crop, layers: &LayerSet, tile_size: u32) -> Film {
@@ -210,11 +210,12 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
     let mut rng = Rng::new(6);
     let spoilt = |rng: &mut Rng| {
         let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY][rng.below(3)];
+        let good = SurfaceSample::default();
         match rng.below(4) {
-            0 => (gray(bad), 1.0),
-            1 => (PixelSample { alpha: bad, ..gray(1.0) }, 1.0),
-            2 => (PixelSample { surface: SurfaceSample { depth: bad, ..Default::default() }, ..gray(1.0) }, 1.0),
-            _ => (gray(1.0), bad),
+            0 => (gray(bad), good, 1.0),
+            1 => (PixelSample { alpha: bad, ..gray(1.0) }, good, 1.0),
+            2 => (gray(1.0), SurfaceSample { depth: bad, ..good }, 1.0),
+            _ => (gray(1.0), good, bad),
         }
     };
     let mut film = film([8, 8], Crop::full([8, 8]), &LayerSet::FULL, 4);
@@ -223,9 +224,10 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
         for pixel in 0..16 {
             for sample in 0..effort.pick(50, 20_000) {
                 if rng.below(4) == 0 {
-                    let (value, weight) = spoilt(&mut rng);
+                    let (value, surface, weight) = spoilt(&mut rng);
+                    let value = Sample { pixel: &value, surface: Some(&surface), parts: &[] };
                     bad += 1;
-                    taken += usize::from(tile.add(pixel, sample, &value, weight));
+                    taken += usize::from(tile.add(pixel, sample, value, weight));
                 } else {
                     refused += usize::from(!tile.add(pixel, sample, &gray(0.25), 1.0));
                 }

@@ -4,7 +4,7 @@ use super::furnaces::glowing_sphere;
 use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::Plot;
-use crate::film::{Crop, Film, LayerSet, PixelSample};
+use crate::film::{Crop, Film, LayerSet, PartNeeds, SampleBatch};
 use crate::integrator::{self, CameraSample, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
@@ -80,16 +80,17 @@ fn checkpoint(film: &Film, sums: &[Sum], squares: f64, spp: u32) -> Checkpoint {
 
 fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let sampler = Sampler::new(settings.sampler, settings.seed);
-    let setup = Setup { sampler, needs: SurfaceNeeds::default(), side_by_side: settings.side_by_side, guide: None };
+    let setup =
+        Setup { sampler, needs: SurfaceNeeds::default(), parts: PartNeeds::default(), side_by_side: settings.side_by_side, guide: None };
     let integrator = integrator::build(&settings.integrator, setup);
     let mut film = Film::new([WIDTH; 2], Crop::full([WIDTH; 2]), &LayerSet::COLOR, WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
-    let mut out = vec![PixelSample::default(); COUNT * AT_ONCE as usize];
+    let mut out = SampleBatch::default();
     let (mut checkpoints, mut next) = (Vec::new(), 1);
     for first in (0..to).step_by(AT_ONCE as usize) {
         let samples = batch(world, &sampler, first);
         integrator.render_batch(world, &samples, &mut out, &mut RayCounts::default());
-        for (i, (sample, value)) in samples.iter().zip(&out).enumerate() {
+        for (i, (sample, value)) in samples.iter().zip(&out.pixels).enumerate() {
             let pixel = i % COUNT;
             film.tiles_mut()[0].add(pixel, sample.sample, value, 1.0);
             let radiance = f64::from(value.radiance.g);

@@ -122,6 +122,9 @@ pub struct RenderArgs {
     /// Render only this part, in pixels from the upper left corner
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_list::<u32, 4>, help_heading = "Picture")]
     pub crop: Option<[u32; 4]>,
+    /// Render this many pixels more on each side: EXR files hold them around the picture (their data window), PNG files do not
+    #[arg(long, value_name = "PIXELS", help_heading = "Picture")]
+    pub overscan: Option<u32>,
     /// EXR: store these beside the picture
     #[arg(long, value_name = "LAYERS", value_delimiter = ',', value_parser = names::plain::<LayerDesc>(), help_heading = "Picture")]
     pub layers: Vec<LayerDesc>,
@@ -224,6 +227,7 @@ impl RenderArgs {
             target_error: self.target_error,
             size: self.size,
             crop: self.crop,
+            overscan: self.overscan,
             threads: self.threads,
             seed: self.seed,
             integrator: self.integrator,

@@ -2,11 +2,11 @@ use super::*;
 
 use crate::color::Rgb;
 use crate::desc::FilterDesc;
-use crate::film::{Filter, SurfaceSample};
+use crate::film::{FilmTile, Filter, LayerKind, PixelSample, Sample, SurfaceSample};
 use crate::math::Vec3;
 
 fn gray(v: f32) -> PixelSample {
-    PixelSample { radiance: Rgb::splat(v), alpha: 1.0, surface: SurfaceSample::default() }
+    PixelSample { radiance: Rgb::splat(v), alpha: 1.0 }
 }
 
 fn one_pixel(layers: LayerSet) -> Film {
@@ -45,18 +45,20 @@ fn samples_that_are_not_finite_are_dropped_and_counted() {
     let tile = &mut film.tiles_mut()[0];
     let pixel = tile.index(2, 1);
     assert!(tile.add(pixel, 0, &gray(0.25), 1.0));
-    let bad_depth = PixelSample { surface: SurfaceSample { depth: f32::NAN, ..Default::default() }, ..gray(1.0) };
-    let mut bad =
-        vec![gray(f32::NAN), gray(f32::INFINITY), gray(f32::NEG_INFINITY), PixelSample { alpha: f32::NAN, ..gray(1.0) }, bad_depth];
+    let mut bad = vec![gray(f32::NAN), gray(f32::INFINITY), gray(f32::NEG_INFINITY), PixelSample { alpha: f32::NAN, ..gray(1.0) }];
     bad.push(PixelSample { radiance: Rgb::new(1.0, f32::INFINITY, f32::NEG_INFINITY), ..gray(0.0) });
     for (i, sample) in bad.iter().enumerate() {
         assert!(!tile.add(pixel, i as u32 + 1, sample, 1.0));
     }
     assert!(!tile.add(pixel, 90, &gray(1.0), f32::NAN));
+    let bad_depth = SurfaceSample { depth: f32::NAN, ..SurfaceSample::default() };
+    assert!(!tile.add(pixel, 91, Sample { pixel: &gray(1.0), surface: Some(&bad_depth), parts: &[] }, 1.0));
+    let bad_part = Rgb::new(0.0, f32::NAN, 0.0);
+    assert!(!tile.add(pixel, 92, Sample { pixel: &gray(1.0), surface: None, parts: &[bad_part] }, 1.0));
     for i in 0..100 {
         tile.add(0, i, &gray(f32::NAN), 1.0);
     }
-    assert_eq!(film.dropped_count(), bad.len() as u64 + 101);
+    assert_eq!(film.dropped_count(), bad.len() as u64 + 103);
     assert_eq!(film.dropped().len(), DROPPED_KEPT);
     assert_eq!(film.dropped()[0], DroppedSample { x: 2, y: 1, sample: 1 });
     let image = film.resolve();
@@ -66,12 +68,18 @@ fn samples_that_are_not_finite_are_dropped_and_counted() {
 
 #[test]
 fn layers_average_what_was_hit() {
-    let surface =
-        |depth, x: f32, n: Vec3, albedo| SurfaceSample { depth, position: Vec3::new(x, 0.0, 1.0), normal: n, albedo: Rgb::splat(albedo) };
+    let surface = |depth, x: f32, n: Vec3, albedo| SurfaceSample {
+        depth,
+        position: Vec3::new(x, 0.0, 1.0),
+        normal: n,
+        albedo: Rgb::splat(albedo),
+        ..Default::default()
+    };
     let mut film = Film::new([2, 1], Crop::full([2, 1]), &LayerSet::FULL, 8).unwrap();
     let tile = &mut film.tiles_mut()[0];
-    tile.add(0, 0, &PixelSample { surface: surface(2.0, 1.0, Vec3::X, 0.5), ..gray(1.0) }, 1.0);
-    tile.add(0, 1, &PixelSample { surface: surface(4.0, 3.0, Vec3::Y, 0.7), ..gray(1.0) }, 1.0);
+    let (near, far) = (surface(2.0, 1.0, Vec3::X, 0.5), surface(4.0, 3.0, Vec3::Y, 0.7));
+    tile.add(0, 0, Sample { pixel: &gray(1.0), surface: Some(&near), parts: &[] }, 1.0);
+    tile.add(0, 1, Sample { pixel: &gray(1.0), surface: Some(&far), parts: &[] }, 1.0);
     tile.add(0, 2, &PixelSample::default(), 1.0);
     tile.add(1, 0, &PixelSample::default(), 1.0);
     let image = film.resolve();
@@ -92,7 +100,7 @@ fn tiles_lie_on_the_full_pictures_grid() {
     assert_eq!(origins, [[0, 16], [16, 16], [0, 32], [16, 32]]);
     assert_eq!(film.tiles()[3].size(), [16, 8]);
     assert_eq!(film.tiles().iter().map(|tile| tile.active().area()).sum::<u64>(), crop.area());
-    assert!(film.tiles().iter().all(|tile| tile.beside.is_empty() && tile.hits.is_empty() && tile.corrections.is_empty()));
+    assert!(film.tiles().iter().all(|tile| tile.surfaces.is_empty() && tile.hits.is_empty() && tile.corrections.is_empty()));
 }
 
 #[test]
@@ -118,10 +126,10 @@ fn merged_films_weigh_their_samples() {
     };
     let (a, b) = (film(&[1.0, 3.0]), film(&[2.0, 4.0, 6.0, 8.0]));
     let mut merged = one_pixel(layers);
-    merged.tiles_mut()[0].merge(&a.tiles()[0], 1.0);
+    merged.tiles_mut()[0].merge_weighed(&a.tiles()[0], 1.0);
     assert_eq!(color(&merged)[0], 2.0);
     assert_eq!(merged.resolve().pixel(LayerKind::Variance, 0, 0), a.resolve().pixel(LayerKind::Variance, 0, 0));
-    merged.tiles_mut()[0].merge(&b.tiles()[0], 3.0);
+    merged.tiles_mut()[0].merge_weighed(&b.tiles()[0], 3.0);
     // Two samples that count once and four that count three times.
     assert!((color(&merged)[0] - (4.0 + 3.0 * 20.0) / 14.0).abs() < 1e-6, "{:?}", color(&merged));
     let of = |film: &Film| film.tiles()[0].group_statistics(0).unwrap().1[0];

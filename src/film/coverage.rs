@@ -1,0 +1,97 @@
+//! Which shapes a pixel shows, and how much of it each covers.
+
+use super::ShapeKey;
+
+/// Samples of each pixel by the shape that they show.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CoverageCounts {
+    /// By pixel, in the order in which shapes were met.
+    pixels: Vec<Vec<(ShapeKey, u32)>>,
+}
+
+impl CoverageCounts {
+    /// No samples of so many pixels.
+    pub fn new(pixels: usize) -> Self {
+        Self { pixels: vec![Vec::new(); pixels] }
+    }
+
+    /// Adds samples.
+    #[inline]
+    pub fn add(&mut self, pixel: usize, shown: ShapeKey, samples: u32) {
+        let list = &mut self.pixels[pixel];
+        match list.iter_mut().find(|(key, _)| *key == shown) {
+            Some((_, count)) => *count += samples,
+            None => list.push((shown, samples)),
+        }
+    }
+
+    /// Adds all samples of others.
+    pub fn merge(&mut self, other: &Self) {
+        for (pixel, list) in other.pixels.iter().enumerate() {
+            for &(key, count) in list {
+                self.add(pixel, key, count);
+            }
+        }
+    }
+
+    /// What a pixel shows, in no particular order.
+    pub fn of(&self, pixel: usize) -> &[(ShapeKey, u32)] {
+        &self.pixels[pixel]
+    }
+}
+
+/// What each pixel of a picture shows: shapes with the share of the pixel that each covers, the largest first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Coverage {
+    /// Where each pixel's entries start, and last where they end.
+    starts: Vec<usize>,
+    entries: Vec<(ShapeKey, f32)>,
+}
+
+impl Coverage {
+    /// From the counts of each pixel, row by row, with its number of samples.
+    pub fn new<'a>(pixels: impl Iterator<Item = (&'a [(ShapeKey, u32)], u32)>) -> Self {
+        let (mut starts, mut entries) = (vec![0], Vec::new());
+        let mut sorted = Vec::new();
+        for (counts, samples) in pixels {
+            sorted.clear();
+            sorted.extend_from_slice(counts);
+            sorted.sort_unstable_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
+            entries.extend(sorted.iter().map(|&(key, count)| (key, (f64::from(count) / f64::from(samples)) as f32)));
+            starts.push(entries.len());
+        }
+        Self { starts, entries }
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// What a pixel shows: shapes with the share that each covers, above 0, the largest first; among equals in the order of their keys.
+    pub fn of(&self, pixel: usize) -> &[(ShapeKey, f32)] {
+        &self.entries[self.starts[pixel]..self.starts[pixel + 1]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_of_all_samples_and_sorted() {
+        let key = |shape| ShapeKey { instance: ShapeKey::NO_INSTANCE, shape };
+        let mut counts = CoverageCounts::new(2);
+        for shape in [3, 1, 1, 2] {
+            counts.add(0, key(shape), 1);
+        }
+        let mut other = CoverageCounts::new(2);
+        other.add(0, key(2), 1);
+        other.add(1, key(9), 2);
+        counts.merge(&other);
+        let coverage = Coverage::new([(counts.of(0), 10), (counts.of(1), 2)].into_iter());
+        assert_eq!(coverage.of(0), [(key(1), 0.2), (key(2), 0.2), (key(3), 0.1)]);
+        assert_eq!(coverage.of(1), [(key(9), 1.0)]);
+        assert_eq!(coverage.pixels(), 2);
+    }
+}
