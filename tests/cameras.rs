@@ -220,7 +220,7 @@ fn the_shutter_chooses_a_part_of_the_motion() {
 #[test]
 fn overscan_surrounds_the_picture() {
     let with = |overscan: u32, lens: Value| {
-        let mut scene = scene(json!({ "vertical_fov_degrees": 30 }));
+        let mut scene = scene(json!({ "vertical_fov_degrees": 18 }));
         merge(&mut scene["camera"], lens);
         scene["film"] = json!({ "width": 37, "height": 21, "overscan": overscan });
         scene["sampler"]["spp"] = json!(4);
