@@ -1,10 +1,34 @@
-//! Where points of moving surfaces are at other times.
+//! Points of surfaces by the corners of their triangles: where they are at other times, and their parameters.
 
 use super::vertex_color::weights;
-use super::{Geometry, Shape, SurfaceInteraction};
-use crate::math::DVec3;
+use super::{Geometry, Hit, Mesh, Shape, SurfaceInteraction};
+use crate::id::PrimId;
+use crate::math::{DVec3, Vec2};
+
+impl Mesh {
+    /// The weights of a triangle's corners at a point of it, at a time from 0 to 1.
+    fn weights_at(&self, prim: PrimId, p: DVec3, time: f32) -> [f64; 3] {
+        let points = self.triangle_points_at(prim, time);
+        let weights = weights([points.a, points.b, points.c].map(|corner| p - corner.as_dvec3()));
+        let sum: f64 = weights.iter().sum();
+        // A triangle may have no area for a moment.
+        if sum > 0.0 && sum < f64::INFINITY { weights.map(|w| w / sum) } else { [1.0 / 3.0; 3] }
+    }
+}
 
 impl Geometry {
+    /// Surface parameters of a point of which only the [place](super::Detail::Place) is known; `hit` is what led to it.
+    pub fn uv(&self, at: &SurfaceInteraction, hit: Option<&Hit>) -> Vec2 {
+        let Shape::Mesh(mesh) = self.shape(at.shape) else { return at.uv };
+        // Behind a rounding artefact another triangle is met than the hit says.
+        if let Some(hit) = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids()) {
+            return mesh.uv(at.prim, hit.u, hit.v);
+        }
+        let local = if at.is_instanced() { self.instance(at.instance).transform_at(at.time).inverse_point(at.p) } else { at.p };
+        let [_, u, v] = mesh.weights_at(at.prim, local, at.time);
+        mesh.uv(at.prim, u as f32, v as f32)
+    }
+
     /// Where a point of a surface is in the world when the shutter opens and when it closes.
     pub fn ends_of_motion(&self, at: &SurfaceInteraction) -> [DVec3; 2] {
         let mesh = match self.shape(at.shape) {
@@ -17,13 +41,7 @@ impl Geometry {
             return [at.p; 2];
         }
         let local = instance.map_or(at.p, |instance| instance.transform_at(at.time).inverse_point(at.p));
-        let weights = mesh.map(|mesh| {
-            let points = mesh.triangle_points_at(at.prim, at.time);
-            let weights = weights([points.a, points.b, points.c].map(|corner| local - corner.as_dvec3()));
-            let sum: f64 = weights.iter().sum();
-            // A triangle may have no area for a moment.
-            if sum > 0.0 && sum < f64::INFINITY { weights.map(|w| w / sum) } else { [1.0 / 3.0; 3] }
-        });
+        let weights = mesh.map(|mesh| mesh.weights_at(at.prim, local, at.time));
         [0.0, 1.0].map(|time| {
             let local = match (mesh, weights) {
                 (Some(mesh), Some([a, b, c])) => {
@@ -43,8 +61,8 @@ impl Geometry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Analytic, Hit, Instance, Mesh, MeshStep, Object, Placed, Sphere};
-    use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
+    use crate::geometry::{Analytic, Instance, MeshStep, Object, Placed, Sphere};
+    use crate::id::{InstanceId, ObjectId, ShapeId};
     use crate::math::{DAffine3, Motion, Ray, Transform, Vec3};
 
     fn seen(geometry: &Geometry, ray: &Ray, instance: InstanceId) -> SurfaceInteraction {
