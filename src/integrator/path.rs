@@ -24,7 +24,7 @@ use crate::film::{PartNeeds, SampleBatch};
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::guiding::Guide;
 use crate::id::LightId;
-use crate::light::{InfinityEval, Light, Receiver};
+use crate::light::{Light, Receiver};
 use crate::math::rows::BATCH;
 use crate::math::{DVec3, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
@@ -378,26 +378,6 @@ impl PathIntegrator {
             Strategy::Light => 0.0,
             Strategy::Bsdf => 1.0,
         }
-    }
-
-    /// Light from infinity along `direction`; `known` if it has been looked up already.
-    fn escaped(&self, world: &World, path: &Path, direction: Vec3, known: Option<InfinityEval>) -> Rgb {
-        let mut radiance = Rgb::BLACK;
-        for &id in world.scene.lights.at_infinity() {
-            radiance += self.escaped_from(world, path, direction, id, known);
-        }
-        radiance
-    }
-
-    /// Light from a light at infinity along `direction`; `known` if it has been looked up already.
-    #[inline(always)]
-    fn escaped_from(&self, world: &World, path: &Path, direction: Vec3, id: LightId, known: Option<InfinityEval>) -> Rgb {
-        let found_by = self.strategy.found_by();
-        let found = known.unwrap_or_else(|| world.scene.lights.get(id).eval_at_infinity(direction, found_by));
-        if found.radiance.is_black() {
-            return Rgb::BLACK;
-        }
-        found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from, found_by))
     }
 
     /// Light that the surface itself gives off against `ray`.
