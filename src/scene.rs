@@ -1,7 +1,8 @@
-//! A scene ready to render: tables and ids, no paths and no names but those of light groups, which become layers.
+//! A scene ready to render: tables and ids, no paths, and no names but those of layers: light groups, objects, materials.
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
+use crate::film::Identities;
 use crate::geometry::{Geometry, SurfaceInteraction};
 use crate::id::{LightId, MaterialId, MediumId, PrimId, ReliefId, ShapeId};
 use crate::light::{LightGroups, LightSet};
@@ -96,6 +97,8 @@ pub struct Scene {
     pub camera: Camera,
     /// What the scene uses.
     pub features: Features,
+    /// What shapes, materials and instances are called.
+    pub identities: Identities,
 }
 
 impl Scene {

@@ -44,6 +44,10 @@ mod glassware;
 /// glTF files as they look: which way up images, normals and glass are.
 mod gltf_looks;
 mod guiding;
+/// What shapes, materials and instances are called in layers that pick them.
+mod identities;
+/// The parts of the light, motion, and what denoisers need.
+mod layers;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
 /// Measured and textured lights, lamps in objects, groups, clamping.

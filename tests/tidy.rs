@@ -20,7 +20,7 @@ const LAYERS: &[(u32, &[&str])] = &[
 const NARROW: &[(&str, &[&str])] = &[
     ("accel", &["geometry", "math", "error", "id"]),
     ("output", &["film", "color", "error", "desc", "math"]),
-    ("scene", &["bsdf", "camera", "geometry", "id", "light", "material", "medium", "relief", "texture", "math", "color"]),
+    ("scene", &["bsdf", "camera", "film", "geometry", "id", "light", "material", "medium", "relief", "texture", "math", "color"]),
 ];
 
 const MAX_LINES: usize = 500;

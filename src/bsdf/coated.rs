@@ -15,6 +15,7 @@
 
 use super::fresnel;
 use super::microfacet::MIN_COSINE;
+use super::split::share;
 use super::{Bsdf, BsdfEval, BsdfSample, Coat, Eon};
 use crate::color::Rgb;
 use crate::math::float::ONE_MINUS_EPSILON;
@@ -97,6 +98,16 @@ impl Coated {
         }
         let (reflected, density) = self.coat.eval(o, i);
         BsdfEval { value: value + Rgb::splat(reflected), pdf: pdf + probability * density }
+    }
+
+    /// As [`Bsdf::diffuse_fraction`].
+    pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        let of_base = self.base.diffuse_fraction(wo, wi);
+        if self.coat.is_smooth() || of_base.is_black() {
+            return of_base;
+        }
+        let base = self.base.eval(wo, wi).value * self.left(upper(wo), upper(wi), self.coat.albedo(upper(wo)));
+        share(of_base * base, self.eval(wo, wi).value)
     }
 
     /// A direction from the coat or the base.

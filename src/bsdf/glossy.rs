@@ -10,6 +10,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::energy::schlick_weight;
 use super::microfacet::{MIN_COSINE, Microfacets, reflect};
+use super::split::share;
 use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
@@ -66,6 +67,11 @@ impl Glossy {
             value: self.diffuse * cosine_pdf + self.reflectance(facet.cos) * facet.value,
             pdf: (1.0 - probability) * cosine_pdf + probability * facet.pdf,
         }
+    }
+
+    /// As [`Bsdf::diffuse_fraction`](super::Bsdf::diffuse_fraction).
+    pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        share(self.diffuse * (FRAC_1_PI * wi.z.abs()), self.eval(wo, wi).value)
     }
 
     /// A direction from one of the parts.

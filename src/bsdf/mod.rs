@@ -17,6 +17,7 @@ mod microfacet;
 mod mirror;
 mod plastic;
 mod principled;
+mod split;
 #[cfg(test)]
 mod tests;
 mod thin;

@@ -15,6 +15,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use super::microfacet::MIN_COSINE;
+use super::split::share;
 use super::{BsdfEval, BsdfSample, Coat};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
@@ -59,13 +60,28 @@ impl Plastic {
         let (coat_o, coat_i) = (coat.albedo(o), coat.albedo(i));
         let probability = self.coat_probability(coat_o);
         let cosine_pdf = FRAC_1_PI * i.z;
-        let value = self.diffuse * ((1.0 - coat_o) * (1.0 - coat_i) * coat.inverse_transmittance() * cosine_pdf);
+        let value = self.base([coat_o, coat_i], cosine_pdf);
         let pdf = (1.0 - probability) * cosine_pdf;
         if coat.is_smooth() {
             return BsdfEval { value, pdf };
         }
         let (reflected, density) = coat.eval(o, i);
         BsdfEval { value: value + Rgb::splat(reflected), pdf: pdf + probability * density }
+    }
+
+    /// What the base scatters below a coat with these albedos.
+    #[inline]
+    fn base(&self, [coat_o, coat_i]: [f32; 2], cosine_pdf: f32) -> Rgb {
+        self.diffuse * ((1.0 - coat_o) * (1.0 - coat_i) * self.coat.inverse_transmittance() * cosine_pdf)
+    }
+
+    /// As [`Bsdf::diffuse_fraction`](super::Bsdf::diffuse_fraction).
+    pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
+        if self.coat.is_smooth() {
+            return Rgb::WHITE;
+        }
+        share(self.base([self.coat.albedo(o), self.coat.albedo(i)], FRAC_1_PI * i.z), self.eval_upper(o, i).value)
     }
 
     /// A direction from the coat or the base, chosen by what they scatter.

@@ -4,6 +4,7 @@
 mod camera;
 mod check;
 mod composites;
+mod identities;
 mod lights;
 mod materials;
 mod media;
@@ -39,6 +40,7 @@ use crate::material::Material;
 use crate::scene::{Features, Scene, Surface};
 use crate::texture::Texture;
 
+use identities::IdentityTable;
 use lights::LightTable;
 use materials::MaterialTable;
 use meshes::MeshStore;
@@ -75,6 +77,7 @@ fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
         surfaces: Vec::new(),
         opacities: Vec::new(),
         lights: LightTable::default(),
+        identities: IdentityTable::new(desc),
     };
     builder.add_world(desc)?;
     for (i, light) in desc.lights.iter().enumerate() {
@@ -154,6 +157,7 @@ struct Builder {
     /// How much of each shape is there, if not all of it, by shape.
     opacities: Vec<Option<TextureId>>,
     lights: LightTable,
+    identities: IdentityTable,
 }
 
 impl Builder {
@@ -205,6 +209,7 @@ impl Builder {
             light_groups,
             camera,
             features,
+            identities: self.identities.finish(),
         })
     }
 }

@@ -8,6 +8,7 @@ use super::nesting::Nesting;
 use super::prepared::PreparedShape;
 use crate::desc::{InstanceDesc, SceneDesc};
 use crate::error::Result;
+use crate::film::PlacementId;
 use crate::geometry::{Instance, Object};
 use crate::id::ObjectId;
 use crate::math::{DAffine3, Motion};
@@ -24,10 +25,10 @@ impl Builder {
     /// Adds the shapes of the world and all instances.
     pub(super) fn add_world(&mut self, desc: &SceneDesc) -> Result<()> {
         for (i, shape) in desc.shapes.iter().enumerate() {
-            for prepared in self.prepare(&format!("shapes[{i}]"), shape)? {
+            for prepared in self.prepare(&format!("shapes[{i}]"), i, shape)? {
                 if let Some(motion) = prepared.motion.clone() {
                     let object = self.group(vec![prepared])?;
-                    self.push_instance(&format!("shapes[{i}].motion"), object, &motion)?;
+                    self.push_instance(&format!("shapes[{i}].motion"), object, &motion, None)?;
                 } else {
                     let id = self.place(prepared, &DAffine3::IDENTITY)?;
                     self.geometry.world.push(id);
@@ -40,7 +41,7 @@ impl Builder {
         for (name, object) in &desc.objects {
             let mut shapes = Vec::new();
             for (k, shape) in object.shapes.iter().enumerate() {
-                shapes.extend(self.prepare(&format!("objects.{name}.shapes[{k}]"), shape)?);
+                shapes.extend(self.prepare(&format!("objects.{name}.shapes[{k}]"), k, shape)?);
             }
             if nesting.is_used(name) {
                 objects.insert(name.as_str(), self.share(shapes)?);
@@ -48,7 +49,8 @@ impl Builder {
                 tracing::warn!("{}: objects.{name}: no instance places this object", self.files.scene.display());
             }
         }
-        let world = Level { desc, nesting: &nesting, objects: &objects, path: "instances", outer: &Motion::constant(DAffine3::IDENTITY) };
+        let still = Motion::constant(DAffine3::IDENTITY);
+        let world = Level { desc, nesting: &nesting, objects: &objects, path: "instances", outer: &still, placement: None };
         self.add_instances(&world, &desc.instances)
     }
 
@@ -76,9 +78,10 @@ impl Builder {
         Ok(ObjectId::new(self.geometry.objects.len() - 1))
     }
 
-    fn push_instance(&mut self, path: &str, object: ObjectId, motion: &Motion) -> Result<()> {
+    fn push_instance(&mut self, path: &str, object: ObjectId, motion: &Motion, placement: Option<PlacementId>) -> Result<()> {
         let instance = Instance::moving(object, motion.clone()).ok_or_else(|| self.files.error(path, super::SINGULAR))?;
         self.geometry.instances.push(instance);
+        self.identities.add_instance(placement);
         Ok(())
     }
 
@@ -96,21 +99,24 @@ impl Builder {
             let place = format!("{path}.transform");
             let map = self.files.transform(&place, &instance.transform, &DAffine3::IDENTITY)?.world_from_object;
             let outer = level.outer.after(&self.files.motion(&format!("{path}.motion"), &instance.motion, &map, self.shutter)?);
+            let placement = Some(self.identities.placement(i, instance, level.placement));
             if let Some(object) = object.shared {
-                self.push_instance(&place, object, &outer)?;
+                self.push_instance(&place, object, &outer, placement)?;
             }
             for (object, motion) in &object.movers {
-                self.push_instance(&place, *object, &outer.after(motion))?;
+                self.push_instance(&place, *object, &outer.after(motion), placement)?;
             }
             for emitter in &object.emitters {
                 let outer = outer.as_constant().ok_or_else(|| {
                     self.files.error(&format!("{path}.motion"), format!("object \"{name}\" gives off light and cannot move"))
                 })?;
-                let id = self.place(emitter.clone(), &outer)?;
+                let mut emitter = emitter.clone();
+                emitter.identity.placement = placement;
+                let id = self.place(emitter, &outer)?;
                 self.geometry.world.push(id);
             }
             let path = format!("objects.{name}.instances");
-            self.add_instances(&Level { path: &path, outer: &outer, ..*level }, &inner.instances)?;
+            self.add_instances(&Level { path: &path, outer: &outer, placement, ..*level }, &inner.instances)?;
         }
         Ok(())
     }
@@ -124,4 +130,5 @@ struct Level<'a> {
     objects: &'a BTreeMap<&'a str, PreparedObject>,
     path: &'a str,
     outer: &'a Motion,
+    placement: Option<PlacementId>,
 }

@@ -6,6 +6,7 @@ use super::{Builder, meshes, shapes};
 use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
 use crate::error::{Error, Result};
+use crate::film::ShapeIdentity;
 use crate::geometry::{Analytic, Placed, Shape};
 use crate::id::{LightGroupId, ShapeId};
 use crate::import::MeshData;
@@ -26,6 +27,8 @@ pub struct PreparedShape {
     look: Look,
     /// Light that it gives off, not black.
     pub emission: Option<PreparedEmission>,
+    /// What it is called.
+    pub identity: ShapeIdentity,
     /// Where the scene has it.
     path: String,
 }
@@ -52,9 +55,10 @@ enum Form {
 }
 
 impl Builder {
-    /// Loads and checks one shape of the scene file; an OBJ file may bring several.
-    pub(super) fn prepare(&mut self, path: &str, desc: &ShapeDesc) -> Result<Vec<PreparedShape>> {
+    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may bring several.
+    pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
+        let identity = self.identities.shape(&self.files, number, desc);
         let mut look = self.materials.find(&self.files, path, common.material)?;
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
@@ -69,7 +73,7 @@ impl Builder {
             return Err(self.without_colors(path, None, common.material));
         }
         let form = match desc {
-            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), look, emission),
+            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), look, emission, identity),
             ShapeDesc::Cube(_) => Form::Mesh {
                 data: meshes::cube(),
                 shading: MeshShadingDesc::Flat,
@@ -83,9 +87,10 @@ impl Builder {
             },
         };
         let reverse_normal = common.reverse_normal;
-        Ok(vec![PreparedShape { form, map, motion, reverse_normal, look, emission, path: path.into() }])
+        Ok(vec![PreparedShape { form, map, motion, reverse_normal, look, emission, identity, path: path.into() }])
     }
 
+    #[allow(clippy::too_many_arguments)]
     fn prepare_mesh(
         &mut self,
         path: &str,
@@ -94,14 +99,16 @@ impl Builder {
         motion: Option<&Motion>,
         look: Look,
         emission: Option<PreparedEmission>,
+        identity: ShapeIdentity,
     ) -> Result<Vec<PreparedShape>> {
         let smoothing = self.smoothing(path, desc)?;
         let mut prepared = Vec::new();
         for mut loaded in self.meshes.take(&self.files, path, desc)? {
             let moves = motion.is_some() || !loaded.later.is_empty();
-            let (mut look, mut emission) = (look, emission);
+            let (mut look, mut emission, mut identity) = (look, emission, identity);
             let has_uvs = loaded.data.uvs.is_some();
             if let Some(mtl) = &loaded.material {
+                identity.material = self.identities.name(&mtl.name);
                 let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
                 // What the scene says of the shape counts.
                 let given = if desc.opacity.is_some() { look.opacity } else { from_mtl.look.opacity };
@@ -131,6 +138,7 @@ impl Builder {
                 reverse_normal: desc.reverse_normal,
                 look,
                 emission,
+                identity,
                 path: path.into(),
             });
         }
@@ -173,7 +181,7 @@ impl Builder {
 
     /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
     pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3) -> Result<ShapeId> {
-        let PreparedShape { form, map, motion, reverse_normal, look, emission, path } = prepared;
+        let PreparedShape { form, map, motion, reverse_normal, look, emission, identity, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform = Transform::new(*outer * map).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
@@ -210,6 +218,7 @@ impl Builder {
             surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
         }
         self.surfaces.push(surface);
+        self.identities.add_shape(identity);
         self.opacities.push(look.opacity);
         Ok(id)
     }

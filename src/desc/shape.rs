@@ -14,7 +14,8 @@ macro_rules! shapes {
             #[serde(deny_unknown_fields)]
             pub struct $name {
                 $($(#[$field_doc])* pub $field: $type,)*
-                /// Free text, used in messages.
+                /// What the shape is called in layers that pick objects; those of the same name are picked together. Default: its file or its kind
+                /// with the place in the list, as in `sphere_3`.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub name: Option<String>,
                 /// A material by name. Default: diffuse with albedo 0.5.
@@ -395,6 +396,10 @@ pub struct ObjectDesc {
 pub struct InstanceDesc {
     /// The object's name.
     pub object: String,
+    /// What the instance is called in layers that pick objects; those of the same name are picked together. Default: the object's name with
+    /// the place in the list, as in `tree_17`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Where it stands.
     #[serde(default, skip_serializing_if = "TransformDesc::is_empty")]
     pub transform: TransformDesc,

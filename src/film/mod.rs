@@ -5,6 +5,7 @@
 
 mod coverage;
 mod filter;
+mod identities;
 mod image;
 mod layer;
 mod sample;
@@ -14,6 +15,7 @@ mod tiles;
 
 pub use coverage::{Coverage, CoverageCounts};
 pub use filter::{Filter, FilterSample};
+pub use identities::{Identities, Label, NameId, PlacementId, ShapeIdentity};
 pub use image::{Crop, Image, Layer};
 pub use layer::{Average, LayerInfo, LayerKind, LayerSet, Source};
 pub use sample::{Part, PartNeeds, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};

@@ -7,6 +7,7 @@ mod hit;
 mod instance;
 mod interaction;
 mod mesh;
+mod moving;
 mod placed;
 mod profile;
 mod quad;

@@ -26,6 +26,7 @@ impl World<'_> {
     /// As part of a picture of `size` pixels with `spp` samples each: textures are looked up over what a sample stands for.
     #[must_use]
     pub fn of_picture(mut self, size: [u32; 2], spp: u32) -> Self {
+        self.picture = Some(size);
         let division = Division { size, share: 1.0 / (spp.max(1) as f32).sqrt() };
         self.division = self.scene.features.filtered_textures.then_some(division);
         self

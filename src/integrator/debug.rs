@@ -1,6 +1,8 @@
 //! Views of a scene without light transport, and ambient occlusion.
 
-use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions, surface_sample};
+use super::parts::add_undivided;
+use super::surface::surface_sample;
+use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
 use crate::accel::Coherence;
 use crate::color::Rgb;
 use crate::film::{PartNeeds, PixelSample, SampleBatch};
@@ -110,10 +112,17 @@ fn for_each_first_surface(
     let wants_surface = needs != SurfaceNeeds::default();
     out.reset(samples.len(), wants_surface, parts);
     for (i, ((sample, ray), hit)) in samples.iter().zip(&rays).zip(hits).enumerate() {
-        let Some(at) = world.resolve(ray, hit) else { continue };
-        out.pixels[i] = PixelSample { radiance: shade(sample, ray, &at), alpha: 1.0 };
+        let Some(at) = world.resolve(ray, hit) else {
+            if needs.motion {
+                out.surfaces[i].motion = world.motion_at_infinity(ray.direction).to_array();
+            }
+            continue;
+        };
+        let radiance = shade(sample, ray, &at);
+        out.pixels[i] = PixelSample { radiance, alpha: 1.0 };
+        add_undivided(parts, out.parts_mut(i), radiance);
         if wants_surface {
-            out.surfaces[i] = surface_sample(world, needs, &at, ray.direction, || world.scene.texture_point(&at));
+            out.surfaces[i] = surface_sample(world, needs, &at, (ray, hit.as_ref()), || world.scene.texture_point(&at));
         }
     }
 }

@@ -8,9 +8,11 @@ mod cones;
 mod debug;
 mod guided;
 mod media;
+mod parts;
 mod path;
 mod shading;
 mod strategy;
+mod surface;
 mod vertex;
 mod whitted;
 mod world;
@@ -19,18 +21,17 @@ pub use debug::{AmbientOcclusion, DebugView, View};
 pub use path::PathIntegrator;
 pub(crate) use shading::{facing_normal, terminator_factor};
 pub use strategy::Strategy;
+pub use surface::SurfaceNeeds;
 pub use whitted::Whitted;
 pub use world::World;
 
 use std::sync::Arc;
 
 use crate::desc::IntegratorDesc;
-use crate::film::{PartNeeds, SampleBatch, ShapeKey, SurfaceSample};
-use crate::geometry::SurfaceInteraction;
+use crate::film::{PartNeeds, SampleBatch};
 use crate::guiding::Guide;
-use crate::math::{Ray, Vec3};
+use crate::math::Ray;
 use crate::sampling::{PixelSeed, Sampler};
-use crate::texture::Footprint;
 
 /// Sets of four dimensions of the sampler, by purpose.
 pub mod dimensions {
@@ -90,15 +91,6 @@ impl RayCounts {
     }
 }
 
-/// Which parts of [`SurfaceSample`] are wanted; the rest is not computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SurfaceNeeds {
-    /// Any of depth, normals, position, uv and the shape.
-    pub geometry: bool,
-    /// Albedo.
-    pub albedo: bool,
-}
-
 /// Computes what each camera sample brings.
 pub trait Integrator: Send + Sync {
     /// Fills `out` with one entry for each of `samples`, and counts rays.
@@ -149,28 +141,4 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
             Box::new(AmbientOcclusion { distance: distance.unwrap_or(f32::INFINITY), sampler, needs, parts })
         }
     }
-}
-
-/// What the layers need of the first surface.
-fn surface_sample(
-    world: &World,
-    needs: SurfaceNeeds,
-    at: &SurfaceInteraction,
-    direction: Vec3,
-    footprint: impl FnOnce() -> Footprint,
-) -> SurfaceSample {
-    let mut sample = SurfaceSample::default();
-    if needs.geometry {
-        sample.depth = world.scene.camera.depth(at.p, at.time);
-        sample.normal = at.n_s;
-        sample.geometric_normal = at.n_g;
-        sample.uv = at.uv.to_array();
-        sample.shown = ShapeKey { instance: at.instance.0, shape: at.shape.0 };
-        sample.position = at.p.as_vec3();
-    }
-    if needs.albedo {
-        let frame = crate::math::Frame::from_normal(at.n_s);
-        sample.albedo = world.scene.bsdf(at, direction, footprint, &mut None).albedo(frame.to_local(-direction));
-    }
-    sample
 }

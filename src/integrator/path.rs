@@ -6,26 +6,32 @@
 mod escapes;
 mod lanes;
 mod side_by_side;
+mod sorting;
 
 use std::cell::RefCell;
 use std::sync::Arc;
 
 use super::guided::{Steered, Steering, Turns};
 use super::media::MediaState;
+use super::parts::{Way, group_of};
+use super::surface::albedo_at;
 use super::vertex::Vertex;
-use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions, surface_sample};
+use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions};
 use crate::accel::Coherence;
+use crate::bsdf::BsdfSample;
 use crate::color::Rgb;
 use crate::film::{PartNeeds, SampleBatch};
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::guiding::Guide;
-use crate::light::{InfinityEval, Light, Receiver};
+use crate::id::LightId;
+use crate::light::{Light, Receiver};
 use crate::math::rows::BATCH;
 use crate::math::{DVec3, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
 use crate::sampling::{Numbers, PixelSeed, Requests, Sampler, power_heuristic};
 use escapes::Escapes;
 use side_by_side::Shaded;
+use sorting::{Sorting, seen_through};
 
 /// Path tracing.
 #[derive(Clone, Debug)]
@@ -93,6 +99,7 @@ struct Scratch {
     draws: Draws,
     escapes: Escapes,
     shaded: Shaded,
+    sorting: Sorting,
     /// With a guide that learns.
     turns: Turns,
 }
@@ -154,6 +161,7 @@ impl PathIntegrator {
         scratch.cones.extend(scratch.rays.iter().map_while(|ray| world.camera_cone(ray)));
 
         scratch.turns.clear();
+        scratch.sorting.begin(self, samples.len());
 
         for bounce in 0..self.max_depth {
             let count = scratch.rays.len();
@@ -191,6 +199,10 @@ impl PathIntegrator {
                     out.pixels[pending.slot as usize].radiance += pending.contribution;
                 }
             }
+            if self.sorts() {
+                let pending = scratch.pending.iter().map(|pending| (pending.slot, pending.contribution));
+                self.sort_pending(&scratch.sorting, pending.zip(&scratch.occluded), out);
+            }
             scratch.turns.settle(out);
         }
         scratch.turns.teach(self, out);
@@ -199,13 +211,14 @@ impl PathIntegrator {
     /// Takes every path through media to the next surface where something happens to it; says how many rays that took.
     #[inline(never)]
     fn arrive_all(&self, world: &World, scratch: &mut Scratch) -> u64 {
-        let Scratch { paths, rays, hits, media, cones, .. } = scratch;
+        let Scratch { paths, rays, hits, media, cones, sorting, .. } = scratch;
         let mut passed = 0;
         for (i, path) in paths.iter_mut().enumerate() {
             let start = rays[i].origin;
             let arrival = world.arrive(&mut rays[i], hits[i], &mut media[i]);
             hits[i] = arrival.hit;
             path.throughput *= arrival.transmittance;
+            sorting.absorb(i, arrival.transmittance);
             if arrival.passed > 0 {
                 // No shadow ray would have come so far.
                 path.pdf = f32::INFINITY;
@@ -234,6 +247,7 @@ impl PathIntegrator {
     fn shade_all<const MEDIA: bool, const GUIDED: bool>(&self, world: &World, bounce: u32, out: &mut SampleBatch, scratch: &mut Scratch) {
         scratch.shadow_rays.clear();
         scratch.pending.clear();
+        scratch.sorting.clear_pending();
         let count = scratch.paths.len();
         let is_last = bounce + 1 >= self.max_depth;
         let side_by_side = !MEDIA && !GUIDED && !is_last && self.shades_side_by_side(world);
@@ -271,14 +285,21 @@ impl PathIntegrator {
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, turns, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, media, cones, draws, escapes, turns, sorting, .. } = scratch;
         let (path, ray) = (&paths[i], &rays[i]);
         let sample = &mut out.pixels[path.slot as usize];
         let found = world.resolve(ray, hits[i]);
         let Some(at) = &found else {
+            let known = escapes.of(i - first, hits[i]);
             if bounce > 0 || !self.hide_emitters {
-                sample.radiance +=
-                    self.clamped(path.throughput * self.escaped(world, path, ray.direction, escapes.of(i - first, hits[i])), bounce);
+                let light = self.clamped(path.throughput * self.escaped(world, path, ray.direction, known), bounce);
+                sample.radiance += light;
+                if self.sorts() {
+                    self.sort_escaped(world, (sorting, i), (path, bounce), (ray.direction, known), light, out);
+                }
+            }
+            if !out.surfaces.is_empty() {
+                self.note_escape(world, sorting.clear_of(i), (path, bounce), (ray.direction, known), out);
             }
             return;
         };
@@ -286,11 +307,17 @@ impl PathIntegrator {
         let footprint = || world.footprint(cone.as_ref(), ray, hits[i].as_ref(), at);
         if bounce == 0 {
             sample.alpha = 1.0;
-            if self.needs != SurfaceNeeds::default() {
-                out.surfaces[path.slot as usize] = surface_sample(world, self.needs, at, ray.direction, footprint);
-            }
         }
-        sample.radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
+        let clear = sorting.clear_of(i);
+        if self.notes_surface(bounce, clear) {
+            let albedo = || albedo_at(world, at, ray, footprint);
+            self.note_surface(world, (bounce, clear, path.slot), (at, hits[i].as_ref()), albedo, out);
+        }
+        let light = self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
+        out.pixels[path.slot as usize].radiance += light;
+        if self.sorts() && !light.is_black() {
+            self.sort_emitted(world, (sorting, i), at, (path.slot, bounce), light, out);
+        }
         if bounce + 1 >= self.max_depth {
             return;
         }
@@ -309,8 +336,12 @@ impl PathIntegrator {
             }
             shadow_rays.push(shadow.ray);
             pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
+            if self.sorts() {
+                let way = || Way::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(shadow.toward));
+                sorting.push_pending(bounce, i, group_of(world.scene, shadow.light), way);
+            }
         }
-        if let Some((path, next)) = self.scatter(world, path, &vertex, bounce, (steering, turns), draws.bsdf.of(i - first)) {
+        if let Some((path, next, sample)) = self.scatter(world, path, &vertex, bounce, (steering, turns), draws.bsdf.of(i - first)) {
             if MEDIA {
                 let here = world.media_toward(at, ray.direction, next.direction, &media[i].here);
                 media[*alive] = MediaState { here, ..media[i] };
@@ -318,6 +349,8 @@ impl PathIntegrator {
             if let Some(cone) = cone {
                 cones[*alive] = world.scattered_cone(cone, at.t, path.pdf);
             }
+            let way = || Way::of_sample(vertex.bsdf, vertex.wo, &sample);
+            sorting.follow(self.parts, bounce, [i, *alive], way, || seen_through(vertex.bsdf, &sample));
             paths[*alive] = path;
             rays[*alive] = next;
             *alive += 1;
@@ -345,19 +378,6 @@ impl PathIntegrator {
             Strategy::Light => 0.0,
             Strategy::Bsdf => 1.0,
         }
-    }
-
-    /// Light from infinity along `direction`; `known` if it has been looked up already.
-    fn escaped(&self, world: &World, path: &Path, direction: Vec3, known: Option<InfinityEval>) -> Rgb {
-        let mut radiance = Rgb::BLACK;
-        let found_by = self.strategy.found_by();
-        for &id in world.scene.lights.at_infinity() {
-            let found = known.unwrap_or_else(|| world.scene.lights.get(id).eval_at_infinity(direction, found_by));
-            if !found.radiance.is_black() {
-                radiance += found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from, found_by));
-            }
-        }
-        radiance
     }
 
     /// Light that the surface itself gives off against `ray`.
@@ -404,10 +424,10 @@ impl PathIntegrator {
         if contribution.is_black() {
             return None;
         }
-        Some(ShadowRay { ray: sample.shadow_ray(start), contribution })
+        Some(ShadowRay { ray: sample.shadow_ray(start), contribution, light: choice.id, toward: sample.wi })
     }
 
-    /// The path after its next scattering with its next ray, unless it ends here.
+    /// The path after its next scattering with its next ray and how it was scattered, unless it ends here.
     #[inline(always)]
     fn scatter(
         &self,
@@ -417,7 +437,7 @@ impl PathIntegrator {
         bounce: u32,
         (steering, turns): (Option<Steering>, &mut Turns),
         u: [f32; 4],
-    ) -> Option<(Path, Ray)> {
+    ) -> Option<(Path, Ray, BsdfSample)> {
         let steered = match steering {
             None => {
                 let (sample, ray) = vertex.sample(world, u[0], [u[1], u[2]])?;
@@ -448,7 +468,7 @@ impl PathIntegrator {
         }
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        Some((Path { throughput, pdf, roulette_scale, from: vertex.receiver(), ..*path }, *ray))
+        Some((Path { throughput, pdf, roulette_scale, from: vertex.receiver(), ..*path }, *ray, *sample))
     }
 }
 
@@ -456,4 +476,7 @@ impl PathIntegrator {
 struct ShadowRay {
     ray: Ray,
     contribution: Rgb,
+    light: LightId,
+    /// The unit direction for which the surface was evaluated.
+    toward: Vec3,
 }

@@ -2,12 +2,15 @@
 //! Display").
 
 use super::media::MediaState;
+use super::parts::{Course, Way, add_by_group, add_by_scattering, group_of};
+use super::surface::surface_sample;
 use super::vertex::Vertex;
-use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, surface_sample};
+use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World};
 use crate::color::Rgb;
-use crate::film::{PartNeeds, PixelSample, SampleBatch};
+use crate::film::{PartNeeds, PixelSample, SampleBatch, SurfaceSample};
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::light::{FoundBy, Light};
+use crate::id::LightId;
+use crate::light::FoundBy;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Ray, RayCone};
 use crate::medium::Interior;
@@ -42,17 +45,68 @@ impl Integrator for Whitted {
                 counts.camera += 1 + world.pass_emitters(&mut ray, &mut hit);
             }
             let segment = Segment::trace(world, ray, world.camera_cone(&ray), here, counts);
-            out.pixels[i] = match &segment.end {
-                Some(at) => {
-                    if wants_surface {
-                        out.surfaces[i] = surface_sample(world, self.needs, at, segment.ray.direction, || segment.footprint(world, at));
+            if wants_surface {
+                out.surfaces[i] = match &segment.end {
+                    Some(at) => {
+                        let met = (&segment.ray, segment.hit.as_ref());
+                        surface_sample(world, self.needs, at, met, || segment.footprint(world, at))
                     }
-                    PixelSample { radiance: self.shade(world, &segment, at, 1, counts) * segment.transmittance, alpha: 1.0 }
-                }
+                    None if self.needs.motion => {
+                        SurfaceSample { motion: world.motion_at_infinity(segment.ray.direction).to_array(), ..SurfaceSample::default() }
+                    }
+                    None => SurfaceSample::default(),
+                };
+            }
+            let mut tally = Tally { needs: self.parts, parts: out.parts_mut(i), rays: counts };
+            let view = View { depth: 1, throughput: segment.transmittance, way: None };
+            out.pixels[i] = match &segment.end {
+                Some(at) => PixelSample { radiance: self.shade(world, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
                 None if self.hide_emitters => PixelSample::default(),
-                None => PixelSample { radiance: segment.escaped(world), alpha: 0.0 },
+                None => PixelSample { radiance: segment.escaped(world, View { throughput: Rgb::WHITE, ..view }, &mut tally), alpha: 0.0 },
             };
         }
+    }
+}
+
+/// A segment of a path as the camera sees it.
+#[derive(Clone, Copy)]
+struct View {
+    /// Its number.
+    depth: u32,
+    /// What is left at the camera of the light that leaves its end.
+    throughput: Rgb,
+    /// How light left the first surface, if this is behind it.
+    way: Option<Way>,
+}
+
+impl View {
+    /// The course of light that comes along the segment, after `scatterings` at its end.
+    fn course(self, scatterings: u32, straight: Course) -> Course {
+        match (self.way, self.depth - 1 + scatterings) {
+            (Some(way), 1) => Course::Direct(way),
+            (Some(way), _) => Course::Indirect(way),
+            (None, _) => straight,
+        }
+    }
+}
+
+/// What is counted of a sample beside its radiance.
+struct Tally<'a> {
+    needs: PartNeeds,
+    parts: &'a mut [Rgb],
+    rays: &'a mut RayCounts,
+}
+
+impl Tally<'_> {
+    fn sorts(&self) -> bool {
+        self.needs.count() > 0
+    }
+
+    /// Adds light at the camera; that of no light is in the last group.
+    fn add(&mut self, world: &World, light: Rgb, course: Course, source: Option<LightId>) {
+        add_by_scattering(self.needs, self.parts, light, course);
+        let group = source.map_or(self.needs.light_groups.saturating_sub(1) as usize, |id| group_of(world.scene, id));
+        add_by_group(self.needs, self.parts, light, group);
     }
 }
 
@@ -93,17 +147,28 @@ impl Segment {
     }
 
     /// What arrives from infinity.
-    fn escaped(&self, world: &World) -> Rgb {
+    fn escaped(&self, world: &World, view: View, tally: &mut Tally) -> Rgb {
+        if tally.sorts() {
+            for &id in world.scene.lights.at_infinity() {
+                let light = world.scene.lights.get(id).eval_at_infinity(self.ray.direction, FoundBy::Lights).radiance;
+                let course = view.course(0, Course::Background);
+                tally.add(world, view.throughput * light * self.transmittance, course, Some(id));
+            }
+        }
         world.radiance_at_infinity(self.ray.direction) * self.transmittance
     }
 }
 
 impl Whitted {
-    /// Radiance leaving `at`, the end of the segment number `depth` of its path, against that.
-    fn shade(&self, world: &World, segment: &Segment, at: &SurfaceInteraction, depth: u32, counts: &mut RayCounts) -> Rgb {
+    /// Radiance leaving `at`, the end of the segment, against that.
+    fn shade(&self, world: &World, segment: &Segment, at: &SurfaceInteraction, view: View, tally: &mut Tally) -> Rgb {
         let Segment { ray, cone, media, .. } = segment;
         let mut radiance = world.emitted(at, -ray.direction);
-        if depth >= self.max_depth {
+        if tally.sorts() {
+            let source = world.scene.surface(at.shape).light(at.prim);
+            tally.add(world, view.throughput * radiance, view.course(0, Course::Emission), source);
+        }
+        if view.depth >= self.max_depth {
             return radiance;
         }
         let mut bsdf = None;
@@ -113,9 +178,13 @@ impl Whitted {
             vertex.bsdf = boundary;
         }
         if !vertex.bsdf.is_delta() {
-            radiance += self.ambient * vertex.bsdf.albedo(vertex.wo);
-            for light in world.scene.lights.lights() {
-                radiance += direct_light(world, segment, &vertex, light, counts);
+            let ambient = self.ambient * vertex.bsdf.albedo(vertex.wo);
+            radiance += ambient;
+            if tally.sorts() {
+                tally.add(world, view.throughput * ambient, view.course(2, Course::Indirect(Way::DIFFUSE)), None);
+            }
+            for id in (0..world.scene.lights.lights().len()).map(LightId::new) {
+                radiance += direct_light(world, segment, &vertex, id, view, tally);
             }
         }
 
@@ -128,12 +197,17 @@ impl Whitted {
             if vertex.shadowing(lobe.wi, direction) == 0.0 {
                 continue;
             }
-            counts.indirect += 1;
+            tally.rays.indirect += 1;
             let here = world.media_toward(at, ray.direction, direction, &media.here);
-            let next = Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), here, counts);
+            let next = Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), here, tally.rays);
+            let way = view.way.unwrap_or_else(|| Way::of_sample(vertex.bsdf, vertex.wo, &lobe));
+            let behind = View { depth: view.depth + 1, throughput: view.throughput * lobe.weight * lobe.pdf, way: Some(way) };
             let arriving = match &next.end {
-                Some(end) => self.shade(world, &next, end, depth + 1, counts) * next.transmittance,
-                None => next.escaped(world),
+                Some(end) => {
+                    let behind = View { throughput: behind.throughput * next.transmittance, ..behind };
+                    self.shade(world, &next, end, behind, tally) * next.transmittance
+                }
+                None => next.escaped(world, behind, tally),
             };
             radiance += arriving * lobe.weight * lobe.pdf;
         }
@@ -142,8 +216,8 @@ impl Whitted {
 }
 
 /// Light that arrives from the middle of one light and is scattered back.
-fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, light: &Light, counts: &mut RayCounts) -> Rgb {
-    let at = vertex.at;
+fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, id: LightId, view: View, tally: &mut Tally) -> Rgb {
+    let (at, light) = (vertex.at, world.scene.lights.get(id));
     let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2], FoundBy::Lights) else {
         return Rgb::BLACK;
     };
@@ -155,11 +229,16 @@ fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, light: &Light
     if scattered.is_black() {
         return scattered;
     }
-    counts.shadow += 1;
+    tally.rays.shadow += 1;
     let shadow = sample.shadow_ray(start);
     if world.accel.occluded(&shadow) {
         return Rgb::BLACK;
     }
     let here = world.media_toward(at, segment.ray.direction, shadow.direction, &segment.media.here);
-    scattered * world.transmittance(&here, &shadow)
+    let light = scattered * world.transmittance(&here, &shadow);
+    if tally.sorts() {
+        let way = Way::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(sample.wi));
+        tally.add(world, view.throughput * light, view.course(1, Course::Direct(way)), Some(id));
+    }
+    light
 }

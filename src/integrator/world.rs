@@ -27,13 +27,15 @@ pub struct World<'a> {
     pub(super) division: Option<Division>,
     /// Around all surfaces of media.
     pub(super) media_bounds: Aabb,
+    /// Width and height of the picture in pixels, if it is part of one.
+    pub(super) picture: Option<[u32; 2]>,
 }
 
 impl<'a> World<'a> {
     /// A scene with its accelerator.
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator) -> Self {
         let detail = if scene.features.parameters { Detail::Full } else { Detail::Place };
-        Self { scene, accel, bounds: accel.bounds(), detail, division: None, media_bounds: super::media::bounds(scene) }
+        Self { scene, accel, bounds: accel.bounds(), detail, division: None, media_bounds: super::media::bounds(scene), picture: None }
     }
 
     /// Whether places are all that is found of surfaces, without parameters.

@@ -108,9 +108,11 @@ impl<'a> Job<'a> {
         let sampler = Sampler::new(settings.sampler, settings.seed);
         let wanted = |kind| settings.layers.contains(kind);
         let needs = SurfaceNeeds {
-            geometry: [LayerKind::Z, LayerKind::N, LayerKind::Ng, LayerKind::P, LayerKind::Uv].into_iter().any(wanted)
-                || settings.layers.needs_coverage(),
+            geometry: [LayerKind::Z, LayerKind::N, LayerKind::Ng, LayerKind::P].into_iter().any(wanted) || settings.layers.needs_coverage(),
+            uv: wanted(LayerKind::Uv),
+            motion: wanted(LayerKind::Motion),
             albedo: wanted(LayerKind::Albedo),
+            features: wanted(LayerKind::FeatureAlbedo) || wanted(LayerKind::FeatureNormal),
         };
         let light_groups = light_groups(scene);
         let parts = PartNeeds {
@@ -120,7 +122,7 @@ impl<'a> Job<'a> {
         let setup = Setup { sampler, needs, parts, side_by_side: settings.side_by_side, guide: None };
         let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
         Self {
-            world: if settings.integrator == IntegratorDesc::Uv || wanted(LayerKind::Uv) { world.in_full() } else { world },
+            world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
             integrator: integrator::build(&settings.integrator, setup.clone()),
             setup,
             filter: Filter::new(&settings.filter),

@@ -137,7 +137,7 @@ fn instances(count: usize) -> Vec<InstanceDesc> {
             TransformStepDesc::Scale(ScaleDesc::Uniform(cell * rng.range(0.3, 0.5))),
             TransformStepDesc::Translate(corner),
         ];
-        InstanceDesc { object: "sphere".into(), transform: TransformDesc(steps), motion: Vec::new() }
+        InstanceDesc { object: "sphere".into(), name: None, transform: TransformDesc(steps), motion: Vec::new() }
     };
     (0..count).map(&mut place).collect()
 }

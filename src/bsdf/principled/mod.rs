@@ -23,6 +23,7 @@
 
 mod corners;
 pub(super) mod shapes;
+mod split;
 
 use std::f32::consts::{FRAC_1_PI, PI};
 

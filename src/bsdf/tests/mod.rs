@@ -8,6 +8,7 @@ mod limits;
 mod microfacet;
 mod principled;
 mod sampling;
+mod split;
 
 use super::*;
 use crate::math::vec3;

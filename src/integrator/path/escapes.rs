@@ -1,6 +1,9 @@
 //! What rays bring that leave the scene, looked up in an image for many of them at once.
 
+use super::{Path, PathIntegrator};
+use crate::color::Rgb;
 use crate::geometry::Hit;
+use crate::id::LightId;
 use crate::integrator::World;
 use crate::light::{FoundBy, InfinityEval};
 use crate::math::rows::BATCH;
@@ -45,5 +48,27 @@ impl Escapes {
     #[inline]
     pub fn of(&self, ray: usize, hit: Option<Hit>) -> Option<InfinityEval> {
         (self.known && hit.is_none()).then(|| self.evals[usize::from(self.index_of[ray])])
+    }
+}
+
+impl PathIntegrator {
+    /// Light from infinity along `direction`; `known` if it has been looked up already.
+    pub(super) fn escaped(&self, world: &World, path: &Path, direction: Vec3, known: Option<InfinityEval>) -> Rgb {
+        let mut radiance = Rgb::BLACK;
+        for &id in world.scene.lights.at_infinity() {
+            radiance += self.escaped_from(world, path, direction, id, known);
+        }
+        radiance
+    }
+
+    /// Light from a light at infinity along `direction`; `known` if it has been looked up already.
+    #[inline(always)]
+    pub(super) fn escaped_from(&self, world: &World, path: &Path, direction: Vec3, id: LightId, known: Option<InfinityEval>) -> Rgb {
+        let found_by = self.strategy.found_by();
+        let found = known.unwrap_or_else(|| world.scene.lights.get(id).eval_at_infinity(direction, found_by));
+        if found.radiance.is_black() {
+            return Rgb::BLACK;
+        }
+        found.radiance * self.found_by_chance(path, found.pdf * world.scene.lights.pmf(id, &path.from, found_by))
     }
 }

@@ -4,11 +4,11 @@
 mod kernels;
 
 use crate::color::Rgb;
-use crate::geometry::{SurfaceInteraction, TrianglePoints};
+use crate::geometry::{Hit, SurfaceInteraction, TrianglePoints};
 use crate::light::{LightSample, Receiver, ShadowTarget};
 use crate::math::rows::{BATCH, Points, Row, Vectors};
 use crate::math::vectorize::vectorize;
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec2, Vec3};
 use kernels::{Face, Illuminate, Place, Scatter};
 
 /// What has become of a ray that a loop was to find.
@@ -239,6 +239,29 @@ impl Lanes {
         } else {
             vectorize(Place::<false>(self));
         }
+    }
+
+    /// The place that was found for `hit` of a ray at this time, without parameters.
+    pub fn interaction(&self, lane: usize, hit: &Hit, time: f32, smooth: bool) -> SurfaceInteraction {
+        let n_g = self.rows.n_g.get(lane);
+        SurfaceInteraction {
+            p: self.points.p.get(lane),
+            t: self.rows.t[lane],
+            error: self.rows.error[lane],
+            n_g,
+            n_s: if smooth { self.rows.n_s.get(lane) } else { n_g },
+            dp_du: Vec3::ZERO,
+            uv: Vec2::ZERO,
+            shape: hit.shape,
+            prim: hit.prim,
+            instance: hit.instance,
+            time,
+        }
+    }
+
+    /// The surface's albedo.
+    pub fn albedo(&self, lane: usize) -> Rgb {
+        rgb(&self.rows.albedo, lane)
     }
 
     /// Whether a triangle is met at all.

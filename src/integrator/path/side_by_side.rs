@@ -8,9 +8,11 @@ use crate::bsdf::{Bsdf, Lambert};
 use crate::color::Rgb;
 use crate::film::SampleBatch;
 use crate::geometry::{Hit, Mesh, Shape};
+use crate::id::LightId;
+use crate::integrator::parts::{Way, group_of};
 use crate::integrator::shading::turned_normal;
 use crate::integrator::vertex::Vertex;
-use crate::integrator::{Strategy, SurfaceNeeds, World, surface_sample};
+use crate::integrator::{Strategy, World};
 use crate::light::LightSample;
 use crate::material::Material;
 use crate::math::Ray;
@@ -27,6 +29,8 @@ pub(super) struct Shaded {
     lane_of: [u8; BATCH],
     /// By lane.
     vertex_of: [u8; BATCH],
+    /// By lane that looks at a light.
+    light_of: [LightId; BATCH],
     /// Vertices on diffuse surfaces of which more is to be found out.
     others: Vec<u8>,
     sky: SkySamples,
@@ -67,6 +71,7 @@ impl Default for Shaded {
             lanes: Box::default(),
             lane_of: [ALONE; BATCH],
             vertex_of: [0; BATCH],
+            light_of: [LightId(0); BATCH],
             others: Vec::with_capacity(BATCH),
             sky: SkySamples::default(),
         }
@@ -104,7 +109,7 @@ impl PathIntegrator {
     /// Shades the vertices of a batch that can be shaded side by side, up to [`collect`](Self::collect).
     pub(super) fn shade_side_by_side(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut SampleBatch, scratch: &mut Scratch) {
         let smooth = world.scene.features.shading_normals;
-        self.find_diffuse(world, bounce, batch.clone(), scratch);
+        self.find_diffuse(world, batch.clone(), scratch);
         scratch.shaded.lanes.place(smooth);
         self.settle(world, bounce, batch, out, scratch);
         let Scratch { shaded: Shaded { lanes, vertex_of, .. }, draws, .. } = scratch;
@@ -126,7 +131,7 @@ impl PathIntegrator {
 
     /// Lets vertices look at lights.
     fn light_lanes(&self, world: &World, scratch: &mut Scratch) {
-        let Scratch { shaded: Shaded { lanes, vertex_of, lane_of, sky, .. }, draws, .. } = scratch;
+        let Scratch { shaded: Shaded { lanes, vertex_of, lane_of, light_of, sky, .. }, draws, .. } = scratch;
         let lights = &world.scene.lights;
         let found_by = self.strategy.found_by();
         let image = lights.image_at_infinity();
@@ -139,6 +144,7 @@ impl PathIntegrator {
             let u = draws.light.of(vertex);
             let receiver = lanes.receiver(lane);
             let Some(choice) = lights.choose(&receiver, [u[0], u[3]], found_by) else { continue };
+            light_of[lane] = choice.id;
             if image.is_some_and(|(id, _)| id == choice.id) {
                 sky.push(lane, choice.pmf, [u[1], u[2]]);
                 continue;
@@ -161,11 +167,10 @@ impl PathIntegrator {
     }
 
     /// Looks for vertices on diffuse surfaces: on triangles of which nothing but their place is to be found out, and others.
-    fn find_diffuse(&self, world: &World, bounce: u32, batch: Range<usize>, scratch: &mut Scratch) {
+    fn find_diffuse(&self, world: &World, batch: Range<usize>, scratch: &mut Scratch) {
         let Scratch { paths, rays, hits, shaded, .. } = scratch;
         let scene = world.scene;
-        let wants_surface = bounce == 0 && self.needs != SurfaceNeeds::default();
-        let places_suffice = world.finds_places_only() && !wants_surface;
+        let places_suffice = world.finds_places_only();
         for (vertex, i) in batch.enumerate() {
             let Some(hit) = &hits[i] else { continue };
             let surface = scene.surface(hit.shape);
@@ -188,11 +193,21 @@ impl PathIntegrator {
 
     /// Leaves those that turn out to be elsewhere, and adds other vertices on diffuse surfaces.
     fn settle(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut SampleBatch, scratch: &mut Scratch) {
-        let Scratch { paths, rays, hits, cones, shaded, .. } = scratch;
+        let Scratch { paths, rays, hits, cones, shaded, sorting, .. } = scratch;
         let first = batch.start;
+        let smooth = world.scene.features.shading_normals;
         for lane in 0..shaded.lanes.count() {
+            let vertex = usize::from(shaded.vertex_of[lane]);
             if !shaded.lanes.is_ahead(lane) {
-                shaded.lane_of[usize::from(shaded.vertex_of[lane])] = ALONE;
+                shaded.lane_of[vertex] = ALONE;
+                continue;
+            }
+            let (i, clear) = (first + vertex, sorting.clear_of(first + vertex));
+            if self.notes_surface(bounce, clear)
+                && let Some(hit) = &hits[i]
+            {
+                let at = shaded.lanes.interaction(lane, hit, rays[i].time, smooth);
+                self.note_surface(world, (bounce, clear, paths[i].slot), (&at, Some(hit)), || shaded.lanes.albedo(lane), out);
             }
         }
         for k in 0..shaded.others.len() {
@@ -205,10 +220,15 @@ impl PathIntegrator {
             let footprint = || world.footprint(cone.as_ref(), ray, hits[i].as_ref(), at);
             let mut place = None;
             let Bsdf::Lambert(Lambert { albedo }) = *world.scene.bsdf(at, ray.direction, footprint, &mut place) else { continue };
-            if bounce == 0 && self.needs != SurfaceNeeds::default() {
-                out.surfaces[path.slot as usize] = surface_sample(world, self.needs, at, ray.direction, footprint);
+            let clear = sorting.clear_of(i);
+            if self.notes_surface(bounce, clear) {
+                self.note_surface(world, (bounce, clear, path.slot), (at, hits[i].as_ref()), || albedo, out);
             }
-            out.pixels[path.slot as usize].radiance += self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
+            let light = self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
+            out.pixels[path.slot as usize].radiance += light;
+            if self.sorts() && !light.is_black() {
+                self.sort_emitted(world, (sorting, i), at, (path.slot, bounce), light, out);
+            }
             let lane = shaded.lanes.push_known(ray, at, path.throughput, path.roulette_scale, albedo);
             shaded.assign(vertex, lane);
         }
@@ -227,7 +247,7 @@ impl PathIntegrator {
         scratch: &mut Scratch,
         alive: &mut usize,
     ) {
-        let Scratch { paths, rays, hits, shadow_rays, pending, cones, draws, shaded, turns, .. } = scratch;
+        let Scratch { paths, rays, hits, shadow_rays, pending, cones, draws, shaded, turns, sorting, .. } = scratch;
         let lanes = &shaded.lanes;
         let (path, time) = (paths[i], rays[i].time);
         if bounce == 0 {
@@ -254,6 +274,9 @@ impl PathIntegrator {
         if let Some((ray, contribution)) = shadow {
             shadow_rays.push(ray);
             pending.push(Pending { contribution: self.clamped(contribution, bounce + 1), slot: path.slot });
+            if self.sorts() {
+                sorting.push_pending(bounce, i, group_of(world.scene, shaded.light_of[lane]), || Way::DIFFUSE);
+            }
         }
 
         let next = match (next, &vertex) {
@@ -262,13 +285,16 @@ impl PathIntegrator {
                 let path = Path { throughput: lanes.throughput(lane), pdf, from: lanes.receiver(lane), ..path };
                 Some((path, Ray { time, ..next_ray }))
             }
-            (Found::Hidden, Some(vertex)) => self.scatter(world, &path, vertex, bounce, (None, turns), draws.bsdf.of(i - first)),
+            (Found::Hidden, Some(vertex)) => {
+                self.scatter(world, &path, vertex, bounce, (None, turns), draws.bsdf.of(i - first)).map(|(path, ray, _)| (path, ray))
+            }
             _ => None,
         };
         if let Some((path, ray)) = next {
             if let Some(cone) = cone {
                 cones[*alive] = world.scattered_cone(cone, lanes.t(lane), path.pdf);
             }
+            sorting.follow(self.parts, bounce, [i, *alive], || Way::DIFFUSE, || None);
             paths[*alive] = path;
             rays[*alive] = ray;
             *alive += 1;

@@ -226,8 +226,12 @@ impl Builder<'_, '_> {
         if shapes.list.is_empty() {
             return;
         }
+        let name_of = |node: usize| self.source.root.nodes.get(node).and_then(|json| json.name.clone());
         if let [(node, map)] = maps {
             for (path, mut shape) in shapes.list {
+                if let Some(name) = name_of(*node) {
+                    *shape.common_mut().name = Some(name);
+                }
                 *shape.common_mut().transform = transform(map);
                 self.draft.add_shape(&format!("nodes[{node}]: {path}"), shape);
             }
@@ -236,8 +240,12 @@ impl Builder<'_, '_> {
         let mesh = self.source.root.meshes.get(form.mesh);
         let name = mesh.and_then(|mesh| mesh.name.clone()).unwrap_or_else(|| format!("mesh {}", form.mesh));
         let object = self.draft.add_object(&name, &format!("meshes[{}]", form.mesh), shapes.list, Vec::new());
+        let mut count = BTreeMap::new();
+        maps.iter().for_each(|(node, _)| *count.entry(*node).or_insert(0) += 1);
         for (node, map) in maps {
-            let instance = InstanceDesc { object: object.clone(), transform: transform(map), motion: Vec::new() };
+            // A node that places many has no name for each.
+            let name = if count[node] == 1 { name_of(*node) } else { None };
+            let instance = InstanceDesc { object: object.clone(), name, transform: transform(map), motion: Vec::new() };
             self.draft.add_instance(&format!("nodes[{node}]"), instance);
         }
     }

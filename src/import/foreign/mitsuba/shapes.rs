@@ -76,9 +76,10 @@ impl<'a> Reader<'a> {
         }
         let object = self.group(group)?;
         let place = element.place().to_string();
+        let name = Some(element.plugin.id.clone()).filter(|id| !id.is_empty());
         element.finish(&mut self.draft);
         if let Some(object) = object {
-            self.draft.add_instance(&place, InstanceDesc { object, transform: steps(&map), motion: Vec::new() });
+            self.draft.add_instance(&place, InstanceDesc { object, name, transform: steps(&map), motion: Vec::new() });
         }
         Ok(())
     }

@@ -349,7 +349,7 @@ impl Reader {
                 let known = known.ok_or_else(|| lexer.error(at, format!("no object named \"{name}\"")))?;
                 if let Some(object) = known.clone() {
                     let (transform, motion) = self.world.place(&self.graphics.ctm, crate::math::DAffine3::IDENTITY);
-                    self.draft.add_instance(&lexer.place(at), InstanceDesc { object, transform, motion });
+                    self.draft.add_instance(&lexer.place(at), InstanceDesc { object, name: None, transform, motion });
                 }
             }
         }

@@ -1,0 +1,158 @@
+//! What things in a picture are called: for layers that pick objects, materials and assets.
+
+use std::borrow::Cow;
+
+use super::ShapeKey;
+
+/// Nothing.
+const NONE: u32 = u32::MAX;
+
+/// What the shapes of a scene are called, by [`ShapeKey`]. A few numbers for each shape and instance; names that are made of another one and a
+/// number are put together when they are asked for. Things with the same name count as one.
+///
+/// - The object of a shape is the instance that places it, or the shape itself. An instance within another is named after both, `outer/inner`.
+/// - Its asset is the object that the outermost instance places, else the file that the shape comes from, else the shape.
+///
+/// What has no name is called after its kind, its file or its object, with the place in its list: `sphere_3`, `bunny_0`, `tree_17`.
+#[derive(Clone, Debug, Default)]
+pub struct Identities {
+    names: Vec<Box<str>>,
+    /// By shape.
+    shapes: Vec<ShapeIdentity>,
+    placements: Vec<Placement>,
+    /// By instance of the geometry: its placement. [`NONE`] for those of shapes that move by themselves.
+    placement_of: Vec<u32>,
+}
+
+/// A name of the table, or one with a number behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Label {
+    name: u32,
+    /// [`NONE`] without.
+    number: u32,
+}
+
+/// A name of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NameId(u32);
+
+/// A placement of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlacementId(u32);
+
+/// What a shape is called.
+#[derive(Clone, Copy, Debug)]
+pub struct ShapeIdentity {
+    /// Its own name.
+    pub label: Label,
+    /// Its material's.
+    pub material: NameId,
+    /// That of the file it comes from, if any.
+    pub asset: Option<NameId>,
+    /// The placement that it belongs to although it stands in the world.
+    pub placement: Option<PlacementId>,
+}
+
+/// What an instance is called.
+#[derive(Clone, Copy, Debug)]
+struct Placement {
+    label: Label,
+    /// Around it; [`NONE`] in the world.
+    parent: u32,
+    /// The object that the outermost placement has.
+    asset: NameId,
+}
+
+impl Label {
+    /// A name alone.
+    pub fn plain(name: NameId) -> Self {
+        Self { name: name.0, number: NONE }
+    }
+
+    /// A name and a number, joined by an underscore.
+    pub fn numbered(name: NameId, number: u32) -> Self {
+        Self { name: name.0, number }
+    }
+}
+
+impl Identities {
+    /// Adds a name to the table; who calls sees to it that none is there twice.
+    pub fn add_name(&mut self, name: &str) -> NameId {
+        self.names.push(name.into());
+        NameId(self.names.len() as u32 - 1)
+    }
+
+    /// Adds the next shape of the geometry.
+    pub fn add_shape(&mut self, shape: ShapeIdentity) {
+        self.shapes.push(shape);
+    }
+
+    /// Adds a placement of the object named `asset`, within another or in the world.
+    pub fn add_placement(&mut self, label: Label, parent: Option<PlacementId>, asset: NameId) -> PlacementId {
+        let asset = parent.map_or(asset, |parent| self.placements[parent.0 as usize].asset);
+        self.placements.push(Placement { label, parent: parent.map_or(NONE, |parent| parent.0), asset });
+        PlacementId(self.placements.len() as u32 - 1)
+    }
+
+    /// Adds the next instance of the geometry; one without a placement is called after its shape.
+    pub fn add_instance(&mut self, placement: Option<PlacementId>) {
+        self.placement_of.push(placement.map_or(NONE, |placement| placement.0));
+    }
+
+    /// What the object is called that a shape belongs to; empty for a key that does not exist.
+    pub fn object(&self, key: ShapeKey) -> Cow<'_, str> {
+        match (self.placement(key), self.shape(key)) {
+            (Some(placement), _) => self.placement_name(placement),
+            (None, Some(shape)) => self.label(shape.label),
+            (None, None) => Cow::Borrowed(""),
+        }
+    }
+
+    /// What a shape's material is called; empty for a key that does not exist.
+    pub fn material(&self, key: ShapeKey) -> &str {
+        self.shape(key).map_or("", |shape| self.name(shape.material))
+    }
+
+    /// What the asset is called that a shape belongs to; empty for a key that does not exist.
+    pub fn asset(&self, key: ShapeKey) -> Cow<'_, str> {
+        match (self.placement(key), self.shape(key)) {
+            (Some(placement), _) => Cow::Borrowed(self.name(placement.asset)),
+            (None, Some(ShapeIdentity { asset: Some(asset), .. })) => Cow::Borrowed(self.name(*asset)),
+            (None, Some(shape)) => self.label(shape.label),
+            (None, None) => Cow::Borrowed(""),
+        }
+    }
+
+    /// Bytes of the tables.
+    pub fn memory_bytes(&self) -> usize {
+        let names: usize = self.names.iter().map(|name| size_of_val(name) + name.len()).sum();
+        names + size_of_val(&self.shapes[..]) + size_of_val(&self.placements[..]) + size_of_val(&self.placement_of[..])
+    }
+
+    fn shape(&self, key: ShapeKey) -> Option<&ShapeIdentity> {
+        self.shapes.get(key.shape as usize)
+    }
+
+    fn placement(&self, key: ShapeKey) -> Option<&Placement> {
+        let of_instance = self.placement_of.get(key.instance as usize).copied().filter(|&placement| placement != NONE);
+        let placement = of_instance.or_else(|| self.shape(key)?.placement.map(|placement| placement.0))?;
+        self.placements.get(placement as usize)
+    }
+
+    fn name(&self, name: NameId) -> &str {
+        self.names.get(name.0 as usize).map_or("", |name| name)
+    }
+
+    fn label(&self, label: Label) -> Cow<'_, str> {
+        let name = self.name(NameId(label.name));
+        if label.number == NONE { Cow::Borrowed(name) } else { Cow::Owned(format!("{name}_{}", label.number)) }
+    }
+
+    fn placement_name(&self, placement: &Placement) -> Cow<'_, str> {
+        let own = self.label(placement.label);
+        match self.placements.get(placement.parent as usize) {
+            None => own,
+            Some(parent) => Cow::Owned(format!("{}/{own}", self.placement_name(parent))),
+        }
+    }
+}

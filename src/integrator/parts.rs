@@ -1,0 +1,95 @@
+//! The parts of a sample's radiance: by how light left the first surface towards the camera, and by the group of the light that gave it.
+//!
+//! Light that is scattered by several lobes at once is shared out between diffuse and specular by what the lobes have of the BSDF's value for its
+//! direction. Light that was scattered once is direct, whether light sampling found it or the path met the light.
+
+use crate::bsdf::{Bsdf, BsdfSample};
+use crate::color::Rgb;
+use crate::film::{Part, PartNeeds};
+use crate::id::LightId;
+use crate::math::Vec3;
+use crate::scene::Scene;
+
+/// How light leaves the first surface towards the camera.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Way {
+    /// Reflected, with this share of diffuse reflection; the rest is specular.
+    Reflected {
+        /// By channel.
+        diffuse: Rgb,
+    },
+    /// Through the surface.
+    Transmitted,
+}
+
+impl Way {
+    /// All by diffuse reflection.
+    pub const DIFFUSE: Self = Self::Reflected { diffuse: Rgb::WHITE };
+
+    /// Of light that does not meet a delta lobe, from `wi` to `wo`, both local.
+    pub fn between(bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> Self {
+        if wo.z * wi.z < 0.0 { Self::Transmitted } else { Self::Reflected { diffuse: bsdf.diffuse_fraction(wo, wi) } }
+    }
+
+    /// Of light from a direction that was chosen for `wo`.
+    pub fn of_sample(bsdf: &Bsdf, wo: Vec3, sample: &BsdfSample) -> Self {
+        match (sample.is_delta, sample.is_transmission) {
+            (true, true) => Self::Transmitted,
+            (true, false) => Self::Reflected { diffuse: Rgb::BLACK },
+            (false, _) => Self::between(bsdf, wo, sample.wi),
+        }
+    }
+}
+
+/// How light came from its source to the camera.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Course {
+    /// Straight from a surface.
+    Emission,
+    /// Straight from infinity.
+    Background,
+    /// Scattered once.
+    Direct(Way),
+    /// Scattered more than once, at last so.
+    Indirect(Way),
+}
+
+/// The place of a light's group among the groups.
+pub(super) fn group_of(scene: &Scene, light: LightId) -> usize {
+    scene.light_groups.of(light).map_or(scene.light_groups.names().len(), |group| group.index())
+}
+
+/// Adds light to the parts of its sample by the course it took.
+pub(super) fn add_by_scattering(needs: PartNeeds, parts: &mut [Rgb], light: Rgb, course: Course) {
+    if !needs.by_scattering {
+        return;
+    }
+    let mut add = |part: Part, light: Rgb| parts[part as usize] += light;
+    let (way, [diffuse, specular, transmission]) = match course {
+        Course::Emission => return add(Part::Emission, light),
+        Course::Background => return add(Part::Background, light),
+        Course::Direct(way) => (way, [Part::DiffuseDirect, Part::SpecularDirect, Part::TransmissionDirect]),
+        Course::Indirect(way) => (way, [Part::DiffuseIndirect, Part::SpecularIndirect, Part::TransmissionIndirect]),
+    };
+    match way {
+        Way::Transmitted => add(transmission, light),
+        Way::Reflected { diffuse: share } => {
+            let part = light * share;
+            add(diffuse, part);
+            add(specular, light - part);
+        }
+    }
+}
+
+/// Adds light to the parts of its sample by the group of the light that gave it.
+pub(super) fn add_by_group(needs: PartNeeds, parts: &mut [Rgb], light: Rgb, group: usize) {
+    if needs.light_groups > 0 {
+        parts[needs.first_group() + group] += light;
+    }
+}
+
+/// Adds all light of a sample whose course and source are not told apart.
+pub(super) fn add_undivided(needs: PartNeeds, parts: &mut [Rgb], light: Rgb) {
+    add_by_scattering(needs, parts, light, Course::Emission);
+    add_by_group(needs, parts, light, needs.light_groups.saturating_sub(1) as usize);
+}

@@ -1,0 +1,94 @@
+//! What layers need of the first surface of a sample, and denoisers of the first one that is no mirror and no clear glass.
+
+use super::World;
+use crate::color::Rgb;
+use crate::film::{ShapeKey, SurfaceSample};
+use crate::geometry::{Hit, SurfaceInteraction};
+use crate::math::{Frame, Ray, Vec2, Vec3};
+use crate::texture::Footprint;
+
+/// Which parts of [`SurfaceSample`] are wanted; the rest is not computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SurfaceNeeds {
+    /// Any of depth, normals, position and the shape.
+    pub geometry: bool,
+    /// Surface parameters.
+    pub uv: bool,
+    /// Motion in the picture.
+    pub motion: bool,
+    /// Albedo.
+    pub albedo: bool,
+    /// Albedo and normal for denoisers.
+    pub features: bool,
+}
+
+/// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator found.
+pub(super) fn place_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInteraction, hit: Option<&Hit>) -> SurfaceSample {
+    let mut sample = SurfaceSample::default();
+    if needs.geometry {
+        sample.depth = world.scene.camera.depth(at.p, at.time);
+        sample.normal = at.n_s;
+        sample.geometric_normal = at.n_g;
+        sample.position = at.p.as_vec3();
+        sample.shown = ShapeKey { instance: at.instance.0, shape: at.shape.0 };
+    }
+    if needs.uv {
+        sample.uv = world.uv(at, hit).to_array();
+    }
+    if needs.motion {
+        sample.motion = world.motion_of(at).to_array();
+    }
+    sample
+}
+
+/// What the layers need of the first surface, which `ray` meets at `at`, for integrators that follow no mirrors to tell denoisers of what is
+/// behind; `hit` is what the accelerator found.
+pub(super) fn surface_sample(
+    world: &World,
+    needs: SurfaceNeeds,
+    at: &SurfaceInteraction,
+    (ray, hit): (&Ray, Option<&Hit>),
+    footprint: impl FnOnce() -> Footprint,
+) -> SurfaceSample {
+    let mut sample = place_sample(world, needs, at, hit);
+    if needs.albedo || needs.features {
+        sample.albedo = albedo_at(world, at, ray, footprint);
+    }
+    if needs.features {
+        let albedo = sample.albedo;
+        set_features(&mut sample, Rgb::WHITE, albedo, at.n_s);
+    }
+    sample
+}
+
+/// What a surface scatters of the light that goes back along a ray.
+pub(super) fn albedo_at(world: &World, at: &SurfaceInteraction, ray: &Ray, footprint: impl FnOnce() -> Footprint) -> Rgb {
+    let frame = Frame::from_normal(at.n_s);
+    world.scene.bsdf(at, ray.direction, footprint, &mut None).albedo(frame.to_local(-ray.direction))
+}
+
+/// Tells of the last surface so far that the sample shows, through mirrors and clear glass that leave `throughput`.
+pub(super) fn set_features(sample: &mut SurfaceSample, throughput: Rgb, albedo: Rgb, normal: Vec3) {
+    sample.feature_albedo = (throughput * albedo).map(|value| value.clamp(0.0, 1.0));
+    sample.feature_normal = normal;
+}
+
+impl World<'_> {
+    /// Surface parameters at the point of a hit.
+    fn uv(&self, at: &SurfaceInteraction, hit: Option<&Hit>) -> Vec2 {
+        if self.finds_places_only() { self.scene.geometry.uv(at, hit) } else { at.uv }
+    }
+
+    /// How far a point of a surface moves in the picture while the shutter is open.
+    fn motion_of(&self, at: &SurfaceInteraction) -> Vec2 {
+        match self.picture {
+            Some(size) if self.scene.features.motion => self.scene.camera.film_motion(self.scene.geometry.ends_of_motion(at), size),
+            _ => Vec2::ZERO,
+        }
+    }
+
+    /// How far what lies infinitely far away in a direction moves in the picture while the shutter is open.
+    pub(super) fn motion_at_infinity(&self, direction: Vec3) -> Vec2 {
+        self.picture.map_or(Vec2::ZERO, |size| self.scene.camera.film_motion_at_infinity(direction.as_dvec3(), size))
+    }
+}
