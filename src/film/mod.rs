@@ -8,6 +8,7 @@ mod filter;
 mod image;
 mod layer;
 mod sample;
+mod state;
 mod sum;
 mod tile;
 mod tiles;

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::mtl_maps::{ObjMap, take_maps};
 use super::{AssetError, ImageData, Imported, MeshData, RgbImage, Samples};
@@ -15,7 +16,7 @@ use crate::error::{Error, Result};
 ///
 /// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count, nor do the folder
 /// of the scene and the format it was read from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneFingerprint {
     /// Of all below.
     pub whole: String,
