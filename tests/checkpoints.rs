@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use steradian::accel::{self, AccelKind, Accelerator};
+use steradian::accel::{self, AccelKind};
 use steradian::film::{Film, LayerSet};
 use steradian::import::SceneFingerprint;
 use steradian::math::Rng;
@@ -41,15 +41,13 @@ pub fn scene(filter: &str) -> Value {
 /// A scene that is ready to be rendered in parts, with every layer.
 pub struct Kit {
     pub prepared: Prepared,
-    pub accel: Box<dyn Accelerator>,
 }
 
 impl Kit {
     pub fn new(scene: &Value, overrides: &Overrides) -> Self {
         let mut prepared = prepare(scene, overrides);
         prepared.settings.layers = LayerSet::FULL;
-        let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
-        Self { prepared, accel }
+        Self { prepared }
     }
 
     pub fn header(&self, shard: Shard) -> Header {
@@ -62,8 +60,19 @@ impl Kit {
     }
 
     pub fn go_on(&self, state: RenderState, progress: &dyn Progress, stop: &AtomicBool) -> RenderState {
+        self.go_on_with(state, None, progress, stop)
+    }
+
+    fn go_on_with(
+        &self,
+        state: RenderState,
+        checkpoints: Option<&mut Checkpoints>,
+        progress: &dyn Progress,
+        stop: &AtomicBool,
+    ) -> RenderState {
         let Prepared { scene, settings } = &self.prepared;
-        render::render_from(scene, &*self.accel, settings, state, None, progress, stop).unwrap().0
+        let accel = accel::build(AccelKind::EMBREE, &scene.geometry, 1).unwrap();
+        render::render_from(scene, &*accel, settings, state, checkpoints, progress, stop).unwrap().0
     }
 
     pub fn render(&self, shard: Shard) -> RenderState {
@@ -228,10 +237,7 @@ fn a_checkpoint_that_cannot_be_written_is_told_and_ends_nothing() {
     let mut checkpoints = Checkpoints::new(file, kit.header(Shard::WHOLE), Duration::ZERO, AtomicBool::new(false).into());
     std::fs::remove_dir_all(&inner).unwrap();
     let warnings = Warnings::default();
-    let Prepared { scene, settings } = &kit.prepared;
-    let stop = AtomicBool::new(false);
-    let state = kit.start(Shard::WHOLE);
-    let (state, _) = render::render_from(scene, &*kit.accel, settings, state, Some(&mut checkpoints), &warnings, &stop).unwrap();
+    let state = kit.go_on_with(kit.start(Shard::WHOLE), Some(&mut checkpoints), &warnings, &AtomicBool::new(false));
     assert!(bits(&state.film) == bits(&kit.render(Shard::WHOLE).film));
     let warnings = warnings.0.into_inner().unwrap();
     assert_eq!(warnings.len(), 1);

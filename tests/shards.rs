@@ -81,7 +81,7 @@ fn what_is_missing_double_or_foreign_is_named() {
     assert!(double.contains("copy.shard: shard 2/4 is there twice") && double.contains("2-of-4.shard has it too"), "{double}");
 
     let other = tempfile::tempdir().unwrap();
-    let mut change = |overrides: Overrides, count: u32, expected: &str| {
+    let change = |overrides: Overrides, count: u32, expected: &str| {
         let foreign = written(&Kit::new(&scene("box"), &overrides), other.path(), [Shard { index: 2, count }]);
         let refused = refusal(&[a, &foreign[0], c, d], true);
         assert!(refused.contains(&format!("{}: ", foreign[0].display())) && refused.contains(expected), "{refused}");
