@@ -13,6 +13,8 @@ pub enum ErrorKind {
     AssetMissing,
     /// An output cannot be written.
     Output,
+    /// A checkpoint or shard is damaged, or does not belong to what is asked for.
+    Checkpoint,
     /// Memory ran out.
     OutOfMemory,
     /// Anything else: a device fault, a failed comparison.
@@ -83,6 +85,14 @@ pub enum Error {
         /// Why.
         message: String,
     },
+    /// A checkpoint or shard is damaged, or does not belong to what is asked for.
+    #[error("{}: {message}", file.display())]
+    Checkpoint {
+        /// The checkpoint or shard.
+        file: PathBuf,
+        /// What is wrong, or what differs.
+        message: String,
+    },
     /// Embree reported an error.
     #[error("Embree: {0}")]
     Embree(String),
@@ -102,6 +112,7 @@ impl Error {
             Self::Parse { .. } | Self::Scene { .. } | Self::Asset { .. } | Self::Malformed { .. } => ErrorKind::Scene,
             Self::Missing { .. } => ErrorKind::AssetMissing,
             Self::Output { .. } => ErrorKind::Output,
+            Self::Checkpoint { .. } => ErrorKind::Checkpoint,
             Self::OutOfMemory(_) => ErrorKind::OutOfMemory,
             Self::Embree(_) | Self::Internal(_) => ErrorKind::Internal,
         }

@@ -17,6 +17,8 @@ mod bench_scale;
 mod bench_stability;
 /// What the cameras of the scene file see.
 mod cameras;
+/// Renders that go on where they were stopped.
+mod checkpoints;
 /// The program as a user runs it: exit codes, what it writes, what it says.
 mod cli;
 /// Scenes written anew.
@@ -70,6 +72,8 @@ mod relief;
 mod scene_files;
 /// Rays that leave a surface do not find it again, and do not leak out of closed boxes.
 mod self_intersection;
+/// Renders in parts, put together.
+mod shards;
 /// Shadow as soft on coarse smooth meshes as on what they stand for, without leaks.
 mod terminator;
 /// Images smaller in the picture than they are.

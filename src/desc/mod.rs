@@ -5,6 +5,7 @@
 //! linear Rec.709. Unknown keys are errors. Comments (`//` and `/* */`) are allowed.
 
 mod camera;
+mod files;
 mod light;
 mod material;
 mod output;

@@ -9,6 +9,7 @@ mod identities;
 mod image;
 mod layer;
 mod sample;
+mod state;
 mod sum;
 mod tile;
 mod tiles;

@@ -35,6 +35,16 @@ impl<const N: usize> Sums<N> {
         }
     }
 
+    /// The high parts and the low ones.
+    pub(super) fn pairs(&self) -> [[f64; N]; 2] {
+        [self.high, self.low]
+    }
+
+    /// Inverts [`pairs`](Self::pairs).
+    pub(super) fn from_pairs([high, low]: [[f64; N]; 2]) -> Self {
+        Self { high, low }
+    }
+
     /// The sums, rounded.
     #[inline]
     pub fn values(&self) -> [f64; N] {

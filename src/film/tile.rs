@@ -59,6 +59,9 @@ pub struct FilmTile {
     pub(super) coverage: Option<CoverageCounts>,
     /// Empty unless the variance is asked for.
     pub(super) spread: Vec<Spread>,
+    /// With `w` a group's weight and `v` its weighted radiance: sums of `w - 1`, of its square, and of `(w - 1) v`. Empty until a weight differs
+    /// from 1.
+    pub(super) spread_corrections: Vec<Sums<5>>,
     /// What each pixel's samples count together and the variance of their mean. Empty while each counts once.
     pub(super) weighed: Vec<Weighed>,
     pub(super) dropped_count: u64,
@@ -82,10 +85,16 @@ impl FilmTile {
             hits: vec![0; hits],
             coverage: layers.set.needs_coverage().then(|| CoverageCounts::new(pixels)),
             spread: vec![Spread::default(); if layers.set.contains(LayerKind::Variance) { pixels } else { 0 }],
+            spread_corrections: Vec::new(),
             weighed: Vec::new(),
             dropped_count: 0,
             dropped: Vec::new(),
         }
+    }
+
+    /// A tile of the same pixels and layers without samples.
+    pub fn empty(&self) -> Self {
+        Self::new(self.area, self.active, self.layers)
     }
 
     /// The upper left corner in the full picture.
@@ -145,16 +154,16 @@ impl FilmTile {
     /// one size.
     #[inline]
     pub fn add_group(&mut self, pixel: usize, weighted: [f64; 3], weight: f64) {
-        let mut mean = weighted;
-        if weight != 1.0 {
-            // As the estimate has it.
-            let color = self.color_at(pixel);
-            mean = [0, 1, 2].map(|k| weighted[k] - (weight - 1.0) * f64::from(color[k]));
-        }
         let Some(spread) = self.spread.get_mut(pixel) else { return };
         spread.groups += 1;
-        spread.sums.add(mean);
-        spread.squares.add(mean.map(|value| value * value));
+        spread.sums.add(weighted);
+        spread.squares.add(weighted.map(|value| value * value));
+        if weight != 1.0 {
+            self.begin_spread_corrections();
+            let excess = weight - 1.0;
+            let [r, g, b] = weighted.map(|value| excess * value);
+            self.spread_corrections[pixel].add([excess, excess * excess, r, g, b]);
+        }
     }
 
     /// Whether [`add_group`](Self::add_group) does anything.
@@ -164,12 +173,21 @@ impl FilmTile {
     }
 
     /// Mean of a pixel's groups and the variance of that mean, by channel; `None` with fewer than two groups.
+    ///
+    /// A group of mean weight `w` and mean `v` of weight times radiance stands for `v - (w - 1) m`, with the pixel's estimate `m`.
     pub fn group_statistics(&self, pixel: usize) -> Option<([f64; 3], [f64; 3])> {
         let spread = self.spread.get(pixel).filter(|spread| spread.groups >= 2)?;
         let n = f64::from(spread.groups);
-        let mean = spread.sums.values().map(|sum| sum / n);
-        let squares = spread.squares.values();
-        let variance = [0, 1, 2].map(|k| ((squares[k] / n - mean[k] * mean[k]) / (n - 1.0)).max(0.0));
+        let mut mean = spread.sums.values().map(|sum| sum / n);
+        let mut square = spread.squares.values().map(|sum| sum / n);
+        if let Some(sums) = self.spread_corrections.get(pixel) {
+            let [excess, excess_square, products @ ..] = sums.values().map(|sum| sum / n);
+            for (k, estimate) in self.mean(pixel).map(f64::from).into_iter().enumerate() {
+                mean[k] -= excess * estimate;
+                square[k] += estimate * (estimate * excess_square - 2.0 * products[k]);
+            }
+        }
+        let variance = [0, 1, 2].map(|k| ((square[k] - mean[k] * mean[k]) / (n - 1.0)).max(0.0));
         Some((mean, variance))
     }
 
@@ -198,6 +216,12 @@ impl FilmTile {
             spread.groups += others.groups;
             spread.sums.merge(&others.sums);
             spread.squares.merge(&others.squares);
+        }
+        if !other.spread_corrections.is_empty() {
+            self.begin_spread_corrections();
+            for (sums, others) in self.spread_corrections.iter_mut().zip(&other.spread_corrections) {
+                sums.merge(others);
+            }
         }
         self.merge_counts(other);
     }
@@ -288,6 +312,12 @@ impl FilmTile {
         if self.corrections.is_empty() {
             self.corrections = vec![Sums::default(); self.samples.len()];
             self.part_corrections = vec![0.0; self.parts.len()];
+        }
+    }
+
+    fn begin_spread_corrections(&mut self) {
+        if self.spread_corrections.is_empty() {
+            self.spread_corrections = vec![Sums::default(); self.spread.len()];
         }
     }
 

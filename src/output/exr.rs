@@ -77,6 +77,9 @@ fn layer_attributes(image: &Image, layers: &[&Layer], info: &RenderInfo) -> Laye
     let samples = i32::try_from(info.samples_per_pixel).unwrap_or(i32::MAX);
     attributes.other.insert(Text::from("samplesPerPixel"), AttributeValue::I32(samples));
     attributes.other.insert(Text::from("renderTimeSeconds"), AttributeValue::F32(info.render_seconds as f32));
+    if let Some(partial) = &info.partial {
+        attributes.other.insert(Text::from("steradian/partial"), AttributeValue::Text(Text::from(partial.as_str())));
+    }
     attributes
 }
 

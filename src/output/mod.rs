@@ -12,6 +12,8 @@ pub use png::write_png;
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
+
 use crate::desc::OutputDesc;
 use crate::error::{Error, Result};
 use crate::film::Image;
@@ -44,7 +46,7 @@ impl Format {
 }
 
 /// What a file tells of the rendering.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RenderInfo {
     /// Samples per pixel.
     pub samples_per_pixel: u32,
@@ -54,6 +56,8 @@ pub struct RenderInfo {
     pub world_to_camera: Option<[[f32; 4]; 4]>,
     /// Width of a pixel over its height; 1 if not given.
     pub pixel_aspect: Option<f32>,
+    /// Which parts of the samples are there, of a picture that lacks some, such as `shards 1,3 of 4`.
+    pub partial: Option<String>,
 }
 
 /// Writes `image` where and how `output` says.

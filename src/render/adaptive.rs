@@ -9,15 +9,13 @@
 //! too dark where such paths are rare. So what a block gets depends on the blocks around it alone. In the first stage its samples
 //! are thus independent of their number; later ones depend on it only through how precisely its neighbours know their variance.
 
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::limits::Limits;
-use super::{BLOCK_SIZE, Batch, Job, Progress, RenderResult, Settings, Stats, TILE_SIZE, next_pass, weighted};
-use crate::error::Result;
-use crate::film::{Crop, Film, FilmTile, LayerKind};
+use super::run::{Run, next_pass};
+use super::{BLOCK_SIZE, Batch, Job, Progress, RenderState, Stats, TILE_SIZE, weighted};
+use crate::film::{Crop, Film, FilmTile};
 use crate::integrator::RayCounts;
 
 /// Samples of a group.
@@ -51,7 +49,8 @@ const BLOCK_PIXELS: u32 = BLOCK_SIZE * BLOCK_SIZE;
 const BATCH_GROUPS: usize = (TILE_SIZE * TILE_SIZE / (BLOCK_PIXELS * GROUP)) as usize;
 
 /// The blocks of a picture's crop on the full picture's grid.
-struct Blocks {
+#[derive(Clone, Debug)]
+pub(super) struct Blocks {
     /// First column and row.
     first: [u32; 2],
     /// Columns and rows.
@@ -73,12 +72,30 @@ struct Estimate {
 }
 
 impl Blocks {
-    fn new(crop: Crop) -> Self {
+    /// All of them, to get the first samples.
+    pub fn new(crop: Crop) -> Self {
         let first = [crop.x / BLOCK_SIZE, crop.y / BLOCK_SIZE];
         let last = [(crop.x + crop.width - 1) / BLOCK_SIZE, (crop.y + crop.height - 1) / BLOCK_SIZE];
         let count = [last[0] - first[0] + 1, last[1] - first[1] + 1];
         let blocks = count[0] as usize * count[1] as usize;
         Self { first, count, done: vec![0; blocks], wanted: vec![PILOT; blocks] }
+    }
+
+    /// As bytes: what each block has and is to have, little endian.
+    pub fn save(&self) -> Vec<u8> {
+        self.done.iter().chain(&self.wanted).flat_map(|groups| groups.to_le_bytes()).collect()
+    }
+
+    /// Takes what [`save`](Self::save) gave for a picture of the same crop; `None` if it is of another.
+    pub fn load(&mut self, bytes: &[u8]) -> Option<()> {
+        let (numbers, rest) = bytes.as_chunks();
+        let (done, wanted) = numbers.split_at_checked(self.done.len())?;
+        if !rest.is_empty() || wanted.len() != done.len() {
+            return None;
+        }
+        let numbers = |bytes: &[[u8; 4]]| bytes.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+        (self.done, self.wanted) = (numbers(done), numbers(wanted));
+        Some(())
     }
 
     /// The block of this column and row of the full picture's grid.
@@ -226,83 +243,76 @@ impl BlockVariance {
 }
 
 /// Renders until the relative squared error is below `target`, or a pixel would get more samples than the settings allow.
-pub(super) fn render(
-    job: &Job,
-    pool: &rayon::ThreadPool,
-    settings: &Settings,
-    target: f64,
-    progress: &dyn Progress,
-    stop: &AtomicBool,
-) -> Result<RenderResult> {
-    let mut film = job.film(Some(LayerKind::Variance))?;
+pub(super) fn render(run: &mut Run, state: &mut RenderState, target: f64) -> Stats {
     let mut stats = Stats::default();
-    let pixels = settings.crop.area();
-    let most = settings.spp.div_ceil(GROUP).max(PILOT);
-    let mut blocks = Blocks::new(settings.crop);
-    progress.start(PILOT * GROUP, pixels);
-
-    let limits = Limits::new(settings, stop);
+    let pixels = state.film.crop().area();
+    let most = run.settings.spp.div_ceil(GROUP).max(PILOT);
+    run.progress.start(PILOT * GROUP, pixels);
+    tell_of_earlier_runs(run, state, target);
     loop {
-        let finished = render_stage(job, pool, &mut film, &mut blocks, &mut stats, &limits, progress);
-        let estimate = blocks.estimate(&film);
+        let finished = render_stage(run, state, &mut stats);
+        let RenderState { film, blocks: Some(blocks), .. } = state else { return stats };
+        let estimate = blocks.estimate(film);
         stats.estimated_error = Some(estimate.error);
         let reached = estimate.error + CONFIDENCE * estimate.deviation <= target;
         if reached || !finished || blocks.done.iter().all(|&n| n >= most) {
+            state.complete = finished;
             break;
         }
         // What few samples tell of the deviation is no reason to go far: the next estimate knows more.
         let deviation = (estimate.deviation / estimate.error).min(0.1);
         let goal = (0.97 * target / (1.0 + CONFIDENCE * deviation)).max(estimate.error / STEP);
         blocks.plan(&estimate.variances, goal, most);
-        let [mut done, mut wanted] = blocks.samples(&film);
+        let [mut done, mut wanted] = blocks.samples(film);
         if wanted < done + done / 50 {
             blocks.add_to_all(most);
-            [done, wanted] = blocks.samples(&film);
-        }
-        if progress.wants_picture() {
-            progress.picture(&job.picture(&film), (done / pixels) as u32);
+            [done, wanted] = blocks.samples(film);
         }
         debug_assert!(wanted >= done, "samples are never taken back");
-        progress.plan(wanted, estimate.error, target);
+        run.progress.plan(wanted, estimate.error, target);
     }
-    stats.render_seconds = limits.elapsed().as_secs_f64();
-    progress.finish();
+    stats.samples = state.blocks.as_ref().map_or(0, |blocks| blocks.samples(&state.film)[0]);
+    stats
+}
 
-    stats.samples = blocks.samples(&film)[0];
-    stats.spp_done = (stats.samples as f64 / pixels as f64).round() as u32;
-    stats.nan_samples = film.dropped_count();
-    stats.dropped = film.dropped();
-    Ok(RenderResult { image: job.picture(&film), stats })
+/// What was done before this run is progress, too.
+fn tell_of_earlier_runs(run: &Run, state: &RenderState, target: f64) {
+    let Some(blocks) = state.blocks.as_ref().filter(|_| state.done > 0) else { return };
+    let [done, wanted] = blocks.samples(&state.film);
+    run.progress.resumed(done);
+    if blocks.done.iter().all(|&n| n >= PILOT) {
+        run.progress.plan(wanted, blocks.estimate(&state.film).error, target);
+    }
 }
 
 /// Renders what is wanted, in passes that end soon when asked to; says whether all of it is there.
-fn render_stage(
-    job: &Job,
-    pool: &rayon::ThreadPool,
-    film: &mut Film,
-    blocks: &mut Blocks,
-    stats: &mut Stats,
-    limits: &Limits,
-    progress: &dyn Progress,
-) -> bool {
+fn render_stage(run: &mut Run, state: &mut RenderState, stats: &mut Stats) -> bool {
+    let pixels = state.film.crop().area();
     let mut step = 1;
-    while blocks.done.iter().zip(&blocks.wanted).any(|(done, wanted)| done < wanted) {
+    loop {
+        let RenderState { film, blocks: Some(blocks), rays, .. } = state else { return true };
+        if blocks.done.iter().zip(&blocks.wanted).all(|(done, wanted)| done >= wanted) {
+            return true;
+        }
         // Fewer groups than the pilot's would say nothing of the error.
         let has_pilot = blocks.done.iter().all(|&n| n >= PILOT);
-        if has_pilot && limits.end(stats, true) {
+        if has_pilot && run.limits.end(stats, true) {
             return false;
         }
-        let pass_start = Instant::now();
-        stats.rays.add(&render_pass(job, pool, film, blocks, step, progress));
+        let start = Instant::now();
+        rays.add(&render_pass(run.job, run.pool, film, blocks, step, run.progress));
         for (done, wanted) in blocks.done.iter_mut().zip(&blocks.wanted) {
             *done = (*done + step).min(*wanted);
         }
+        state.done = (blocks.samples(film)[0] as f64 / pixels as f64).round() as u32;
+        let elapsed = start.elapsed();
         if stats.first_pass_seconds == 0.0 {
-            stats.first_pass_seconds = limits.elapsed().as_secs_f64();
+            stats.first_pass_seconds = run.limits.elapsed().as_secs_f64();
         }
-        step = next_pass(step, pass_start.elapsed(), limits.remaining());
+        let next = next_pass(step, elapsed, run.limits.remaining());
+        run.pass_done(state, elapsed.mul_f64(f64::from(next) / f64::from(step)));
+        step = next;
     }
-    true
 }
 
 /// Renders at most `step` more groups of every block that wants them.

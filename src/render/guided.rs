@@ -10,7 +10,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::limits::Limits;
-use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats, next_pass, render_pass};
+use super::plain::render_pass;
+use super::run::next_pass;
+use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats};
 use crate::error::Result;
 use crate::film::{Film, FilmTile, LayerKind};
 use crate::guiding::Guide;

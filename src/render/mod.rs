@@ -6,16 +6,19 @@
 mod adaptive;
 mod guided;
 mod limits;
+mod plain;
 mod progress;
+mod run;
 mod settings;
+mod state;
 
 pub use progress::{Progress, Silent};
 pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings};
+pub use state::{Checkpoints, FilmShape, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
 
-use rayon::prelude::*;
+use run::Run;
 
 use crate::accel::Accelerator;
 use crate::camera::FilmRows;
@@ -29,7 +32,6 @@ use crate::math::rows::BATCH;
 use crate::math::{Ray, Vec2};
 use crate::sampling::{Numbers, Requests, Sampler};
 use crate::scene::Scene;
-use limits::Limits;
 
 /// Width and height of a tile in pixels: a batch has 1,024 paths. Of a Cornell box, batches of 256 paths take 3 % longer.
 pub const TILE_SIZE: u32 = 32;
@@ -39,9 +41,6 @@ const BLOCK_SIZE: u32 = 4;
 
 /// Textures are as sharp as so many samples per pixel can show.
 const FINEST_SPP: u32 = 1024;
-
-/// A pass aims at this time: long enough to cost nothing, short enough that an interrupt is answered soon.
-const PASS_TIME: Duration = Duration::from_millis(500);
 
 /// What a render did.
 #[derive(Clone, Debug, Default)]
@@ -98,6 +97,13 @@ struct Job<'a> {
 /// The group of lights that are in none.
 const DEFAULT_GROUP: &str = "default";
 
+/// The picture of a film, in these layers.
+fn picture(film: &Film, layers: LayerSet, overscan: u32) -> Image {
+    let mut image = film.resolve();
+    image.layers.retain(|layer| layers.contains(layer.kind));
+    Image { overscan, ..image }
+}
+
 /// Names of the groups of lights that a picture of the scene may tell apart.
 fn light_groups(scene: &Scene) -> Vec<String> {
     scene.light_groups.names().iter().map(String::as_str).chain([DEFAULT_GROUP]).map(str::to_owned).collect()
@@ -144,9 +150,7 @@ impl<'a> Job<'a> {
 
     /// The picture of a film, in the settings' layers.
     fn picture(&self, film: &Film) -> Image {
-        let mut image = film.resolve();
-        image.layers.retain(|layer| self.layers.contains(layer.kind));
-        Image { overscan: self.overscan, ..image }
+        picture(film, self.layers, self.overscan)
     }
 
     /// Renders one sample of every pixel of the tile with this origin; `out` is in the order of [`slots`].
@@ -307,73 +311,48 @@ pub fn render(
     progress: &dyn Progress,
     stop: &AtomicBool,
 ) -> Result<RenderResult> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(settings.threads)
-        .build()
-        .map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))?;
+    if settings.is_guided() {
+        return guided::render(Job::new(scene, accel, settings), &pool(settings)?, settings, progress, stop);
+    }
+    let state = RenderState::new(scene, settings, Shard::WHOLE)?;
+    let (state, stats) = render_from(scene, accel, settings, state, None, progress, stop)?;
+    Ok(RenderResult { image: state.picture(settings), stats })
+}
+
+/// Renders what is missing of a state, whose shard says which samples belong to it. Ends early as [`render`] does; the state can be continued
+/// then, also from one of `checkpoints`. The picture has the same bits however often that happens.
+///
+/// # Errors
+/// As [`render`]; [`Error::Usage`] as [`check_kept`] has it.
+pub fn render_from(
+    scene: &Scene,
+    accel: &dyn Accelerator,
+    settings: &Settings,
+    mut state: RenderState,
+    checkpoints: Option<&mut Checkpoints>,
+    progress: &dyn Progress,
+    stop: &AtomicBool,
+) -> Result<(RenderState, Stats)> {
+    check_kept(settings, state.shard)?;
+    let pool = pool(settings)?;
     let job = Job::new(scene, accel, settings);
-    if matches!(settings.integrator, IntegratorDesc::Path { guiding: true, .. }) {
-        return guided::render(job, &pool, settings, progress, stop);
-    }
-    if let Some(target) = settings.target_error {
-        return adaptive::render(&job, &pool, settings, target, progress, stop);
-    }
-    let mut film = job.film(None)?;
-    let mut stats = Stats::default();
-    let pixels = u64::from(settings.crop.width) * u64::from(settings.crop.height);
-    progress.start(settings.spp, pixels);
-
-    let limits = Limits::new(settings, stop);
-    let mut pass_samples = 1;
-    while stats.spp_done < settings.spp {
-        let has_picture = stats.spp_done > 0;
-        if limits.end(&mut stats, has_picture) {
-            break;
-        }
-        let count = pass_samples.min(settings.spp - stats.spp_done);
-        let pass_start = Instant::now();
-        stats.rays.add(&render_pass(&job, &pool, &mut film, stats.spp_done, count, progress));
-        stats.spp_done += count;
-        if stats.first_pass_seconds == 0.0 {
-            stats.first_pass_seconds = limits.elapsed().as_secs_f64();
-        }
-        pass_samples = next_pass(count, pass_start.elapsed(), limits.remaining());
-        if progress.wants_picture() && stats.spp_done < settings.spp {
-            progress.picture(&job.picture(&film), stats.spp_done);
-        }
-    }
-    stats.render_seconds = limits.elapsed().as_secs_f64();
-    progress.finish();
-
-    stats.samples = pixels * u64::from(stats.spp_done);
-    stats.nan_samples = film.dropped_count();
-    stats.dropped = film.dropped();
-    Ok(RenderResult { image: job.picture(&film), stats })
+    let mut run = Run::new(&job, &pool, settings, progress, stop, checkpoints);
+    let mut stats = match settings.target_error {
+        Some(target) => adaptive::render(&mut run, &mut state, target),
+        None => plain::render(&mut run, &mut state),
+    };
+    run.finish(&mut state);
+    stats.render_seconds = state.seconds;
+    stats.rays = state.rays;
+    stats.spp_done = state.done;
+    stats.nan_samples = state.film.dropped_count();
+    stats.dropped = state.film.dropped();
+    Ok((state, stats))
 }
 
-/// Renders `count` samples of every pixel, from sample `first` on.
-fn render_pass(job: &Job, pool: &rayon::ThreadPool, film: &mut Film, first: u32, count: u32, progress: &dyn Progress) -> RayCounts {
-    pool.install(|| {
-        film.tiles_mut()
-            .par_iter_mut()
-            .with_max_len(1)
-            .map_init(Batch::new, |batch, tile| {
-                let counts = job.render_tile(tile, first, count, batch);
-                progress.tile_done(u64::from(count) * tile.active().area());
-                counts
-            })
-            .reduce(RayCounts::default, |mut a, b| {
-                a.add(&b);
-                a
-            })
-    })
-}
-
-/// How many samples the next pass should have, after one of `count` took `elapsed`.
-fn next_pass(count: u32, elapsed: Duration, remaining: Option<Duration>) -> u32 {
-    let target = remaining.map_or(PASS_TIME, |r| r.min(PASS_TIME)).as_secs_f64();
-    let fitting = f64::from(count) * target / elapsed.as_secs_f64().max(1e-6);
-    (fitting as u32).clamp(1, count.saturating_mul(4))
+fn pool(settings: &Settings) -> Result<rayon::ThreadPool> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(settings.threads).build();
+    pool.map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))
 }
 
 /// What a replayed sample brings.
@@ -394,7 +373,7 @@ pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel
     if pixel[0] >= width || pixel[1] >= height {
         return Err(Error::Usage(format!("--pixel {},{}: the film has {width}x{height} pixels", pixel[0], pixel[1])));
     }
-    if matches!(settings.integrator, IntegratorDesc::Path { guiding: true, .. }) {
+    if settings.is_guided() {
         return Err(Error::Usage("--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off".into()));
     }
     let job = Job::new(scene, accel, settings);
@@ -432,12 +411,5 @@ mod tests {
                 assert!(slots(size, origin).any(|other| other == slot), "{size:?} {pixel:?}");
             }
         }
-    }
-
-    #[test]
-    fn passes_grow_towards_their_time_and_fit_what_remains() {
-        assert_eq!(next_pass(1, Duration::from_millis(1), None), 4);
-        assert_eq!(next_pass(8, Duration::from_secs(8), None), 1);
-        assert_eq!(next_pass(8, Duration::from_millis(100), Some(Duration::from_millis(50))), 4);
     }
 }

@@ -14,6 +14,11 @@ pub trait Progress: Sync {
         let _ = (samples, error, target);
     }
 
+    /// So many samples, all pixels together, are there already from an earlier run.
+    fn resumed(&self, samples: u64) {
+        let _ = samples;
+    }
+
     /// A tile got this many more samples, all pixels together.
     fn tile_done(&self, samples: u64) {
         let _ = samples;

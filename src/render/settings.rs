@@ -137,6 +137,11 @@ impl Settings {
         })
     }
 
+    /// Whether paths are guided: a sample then depends on all that were before.
+    pub fn is_guided(&self) -> bool {
+        matches!(self.integrator, IntegratorDesc::Path { guiding: true, .. })
+    }
+
     /// Width and height of what is rendered: the picture with its overscan.
     pub fn film_size(&self) -> [u32; 2] {
         grown(self.size, self.overscan)

@@ -1,9 +1,10 @@
-//! Ctrl-C and SIGTERM: the first asks the render to stop, so that the picture so far is written; the second ends the program at once.
+//! Signals. The first Ctrl-C or SIGTERM asks the render to stop, so that its state and the picture so far are written; the second ends the program
+//! at once. SIGUSR1 asks for a checkpoint, and the render goes on.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
 use steradian::{Error, Result};
 
@@ -15,27 +16,39 @@ const TERMINATED: u8 = 143;
 /// What the signals have asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
-    /// Becomes true with the first signal.
+    /// Becomes true with the first signal to stop.
     pub stop: Arc<AtomicBool>,
+    /// Becomes true when a checkpoint is asked for.
+    pub checkpoint: Arc<AtomicBool>,
     code: Arc<AtomicUsize>,
 }
 
 impl Interrupt {
-    /// Starts to listen.
+    /// Starts to listen to SIGUSR1, which would end the program otherwise. Signals to stop still do so.
     pub fn listen() -> Result<Self> {
         let interrupt = Self::default();
+        flag::register(SIGUSR1, Arc::clone(&interrupt.checkpoint)).map_err(failed)?;
+        Ok(interrupt)
+    }
+
+    /// Starts to listen to signals to stop.
+    pub fn listen_to_stop(&self) -> Result<()> {
         for (signal, code) in [(SIGINT, INTERRUPTED), (SIGTERM, TERMINATED)] {
             // Actions run in the order of their registration: the first signal finds the flag down and only then raises it.
-            let registered = flag::register_conditional_shutdown(signal, i32::from(code), Arc::clone(&interrupt.stop))
-                .and_then(|_| flag::register_usize(signal, Arc::clone(&interrupt.code), usize::from(code)))
-                .and_then(|_| flag::register(signal, Arc::clone(&interrupt.stop)));
-            registered.map_err(|e| Error::Internal(format!("cannot listen to signals: {e}")))?;
+            let registered = flag::register_conditional_shutdown(signal, i32::from(code), Arc::clone(&self.stop))
+                .and_then(|_| flag::register_usize(signal, Arc::clone(&self.code), usize::from(code)))
+                .and_then(|_| flag::register(signal, Arc::clone(&self.stop)));
+            registered.map_err(failed)?;
         }
-        Ok(interrupt)
+        Ok(())
     }
 
     /// The exit code of an interrupted run.
     pub fn exit_code(&self) -> u8 {
         u8::try_from(self.code.load(Ordering::Relaxed)).ok().filter(|code| *code != 0).unwrap_or(INTERRUPTED)
     }
+}
+
+fn failed(error: std::io::Error) -> Error {
+    Error::Internal(format!("cannot listen to signals: {error}"))
 }

@@ -8,6 +8,8 @@ mod compare;
 mod convert;
 mod info;
 mod interrupt;
+mod kept;
+mod merge;
 mod names;
 mod progress;
 mod render;
@@ -45,6 +47,7 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Bench(command) => bench::run(&command),
         Command::Convert(arguments) => convert::run(&arguments).map(|()| 0),
         Command::Schema => text::print(&import::schema()).map(|()| 0),
+        Command::Merge(arguments) => merge::run(&arguments).map(|()| 0),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -61,6 +64,7 @@ fn exit_code(kind: ErrorKind) -> u8 {
         ErrorKind::Scene => 3,
         ErrorKind::AssetMissing => 4,
         ErrorKind::Output => 5,
+        ErrorKind::Checkpoint => 6,
         ErrorKind::OutOfMemory => 33,
     }
 }

@@ -35,6 +35,8 @@ pub struct Reporter {
 struct State {
     start: Instant,
     total: u64,
+    /// What was there at the start.
+    resumed: u64,
     last: Option<Instant>,
     last_percent: Option<u64>,
     /// What the picture's error is and is to be.
@@ -50,7 +52,7 @@ impl Reporter {
             (false, true) => Sink::Bar(bar()),
             (false, false) => Sink::Lines,
         };
-        let state = State { start: Instant::now(), total: 0, last: None, last_percent: None, errors: None, stop_told: false };
+        let state = State { start: Instant::now(), total: 0, resumed: 0, last: None, last_percent: None, errors: None, stop_told: false };
         Self { sink, stop, time_limit, done: AtomicU64::new(0), state: Mutex::new(state) }
     }
 
@@ -80,7 +82,7 @@ impl Reporter {
             state.stop_told = true;
             self.say("interrupted: finishing the samples under way; interrupt again to leave at once");
         }
-        let mut view = view(self.done.load(Ordering::Relaxed), state.total, now - state.start, self.time_limit);
+        let mut view = view([state.resumed, self.done.load(Ordering::Relaxed)], state.total, now - state.start, self.time_limit);
         if let Some([error, target]) = state.errors {
             view.text += &format!(", error {error:.2e} of {target:.2e}");
         }
@@ -118,13 +120,15 @@ struct View {
     text: String,
 }
 
-fn view(done: u64, total: u64, elapsed: Duration, time_limit: Option<Duration>) -> View {
+/// Of the samples there were at the start and are now.
+fn view([resumed, done]: [u64; 2], total: u64, elapsed: Duration, time_limit: Option<Duration>) -> View {
     let seconds = elapsed.as_secs_f64();
     let of_samples = done as f64 / total.max(1) as f64;
     let of_time = time_limit.map_or(0.0, |limit| seconds / limit.as_secs_f64());
     let fraction = of_samples.max(of_time).clamp(0.0, 1.0);
-    let rate = if seconds > 0.0 { done as f64 / seconds * 1e-6 } else { 0.0 };
-    let left = if fraction > 0.0 { duration(seconds * (1.0 - fraction) / fraction) } else { "?".to_owned() };
+    let rate = if seconds > 0.0 { (done - resumed) as f64 / seconds * 1e-6 } else { 0.0 };
+    let gained = of_time.max(of_samples - resumed as f64 / total.max(1) as f64);
+    let left = if gained > 0.0 { duration(seconds * (1.0 - fraction) / gained) } else { "?".to_owned() };
     View { fraction, percent: ((fraction * 100.0) as u64).min(99), text: format!("{rate:.2} Msamples/s, {left} left") }
 }
 
@@ -155,6 +159,13 @@ impl Progress for Reporter {
         }
     }
 
+    fn resumed(&self, samples: u64) {
+        self.done.fetch_add(samples, Ordering::Relaxed);
+        if let Ok(mut state) = self.state.lock() {
+            state.resumed = samples;
+        }
+    }
+
     fn tile_done(&self, samples: u64) {
         self.done.fetch_add(samples, Ordering::Relaxed);
         // Whoever finds the door closed goes on working: another thread is showing the numbers.
@@ -180,12 +191,14 @@ mod tests {
 
     #[test]
     fn percentages_are_rounded_down_and_stay_below_100() {
-        let at = |done, seconds, limit| view(done, 1000, Duration::from_secs(seconds), limit);
+        let at = |done, seconds, limit| view([0, done], 1000, Duration::from_secs(seconds), limit);
         assert_eq!(at(429, 10, None).percent, 42);
         assert_eq!(at(1000, 10, None).percent, 99);
         assert_eq!(at(100, 30, Some(Duration::from_secs(60))).percent, 50);
         assert_eq!(at(500, 60, None).text, "0.00 Msamples/s, 1:00 left");
         assert_eq!(at(0, 0, None).text, "0.00 Msamples/s, ? left");
+        let resumed = view([800, 900], 1000, Duration::from_secs(10), None);
+        assert_eq!((resumed.percent, resumed.text.as_str()), (90, "0.00 Msamples/s, 10 s left"));
     }
 
     #[test]

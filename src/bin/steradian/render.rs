@@ -1,6 +1,6 @@
 //! `steradian render`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use steradian::accel::{self, Accelerator};
@@ -14,6 +14,7 @@ use tracing_subscriber::filter::LevelFilter;
 
 use crate::args::{RenderArgs, Verbosity};
 use crate::interrupt::Interrupt;
+use crate::kept::{self, Kept};
 use crate::progress::Reporter;
 use crate::scene;
 use crate::stats::{self, Run};
@@ -22,13 +23,26 @@ use crate::text;
 /// Renders a scene and writes what was asked for; the result is the exit code.
 pub fn run(arguments: &RenderArgs) -> Result<u8> {
     log_to_stderr(arguments.verbosity);
+    let interrupt = Interrupt::listen()?;
     let start = Instant::now();
     let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
-    let mut settings = Settings::new(&imported.desc, &arguments.overrides(default_outputs(&arguments.scene)))?;
+    let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
+    let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?;
+    let mut settings = Settings::new(&imported.desc, &overrides)?;
     if arguments.pixel.is_none() {
-        check_outputs(&settings, arguments.json.as_deref())?;
+        check_outputs(&settings, shard_file.as_deref(), arguments.json.as_deref())?;
     }
+    let kept = Kept::new(&arguments.state, &settings, shard_file.as_deref())?;
     let scene = compile::compile_imported(&imported, &arguments.scene)?;
+    let mut info = RenderInfo {
+        world_to_camera: Some(world_to_camera(&scene.camera)),
+        pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
+        ..RenderInfo::default()
+    };
+    let header = match &kept {
+        Some(kept) => Some(kept.header(&imported, &arguments.scene, &scene, &settings, info.clone())?),
+        None => None,
+    };
     drop(imported);
     let load_seconds = start.elapsed().as_secs_f64();
 
@@ -43,28 +57,37 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
         return text::print(&describe_sample(&value)).map(|()| 0);
     }
 
-    let interrupt = Interrupt::listen()?;
+    interrupt.listen_to_stop()?;
     let reporter = Reporter::new(arguments.verbosity.quiet, interrupt.stop.clone(), settings.time_limit);
-    let result = render::render(&scene, &*accel, &settings, &reporter, &interrupt.stop)?;
+    let result = match (kept, &header) {
+        (Some(kept), Some(header)) => kept.render(&scene, &*accel, &settings, header, &reporter, &interrupt)?,
+        _ => {
+            let result = render::render(&scene, &*accel, &settings, &reporter, &interrupt.stop)?;
+            kept::warn_of_request(&interrupt, &reporter);
+            result
+        }
+    };
     let stats = &result.stats;
     let first = load_seconds + build_seconds + stats.first_pass_seconds;
     tracing::info!("{first:.3} s until every pixel had its first sample");
     warn_of_dropped(stats, &reporter);
 
-    let info = RenderInfo {
-        samples_per_pixel: stats.spp_done,
-        render_seconds: stats.render_seconds,
-        world_to_camera: Some(world_to_camera(&scene.camera)),
-        pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
+    info.samples_per_pixel = stats.spp_done;
+    info.render_seconds = stats.render_seconds;
+    let written: Vec<String> = match &shard_file {
+        Some(file) => vec![file.display().to_string()],
+        None => settings.outputs.iter().map(|output| output.file.clone()).collect(),
     };
-    for desc in &settings.outputs {
-        output::write(desc, &result.image, &info)?;
+    if shard_file.is_none() {
+        for desc in &settings.outputs {
+            output::write(desc, &result.image, &info)?;
+        }
     }
     if let Some(path) = &arguments.json {
         let run = Run { scene: &arguments.scene, load_seconds, build_seconds };
         stats::write(path, &stats::value(&run, &settings, &*accel, stats))?;
     }
-    report(&reporter, &settings, &*accel, stats);
+    report(&reporter, &settings, &*accel, stats, &written);
     Ok(if stats.interrupted { interrupt.exit_code() } else { 0 })
 }
 
@@ -88,9 +111,11 @@ fn default_outputs(scene: &Path) -> Vec<String> {
 }
 
 /// A slip in a name is found before the render, not after it.
-fn check_outputs(settings: &Settings, stats: Option<&Path>) -> Result<()> {
-    for output in &settings.outputs {
-        output::check_writable(Path::new(&output.file))?;
+fn check_outputs(settings: &Settings, shard: Option<&Path>, stats: Option<&Path>) -> Result<()> {
+    if shard.is_none() {
+        for output in &settings.outputs {
+            output::check_writable(Path::new(&output.file))?;
+        }
     }
     match stats {
         Some(path) if path != Path::new("-") => output::check_creatable(path),
@@ -107,7 +132,7 @@ fn warn_of_dropped(stats: &Stats, reporter: &Reporter) {
     ));
 }
 
-fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, stats: &Stats) {
+fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, stats: &Stats, written: &[String]) {
     let seconds = stats.render_seconds.max(1e-9);
     let ended = match (stats.interrupted, stats.time_limited) {
         (true, _) => " (interrupted)",
@@ -128,9 +153,7 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
     if let (Some(error), Some(target)) = (stats.estimated_error, settings.target_error) {
         reporter.say(&format!("relative squared error about {error:.3e}, asked for {target:.3e}"));
     }
-    for output in &settings.outputs {
-        reporter.say(&format!("wrote {}", PathBuf::from(&output.file).display()));
-    }
+    written.iter().for_each(|file| reporter.say(&format!("wrote {file}")));
     if !stats.interrupted {
         reporter.complete();
     }

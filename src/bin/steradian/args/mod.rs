@@ -4,6 +4,7 @@ mod bench;
 mod bench_error;
 mod bench_scale;
 mod import;
+mod state;
 
 use std::path::PathBuf;
 
@@ -18,6 +19,8 @@ pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityAr
 pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
 pub use import::{ConvertArgs, ImportArgs};
+use state::MERGE_EXAMPLES;
+pub use state::{MergeArgs, StateArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -28,8 +31,8 @@ Examples:
   steradian info scene.json                        What is in the scene
   steradian compare reference.exr test.exr         How far two pictures differ
 
-Exit codes: 0 done, 1 internal failure, 2 wrong usage, 3 scene invalid, 4 file missing, 5 output not writable, 33 out of memory,
-130 interrupted and 143 terminated (with the picture so far written).";
+Exit codes: 0 done, 1 internal failure, 2 wrong usage, 3 scene invalid, 4 file missing, 5 output not writable, 6 checkpoint or
+shard does not match, 33 out of memory, 130 interrupted and 143 terminated (with checkpoint and picture so far written).";
 
 const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -43,6 +46,10 @@ Examples:
       The geometry without materials and lights.
   steradian render cornell.json --layers Z,N,albedo --float -o cornell.exr
       Depth, normals and albedo beside the picture, everything in 32 bits.
+  steradian render cornell.json --spp 4096 --checkpoint cornell.state --resume
+      Whatever ends the render, the same line continues it; a larger --spp adds samples.
+  steradian render cornell.json --shard 2/8
+      An eighth of the samples into cornell.2-of-8.shard, for steradian merge.
   steradian render cornell.json --pixel 120,80 --sample 7
       What exactly one sample brings; nothing is written.
   steradian render cornell.json -q --json - | jq .mrays_per_second
@@ -79,6 +86,11 @@ pub enum Command {
     /// Editors check and complete scenes with it: save it and name it in the scene's "$schema".
     #[command(after_help = "Example:\n  steradian schema > scene.schema.json")]
     Schema,
+    /// Merge shards into the picture
+    ///
+    /// Shards are what `render --shard` writes. All of them together are the picture of one run bit for bit, in every layer.
+    #[command(after_help = MERGE_EXAMPLES)]
+    Merge(MergeArgs),
     /// Compare a picture with its reference
     ///
     /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of (test - reference)² /
@@ -178,6 +190,8 @@ pub struct RenderArgs {
     /// The sample to replay, counted from 0
     #[arg(long, value_name = "I", requires = "pixel", help_heading = "Run")]
     pub sample: Option<u32>,
+    #[command(flatten)]
+    pub state: StateArgs,
     #[command(flatten)]
     pub import: ImportArgs,
     #[command(flatten)]

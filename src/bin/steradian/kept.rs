@@ -1,0 +1,111 @@
+//! Renders whose state is kept in a checkpoint, or goes into a shard.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use steradian::accel::Accelerator;
+use steradian::film::Image;
+use steradian::import::{Imported, scene_fingerprint};
+use steradian::output::RenderInfo;
+use steradian::render::{self, Checkpoints, Header, Overrides, Progress, RenderResult, RenderState, Settings, Shard, StateFile};
+use steradian::scene::Scene;
+use steradian::{Error, Result};
+
+use crate::args::StateArgs;
+use crate::interrupt::Interrupt;
+use crate::progress::Reporter;
+
+/// The extension of shards.
+const EXTENSION: &str = "shard";
+
+/// What the command line says of the state.
+pub struct Kept<'a> {
+    arguments: &'a StateArgs,
+    shard: Shard,
+    /// Where the shard goes, if the render is of one.
+    pub shard_file: Option<StateFile>,
+    checkpoint: Option<StateFile>,
+}
+
+/// Takes the name of the shard out of the outputs; what is left says which layers pictures have.
+pub fn take_shard_name(arguments: &StateArgs, scene: &Path, overrides: &mut Overrides) -> Result<Option<PathBuf>> {
+    let is_shard = |name: &String| Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case(EXTENSION));
+    let Some(shard) = arguments.shard else { return Ok(None) };
+    let names = std::mem::take(&mut overrides.outputs);
+    match names.as_slice() {
+        [] => {
+            let stem = scene.file_stem().map_or("picture".into(), |stem| stem.to_string_lossy().into_owned());
+            Ok(Some(format!("{stem}.{}-of-{}.{EXTENSION}", shard.index, shard.count).into()))
+        }
+        [name] if is_shard(name) => Ok(Some(name.into())),
+        _ => Err(Error::Usage(format!("-o {}: with --shard, one file whose name ends with .{EXTENSION}", names.join(" -o ")))),
+    }
+}
+
+impl<'a> Kept<'a> {
+    /// Takes the files, so that nobody else writes them; `None` if nothing is kept.
+    pub fn new(arguments: &'a StateArgs, settings: &Settings, shard_file: Option<&Path>) -> Result<Option<Self>> {
+        if arguments.checkpoint.is_none() && shard_file.is_none() {
+            return Ok(None);
+        }
+        let shard = arguments.shard.unwrap_or_default();
+        render::check_kept(settings, shard)?;
+        if let Some(path) = arguments.checkpoint.as_deref() {
+            if shard_file == Some(path) {
+                return Err(Error::Usage(format!("--checkpoint {}: the shard is to have this name", path.display())));
+            }
+            if path.exists() && !arguments.resume {
+                let message = "there is such a file: --resume continues from it; remove it to begin anew";
+                return Err(Error::Usage(format!("--checkpoint {}: {message}", path.display())));
+            }
+        }
+        let take = |path: Option<&Path>| path.map(StateFile::take).transpose();
+        Ok(Some(Self { arguments, shard, shard_file: take(shard_file)?, checkpoint: take(arguments.checkpoint.as_deref())? }))
+    }
+
+    /// What checkpoints and shards of this render say of themselves.
+    pub fn header(&self, imported: &Imported, file: &Path, scene: &Scene, settings: &Settings, info: RenderInfo) -> Result<Header> {
+        let fingerprint = scene_fingerprint(imported, file)?;
+        Ok(Header { info, ..Header::new(&file.to_string_lossy(), fingerprint, scene, settings, self.shard) })
+    }
+
+    /// Renders from where the checkpoint is, and writes the shard.
+    pub fn render(
+        mut self,
+        scene: &Scene,
+        accel: &dyn Accelerator,
+        settings: &Settings,
+        header: &Header,
+        reporter: &Reporter,
+        interrupt: &Interrupt,
+    ) -> Result<RenderResult> {
+        let state = match self.checkpoint.as_ref().filter(|_| self.arguments.resume) {
+            Some(file) if file.path().exists() => {
+                let state = RenderState::read(file.path(), header, scene, settings)?;
+                reporter.say(&format!("{}: continuing after {} samples per pixel", file.path().display(), state.done));
+                state
+            }
+            Some(file) => {
+                reporter.say(&format!("{}: there is no such checkpoint, beginning anew", file.path().display()));
+                RenderState::new(scene, settings, self.shard)?
+            }
+            None => RenderState::new(scene, settings, self.shard)?,
+        };
+        let asked = || Arc::clone(&interrupt.checkpoint);
+        let mut checkpoints = self.checkpoint.take().map(|file| Checkpoints::new(file, header.clone(), self.arguments.every, asked()));
+        let (state, stats) = render::render_from(scene, accel, settings, state, checkpoints.as_mut(), reporter, &interrupt.stop)?;
+        if let Some(file) = &self.shard_file {
+            file.replace(|out| state.write(header, out))?;
+        }
+        // Of a shard nobody looks at the picture.
+        let image = if self.shard_file.is_some() { Image::default() } else { state.picture(settings) };
+        Ok(RenderResult { image, stats })
+    }
+}
+
+/// What SIGUSR1 asks for without a checkpoint.
+pub fn warn_of_request(interrupt: &Interrupt, reporter: &Reporter) {
+    if interrupt.checkpoint.load(std::sync::atomic::Ordering::Relaxed) {
+        reporter.warn("SIGUSR1 asked for a checkpoint, but there is no --checkpoint");
+    }
+}

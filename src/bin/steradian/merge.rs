@@ -1,0 +1,66 @@
+//! `steradian merge`.
+
+use std::path::Path;
+
+use steradian::desc::OutputDesc;
+use steradian::output::{self, Format, RenderInfo};
+use steradian::render::{self, Header};
+use steradian::{Error, Result};
+
+use crate::args::MergeArgs;
+
+/// Merges shards and writes the picture.
+pub fn run(arguments: &MergeArgs) -> Result<()> {
+    let first = arguments.shards.first().ok_or_else(|| Error::Usage("no shards to merge".into()))?;
+    let outputs = outputs(&Header::read(first)?, &arguments.output)?;
+    for output in &outputs {
+        output::check_writable(Path::new(&output.file))?;
+    }
+    let merged = render::merge(&arguments.shards, arguments.partial)?;
+    let image = merged.state.film.resolve();
+    let info = RenderInfo {
+        samples_per_pixel: merged.state.done,
+        render_seconds: merged.state.seconds,
+        partial: merged.partial.clone(),
+        ..merged.header.info
+    };
+    for output in &outputs {
+        output::write(output, &image, &info)?;
+    }
+    if !arguments.quiet {
+        let partial = merged.partial.map_or(String::new(), |partial| format!(" ({partial})"));
+        eprintln!("{}x{} pixels, {} samples per pixel{partial}", image.crop.width, image.crop.height, info.samples_per_pixel);
+        outputs.iter().for_each(|output| eprintln!("wrote {}", output.file));
+    }
+    Ok(())
+}
+
+/// The files to write: with the names of the command line, but else as the render was to write files of that kind.
+fn outputs(header: &Header, names: &[String]) -> Result<Vec<OutputDesc>> {
+    if names.is_empty() {
+        return Ok(header.outputs.clone());
+    }
+    let like = |name: &String| -> Result<OutputDesc> {
+        let format = Format::from_path(Path::new(name))?;
+        let known = header.outputs.iter().find(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|other| other == format));
+        Ok(OutputDesc { file: name.clone(), ..known.cloned().unwrap_or_else(|| OutputDesc::new(name.clone())) })
+    };
+    names.iter().map(like).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use steradian::desc::LayerDesc;
+
+    #[test]
+    fn files_have_the_layers_of_the_render() {
+        let mut header = Header::default();
+        header.outputs = vec![OutputDesc { layers: vec![LayerDesc::Z], ..OutputDesc::new("a.exr") }];
+        let named = outputs(&header, &["b.EXR".to_owned(), "c.png".to_owned()]).unwrap();
+        assert_eq!((named[0].file.as_str(), named[0].layers.as_slice()), ("b.EXR", &[LayerDesc::Z][..]));
+        assert_eq!((named[1].file.as_str(), named[1].layers.len()), ("c.png", 0));
+        assert_eq!(outputs(&header, &[]).unwrap()[0].file, "a.exr");
+        assert!(matches!(outputs(&header, &["d.jpg".to_owned()]), Err(Error::Usage(_))));
+    }
+}

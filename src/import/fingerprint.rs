@@ -1,0 +1,244 @@
+//! What a scene is, in a few bytes: BLAKE3 hashes of its description and of every file and asset that it names.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::mtl_maps::{ObjMap, take_maps};
+use super::{AssetError, ImageData, Imported, MeshData, RgbImage, Samples};
+use crate::desc::{FilmDesc, IntegratorDesc, SamplerDesc, SceneDesc};
+use crate::error::{Error, Result};
+
+/// Hashes of a scene, each as 64 hexadecimal digits. Two scenes of the same `whole` look the same under the same settings.
+///
+/// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count, nor do the folder
+/// of the scene and the format it was read from.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneFingerprint {
+    /// Of all below.
+    pub whole: String,
+    /// Of the description.
+    pub scene: String,
+    /// Of the files and assets that the scene names, by the names it uses; materials and images of OBJ files are among them.
+    pub assets: BTreeMap<String, String>,
+}
+
+impl SceneFingerprint {
+    /// What differs from another scene: the description and files, by name.
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        let names: BTreeSet<&String> = self.assets.keys().chain(other.assets.keys()).collect();
+        let files = names.into_iter().filter(|&name| self.assets.get(name) != other.assets.get(name)).cloned();
+        (self.scene != other.scene).then(|| "the scene's description".to_owned()).into_iter().chain(files).collect()
+    }
+}
+
+/// The hashes of a scene that was read from `scene_file`, beside which its files lie. Reads all of them.
+///
+/// # Errors
+/// [`Error::Missing`] if a file cannot be read.
+pub fn scene_fingerprint(imported: &Imported, scene_file: &Path) -> Result<SceneFingerprint> {
+    let mut desc = imported.desc.clone();
+    let names: BTreeMap<String, String> = desc.files_mut().into_iter().map(|(path, name)| (name.clone(), path)).collect();
+    let scene = description_hash(desc)?;
+    let folder = scene_file.parent().unwrap_or(Path::new(""));
+    let hashed: Vec<Vec<(String, String)>> = names
+        .par_iter()
+        .map(|(name, path)| match asset_hash(imported, name) {
+            Some(hash) => Ok(vec![(name.clone(), hash)]),
+            None => file_hashes(folder, name).map_err(|error| error.at(scene_file, path, &folder.join(name))),
+        })
+        .collect::<Result<_>>()?;
+    let assets: BTreeMap<String, String> = hashed.into_iter().flatten().collect();
+    let mut whole = Hash::default();
+    whole.text(&scene);
+    for (name, hash) in &assets {
+        whole.text(name);
+        whole.text(hash);
+    }
+    Ok(SceneFingerprint { whole: whole.finish(), scene, assets })
+}
+
+/// The hash of what the description says beside the settings of a render.
+fn description_hash(mut desc: SceneDesc) -> Result<String> {
+    desc.schema = None;
+    desc.comment = None;
+    desc.film = FilmDesc::default();
+    desc.sampler = SamplerDesc::default();
+    desc.integrator = IntegratorDesc::default();
+    desc.outputs = Vec::new();
+    let text = serde_json::to_string(&desc).map_err(|e| Error::Internal(format!("the scene cannot be written as JSON: {e}")))?;
+    let mut hash = Hash::default();
+    hash.text(&text);
+    Ok(hash.finish())
+}
+
+/// The hashes of a file and of those that it names itself.
+fn file_hashes(folder: &Path, name: &str) -> Result<Vec<(String, String)>, AssetError> {
+    let path = folder.join(name);
+    let mut hashes = vec![(name.to_owned(), file_hash(&path)?)];
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+        for file in files_of_obj(&path)? {
+            let named = file.strip_prefix(folder).unwrap_or(&file).to_string_lossy().into_owned();
+            hashes.push((named, file_hash(&file)?));
+        }
+    }
+    Ok(hashes)
+}
+
+fn file_hash(path: &Path) -> Result<String, AssetError> {
+    let missing = |e: std::io::Error| AssetError::missing(path, &e);
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(path).map_err(missing)?).map_err(missing)?;
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+/// The MTL files that an OBJ names and their images, as far as they exist.
+fn files_of_obj(path: &Path) -> Result<BTreeSet<PathBuf>, AssetError> {
+    let read = |path: &Path| std::fs::read(path).map_err(|e| AssetError::missing(path, &e));
+    let obj = read(path)?;
+    let mut files = BTreeSet::new();
+    for line in obj.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii_start().starts_with(b"mtllib")) {
+        let line = String::from_utf8_lossy(line);
+        let name = line.trim().strip_prefix("mtllib").unwrap_or_default().trim();
+        let mtl = path.parent().unwrap_or(Path::new("")).join(name);
+        if !mtl.is_file() {
+            continue;
+        }
+        let text = read(&mtl)?;
+        // A malformed one is refused when the scene is compiled.
+        let maps = take_maps(&String::from_utf8_lossy(&text), mtl.parent().unwrap_or(Path::new(""))).map(|(_, maps)| maps);
+        for maps in maps.unwrap_or_default().into_values() {
+            let all = [maps.diffuse, maps.bump, maps.normal, maps.opacity, maps.specular, maps.emission];
+            files.extend(all.into_iter().flatten().map(|ObjMap { file, .. }| file).filter(|file| file.is_file()));
+        }
+        files.insert(mtl);
+    }
+    Ok(files)
+}
+
+/// The hash of an asset that is no file.
+fn asset_hash(imported: &Imported, name: &str) -> Option<String> {
+    let assets = &imported.assets;
+    let mut hash = Hash::default();
+    if let Some(mesh) = assets.meshes.get(name) {
+        hash.mesh(mesh);
+    } else if let Some(image) = assets.images.get(name) {
+        hash.image(image);
+    } else {
+        let RgbImage { width, height, pixels } = assets.environments.get(name)?;
+        hash.numbers([*width as u64, *height as u64], u64::to_le_bytes);
+        hash.numbers(pixels.as_flattened().iter().copied(), f32::to_le_bytes);
+    }
+    Some(hash.finish())
+}
+
+/// A hash of values, each with its length, so that no two lists of values have the same bytes.
+#[derive(Default)]
+struct Hash {
+    hasher: blake3::Hasher,
+    buffer: Vec<u8>,
+}
+
+impl Hash {
+    fn text(&mut self, text: &str) {
+        self.hasher.update(&(text.len() as u64).to_le_bytes());
+        self.hasher.update(text.as_bytes());
+    }
+
+    fn numbers<T, const N: usize>(&mut self, numbers: impl IntoIterator<Item = T>, bytes: impl Fn(T) -> [u8; N]) {
+        self.buffer.clear();
+        self.buffer.extend(numbers.into_iter().flat_map(bytes));
+        self.hasher.update(&(self.buffer.len() as u64).to_le_bytes());
+        self.hasher.update(&self.buffer);
+    }
+
+    fn mesh(&mut self, mesh: &MeshData) {
+        let MeshData { positions, triangles, normals, uvs, colors } = mesh;
+        self.numbers(triangles.as_flattened().iter().copied(), u32::to_le_bytes);
+        let triples = [Some(positions), normals.as_ref(), colors.as_ref()].map(|list| list.map(|list| list.as_flattened()));
+        let pairs = uvs.as_ref().map(|list| list.as_flattened());
+        for list in triples.into_iter().chain([pairs]) {
+            self.hasher.update(&[u8::from(list.is_some())]);
+            self.numbers(list.unwrap_or_default().iter().copied(), f32::to_le_bytes);
+        }
+    }
+
+    fn image(&mut self, image: &ImageData) {
+        self.numbers([image.width, image.height, image.channels].map(|n| n as u64), u64::to_le_bytes);
+        match &image.samples {
+            Samples::U8(samples) => self.numbers(samples.iter().copied(), u8::to_le_bytes),
+            Samples::U16(samples) => self.numbers(samples.iter().copied(), u16::to_le_bytes),
+            Samples::F16(samples) => self.numbers(samples.iter().copied(), half::f16::to_le_bytes),
+            Samples::F32(samples) => self.numbers(samples.iter().copied(), f32::to_le_bytes),
+        }
+    }
+
+    fn finish(self) -> String {
+        self.hasher.finalize().to_hex().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::import::{Draft, ImportOptions, read_scene};
+
+    /// The hashes of a scene in a folder with a mesh and an image.
+    fn fingerprint(folder: &Path, scene: &str) -> SceneFingerprint {
+        let path = folder.join("scene.json");
+        std::fs::write(&path, scene).unwrap();
+        scene_fingerprint(&read_scene(&path, &ImportOptions::default()).unwrap(), &path).unwrap()
+    }
+
+    const SCENE: &str =
+        r#"{ "camera": {}, "sampler": { "spp": 4 }, "shapes": [{ "type": "mesh", "file": "m/a.obj" }, { "type": "sphere" }] }"#;
+
+    #[test]
+    fn what_a_scene_shows_counts_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("m")).unwrap();
+        std::fs::write(folder.path().join("m/a.obj"), "mtllib a.mtl\nv 0 0 0\n").unwrap();
+        std::fs::write(folder.path().join("m/a.mtl"), "newmtl a\nmap_Kd -s 2 2 1 a.png\nbump gone.png\n").unwrap();
+        std::fs::write(folder.path().join("m/a.png"), "picture").unwrap();
+        let first = fingerprint(folder.path(), SCENE);
+        assert_eq!(first.assets.keys().collect::<Vec<_>>(), ["m/a.mtl", "m/a.obj", "m/a.png"]);
+        assert_eq!(first.assets["m/a.png"], blake3::hash(b"picture").to_hex().to_string());
+
+        let settings = SCENE.replace("\"spp\": 4", "\"spp\": 9, /* more */ \"seed\": 3").replace("{}", "{ }");
+        assert_eq!(fingerprint(folder.path(), &settings), first);
+        let other = fingerprint(folder.path(), &SCENE.replace("sphere", "disk"));
+        assert_eq!(first.differences(&other), ["the scene's description"]);
+        assert_ne!(first.whole, other.whole);
+
+        std::fs::write(folder.path().join("m/a.png"), "pictures").unwrap();
+        let other = fingerprint(folder.path(), SCENE);
+        assert_eq!(first.differences(&other), ["m/a.png"]);
+        assert_ne!(first.whole, other.whole);
+
+        std::fs::remove_file(folder.path().join("m/a.obj")).unwrap();
+        let imported = read_scene(&folder.path().join("scene.json"), &ImportOptions::default()).unwrap();
+        let error = scene_fingerprint(&imported, &folder.path().join("scene.json")).unwrap_err();
+        assert!(matches!(&error, Error::Missing { file, message } if file.ends_with("m/a.obj") && message.contains("shapes[0].file")));
+    }
+
+    #[test]
+    fn assets_without_files_count() {
+        let hash = |change: fn(&mut MeshData)| {
+            let mut imported = Draft::default().finish();
+            let mut mesh = MeshData { positions: vec![[0.0; 3], [1.0, 2.0, 3.0]], triangles: vec![[0, 1, 1]], ..MeshData::default() };
+            change(&mut mesh);
+            std::sync::Arc::make_mut(&mut imported.assets).meshes.insert("a.ply".into(), mesh);
+            let shape = serde_json::from_str(r#"{ "type": "mesh", "file": "a.ply" }"#).unwrap();
+            imported.desc.shapes.push(shape);
+            scene_fingerprint(&imported, Path::new("s.gltf")).unwrap().assets["a.ply"].clone()
+        };
+        let same = hash(|_| {});
+        assert_eq!(hash(|_| {}), same);
+        assert_ne!(hash(|mesh| mesh.positions[1][2] = 3.5), same);
+        assert_ne!(hash(|mesh| mesh.normals = Some(vec![])), same);
+        assert_ne!(hash(|mesh| mesh.colors = Some(vec![])), hash(|mesh| mesh.normals = Some(vec![])));
+    }
+}

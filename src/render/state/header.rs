@@ -1,0 +1,262 @@
+//! What a checkpoint or shard says of itself, and whether it fits.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::ops::Range;
+use std::path::Path;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::container::Reader;
+use crate::desc::{IntegratorDesc, OutputDesc};
+use crate::error::{Error, Result};
+use crate::film::{Crop, Film, LayerKind, LayerSet};
+use crate::import::SceneFingerprint;
+use crate::output::RenderInfo;
+use crate::render::{FINEST_SPP, Settings, TILE_SIZE};
+use crate::scene::Scene;
+
+/// A part of the samples of every pixel: part `index` of `count`, from 1. All of them are part 1 of 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Shard {
+    /// Which part, from 1 to `count`.
+    pub index: u32,
+    /// How many parts there are.
+    pub count: u32,
+}
+
+impl Shard {
+    /// All samples.
+    pub const WHOLE: Self = Self { index: 1, count: 1 };
+
+    /// The indices of its samples, of `spp` in all: contiguous, and none missing or double among all parts. Empty if there are more parts than
+    /// samples.
+    pub fn samples(&self, spp: u32) -> Range<u32> {
+        let start = |index: u32| (u64::from(index) * u64::from(spp) / u64::from(self.count)) as u32;
+        start(self.index - 1)..start(self.index)
+    }
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self::WHOLE
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(index, count)| Some((index.trim().parse().ok()?, count.trim().parse().ok()?)));
+        let shard = numbers.map(|(index, count)| Self { index, count });
+        shard.filter(|s| (1..=s.count).contains(&s.index)).ok_or_else(|| "expected I/N with I from 1 to N, such as 2/8".to_owned())
+    }
+}
+
+/// What a film holds.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FilmShape {
+    /// Width and height of the full picture in pixels.
+    pub size: [u32; 2],
+    /// The part that is there: first column, first row, columns, rows.
+    pub crop: [u32; 4],
+    /// Names of the layers.
+    pub layers: Vec<String>,
+    /// Names of the groups of lights.
+    pub light_groups: Vec<String>,
+}
+
+impl FilmShape {
+    /// Of this film.
+    pub fn of(film: &Film) -> Self {
+        let Crop { x, y, width, height } = film.crop();
+        let layers = film.layers().iter().map(|info| info.name.to_owned()).collect();
+        Self { size: film.size(), crop: [x, y, width, height], layers, light_groups: film.light_groups().to_vec() }
+    }
+
+    /// A black film of this shape.
+    ///
+    /// # Errors
+    /// As [`Film::new`]; [`Error::Internal`] if a layer is not known.
+    pub fn film(&self) -> Result<Film> {
+        let kind = |name: &String| {
+            let info = LayerKind::ALL.iter().find(|info| info.name == *name);
+            info.map(|info| info.kind).ok_or_else(|| Error::Internal(format!("there is no layer {name}")))
+        };
+        let layers: LayerSet = self.layers.iter().map(kind).collect::<Result<_>>()?;
+        let [x, y, width, height] = self.crop;
+        Film::with_light_groups(self.size, Crop { x, y, width, height }, &layers, self.light_groups.clone(), TILE_SIZE)
+    }
+}
+
+/// What a checkpoint or shard says of itself.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Header {
+    /// Name and version of the program.
+    pub program: String,
+    /// The scene's file.
+    pub scene_file: String,
+    /// What the scene and its files are.
+    pub scene: SceneFingerprint,
+    /// All settings that the picture depends on but the number of samples, as text by name.
+    pub settings: BTreeMap<String, String>,
+    /// Samples per pixel of the whole picture; with a target error the most.
+    pub spp: u32,
+    /// Which of them are here.
+    pub shard: Shard,
+    /// How many of the shard's samples every pixel has; with a target error their mean, rounded.
+    pub done: u32,
+    /// Whether no sample is missing.
+    pub complete: bool,
+    /// What the film holds.
+    pub film: FilmShape,
+    /// Pixels on each side of it that lie around the picture.
+    pub overscan: u32,
+    /// The files that the picture is to be written to.
+    pub outputs: Vec<OutputDesc>,
+    /// What these tell of the rendering.
+    pub info: RenderInfo,
+    /// Rays so far: from the camera, indirect, and to lights.
+    pub rays: [u64; 3],
+    /// Wall-clock seconds of rendering so far.
+    pub render_seconds: f64,
+}
+
+impl Header {
+    /// For a render that has not begun.
+    pub fn new(scene_file: &str, fingerprint: SceneFingerprint, scene: &Scene, settings: &Settings, shard: Shard) -> Self {
+        Self {
+            program: concat!("steradian ", env!("CARGO_PKG_VERSION")).to_owned(),
+            scene_file: scene_file.to_owned(),
+            scene: fingerprint,
+            settings: named(settings, scene),
+            spp: settings.spp,
+            shard,
+            overscan: settings.overscan,
+            outputs: settings.outputs.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// That of a file, without a look at the rest of it.
+    ///
+    /// # Errors
+    /// [`Error::Missing`] if it cannot be read, [`Error::Checkpoint`] if it is of another kind or damaged.
+    pub fn read(file: &Path) -> Result<Self> {
+        Reader::peek(file)
+    }
+
+    /// In what it belongs to another picture than `other`, in words; empty if it does not. `these` and `those` name the two.
+    pub fn differences(&self, other: &Self, these: &str, those: &str) -> Vec<String> {
+        let mut found = Vec::new();
+        if self.program != other.program {
+            found.push(format!("program: {} {these}, {} {those}", self.program, other.program));
+        }
+        if self.scene.whole != other.scene.whole {
+            let what = self.scene.differences(&other.scene).join(", ");
+            let files =
+                if self.scene_file == other.scene_file { String::new() } else { format!(" ({}, {})", self.scene_file, other.scene_file) };
+            found.push(format!("scene{files}: not the same {what}"));
+        }
+        let names: BTreeSet<&String> = self.settings.keys().chain(other.settings.keys()).collect();
+        for name in names {
+            let [a, b] = [self, other].map(|header| header.settings.get(name).map_or("none", String::as_str));
+            if a != b {
+                found.push(format!("{name}: {a} {these}, {b} {those}"));
+            }
+        }
+        found
+    }
+}
+
+/// The settings that the picture depends on, by the names of their options.
+fn named(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
+    let mut named = BTreeMap::new();
+    let mut put = |name: &str, value: String| named.insert(name.to_owned(), value);
+    put("size", format!("{}x{}", settings.size[0], settings.size[1]));
+    let crop = settings.crop;
+    put("crop", format!("{},{},{},{}", crop.x, crop.y, crop.width, crop.height));
+    put("overscan", settings.overscan.to_string());
+    put("seed", settings.seed.to_string());
+    put("sampler", format!("{:?}", settings.sampler).to_lowercase());
+    put("accel", settings.accel.to_string());
+    put("layers", settings.layers.iter().map(|info| info.name).collect::<Vec<_>>().join(","));
+    if let Some(target) = settings.target_error {
+        put("target-error", target.to_string());
+        put("spp", settings.spp.to_string());
+    }
+    if scene.features.filtered_textures {
+        put("samples per pixel that textures are filtered for", settings.spp.min(FINEST_SPP).to_string());
+    }
+    put_value(&mut named, "filter", &serde_json::to_value(settings.filter).unwrap_or_default());
+    put_value(&mut named, "integrator", &serde_json::to_value::<IntegratorDesc>(settings.integrator).unwrap_or_default());
+    named
+}
+
+/// Each of an object's values under a name of its own.
+fn put_value(named: &mut BTreeMap<String, String>, name: &str, value: &Value) {
+    match value {
+        Value::Object(values) => values.iter().for_each(|(key, value)| put_value(named, &format!("{name}.{key}"), value)),
+        Value::String(text) => {
+            named.insert(name.to_owned(), text.clone());
+        }
+        value => {
+            named.insert(name.to_owned(), value.to_string());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_share_out_all_samples() {
+        for spp in [0, 1, 2, 3, 7, 64, 1000, u32::MAX] {
+            for count in [1, 2, 3, 8, 100] {
+                let ranges: Vec<_> = (1..=count).map(|index| Shard { index, count }.samples(spp)).collect();
+                assert_eq!((ranges[0].start, ranges[ranges.len() - 1].end), (0, spp));
+                assert!(ranges.windows(2).all(|pair| pair[0].end == pair[1].start));
+                let lengths = ranges.iter().map(ExactSizeIterator::len);
+                assert!(lengths.clone().max().unwrap() - lengths.min().unwrap() <= 1, "{spp} {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn shards_are_written_as_fractions() {
+        assert_eq!("2/8".parse(), Ok(Shard { index: 2, count: 8 }));
+        assert_eq!(Shard { index: 2, count: 8 }.to_string(), "2/8");
+        for text in ["0/4", "5/4", "1", "1/0", "1/4/2", "-1/4", "a/b", ""] {
+            assert!(text.parse::<Shard>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_differs_is_named() {
+        let mut a = Header { program: "p 1".into(), scene_file: "a.json".into(), ..Header::default() };
+        a.settings.insert("seed".into(), "1".into());
+        let mut b = a.clone();
+        assert!(a.differences(&b, "there", "here").is_empty());
+        b.settings.insert("seed".into(), "2".into());
+        b.settings.insert("integrator.clamp".into(), "2.5".into());
+        b.program = "p 2".into();
+        b.scene.whole = "x".into();
+        b.scene.assets.insert("m.ply".into(), "x".into());
+        let expected = [
+            "program: p 1 there, p 2 here",
+            "scene: not the same m.ply",
+            "integrator.clamp: none there, 2.5 here",
+            "seed: 1 there, 2 here",
+        ];
+        assert_eq!(a.differences(&b, "there", "here"), expected);
+    }
+}

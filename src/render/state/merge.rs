@@ -1,0 +1,107 @@
+//! Shards put together: one at a time, tile by tile.
+
+use std::path::{Path, PathBuf};
+
+use super::container::Reader;
+use super::{Header, RenderState, Shard};
+use crate::error::{Error, Result};
+use crate::integrator::RayCounts;
+
+/// The picture of several shards.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// All samples.
+    pub state: RenderState,
+    /// What is said of the picture: as the first shard has it.
+    pub header: Header,
+    /// Which shards or samples are missing, such as `shards 1,3 of 4`; `None` if none are.
+    pub partial: Option<String>,
+}
+
+/// Merges shards: the same bits as of one run with all samples. Without `partial` every shard and every sample must be there. Holds one film.
+///
+/// # Errors
+/// [`Error::Missing`] if a file cannot be read; [`Error::Checkpoint`] naming the file if one is damaged, belongs to another picture, or is there
+/// twice, and naming what is missing.
+pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
+    let first = files.first().ok_or_else(|| Error::Usage("no shards to merge".into()))?;
+    let mut headers: Vec<Header> = Vec::new();
+    for file in files {
+        let header = Reader::peek(file)?;
+        if let Some(known) = headers.first() {
+            check_kinship(file, &header, first, known)?;
+        }
+        if let Some(place) = headers.iter().position(|other| other.shard == header.shard) {
+            let message = format!("shard {} is there twice: {} has it too", header.shard, files[place].display());
+            return Err(Error::Checkpoint { file: file.clone(), message });
+        }
+        headers.push(header);
+    }
+    let lack = lack(files, &headers);
+    if let (Some((file, message)), false) = (&lack, partial) {
+        let message = format!("{message}; --partial merges what is there");
+        return Err(Error::Checkpoint { file: file.clone(), message });
+    }
+    let film = headers[0].film.film()?;
+    let rays = RayCounts::default();
+    let mut state = RenderState { film, shard: Shard::WHOLE, done: 0, complete: lack.is_none(), blocks: None, rays, seconds: 0.0 };
+    for file in files {
+        add(&mut state, file)?;
+    }
+    Ok(Merged { state, header: headers.swap_remove(0), partial: lack.map(|(_, message)| message) })
+}
+
+/// Whether two files are parts of one picture.
+fn check_kinship(file: &Path, header: &Header, first: &Path, known: &Header) -> Result<()> {
+    let mut differences = header.differences(known, "here", "there");
+    if header.shard.count != known.shard.count {
+        differences.push(format!("shards: {} here, {} there", header.shard.count, known.shard.count));
+    }
+    if header.spp != known.spp {
+        differences.push(format!("spp: {} here, {} there", header.spp, known.spp));
+    }
+    if differences.is_empty() {
+        return Ok(());
+    }
+    // What was altered is no stranger.
+    Reader::open(file)?;
+    Reader::open(first)?;
+    let message = format!("this belongs to another picture than {}; {}", first.display(), differences.join("; "));
+    Err(Error::Checkpoint { file: file.into(), message })
+}
+
+/// What is missing, with the file to be named.
+fn lack(files: &[PathBuf], headers: &[Header]) -> Option<(PathBuf, String)> {
+    let count = headers[0].shard.count;
+    let mut there: Vec<u32> = headers.iter().map(|header| header.shard.index).collect();
+    there.sort_unstable();
+    let unfinished = headers.iter().zip(files).filter(|(header, _)| !header.complete);
+    let samples = unfinished
+        .clone()
+        .map(|(header, _)| format!("{} of {} samples of shard {}", header.done, header.shard.samples(header.spp).len(), header.shard));
+    let mut parts: Vec<String> = samples.collect();
+    let file = if there.len() < count as usize {
+        let list = there.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
+        parts.insert(0, format!("shard{} {list} of {count}", if there.len() == 1 { "" } else { "s" }));
+        &files[0]
+    } else {
+        unfinished.map(|(_, file)| file).next()?
+    };
+    Some((file.clone(), parts.join(", ")))
+}
+
+/// Adds the samples of a file.
+fn add(state: &mut RenderState, file: &Path) -> Result<()> {
+    let mut reader = Reader::open(file)?;
+    for tile in state.film.tiles_mut() {
+        let bytes = reader.block()?;
+        let mut other = tile.empty();
+        other.load(&bytes).map_err(|e| reader.fault(e))?;
+        tile.merge(&other);
+    }
+    let [camera, indirect, shadow] = reader.header().rays;
+    state.rays.add(&RayCounts { camera, indirect, shadow });
+    state.done += reader.header().done;
+    state.seconds += reader.header().render_seconds;
+    Ok(())
+}
