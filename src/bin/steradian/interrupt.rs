@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -11,6 +12,9 @@ use steradian::{Error, Result};
 const INTERRUPTED: u8 = 130;
 /// Exit code after SIGTERM.
 const TERMINATED: u8 = 143;
+
+/// How often a wait looks whether a signal has come.
+const WAIT_STEP: Duration = Duration::from_millis(50);
 
 /// What the signals have asked for.
 #[derive(Clone, Debug, Default)]
@@ -32,6 +36,13 @@ impl Interrupt {
             registered.map_err(|e| Error::Internal(format!("cannot listen to signals: {e}")))?;
         }
         Ok(interrupt)
+    }
+
+    /// Returns after the first signal.
+    pub fn wait(&self) {
+        while !self.stop.load(Ordering::Relaxed) {
+            std::thread::sleep(WAIT_STEP);
+        }
     }
 
     /// The exit code of an interrupted run.

@@ -4,6 +4,7 @@ mod bench;
 mod bench_error;
 mod bench_scale;
 mod import;
+mod live;
 
 use std::path::PathBuf;
 
@@ -178,6 +179,8 @@ pub struct RenderArgs {
     /// The sample to replay, counted from 0
     #[arg(long, value_name = "I", requires = "pixel", help_heading = "Run")]
     pub sample: Option<u32>,
+    #[command(flatten)]
+    pub live: live::LiveArgs,
     #[command(flatten)]
     pub import: ImportArgs,
     #[command(flatten)]
