@@ -46,6 +46,10 @@ mod gltf_looks;
 mod guiding;
 /// Integrators against closed forms, strategies against each other.
 mod light_transport;
+/// A render watched in browsers: what is served, to whom.
+mod live_preview;
+/// A render watched in tev.
+mod live_tev;
 /// Measured and textured lights, lamps in objects, groups, clamping.
 mod lights;
 /// Choosing among many lights.

@@ -1,5 +1,6 @@
 //! Several listeners to one render.
 
+use crate::film::Image;
 use crate::render::Progress;
 
 /// Tells every listener what it is told.
@@ -33,5 +34,13 @@ impl Progress for Fan<'_> {
 
     fn warn(&self, message: &str) {
         self.listeners.iter().for_each(|listener| listener.warn(message));
+    }
+
+    fn wants_picture(&self) -> bool {
+        self.listeners.iter().any(|listener| listener.wants_picture())
+    }
+
+    fn picture(&self, image: &Image, spp: u32) {
+        self.listeners.iter().filter(|listener| listener.wants_picture()).for_each(|listener| listener.picture(image, spp));
     }
 }

@@ -88,24 +88,6 @@ impl Live {
     }
 }
 
-impl Live {
-    /// Whether a viewer is there that waits for a picture.
-    pub fn wants_picture(&self) -> bool {
-        self.tev.as_ref().is_some_and(Tev::wants_picture) || self.preview.as_ref().is_some_and(Preview::wants_picture)
-    }
-
-    /// Hands a copy of the picture to the viewers that are there.
-    pub fn picture(&self, image: &Image, spp: u32) {
-        let snapshot = Arc::new(Snapshot::new(image, spp));
-        if let Some(tev) = &self.tev {
-            tev.offer(&snapshot);
-        }
-        if let Some(preview) = &self.preview {
-            preview.show(&snapshot);
-        }
-    }
-}
-
 impl Progress for Live {
     fn start(&self, samples_per_pixel: u32, pixels: u64) {
         self.statistics.start(samples_per_pixel, pixels);
@@ -117,6 +99,21 @@ impl Progress for Live {
 
     fn tile_done(&self, samples: u64) {
         self.statistics.add(samples);
+    }
+
+    fn wants_picture(&self) -> bool {
+        self.tev.as_ref().is_some_and(Tev::wants_picture) || self.preview.as_ref().is_some_and(Preview::wants_picture)
+    }
+
+    fn picture(&self, image: &Image, samples_per_pixel: u32) {
+        let snapshot = Arc::new(Snapshot::new(image, samples_per_pixel));
+        // Those who do not want it yet would only have it replaced sooner.
+        if let Some(tev) = self.tev.as_ref().filter(|tev| tev.wants_picture()) {
+            tev.offer(&snapshot);
+        }
+        if let Some(preview) = self.preview.as_ref().filter(|preview| preview.wants_picture()) {
+            preview.show(&snapshot);
+        }
     }
 
     fn finish(&self) {

@@ -16,7 +16,8 @@ pub struct Snapshot {
 impl Snapshot {
     /// A copy of a picture of so many samples per pixel.
     pub fn new(image: &Image, spp: u32) -> Self {
-        Self { image: image.clone(), spp, names: image.layers.iter().map(channel_names).collect() }
+        let layers = image.layers.clone();
+        Self { image: Image { size: image.size, crop: image.crop, layers }, spp, names: image.layers.iter().map(channel_names).collect() }
     }
 
     /// Every layer with the full names of its channels.
@@ -54,7 +55,7 @@ impl Snapshot {
 
 /// The names of a layer's channels; what no name can hold is replaced.
 fn channel_names(layer: &Layer) -> Vec<String> {
-    layer.kind.info().channels.iter().map(|name| name.replace('\0', "_")).collect()
+    layer.channel_names().iter().map(|name| name.replace('\0', "_")).collect()
 }
 
 #[cfg(test)]

@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn pictures_are_wanted_only_while_somebody_waits_for_one() {
-        let picture = Arc::new(Snapshot::new(&Image { size: [1, 1], crop: Crop::full([1, 1]), layers: Vec::new() }, 1));
+        let picture = Arc::new(Snapshot::new(&Image { size: [1, 1], crop: Crop::full([1, 1]), ..Image::default() }, 1));
         let board = Board::default();
         assert!(!board.wants_picture());
         board.visit(7, 0, true);

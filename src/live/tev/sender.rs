@@ -180,9 +180,9 @@ mod tests {
 
     fn snapshot(size: [u32; 2]) -> Snapshot {
         let pixels = (size[0] * size[1]) as usize;
-        let layer = |kind: LayerKind, channels: usize| Layer { kind, data: (0..pixels * channels).map(|i| i as f32).collect() };
+        let layer = |kind: LayerKind, channels: usize| Layer::new(kind, (0..pixels * channels).map(|i| i as f32).collect());
         let layers = vec![layer(LayerKind::Color, 4), layer(LayerKind::Z, 1)];
-        Snapshot::new(&Image { size, crop: Crop::full(size), layers }, 1)
+        Snapshot::new(&Image { size, crop: Crop::full(size), layers, ..Image::default() }, 1)
     }
 
     #[test]
