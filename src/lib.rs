@@ -21,6 +21,7 @@
 //! | 5 | `scene` |
 //! | 6 | `integrator`, `compile` |
 //! | 7 | `render` |
+//! | 8 | `live` |
 //! | 9 | `bin/steradian` |
 
 pub mod accel;
@@ -39,6 +40,7 @@ pub mod id;
 pub mod import;
 pub mod integrator;
 pub mod light;
+pub mod live;
 pub mod material;
 pub mod math;
 pub mod medium;

@@ -118,7 +118,8 @@ fn what_is_there_can_be_merged() {
     // A shard that was stopped.
     let shard = Shard { index: 2, count: 3 };
     let path = folder.path().join("stopped.shard");
-    let stopped = RenderState { done: 1, ..kit.start(shard) };
+    let mut stopped = kit.start(shard);
+    stopped.done = 1;
     StateFile::take(&path).unwrap().replace(|out| stopped.write(&kit.header(shard), out)).unwrap();
     let files = [files, vec![path]].concat();
     let refused = render::merge(&files, false).unwrap_err().to_string();

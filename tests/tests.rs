@@ -54,6 +54,10 @@ mod layers;
 mod light_transport;
 /// Measured and textured lights, lamps in objects, groups, clamping.
 mod lights;
+/// A render watched in browsers: what is served, to whom.
+mod live_preview;
+/// A render watched in tev.
+mod live_tev;
 /// Choosing among many lights.
 mod many_lights;
 /// Materials as scenes use them.

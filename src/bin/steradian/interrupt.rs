@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
@@ -12,6 +13,9 @@ use steradian::{Error, Result};
 const INTERRUPTED: u8 = 130;
 /// Exit code after SIGTERM.
 const TERMINATED: u8 = 143;
+
+/// How often a wait looks whether a signal has come.
+const WAIT_STEP: Duration = Duration::from_millis(50);
 
 /// What the signals have asked for.
 #[derive(Clone, Debug, Default)]
@@ -41,6 +45,13 @@ impl Interrupt {
             registered.map_err(failed)?;
         }
         Ok(())
+    }
+
+    /// Returns after the first signal.
+    pub fn wait(&self) {
+        while !self.stop.load(Ordering::Relaxed) {
+            std::thread::sleep(WAIT_STEP);
+        }
     }
 
     /// The exit code of an interrupted run.

@@ -76,7 +76,7 @@ impl<'a> Kept<'a> {
         accel: &dyn Accelerator,
         settings: &Settings,
         header: &Header,
-        reporter: &Reporter,
+        (reporter, progress): (&Reporter, &dyn Progress),
         interrupt: &Interrupt,
     ) -> Result<RenderResult> {
         let state = match self.checkpoint.as_ref().filter(|_| self.arguments.resume) {
@@ -93,7 +93,7 @@ impl<'a> Kept<'a> {
         };
         let asked = || Arc::clone(&interrupt.checkpoint);
         let mut checkpoints = self.checkpoint.take().map(|file| Checkpoints::new(file, header.clone(), self.arguments.every, asked()));
-        let (state, stats) = render::render_from(scene, accel, settings, state, checkpoints.as_mut(), reporter, &interrupt.stop)?;
+        let (state, stats) = render::render_from(scene, accel, settings, state, checkpoints.as_mut(), progress, &interrupt.stop)?;
         if let Some(file) = &self.shard_file {
             file.replace(|out| state.write(header, out))?;
         }

@@ -6,6 +6,7 @@ use std::time::Instant;
 use steradian::accel::{self, Accelerator};
 use steradian::camera::Camera;
 use steradian::film::LayerSet;
+use steradian::live::Fan;
 use steradian::math::Vec3;
 use steradian::output::{self, RenderInfo};
 use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Replayed, Settings, Stats};
@@ -59,10 +60,15 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
 
     interrupt.listen_to_stop()?;
     let reporter = Reporter::new(arguments.verbosity.quiet, interrupt.stop.clone(), settings.time_limit);
+    let live = arguments.live.start(&arguments.scene, settings.time_limit)?;
+    if let Some(url) = live.preview_url() {
+        reporter.say(&format!("preview: {url}"));
+    }
+    let fan = Fan::new([&reporter as &dyn Progress, &live]);
     let result = match (kept, &header) {
-        (Some(kept), Some(header)) => kept.render(&scene, &*accel, &settings, header, &reporter, &interrupt)?,
+        (Some(kept), Some(header)) => kept.render(&scene, &*accel, &settings, header, (&reporter, &fan), &interrupt)?,
         _ => {
-            let result = render::render(&scene, &*accel, &settings, &reporter, &interrupt.stop)?;
+            let result = render::render(&scene, &*accel, &settings, &fan, &interrupt.stop)?;
             kept::warn_of_request(&interrupt, &reporter);
             result
         }
@@ -83,11 +89,15 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
             output::write(desc, &result.image, &info)?;
         }
     }
+    live.show_final(&result.image, stats.spp_done);
     if let Some(path) = &arguments.json {
         let run = Run { scene: &arguments.scene, load_seconds, build_seconds };
         stats::write(path, &stats::value(&run, &settings, &*accel, stats))?;
     }
     report(&reporter, &settings, &*accel, stats, &written);
+    if arguments.live.preview_hold {
+        interrupt.wait();
+    }
     Ok(if stats.interrupted { interrupt.exit_code() } else { 0 })
 }
 

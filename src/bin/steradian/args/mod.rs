@@ -4,6 +4,7 @@ mod bench;
 mod bench_error;
 mod bench_scale;
 mod import;
+mod live;
 mod state;
 
 use std::path::PathBuf;
@@ -192,6 +193,8 @@ pub struct RenderArgs {
     pub sample: Option<u32>,
     #[command(flatten)]
     pub state: StateArgs,
+    #[command(flatten)]
+    pub live: live::LiveArgs,
     #[command(flatten)]
     pub import: ImportArgs,
     #[command(flatten)]

@@ -1,0 +1,223 @@
+//! As much of HTTP/1.1 as a page of one's own needs: GET, one request after the other.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{IpAddr, TcpStream};
+use std::time::{Duration, Instant};
+
+/// The longest head of a request, in bytes.
+const MAX_HEAD: usize = 8192;
+
+/// The most header lines of a request.
+const MAX_HEADERS: usize = 64;
+
+/// What the page may do: show what is in it, and ask its own server.
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:; \
+                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Why a request is not answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// Not HTTP, or without a host.
+    Malformed,
+    /// The head is too long.
+    TooLong,
+    /// Anything but GET.
+    Method,
+    /// Asked under a foreign name or by a foreign page.
+    Foreign,
+    /// Too many connections.
+    Busy,
+}
+
+impl Refusal {
+    const fn status(self) -> &'static str {
+        match self {
+            Self::Malformed => "400 Bad Request",
+            Self::TooLong => "431 Request Header Fields Too Large",
+            Self::Method => "405 Method Not Allowed",
+            Self::Foreign => "403 Forbidden",
+            Self::Busy => "503 Service Unavailable",
+        }
+    }
+}
+
+/// What is asked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Request {
+    path: String,
+    query: String,
+}
+
+impl Request {
+    /// The path, from the slash on.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// A whole number of the query.
+    pub fn number(&self, key: &str) -> Option<u64> {
+        let mut pairs = self.query.split('&').filter_map(|pair| pair.split_once('='));
+        pairs.find(|(name, _)| *name == key)?.1.parse().ok()
+    }
+}
+
+/// A connection to a browser.
+pub struct Connection {
+    stream: TcpStream,
+    /// What has been read and not yet been used.
+    buffer: Vec<u8>,
+}
+
+impl Connection {
+    pub const fn new(stream: TcpStream) -> Self {
+        Self { stream, buffer: Vec::new() }
+    }
+
+    /// The next request; `None` if there is none. Its head must be there after `patience`, and it must ask for this machine or for `host`.
+    pub fn request(&mut self, patience: Duration, host: &str) -> io::Result<Option<Result<Request, Refusal>>> {
+        let deadline = Instant::now() + patience;
+        loop {
+            match parse(&self.buffer, host) {
+                Some(Ok((request, length))) => {
+                    self.buffer.drain(..length);
+                    return Ok(Some(Ok(request)));
+                }
+                Some(Err(refusal)) => return Ok(Some(Err(refusal))),
+                None if self.buffer.len() > MAX_HEAD => return Ok(Some(Err(Refusal::TooLong))),
+                None => {}
+            }
+            let mut piece = [0; 2048];
+            let read = match self.stream.read(&mut piece) {
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                read => read?,
+            };
+            if read == 0 || Instant::now() > deadline {
+                return Ok(None);
+            }
+            self.buffer.extend_from_slice(&piece[..read]);
+        }
+    }
+
+    /// Answers with a refusal.
+    pub fn refuse(&mut self, refusal: Refusal) -> io::Result<()> {
+        let allow = if refusal == Refusal::Method { "Allow: GET\r\n" } else { "" };
+        let status = refusal.status();
+        self.stream.write_all(
+            format!(
+                "HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{status}",
+                status.len()
+            )
+            .as_bytes(),
+        )
+    }
+
+    /// Starts an answer; the body of `length` bytes follows by [`Connection::write`].
+    pub fn start(&mut self, status: &str, kind: &str, length: u64) -> io::Result<()> {
+        let head = format!(
+            "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nCache-Control: no-store\r\n\
+             Content-Security-Policy: {POLICY}\r\nCross-Origin-Resource-Policy: same-origin\r\nX-Content-Type-Options: nosniff\r\n\
+             Referrer-Policy: no-referrer\r\n\r\n"
+        );
+        self.stream.write_all(head.as_bytes())
+    }
+
+    /// Some of the body.
+    pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.stream.write_all(bytes)
+    }
+
+    /// A whole answer.
+    pub fn answer(&mut self, status: &str, kind: &str, body: &[u8]) -> io::Result<()> {
+        self.start(status, kind, body.len() as u64)?;
+        self.write(body)
+    }
+}
+
+/// The request at the start of `bytes` and its length; `None` if it is not all there yet.
+fn parse(bytes: &[u8], host: &str) -> Option<Result<(Request, usize), Refusal>> {
+    let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
+    let mut request = httparse::Request::new(&mut headers);
+    let length = match request.parse(bytes) {
+        Ok(httparse::Status::Partial) => return None,
+        Ok(httparse::Status::Complete(length)) => length,
+        Err(httparse::Error::TooManyHeaders) => return Some(Err(Refusal::TooLong)),
+        Err(_) => return Some(Err(Refusal::Malformed)),
+    };
+    Some(check(&request, host).map(|request| (request, length)))
+}
+
+fn check(request: &httparse::Request, host: &str) -> Result<Request, Refusal> {
+    let values = |name: &'static str| request.headers.iter().filter(move |h| h.name.eq_ignore_ascii_case(name)).map(|h| h.value);
+    if request.method != Some("GET") {
+        return Err(Refusal::Method);
+    }
+    // A request with a body would leave it where the next request is looked for.
+    let has_body = values("Transfer-Encoding").next().is_some() || values("Content-Length").any(|value| value != b"0");
+    let mut hosts = values("Host");
+    let (Some(asked), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(Refusal::Malformed) };
+    let asked = std::str::from_utf8(asked).map_err(|_| Refusal::Malformed)?;
+    // Browsers say which kind of page a request comes from; pages of other origins have no business here.
+    let from_elsewhere = values("Sec-Fetch-Site").any(|site| site != b"same-origin" && site != b"none");
+    if !is_own_host(asked, host) || from_elsewhere {
+        return Err(Refusal::Foreign);
+    }
+    let target = request.path.filter(|path| path.starts_with('/')).ok_or(Refusal::Malformed)?;
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    Ok(Request { path: path.to_owned(), query: query.to_owned() })
+}
+
+/// Whether a Host header names this machine: by address, as localhost, or by the name asked for on the command line. A foreign name that has been
+/// made to point here (DNS rebinding) is none of these. The port may be another, that of a tunnel.
+fn is_own_host(asked: &str, host: &str) -> bool {
+    let asked = asked.to_ascii_lowercase();
+    let name = match asked.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+        Some((name, _)) => name,
+        None => asked.split(':').next().unwrap_or(""),
+    };
+    name == "localhost" || name == host || name.parse::<IpAddr>().is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn result(text: &str) -> Option<Result<Request, Refusal>> {
+        parse(text.as_bytes(), "node7").map(|result| result.map(|(request, _)| request))
+    }
+
+    #[test]
+    fn requests_are_read_whole() {
+        let text = "GET /layer?index=3&page=12 HTTP/1.1\r\nHost: 127.0.0.1:8000\r\n\r\n";
+        let request = result(text).unwrap().unwrap();
+        assert_eq!((request.path(), request.number("index"), request.number("page")), ("/layer", Some(3), Some(12)));
+        assert_eq!((request.number("x"), parse(format!("{text}GET").as_bytes(), "").unwrap().unwrap().1), (None, text.len()));
+        for end in 0..text.len() {
+            assert_eq!(result(&text[..end]), None, "{end}");
+        }
+    }
+
+    #[test]
+    fn only_this_machine_may_be_asked_for() {
+        for host in ["127.0.0.1:8000", "localhost", "LOCALHOST:1", "[::1]:8000", "192.168.1.7", "node7:80"] {
+            assert!(is_own_host(host, "node7"), "{host}");
+        }
+        for host in ["", "example.com", "localhost.example.com:8000", "127.0.0.1.example.com", "node7.example.com", "[example.com]:80"] {
+            assert!(!is_own_host(host, "node7"), "{host}");
+        }
+    }
+
+    #[test]
+    fn anything_else_is_refused() {
+        let of = |head: &str| result(&format!("{head}\r\n\r\n")).unwrap().unwrap_err();
+        assert_eq!(of("POST / HTTP/1.1\r\nHost: localhost"), Refusal::Method);
+        assert_eq!(of("HEAD / HTTP/1.1\r\nHost: localhost"), Refusal::Method);
+        assert_eq!(of("GET / HTTP/1.1"), Refusal::Malformed);
+        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost"), Refusal::Malformed);
+        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5"), Refusal::Malformed);
+        assert_eq!(of("GET http://localhost/ HTTP/1.1\r\nHost: localhost"), Refusal::Malformed);
+        assert_eq!(of("nonsense\u{1}"), Refusal::Malformed);
+        assert_eq!(of("GET / HTTP/1.1\r\nHost: evil.example"), Refusal::Foreign);
+        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nSec-Fetch-Site: cross-site"), Refusal::Foreign);
+        assert_eq!(of(&format!("GET / HTTP/1.1{}", "\r\nA: b".repeat(MAX_HEADERS + 1))), Refusal::TooLong);
+    }
+}

@@ -1,0 +1,165 @@
+//! A small web page that shows the picture as it grows.
+//!
+//! The page and everything it needs are in the program. It asks for the numbers a few times a second, fetches the layer it shows when there is a
+//! newer picture, and so tells that it wants the next one; nobody looking means no pictures and no cost.
+
+mod board;
+mod http;
+mod respond;
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use super::{Snapshot, Statistics};
+use crate::error::{Error, Result};
+use board::Board;
+use http::{Connection, Refusal};
+
+/// More connections than this are turned away.
+const MAX_CONNECTIONS: usize = 64;
+
+/// A connection ends after this time without a request, and when a reader takes nothing for this time.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// After a failure to accept a connection (too many open files, say) the next attempt waits so long.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Where the page is served.
+#[derive(Clone, Debug)]
+pub struct PreviewOptions {
+    /// Host name or address to listen at; only those who reach it can look.
+    pub host: String,
+    /// The port; 0 stands for any that is free.
+    pub port: u16,
+}
+
+impl Default for PreviewOptions {
+    /// Only this machine, any port.
+    fn default() -> Self {
+        Self { host: Ipv4Addr::LOCALHOST.to_string(), port: 0 }
+    }
+}
+
+/// What all connections share.
+struct Shared {
+    board: Board,
+    statistics: Arc<Statistics>,
+    name: String,
+    /// The host asked for: requests may name it.
+    host: String,
+    connections: AtomicUsize,
+    closing: AtomicBool,
+}
+
+/// Serves the page.
+pub struct Preview {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+}
+
+impl Preview {
+    /// Starts to serve; the picture is called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the address and port are not to be had.
+    pub fn new(options: &PreviewOptions, name: String, statistics: Arc<Statistics>) -> Result<Self> {
+        let unusable =
+            |e: &dyn std::fmt::Display| Error::Usage(format!("--preview: cannot listen at {}:{}: {e}", options.host, options.port));
+        let host = options.host.trim_start_matches('[').trim_end_matches(']');
+        let addresses: Vec<_> = (host, options.port).to_socket_addrs().map_err(|e| unusable(&e))?.collect();
+        let listener = TcpListener::bind(&addresses[..]).map_err(|e| unusable(&e))?;
+        let address = listener.local_addr().map_err(|e| unusable(&e))?;
+        let shared = Arc::new(Shared {
+            board: Board::default(),
+            statistics,
+            name,
+            host: host.to_ascii_lowercase(),
+            connections: AtomicUsize::new(0),
+            closing: AtomicBool::new(false),
+        });
+        let of_thread = Arc::clone(&shared);
+        std::thread::spawn(move || accept(&listener, &of_thread));
+        Ok(Self { shared, address })
+    }
+
+    /// The page's address.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.address)
+    }
+
+    /// Whether a page that shows the newest picture waits for a newer one.
+    pub fn wants_picture(&self) -> bool {
+        self.shared.board.wants_picture()
+    }
+
+    /// Shows a picture from now on. Never blocks.
+    pub fn show(&self, snapshot: &Arc<Snapshot>) {
+        self.shared.board.show(snapshot, false);
+    }
+
+    /// Shows the finished picture.
+    pub fn show_final(&self, snapshot: &Arc<Snapshot>) {
+        self.shared.board.show(snapshot, true);
+    }
+
+    /// Waits until every page open has fetched the finished picture, no longer than until `deadline`; says whether they have.
+    pub fn wait(&self, deadline: Instant) -> bool {
+        self.shared.board.wait(deadline)
+    }
+}
+
+impl Drop for Preview {
+    fn drop(&mut self) {
+        self.shared.closing.store(true, Ordering::Relaxed);
+        let ip = match self.address.ip() {
+            IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
+            IpAddr::V6(ip) if ip.is_unspecified() => std::net::Ipv6Addr::LOCALHOST.into(),
+            ip => ip,
+        };
+        // Wakes the thread that accepts.
+        let _ = TcpStream::connect_timeout(&SocketAddr::new(ip, self.address.port()), ACCEPT_PAUSE);
+    }
+}
+
+/// Gives every connection a thread of its own: a slow one keeps nobody waiting.
+fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
+    for stream in listener.incoming() {
+        if shared.closing.load(Ordering::Relaxed) {
+            return;
+        }
+        let Ok(stream) = stream else {
+            std::thread::sleep(ACCEPT_PAUSE);
+            continue;
+        };
+        let shared = Arc::clone(shared);
+        let serve = move || {
+            let count = shared.connections.fetch_add(1, Ordering::Relaxed);
+            // The other side may hang up at any time; that is no fault.
+            let _ = serve(stream, &shared, count < MAX_CONNECTIONS);
+            shared.connections.fetch_sub(1, Ordering::Relaxed);
+        };
+        // Without a thread to be had, the connection closes.
+        let _ = std::thread::Builder::new().name("preview".to_owned()).spawn(serve);
+    }
+}
+
+/// Answers the requests of a connection, one after the other.
+fn serve(stream: TcpStream, shared: &Shared, has_room: bool) -> std::io::Result<()> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_nodelay(true)?;
+    let mut connection = Connection::new(stream);
+    if !has_room {
+        return connection.refuse(Refusal::Busy);
+    }
+    while !shared.closing.load(Ordering::Relaxed) {
+        match connection.request(PATIENCE, &shared.host)? {
+            None => break,
+            Some(Err(refusal)) => return connection.refuse(refusal),
+            Some(Ok(request)) => respond::respond(&mut connection, &request, shared)?,
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! What there is to ask for.
+//!
+//! | path | answer |
+//! |---|---|
+//! | `/` | the page |
+//! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and wants the next one, not so with `idle=1` |
+//! | `/layer?index=I&page=P` | a layer: version, width, height, channels as little-endian u32, then 16-bit floats, row by row from the top |
+//! | `/pixel?x=X&y=Y` | every layer's exact values at a pixel as JSON |
+
+use std::io;
+
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use serde_json::{Value, json};
+
+use super::http::{Connection, Request};
+use super::{Shared, Snapshot};
+
+const PAGE: &str = include_str!("page.html");
+
+/// Values converted at a time.
+const PIECE: usize = 32768;
+
+const OK: &str = "200 OK";
+const JSON: &str = "application/json";
+
+pub fn respond(connection: &mut Connection, request: &Request, shared: &Shared) -> io::Result<()> {
+    match request.path() {
+        "/" => connection.answer(OK, "text/html; charset=utf-8", PAGE.as_bytes()),
+        "/state" => {
+            if let (Some(page), Some(version)) = (request.number("page"), request.number("have")) {
+                shared.board.visit(page, version, request.number("idle") == Some(1));
+            }
+            connection.answer(OK, JSON, state(shared).to_string().as_bytes())
+        }
+        "/layer" => layer(connection, request, shared),
+        "/pixel" => match pixel(request, shared) {
+            Some(value) => connection.answer(OK, JSON, value.to_string().as_bytes()),
+            None => not_found(connection),
+        },
+        _ => not_found(connection),
+    }
+}
+
+fn not_found(connection: &mut Connection) -> io::Result<()> {
+    connection.answer("404 Not Found", "text/plain", b"not found")
+}
+
+fn state(shared: &Shared) -> Value {
+    let shown = shared.board.look();
+    let snapshot = shown.snapshot.as_deref();
+    let layers = snapshot.map(|snapshot| {
+        let layer = |names: &[String]| json!({ "name": Snapshot::title(names), "channels": names });
+        snapshot.layers().map(|(_, names)| layer(names)).collect::<Vec<_>>()
+    });
+    json!({
+        "name": shared.name,
+        "version": shown.version,
+        "finished": shown.finished,
+        "size": snapshot.map(Snapshot::size),
+        "origin": snapshot.map(|snapshot| [snapshot.image.crop.x, snapshot.image.crop.y]),
+        "picture_spp": snapshot.map(|snapshot| snapshot.spp),
+        "layers": layers.unwrap_or_default(),
+        "statistics": shared.statistics.numbers(),
+    })
+}
+
+/// The connection holds its picture while it sends, however long that takes.
+fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io::Result<()> {
+    let shown = shared.board.look();
+    let index = request.number("index").and_then(|index| usize::try_from(index).ok());
+    let (Some(snapshot), Some(index)) = (shown.snapshot, index) else { return not_found(connection) };
+    let Some((layer, names)) = snapshot.layers().nth(index) else { return not_found(connection) };
+    let [width, height] = snapshot.size();
+    let head = [shown.version as u32, width, height, names.len() as u32];
+    connection.start(OK, "application/octet-stream", (size_of_val(&head) + layer.data.len() * size_of::<f16>()) as u64)?;
+    connection.write(&head.map(u32::to_le_bytes).concat())?;
+    let (mut halves, mut bytes) = (vec![f16::ZERO; PIECE], Vec::with_capacity(PIECE * size_of::<f16>()));
+    for piece in layer.data.chunks(PIECE) {
+        let halves = &mut halves[..piece.len()];
+        halves.convert_from_f32_slice(piece);
+        bytes.clear();
+        bytes.extend(halves.iter().flat_map(|half| half.to_le_bytes()));
+        connection.write(&bytes)?;
+    }
+    if let Some(page) = request.number("page") {
+        shared.board.visit(page, shown.version, false);
+    }
+    Ok(())
+}
+
+fn pixel(request: &Request, shared: &Shared) -> Option<Value> {
+    let shown = shared.board.look();
+    let snapshot = shown.snapshot?;
+    let [x, y] = [request.number("x")?, request.number("y")?];
+    let [width, height] = snapshot.size().map(u64::from);
+    if x >= width || y >= height {
+        return None;
+    }
+    let index = usize::try_from(y * width + x).ok()?;
+    let values = |data: &[f32], channels: usize| -> Vec<Value> {
+        data.chunks_exact(channels).nth(index).unwrap_or_default().iter().map(|value| number(*value)).collect()
+    };
+    let layers: Vec<Value> = snapshot
+        .layers()
+        .filter(|(_, names)| !names.is_empty())
+        .map(|(layer, names)| json!({ "channels": names, "values": values(&layer.data, names.len()) }))
+        .collect();
+    Some(json!({ "version": shown.version, "x": x, "y": y, "layers": layers }))
+}
+
+/// The shortest decimal that is this value; JSON has no others than finite ones, so the rest are texts.
+fn number(value: f32) -> Value {
+    if !value.is_finite() {
+        return value.to_string().into();
+    }
+    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_told_exactly() {
+        for value in [0.1f32, -1.5e-30, 16_777_217.0, f32::MAX, 1.0 / 3.0] {
+            let told = number(value).to_string();
+            assert_eq!(told.parse::<f32>().unwrap(), value, "{told}");
+        }
+        assert_eq!(number(0.1), json!(0.1));
+        assert_eq!([number(f32::NAN), number(f32::INFINITY), number(f32::NEG_INFINITY)], [json!("NaN"), json!("inf"), json!("-inf")]);
+    }
+}
