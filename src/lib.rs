@@ -21,6 +21,7 @@
 //! | 5 | `scene` |
 //! | 6 | `integrator`, `compile` |
 //! | 7 | `render` |
+//! | 8 | `bench`, `farm` |
 //! | 9 | `bin/steradian` |
 
 pub mod accel;
@@ -32,6 +33,7 @@ pub mod compile;
 pub mod convert;
 pub mod desc;
 pub mod error;
+pub mod farm;
 pub mod film;
 pub mod geometry;
 pub mod guiding;

@@ -6,8 +6,10 @@ mod bench_error;
 mod bench_scale;
 mod compare;
 mod convert;
+mod frames;
 mod info;
 mod interrupt;
+mod log;
 mod names;
 mod progress;
 mod render;
@@ -21,6 +23,7 @@ use clap::{CommandFactory, Parser};
 use steradian::{Error, ErrorKind, Result, import};
 
 use args::{Cli, Command};
+use log::Level;
 
 /// Exit codes; the manual in `args` lists them too.
 const INTERNAL: u8 = 1;
@@ -28,10 +31,11 @@ const INTERNAL: u8 = 1;
 fn main() -> ExitCode {
     report_panics();
     let cli = Cli::parse();
-    match run(cli) {
+    let started = log::start(&cli.log, cli.command.verbosity(), cli.command.log_format());
+    match started.and_then(|()| run(cli)) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            eprintln!("error: {}", chain(&error));
+            log::message(Level::Error, &chain(&error));
             ExitCode::from(exit_code(error.kind()))
         }
     }
@@ -40,7 +44,7 @@ fn main() -> ExitCode {
 /// Runs a command; the result is the exit code.
 fn run(cli: Cli) -> Result<u8> {
     match cli.command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(arguments) => frames::run(&arguments),
         Command::Info(arguments) => info::run(&arguments).map(|()| 0),
         Command::Bench(command) => bench::run(&command),
         Command::Convert(arguments) => convert::run(&arguments).map(|()| 0),
@@ -82,7 +86,8 @@ fn report_panics() {
         let message = panic.payload_as_str().unwrap_or("unknown");
         let place = panic.location().map(ToString::to_string).unwrap_or_default();
         let version = env!("CARGO_PKG_VERSION");
-        eprintln!("error: internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the scene)");
+        let text = format!("internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the scene)");
+        log::message(Level::Error, &text);
         std::process::exit(i32::from(INTERNAL));
     }));
 }

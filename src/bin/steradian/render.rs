@@ -10,26 +10,28 @@ use steradian::math::Vec3;
 use steradian::output::{self, RenderInfo};
 use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Replayed, Settings, Stats};
 use steradian::{Result, compile};
-use tracing_subscriber::filter::LevelFilter;
 
-use crate::args::{RenderArgs, Verbosity};
-use crate::interrupt::Interrupt;
+use crate::args::RenderArgs;
+use crate::frames::{Session, Shot};
 use crate::progress::Reporter;
-use crate::scene;
 use crate::stats::{self, Run};
 use crate::text;
 
-/// Renders a scene and writes what was asked for; the result is the exit code.
-pub fn run(arguments: &RenderArgs) -> Result<u8> {
-    log_to_stderr(arguments.verbosity);
-    let start = Instant::now();
-    let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
-    let mut settings = Settings::new(&imported.desc, &arguments.overrides(default_outputs(&arguments.scene)))?;
-    if arguments.pixel.is_none() {
-        check_outputs(&settings, arguments.json.as_deref())?;
+/// Renders a picture and writes what was asked for; the result is the exit code. `start` is when the scene's reading began.
+pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Instant) -> Result<u8> {
+    let json = arguments.json.as_deref().map(|path| shot.file(path));
+    let mut settings = Settings::new(&shot.imported.desc, &arguments.overrides(default_outputs(&arguments.scene)))?;
+    shot.adapt(&mut settings);
+    if shot.is_there(&settings, arguments.sequence.overwrite) {
+        session.reporter.complete_frame();
+        return Ok(0);
     }
-    let scene = compile::compile_imported(&imported, &arguments.scene)?;
-    drop(imported);
+    if arguments.pixel.is_none() {
+        check_outputs(&settings, json.as_deref())?;
+    }
+    let scene = compile::compile_imported(&shot.imported, &shot.scene)?;
+    let scene_file = shot.scene.clone();
+    drop(shot);
     let load_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
@@ -43,13 +45,13 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
         return text::print(&describe_sample(&value)).map(|()| 0);
     }
 
-    let interrupt = Interrupt::listen()?;
-    let reporter = Reporter::new(arguments.verbosity.quiet, interrupt.stop.clone(), settings.time_limit);
-    let result = render::render(&scene, &*accel, &settings, &reporter, &interrupt.stop)?;
+    let (interrupt, reporter) = (session.interrupt()?, &session.reporter);
+    reporter.limit_time(settings.time_limit);
+    let result = render::render(&scene, &*accel, &settings, reporter, &interrupt.stop)?;
     let stats = &result.stats;
     let first = load_seconds + build_seconds + stats.first_pass_seconds;
     tracing::info!("{first:.3} s until every pixel had its first sample");
-    warn_of_dropped(stats, &reporter);
+    warn_of_dropped(stats, reporter);
 
     let info = RenderInfo {
         samples_per_pixel: stats.spp_done,
@@ -60,25 +62,12 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
     for desc in &settings.outputs {
         output::write(desc, &result.image, &info)?;
     }
-    if let Some(path) = &arguments.json {
-        let run = Run { scene: &arguments.scene, load_seconds, build_seconds };
+    if let Some(path) = &json {
+        let run = Run { scene: &scene_file, load_seconds, build_seconds };
         stats::write(path, &stats::value(&run, &settings, &*accel, stats))?;
     }
-    report(&reporter, &settings, &*accel, stats);
+    report(reporter, &settings, &*accel, stats);
     Ok(if stats.interrupted { interrupt.exit_code() } else { 0 })
-}
-
-/// Warnings of the library; with `-v` what it does, with `-vv` every detail.
-fn log_to_stderr(verbosity: Verbosity) {
-    let level = match (verbosity.quiet, verbosity.verbose) {
-        (true, _) => LevelFilter::ERROR,
-        (false, 0) => LevelFilter::WARN,
-        (false, 1) => LevelFilter::INFO,
-        (false, _) => LevelFilter::DEBUG,
-    };
-    let subscriber = tracing_subscriber::fmt().with_max_level(level).without_time().with_target(false).with_ansi(false);
-    // Fails only if there is a logger already, which then does the work.
-    let _ = subscriber.with_writer(std::io::stderr).try_init();
 }
 
 /// Files named after the scene, in the working directory.
@@ -132,7 +121,7 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
         reporter.say(&format!("wrote {}", PathBuf::from(&output.file).display()));
     }
     if !stats.interrupted {
-        reporter.complete();
+        reporter.complete_frame();
     }
 }
 

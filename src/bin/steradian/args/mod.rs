@@ -3,7 +3,9 @@
 mod bench;
 mod bench_error;
 mod bench_scale;
+mod frames;
 mod import;
+mod log;
 
 use std::path::PathBuf;
 
@@ -17,7 +19,9 @@ use crate::names;
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
+pub use frames::SequenceArgs;
 pub use import::{ConvertArgs, ImportArgs};
+pub use log::{ColorChoice, LogArgs, LogFormat};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -58,6 +62,8 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    #[command(flatten)]
+    pub log: LogArgs,
 }
 
 /// What to do.
@@ -179,6 +185,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "I", requires = "pixel", help_heading = "Run")]
     pub sample: Option<u32>,
     #[command(flatten)]
+    pub sequence: SequenceArgs,
+    #[command(flatten)]
     pub import: ImportArgs,
     #[command(flatten)]
     pub verbosity: Verbosity,
@@ -205,6 +213,8 @@ pub struct InfoArgs {
     pub json: bool,
     #[command(flatten)]
     pub import: ImportArgs,
+    #[command(flatten)]
+    pub verbosity: Verbosity,
 }
 
 /// Arguments of `compare`.
@@ -217,6 +227,24 @@ pub struct CompareArgs {
     /// As JSON
     #[arg(long)]
     pub json: bool,
+}
+
+impl Command {
+    /// How much is said, where a command leaves it to the user.
+    pub fn verbosity(&self) -> Verbosity {
+        match self {
+            Self::Render(arguments) => arguments.verbosity,
+            Self::Info(arguments) => arguments.verbosity,
+            Self::Convert(arguments) => Verbosity { quiet: arguments.quiet, verbose: arguments.verbose },
+            _ => Verbosity::default(),
+        }
+    }
+
+    /// Messages are JSON where progress is, unless the user wants another form.
+    pub fn log_format(&self) -> LogFormat {
+        let progress = if let Self::Render(arguments) = self { arguments.sequence.progress } else { None };
+        if progress.is_some_and(|format| format.name == "json") { LogFormat::Json } else { LogFormat::Text }
+    }
 }
 
 impl RenderArgs {
