@@ -177,7 +177,9 @@ mod tests {
 
     #[test]
     fn ranges_are_short_and_mean_the_same() {
-        for (text, short) in [("1-10", "1-10"), ("1-9x2", "1-9:2"), ("3,1,2,7,20", "1-3,7,20"), ("5,6", "5-6"), ("4", "4"), ("-3-0", "-3-0")] {
+        for (text, short) in
+            [("1-10", "1-10"), ("1-9x2", "1-9:2"), ("3,1,2,7,20", "1-3,7,20"), ("5,6", "5-6"), ("4", "4"), ("-3-0", "-3-0")]
+        {
             assert_eq!(text.parse::<FrameList>().unwrap().ranges(':'), short);
             let mut sorted = frames(text);
             sorted.sort_unstable();

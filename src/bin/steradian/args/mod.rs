@@ -3,6 +3,8 @@
 mod bench;
 mod bench_error;
 mod bench_scale;
+mod config;
+mod farm;
 mod frames;
 mod import;
 mod log;
@@ -19,6 +21,8 @@ use crate::names;
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
+pub use config::{ConfigCommand, ConfigShowArgs};
+pub use farm::{FarmCommand, JobArgs, SlurmArgs};
 pub use frames::SequenceArgs;
 pub use import::{ConvertArgs, ImportArgs};
 pub use log::{ColorChoice, LogArgs, LogFormat};
@@ -91,9 +95,22 @@ pub enum Command {
     /// (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels, psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
     #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
     Compare(CompareArgs),
+    /// Write jobs for render farms
+    #[command(subcommand)]
+    Farm(FarmCommand),
     /// Measure
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// What the environment and configuration files say
+    #[command(subcommand)]
+    Config(ConfigCommand),
+    /// Print the manual page, or write those of all commands into a folder
+    #[command(after_help = "Example:\n  steradian man --dir ~/.local/share/man/man1")]
+    Man {
+        /// The folder.
+        #[arg(long, value_name = "DIR")]
+        dir: Option<PathBuf>,
+    },
     /// Print completions for a shell
     #[command(after_help = "Example:\n  steradian completions bash > ~/.local/share/bash-completion/completions/steradian")]
     Completions {
