@@ -213,8 +213,8 @@ pub fn settings(options: &Options, scene: &Path) -> Result<(Vec<Setting>, Vec<St
     for file in files::for_scene(scene) {
         found.extend(files::read(options, &file)?);
     }
-    let limit = |name: &&str| std::env::var(name).is_ok_and(|value| value.parse::<usize>().is_ok_and(|threads| threads > 0));
-    if let Some(name) = FARM_THREADS.iter().find(limit) {
+    let limits = |name: &str| std::env::var(name).is_ok_and(|value| value.parse::<usize>().is_ok_and(|threads| threads > 0));
+    if let Some(name) = FARM_THREADS.iter().find(|name| limits(name)) {
         let values = std::env::var(name).into_iter().collect();
         found.push(Setting { key: "threads".to_owned(), values, origin: Origin::Environment((*name).to_owned()) });
     }
