@@ -4,13 +4,14 @@
 #   ./setup.sh          install what is missing, build, render scenes/gallery.json to gallery.exr and gallery.png
 #   ./setup.sh test     install what is missing, run all tests
 #   ./setup.sh install  install what is missing, build, put `steradian` into ~/.cargo/bin
+#   ./setup.sh package  install what is missing, build, make a Debian package in target/debian
 set -euo pipefail
 cd "$(dirname "$0")"
 
 case "${1:-render}" in
-    render | test | install) ;;
-    -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
-    *) echo "setup.sh: unknown command '$1' (render, test or install)" >&2; exit 2 ;;
+    render | test | install | package) ;;
+    -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    *) echo "setup.sh: unknown command '$1' (render, test, install or package)" >&2; exit 2 ;;
 esac
 
 as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
@@ -39,4 +40,16 @@ case "${1:-render}" in
     render) cargo run --release --locked -- render scenes/gallery.json -o gallery.exr -o gallery.png ;;
     test) cargo test --locked ;;
     install) cargo install --locked --path . ;;
+    package)
+        command -v cargo-deb >/dev/null || cargo install --locked cargo-deb
+        command -v dpkg-shlibdeps >/dev/null || as_root apt-get install -y -qq --no-install-recommends dpkg-dev >/dev/null
+        cargo build --release --locked
+        rm -rf target/man target/completions
+        mkdir -p target/completions
+        target/release/steradian man --dir target/man
+        for shell in bash:steradian.bash zsh:_steradian fish:steradian.fish; do
+            target/release/steradian completions "${shell%%:*}" >"target/completions/${shell#*:}"
+        done
+        cargo deb --no-build --locked
+        ;;
 esac

@@ -21,7 +21,7 @@
 //! | 5 | `scene` |
 //! | 6 | `integrator`, `compile` |
 //! | 7 | `render` |
-//! | 8 | `live` |
+//! | 8 | `bench`, `farm`, `live` |
 //! | 9 | `bin/steradian` |
 
 pub mod accel;
@@ -33,6 +33,7 @@ pub mod compile;
 pub mod convert;
 pub mod desc;
 pub mod error;
+pub mod farm;
 pub mod film;
 pub mod geometry;
 pub mod guiding;

@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use steradian::film::{FilmTile, Image};
 use steradian::math::Rng;
-use steradian::render::{self, Overrides, RenderState, Shard, StateFile};
+use steradian::render::{self, Overrides, Shard, StateFile};
 
 use crate::checkpoints::{Kit, channels, scene};
 

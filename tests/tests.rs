@@ -29,6 +29,8 @@ mod cutouts;
 mod degenerate_input;
 /// The same picture for any number of threads, any crop, any accelerator; samples can be replayed.
 mod determinism;
+/// Jobs for farms: their scripts with stand-ins for Slurm and the render.
+mod farm;
 /// Known flaws of renderers in camera and film: each test fails on the flawed formula.
 mod flaws_of_camera;
 /// Known flaws of renderers in glass and in round shapes: each test fails on the flawed formula.
@@ -37,6 +39,8 @@ mod flaws_of_glass;
 mod flaws_of_light;
 /// Known flaws of renderers in textures and surfaces, beyond those of [`textures`] and [`relief`]: each test fails on the flawed formula.
 mod flaws_of_textures;
+/// Sequences of frames from the command line.
+mod frames;
 /// What fuzzing found, read again.
 mod fuzz_corpus;
 /// The scenes that come with the program.
@@ -46,6 +50,8 @@ mod glassware;
 /// glTF files as they look: which way up images, normals and glass are.
 mod gltf_looks;
 mod guiding;
+/// Progress, logs, colours, configuration and manual pages.
+mod hygiene;
 /// What shapes, materials and instances are called in layers that pick them.
 mod identities;
 /// The parts of the light, motion, and what denoisers need.

@@ -13,7 +13,7 @@ const LAYERS: &[(u32, &[&str])] = &[
     (5, &["scene", "convert"]),
     (6, &["integrator", "compile"]),
     (7, &["render"]),
-    (8, &["bench", "live"]),
+    (8, &["bench", "farm", "live"]),
 ];
 
 /// Imports narrower than the layer number allows.

@@ -49,6 +49,12 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneDesc> {
     }
 }
 
+/// A scene of ours as its file says it, without any default; `None` if it cannot be read or is no JSON.
+pub fn scene_as_written(path: &Path) -> Option<Value> {
+    let text = std::fs::read_to_string(path).ok()?;
+    serde_json::from_str(&blank_comments(&text).text).ok()
+}
+
 /// The error for what serde complains about.
 fn parse_fault(path: &Path, text: &str, json: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> Error {
     let inner = error.inner();

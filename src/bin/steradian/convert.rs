@@ -4,6 +4,7 @@ use steradian::Result;
 use steradian::convert::{self, Originals};
 
 use crate::args::{ConvertArgs, Verbosity};
+use crate::log::{self, Level};
 use crate::scene;
 
 /// Reads a scene of any kind and writes one of ours.
@@ -14,7 +15,7 @@ pub fn run(arguments: &ConvertArgs) -> Result<()> {
     let count = convert::write_scene(&imported, &arguments.input, &arguments.output, originals)?;
     if !arguments.quiet {
         let files = if count == 1 { "1 file".to_owned() } else { format!("{count} files") };
-        eprintln!("wrote {} and {files} beside it", arguments.output.display());
+        log::message(Level::Note, &format!("wrote {} and {files} beside it", arguments.output.display()));
     }
     Ok(())
 }

@@ -4,13 +4,13 @@ use serde_json::Value;
 use steradian::compile::Summary;
 use steradian::{Error, Result, compile};
 
-use crate::args::{InfoArgs, Verbosity};
+use crate::args::InfoArgs;
 use crate::scene;
 use crate::text;
 
 /// Prints what is in a scene.
 pub fn run(arguments: &InfoArgs) -> Result<()> {
-    let imported = scene::load(&arguments.scene, &arguments.import, Verbosity::default())?;
+    let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
     let scene = compile::compile_imported(&imported, &arguments.scene)?;
     let value: Value = serde_json::to_value(Summary::new(&scene)).map_err(|e| Error::Internal(e.to_string()))?;
     if arguments.json { text::print_json(&value) } else { text::print(&text::outline(&value)) }

@@ -44,13 +44,18 @@ pub fn take_shard_name(arguments: &StateArgs, scene: &Path, overrides: &mut Over
 
 impl<'a> Kept<'a> {
     /// Takes the files, so that nobody else writes them; `None` if nothing is kept.
-    pub fn new(arguments: &'a StateArgs, settings: &Settings, shard_file: Option<&Path>) -> Result<Option<Self>> {
-        if arguments.checkpoint.is_none() && shard_file.is_none() {
+    pub fn new(
+        arguments: &'a StateArgs,
+        settings: &Settings,
+        shard_file: Option<&Path>,
+        checkpoint: Option<&Path>,
+    ) -> Result<Option<Self>> {
+        if checkpoint.is_none() && shard_file.is_none() {
             return Ok(None);
         }
         let shard = arguments.shard.unwrap_or_default();
         render::check_kept(settings, shard)?;
-        if let Some(path) = arguments.checkpoint.as_deref() {
+        if let Some(path) = checkpoint {
             if shard_file == Some(path) {
                 return Err(Error::Usage(format!("--checkpoint {}: the shard is to have this name", path.display())));
             }
@@ -60,7 +65,7 @@ impl<'a> Kept<'a> {
             }
         }
         let take = |path: Option<&Path>| path.map(StateFile::take).transpose();
-        Ok(Some(Self { arguments, shard, shard_file: take(shard_file)?, checkpoint: take(arguments.checkpoint.as_deref())? }))
+        Ok(Some(Self { arguments, shard, shard_file: take(shard_file)?, checkpoint: take(checkpoint)? }))
     }
 
     /// What checkpoints and shards of this render say of themselves.

@@ -5,10 +5,14 @@ mod bench;
 mod bench_error;
 mod bench_scale;
 mod compare;
+mod config;
 mod convert;
+mod farm;
+mod frames;
 mod info;
 mod interrupt;
 mod kept;
+mod log;
 mod merge;
 mod names;
 mod progress;
@@ -17,35 +21,51 @@ mod scene;
 mod stats;
 mod text;
 
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser};
+use clap::CommandFactory;
 use steradian::{Error, ErrorKind, Result, import};
 
-use args::{Cli, Command};
+use args::{Cli, Command, ConfigCommand};
+use log::Level;
 
 /// Exit codes; the manual in `args` lists them too.
 const INTERNAL: u8 = 1;
 
 fn main() -> ExitCode {
     report_panics();
-    let cli = Cli::parse();
-    match run(cli) {
+    match config::parse().and_then(start) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            eprintln!("error: {}", chain(&error));
+            log::message(Level::Error, &chain(&error));
             ExitCode::from(exit_code(error.kind()))
         }
     }
 }
 
+/// Starts to log, says what the configuration brought, and runs the command.
+fn start(parsed: config::Parsed) -> Result<u8> {
+    let cli = parsed.cli;
+    log::start(&cli.log, cli.command.verbosity(), cli.command.log_format())?;
+    parsed.warnings.iter().for_each(|warning| log::message(Level::Warning, warning));
+    for setting in &parsed.added {
+        let value = if setting.values.is_empty() { "false".to_owned() } else { setting.values.join(",") };
+        log::message(Level::Info, &format!("{} = {value} ({})", setting.key, setting.origin));
+    }
+    run(cli)
+}
+
 /// Runs a command; the result is the exit code.
 fn run(cli: Cli) -> Result<u8> {
     match cli.command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(arguments) => frames::run(&arguments),
         Command::Info(arguments) => info::run(&arguments).map(|()| 0),
         Command::Bench(command) => bench::run(&command),
         Command::Convert(arguments) => convert::run(&arguments).map(|()| 0),
+        Command::Farm(command) => farm::run(&command).map(|()| 0),
+        Command::Config(ConfigCommand::Show(arguments)) => config::show(&arguments).map(|()| 0),
+        Command::Man { dir } => man(dir.as_deref()).map(|()| 0),
         Command::Schema => text::print(&import::schema()).map(|()| 0),
         Command::Merge(arguments) => merge::run(&arguments).map(|()| 0),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
@@ -55,6 +75,18 @@ fn run(cli: Cli) -> Result<u8> {
             text::print(String::from_utf8_lossy(&script).trim_end()).map(|()| 0)
         }
     }
+}
+
+/// Prints the manual page of the program, or writes those of all its commands.
+fn man(folder: Option<&Path>) -> Result<()> {
+    let Some(folder) = folder else {
+        let mut page = Vec::new();
+        let rendered = clap_mangen::Man::new(Cli::command()).render(&mut page);
+        rendered.map_err(|e| Error::Internal(e.to_string()))?;
+        return text::print(String::from_utf8_lossy(&page).trim_end());
+    };
+    let written = std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
+    written.map_err(|e| Error::Output { file: folder.to_owned(), message: e.to_string() })
 }
 
 fn exit_code(kind: ErrorKind) -> u8 {
@@ -86,7 +118,8 @@ fn report_panics() {
         let message = panic.payload_as_str().unwrap_or("unknown");
         let place = panic.location().map(ToString::to_string).unwrap_or_default();
         let version = env!("CARGO_PKG_VERSION");
-        eprintln!("error: internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the scene)");
+        let text = format!("internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the scene)");
+        log::message(Level::Error, &text);
         std::process::exit(i32::from(INTERNAL));
     }));
 }

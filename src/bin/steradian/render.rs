@@ -11,40 +11,46 @@ use steradian::math::Vec3;
 use steradian::output::{self, RenderInfo};
 use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Replayed, Settings, Stats};
 use steradian::{Result, compile};
-use tracing_subscriber::filter::LevelFilter;
 
-use crate::args::{RenderArgs, Verbosity};
-use crate::interrupt::Interrupt;
+use crate::args::RenderArgs;
+use crate::frames::{Session, Shot};
 use crate::kept::{self, Kept};
 use crate::progress::Reporter;
-use crate::scene;
 use crate::stats::{self, Run};
 use crate::text;
 
-/// Renders a scene and writes what was asked for; the result is the exit code.
-pub fn run(arguments: &RenderArgs) -> Result<u8> {
-    log_to_stderr(arguments.verbosity);
-    let interrupt = Interrupt::listen()?;
-    let start = Instant::now();
-    let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
+/// Renders a picture and writes what was asked for; the result is the exit code. `start` is when the scene's reading began.
+pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Instant) -> Result<u8> {
+    let json = arguments.json.as_deref().map(|path| shot.file(path));
     let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
-    let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?;
-    let mut settings = Settings::new(&imported.desc, &overrides)?;
-    if arguments.pixel.is_none() {
-        check_outputs(&settings, shard_file.as_deref(), arguments.json.as_deref())?;
+    let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?.map(|name| shot.file_of(&name));
+    let mut settings = Settings::new(&shot.imported.desc, &overrides)?;
+    shot.adapt(&mut settings);
+    let is_there = match &shard_file {
+        Some(file) => shot.frame.is_some() && !arguments.sequence.overwrite && file.exists(),
+        None => shot.is_there(&settings, arguments.sequence.overwrite),
+    };
+    if is_there {
+        session.reporter.complete_frame();
+        return Ok(0);
     }
-    let kept = Kept::new(&arguments.state, &settings, shard_file.as_deref())?;
-    let scene = compile::compile_imported(&imported, &arguments.scene)?;
+    if arguments.pixel.is_none() {
+        check_outputs(&settings, shard_file.as_deref(), json.as_deref())?;
+    }
+    let checkpoint = arguments.state.checkpoint.as_deref().map(|path| shot.file_of(path));
+    let kept = Kept::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?;
+    let scene = compile::compile_imported(&shot.imported, &shot.scene)?;
     let mut info = RenderInfo {
         world_to_camera: Some(world_to_camera(&scene.camera)),
         pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
         ..RenderInfo::default()
     };
     let header = match &kept {
-        Some(kept) => Some(kept.header(&imported, &arguments.scene, &scene, &settings, info.clone())?),
+        Some(kept) => Some(kept.header(&shot.imported, &shot.scene, &scene, &settings, info.clone())?),
         None => None,
     };
-    drop(imported);
+    let scene_file = shot.scene.clone();
+    drop(shot);
     let load_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
@@ -58,25 +64,25 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
         return text::print(&describe_sample(&value)).map(|()| 0);
     }
 
-    interrupt.listen_to_stop()?;
-    let reporter = Reporter::new(arguments.verbosity.quiet, interrupt.stop.clone(), settings.time_limit);
-    let live = arguments.live.start(&arguments.scene, settings.time_limit)?;
+    let (interrupt, reporter) = (session.interrupt()?, &session.reporter);
+    reporter.limit_time(settings.time_limit);
+    let live = arguments.live.start(&scene_file, settings.time_limit)?;
     if let Some(url) = live.preview_url() {
         reporter.say(&format!("preview: {url}"));
     }
-    let fan = Fan::new([&reporter as &dyn Progress, &live]);
+    let fan = Fan::new([reporter as &dyn Progress, &live]);
     let result = match (kept, &header) {
-        (Some(kept), Some(header)) => kept.render(&scene, &*accel, &settings, header, (&reporter, &fan), &interrupt)?,
+        (Some(kept), Some(header)) => kept.render(&scene, &*accel, &settings, header, (reporter, &fan), interrupt)?,
         _ => {
             let result = render::render(&scene, &*accel, &settings, &fan, &interrupt.stop)?;
-            kept::warn_of_request(&interrupt, &reporter);
+            kept::warn_of_request(interrupt, reporter);
             result
         }
     };
     let stats = &result.stats;
     let first = load_seconds + build_seconds + stats.first_pass_seconds;
     tracing::info!("{first:.3} s until every pixel had its first sample");
-    warn_of_dropped(stats, &reporter);
+    warn_of_dropped(stats, reporter);
 
     info.samples_per_pixel = stats.spp_done;
     info.render_seconds = stats.render_seconds;
@@ -90,28 +96,15 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
         }
     }
     live.show_final(&result.image, stats.spp_done);
-    if let Some(path) = &arguments.json {
-        let run = Run { scene: &arguments.scene, load_seconds, build_seconds };
+    if let Some(path) = &json {
+        let run = Run { scene: &scene_file, load_seconds, build_seconds };
         stats::write(path, &stats::value(&run, &settings, &*accel, stats))?;
     }
-    report(&reporter, &settings, &*accel, stats, &written);
+    report(reporter, &settings, &*accel, stats, &written);
     if arguments.live.preview_hold {
         interrupt.wait();
     }
     Ok(if stats.interrupted { interrupt.exit_code() } else { 0 })
-}
-
-/// Warnings of the library; with `-v` what it does, with `-vv` every detail.
-fn log_to_stderr(verbosity: Verbosity) {
-    let level = match (verbosity.quiet, verbosity.verbose) {
-        (true, _) => LevelFilter::ERROR,
-        (false, 0) => LevelFilter::WARN,
-        (false, 1) => LevelFilter::INFO,
-        (false, _) => LevelFilter::DEBUG,
-    };
-    let subscriber = tracing_subscriber::fmt().with_max_level(level).without_time().with_target(false).with_ansi(false);
-    // Fails only if there is a logger already, which then does the work.
-    let _ = subscriber.with_writer(std::io::stderr).try_init();
 }
 
 /// Files named after the scene, in the working directory.
@@ -165,7 +158,7 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
     }
     written.iter().for_each(|file| reporter.say(&format!("wrote {file}")));
     if !stats.interrupted {
-        reporter.complete();
+        reporter.complete_frame();
     }
 }
 

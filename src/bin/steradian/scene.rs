@@ -6,6 +6,7 @@ use steradian::import::{self, Imported, Outcome, ReportEntry};
 use steradian::{Error, Result, output};
 
 use crate::args::{ImportArgs, Verbosity};
+use crate::log::{self, Level};
 use crate::text;
 
 /// Lines of the summary that are shown without `-v`.
@@ -22,7 +23,7 @@ pub fn load(path: &Path, arguments: &ImportArgs, verbosity: Verbosity) -> Result
     }
     if !verbosity.quiet {
         for line in lines(path, &imported, verbosity.verbose > 0) {
-            eprintln!("{line}");
+            log::message(Level::Note, &line);
         }
     }
     if arguments.strict && !imported.report.is_exact() {

@@ -3,8 +3,12 @@
 mod bench;
 mod bench_error;
 mod bench_scale;
+mod config;
+mod farm;
+mod frames;
 mod import;
 mod live;
+mod log;
 mod state;
 
 use std::path::PathBuf;
@@ -19,7 +23,11 @@ use crate::names;
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
+pub use config::{ConfigCommand, ConfigShowArgs};
+pub use farm::{FarmCommand, JobArgs, SlurmArgs};
+pub use frames::SequenceArgs;
 pub use import::{ConvertArgs, ImportArgs};
+pub use log::{ColorChoice, LogArgs, LogFormat};
 use state::MERGE_EXAMPLES;
 pub use state::{MergeArgs, StateArgs};
 
@@ -66,6 +74,8 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    #[command(flatten)]
+    pub log: LogArgs,
 }
 
 /// What to do.
@@ -98,9 +108,22 @@ pub enum Command {
     /// (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels, psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
     #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
     Compare(CompareArgs),
+    /// Write jobs for render farms
+    #[command(subcommand)]
+    Farm(FarmCommand),
     /// Measure
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// What the environment and configuration files say
+    #[command(subcommand)]
+    Config(ConfigCommand),
+    /// Print the manual page, or write those of all commands into a folder
+    #[command(after_help = "Example:\n  steradian man --dir ~/.local/share/man/man1")]
+    Man {
+        /// The folder.
+        #[arg(long, value_name = "DIR")]
+        dir: Option<PathBuf>,
+    },
     /// Print completions for a shell
     #[command(after_help = "Example:\n  steradian completions bash > ~/.local/share/bash-completion/completions/steradian")]
     Completions {
@@ -196,6 +219,8 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub live: live::LiveArgs,
     #[command(flatten)]
+    pub sequence: SequenceArgs,
+    #[command(flatten)]
     pub import: ImportArgs,
     #[command(flatten)]
     pub verbosity: Verbosity,
@@ -222,6 +247,8 @@ pub struct InfoArgs {
     pub json: bool,
     #[command(flatten)]
     pub import: ImportArgs,
+    #[command(flatten)]
+    pub verbosity: Verbosity,
 }
 
 /// Arguments of `compare`.
@@ -234,6 +261,24 @@ pub struct CompareArgs {
     /// As JSON
     #[arg(long)]
     pub json: bool,
+}
+
+impl Command {
+    /// How much is said, where a command leaves it to the user.
+    pub fn verbosity(&self) -> Verbosity {
+        match self {
+            Self::Render(arguments) => arguments.verbosity,
+            Self::Info(arguments) => arguments.verbosity,
+            Self::Convert(arguments) => Verbosity { quiet: arguments.quiet, verbose: arguments.verbose },
+            _ => Verbosity::default(),
+        }
+    }
+
+    /// Messages are JSON where progress is, unless the user wants another form.
+    pub fn log_format(&self) -> LogFormat {
+        let progress = if let Self::Render(arguments) = self { arguments.sequence.progress } else { None };
+        if progress.is_some_and(|format| format.name == "json") { LogFormat::Json } else { LogFormat::Text }
+    }
 }
 
 impl RenderArgs {

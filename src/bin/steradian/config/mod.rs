@@ -1,0 +1,293 @@
+//! Where the options of `render` come from: the command line, the environment, files of the project and of the user, the machine's limits.
+
+mod files;
+mod show;
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::parser::ValueSource;
+use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
+use steradian::{Error, Result, import};
+
+use crate::args::Cli;
+pub use show::run as show;
+
+/// Options that belong to a single run.
+const OF_ONE_RUN: [&str; 10] = ["pixel", "sample", "frames", "checkpoint", "resume", "shard", "json", "report", "help", "version"];
+
+/// What environment variables that stand for options begin with.
+const PREFIX: &str = "STERADIAN_";
+
+/// Variables in which farms say how many processors a task may use.
+const FARM_THREADS: [&str; 2] = ["SLURM_CPUS_PER_TASK", "CUE_THREADS"];
+
+/// Where a value comes from, the strongest first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// A variable of the environment.
+    Environment(String),
+    /// A line of a file.
+    File(PathBuf, usize),
+}
+
+impl std::fmt::Display for Origin {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Environment(name) => write!(f, "environment: {name}"),
+            Self::File(file, line) => write!(f, "{}:{line}", file.display()),
+        }
+    }
+}
+
+/// What is given for an option.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setting {
+    /// The option's name without its dashes.
+    pub key: String,
+    /// Its values, as the command line would have them; none stands for a switch that is off.
+    pub values: Vec<String>,
+    /// Where this is said.
+    pub origin: Origin,
+}
+
+/// The command line with what the environment and the files add to `render`; and what to say of that.
+pub struct Parsed {
+    /// The command line.
+    pub cli: Cli,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// What was added.
+    pub added: Vec<Setting>,
+}
+
+/// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help with 0.
+pub fn parse() -> Result<Parsed> {
+    let line: Vec<OsString> = std::env::args_os().collect();
+    let command = color(Cli::command(), &line);
+    let matches = command.clone().try_get_matches_from(&line).unwrap_or_else(|error| error.exit());
+    let Some(("render", render)) = matches.subcommand() else {
+        return Ok(Parsed { cli: typed(&matches), warnings: Vec::new(), added: Vec::new() });
+    };
+    let scene = render.get_one::<PathBuf>("scene").cloned().unwrap_or_default();
+    let options = Options::new(&command);
+    let (found, warnings) = settings(&options, &scene)?;
+    let given = |key: &str| options.find(key).is_some_and(|arg| is_given(render, &matches, arg));
+    // Who asks for more on the command line does not want the quiet of a file.
+    let opposed = |key: &str| (key == "quiet" && given("verbose")) || (key == "verbose" && given("quiet"));
+    let added: Vec<Setting> = found.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
+    let command =
+        added.iter().filter(|setting| !setting.values.is_empty()).fold(command, |command, setting| options.with_default(command, setting));
+    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| error.exit());
+    Ok(Parsed { cli: typed(&matches), warnings, added })
+}
+
+fn typed(matches: &ArgMatches) -> Cli {
+    Cli::from_arg_matches(matches).unwrap_or_else(|error| error.exit())
+}
+
+/// Help and complaints about the command line follow `--color`, which is not parsed yet.
+fn color(command: Command, line: &[OsString]) -> Command {
+    let words: Vec<&str> = line.iter().filter_map(|word| word.to_str()).collect();
+    let after = words.windows(2).find(|pair| pair[0] == "--color").map(|pair| pair[1]);
+    let choice = words.iter().find_map(|word| word.strip_prefix("--color=")).or(after);
+    command.color(match choice {
+        Some("always") => clap::ColorChoice::Always,
+        Some("never") => clap::ColorChoice::Never,
+        _ => clap::ColorChoice::Auto,
+    })
+}
+
+fn is_given(render: &ArgMatches, root: &ArgMatches, arg: &Arg) -> bool {
+    let source = |matches: &ArgMatches| {
+        matches.try_contains_id(arg.get_id().as_str()).ok().and_then(|_| matches.value_source(arg.get_id().as_str()))
+    };
+    [render, root].into_iter().any(|matches| source(matches) == Some(ValueSource::CommandLine))
+}
+
+/// The options of `render` that may be given elsewhere.
+pub struct Options {
+    render: Vec<Arg>,
+    global: Vec<Arg>,
+}
+
+impl Options {
+    /// Those that the command line's definition has.
+    pub fn new(command: &Command) -> Self {
+        let known = |arg: &&Arg| arg.get_long().is_some_and(|long| !OF_ONE_RUN.contains(&long));
+        let of = |command: &Command| command.get_arguments().filter(known).cloned().collect::<Vec<_>>();
+        Self { render: command.find_subcommand("render").map(of).unwrap_or_default(), global: of(command) }
+    }
+
+    /// Their names, without dashes.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.render.iter().chain(&self.global).filter_map(Arg::get_long)
+    }
+
+    fn find(&self, key: &str) -> Option<&Arg> {
+        self.render.iter().chain(&self.global).find(|arg| arg.get_long() == Some(key))
+    }
+
+    /// The built-in value of an option that has one of its own.
+    fn default_of(&self, key: &str) -> Option<String> {
+        let values = self.find(key)?.get_default_values();
+        (!values.is_empty()).then(|| values.iter().map(|value| value.to_string_lossy()).collect::<Vec<_>>().join(","))
+    }
+
+    /// A hint for a name that is not known.
+    fn unknown(&self, key: &str) -> String {
+        let hint = import::closest_name(key, self.names()).map_or(String::new(), |name| format!(" (did you mean \"{name}\"?)"));
+        let why = if OF_ONE_RUN.contains(&key) { "belongs to the command line" } else { "is no option of render" };
+        format!("\"{key}\" {why}{hint}")
+    }
+
+    /// The command with a setting's values as the option's default.
+    fn with_default(&self, command: Command, setting: &Setting) -> Command {
+        let Some(arg) = self.find(&setting.key) else { return command };
+        let id = arg.get_id().as_str().to_owned();
+        let values: Vec<String> = setting.values.clone();
+        let set = move |arg: Arg| arg.default_values(values);
+        if self.global.iter().any(|global| global.get_id() == arg.get_id()) {
+            command.mut_arg(id, set)
+        } else {
+            command.mut_subcommand("render", |render| render.mut_arg(id, set))
+        }
+    }
+
+    /// A setting of which the words are those of a variable or a file; `Err` says what is wrong.
+    fn setting(&self, key: &str, words: Words, origin: Origin) -> Result<Setting, String> {
+        let key = key.replace('_', "-");
+        let arg = self.find(&key).ok_or_else(|| self.unknown(&key))?;
+        let values = words.for_option(arg)?;
+        if arg.get_action().takes_values() {
+            let line = ["steradian".to_owned(), "render".to_owned(), "scene".to_owned()].into_iter();
+            let line = line.chain(values.iter().map(|value| format!("--{key}={value}")));
+            use clap::error::ErrorKind::{InvalidValue, NoEquals, TooFewValues, TooManyValues, ValueValidation, WrongNumberOfValues};
+            match Cli::command().try_get_matches_from(line) {
+                Err(e)
+                    if [InvalidValue, NoEquals, TooFewValues, TooManyValues, ValueValidation, WrongNumberOfValues].contains(&e.kind()) =>
+                {
+                    let text = e.to_string();
+                    return Err(text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned());
+                }
+                _ => {}
+            }
+        }
+        Ok(Setting { key, values, origin })
+    }
+}
+
+/// What a variable or a file says of an option.
+#[derive(Clone, Debug)]
+pub enum Words {
+    /// A word or a number.
+    One(String),
+    /// A list.
+    Many(Vec<String>),
+    /// Yes or no.
+    Switch(bool),
+}
+
+impl Words {
+    /// The values as the command line would have them.
+    fn for_option(self, arg: &Arg) -> Result<Vec<String>, String> {
+        let name = arg.get_long().unwrap_or_default();
+        match (arg.get_action(), self) {
+            (ArgAction::SetTrue, Self::Switch(on)) => Ok(if on { vec!["true".to_owned()] } else { Vec::new() }),
+            (ArgAction::SetTrue, _) => Err(format!("{name} is true or false")),
+            (ArgAction::Count, Self::One(number)) if number.parse::<u8>().is_ok() => Ok(vec![number]),
+            (ArgAction::Count, Self::Switch(on)) => Ok(vec![u8::from(on).to_string()]),
+            (ArgAction::Count, _) => Err(format!("{name} is a number")),
+            (_, Self::Switch(on)) => Ok(vec![if on { "on" } else { "off" }.to_owned()]),
+            (ArgAction::Append, Self::Many(words)) => Ok(words),
+            (_, Self::Many(words)) => Ok(vec![words.join(",")]),
+            (_, Self::One(word)) => Ok(vec![word]),
+        }
+    }
+}
+
+/// Everything that is said outside the command line for rendering `scene`, each option once, from the strongest place; and warnings.
+pub fn settings(options: &Options, scene: &Path) -> Result<(Vec<Setting>, Vec<String>)> {
+    let mut warnings = Vec::new();
+    let mut found = environment(options, std::env::vars_os(), &mut warnings)?;
+    for file in files::for_scene(scene) {
+        found.extend(files::read(options, &file)?);
+    }
+    let limits = |name: &str| std::env::var(name).is_ok_and(|value| value.parse::<usize>().is_ok_and(|threads| threads > 0));
+    if let Some(name) = FARM_THREADS.iter().find(|name| limits(name)) {
+        let values = std::env::var(name).into_iter().collect();
+        found.push(Setting { key: "threads".to_owned(), values, origin: Origin::Environment((*name).to_owned()) });
+    }
+    let mut kept: Vec<Setting> = Vec::new();
+    for setting in found {
+        if !kept.iter().any(|other| other.key == setting.key) {
+            kept.push(setting);
+        }
+    }
+    Ok((kept, warnings))
+}
+
+/// What variables such as `STERADIAN_SPP` say; an empty one says nothing.
+fn environment(
+    options: &Options,
+    variables: impl Iterator<Item = (OsString, OsString)>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Setting>> {
+    let mut found = Vec::new();
+    for (name, value) in variables {
+        let (Some(name), Some(value)) = (name.to_str(), value.to_str()) else { continue };
+        let Some(rest) = name.strip_prefix(PREFIX).filter(|_| !value.is_empty()) else { continue };
+        let key = rest.to_lowercase().replace('_', "-");
+        let Some(arg) = options.find(&key) else {
+            warnings.push(format!("{name}: {}", options.unknown(&key)));
+            continue;
+        };
+        let words = match (arg.get_action(), value.to_lowercase().as_str()) {
+            (ArgAction::SetTrue, "1" | "true" | "yes" | "on") => Words::Switch(true),
+            (ArgAction::SetTrue, "0" | "false" | "no" | "off") => Words::Switch(false),
+            (ArgAction::Append, _) => Words::Many(value.split(',').map(str::to_owned).collect()),
+            _ => Words::One(value.to_owned()),
+        };
+        let setting = options.setting(&key, words, Origin::Environment(name.to_owned()));
+        found.push(setting.map_err(|message| Error::Usage(format!("{name}: {message}")))?);
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn from_environment(variables: &[(&str, &str)]) -> (Result<Vec<Setting>>, Vec<String>) {
+        let mut warnings = Vec::new();
+        let variables = variables.iter().map(|(name, value)| (OsString::from(name), OsString::from(value)));
+        let found = environment(&Options::new(&Cli::command()), variables, &mut warnings);
+        (found, warnings)
+    }
+
+    #[test]
+    fn variables_are_named_after_options() {
+        let (found, warnings) = from_environment(&[
+            ("STERADIAN_TARGET_ERROR", "0.1"),
+            ("STERADIAN_FLOAT", "yes"),
+            ("STERADIAN_OVERWRITE", "0"),
+            ("STERADIAN_OUTPUT", "a.exr,b.png"),
+            ("STERADIAN_SEED", ""),
+            ("HOME", "/"),
+        ]);
+        let found: Vec<_> = found.unwrap().into_iter().map(|s| (s.key, s.values)).collect();
+        let expected = [("target-error", vec!["0.1"]), ("float", vec!["true"]), ("overwrite", vec![]), ("output", vec!["a.exr", "b.png"])];
+        assert_eq!(found, expected.map(|(key, values)| (key.to_owned(), values.into_iter().map(str::to_owned).collect::<Vec<_>>())));
+        assert!(warnings.is_empty());
+    }
+
+    #[test]
+    fn faults_of_variables_name_them() {
+        let (found, _) = from_environment(&[("STERADIAN_SPP", "many")]);
+        let message = found.unwrap_err().to_string();
+        assert!(message.starts_with("STERADIAN_SPP: invalid value 'many' for '--spp <N>'"), "{message}");
+        let (found, warnings) = from_environment(&[("STERADIAN_THREAD", "2"), ("STERADIAN_PIXEL", "1,2")]);
+        assert!(found.unwrap().is_empty());
+        assert!(warnings[0].contains("did you mean \"threads\"") && warnings[1].contains("belongs to the command line"), "{warnings:?}");
+    }
+}

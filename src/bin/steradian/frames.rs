@@ -1,0 +1,197 @@
+//! Pictures and sequences of them: which frames are rendered, from which scene, into which files.
+
+use std::cell::OnceCell;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use steradian::farm::{FrameList, file_of_frame, is_scene_per_frame, scene_of_frame, with_frame_pattern};
+use steradian::import::{ImportReport, Imported};
+use steradian::render::Settings;
+use steradian::{Error, Result};
+
+use crate::args::RenderArgs;
+use crate::interrupt::Interrupt;
+use crate::log::{self, Level};
+use crate::progress::Reporter;
+use crate::{chain, exit_code, render, scene};
+
+/// What all frames of a run share.
+pub struct Session {
+    /// Tells progress.
+    pub reporter: Reporter,
+    interrupt: Interrupt,
+    listens_to_stop: OnceCell<()>,
+}
+
+impl Session {
+    fn new(arguments: &RenderArgs) -> Result<Self> {
+        let reporter = Reporter::new(arguments.sequence.progress, arguments.verbosity.quiet);
+        Ok(Self { reporter, interrupt: Interrupt::listen()?, listens_to_stop: OnceCell::new() })
+    }
+
+    /// Listens to signals to stop from the first call on; until then they end the program at once.
+    pub fn interrupt(&self) -> Result<&Interrupt> {
+        if self.listens_to_stop.set(()).is_ok() {
+            self.interrupt.listen_to_stop()?;
+            self.reporter.watch(self.interrupt.stop.clone());
+        }
+        Ok(&self.interrupt)
+    }
+
+    /// The exit code that a signal has asked for.
+    fn interrupted(&self) -> Option<u8> {
+        self.interrupt.stop.load(std::sync::atomic::Ordering::Relaxed).then(|| self.interrupt.exit_code())
+    }
+}
+
+/// One picture to render.
+pub struct Shot {
+    /// The scene's file.
+    pub scene: PathBuf,
+    /// What it says, for this frame.
+    pub imported: Imported,
+    /// The frame of a sequence.
+    pub frame: Option<i64>,
+}
+
+impl Shot {
+    /// The settings of this frame: its own files, and noise of its own, so that none stands still while the picture moves.
+    pub fn adapt(&self, settings: &mut Settings) {
+        let Some(frame) = self.frame else { return };
+        settings.seed = settings.seed.wrapping_add_signed(frame);
+        for output in &mut settings.outputs {
+            output.file = file_of_frame(&with_frame_pattern(&output.file), frame);
+        }
+    }
+
+    /// Whether the files of this frame of a sequence are there already and are to stay.
+    pub fn is_there(&self, settings: &Settings, overwrite: bool) -> bool {
+        self.frame.is_some() && !overwrite && settings.outputs.iter().all(|output| Path::new(&output.file).exists())
+    }
+
+    /// The file of this frame of a sequence: its number goes where the name has a place for it, or before the extension.
+    pub fn file_of(&self, name: &Path) -> PathBuf {
+        match (self.frame, name.to_str()) {
+            (Some(frame), Some(text)) => file_of_frame(&with_frame_pattern(text), frame).into(),
+            _ => name.to_owned(),
+        }
+    }
+
+    /// The file that a name with a place for the frame's number stands for.
+    pub fn file(&self, name: &Path) -> PathBuf {
+        match (self.frame, name.to_str()) {
+            (Some(frame), Some(text)) => file_of_frame(text, frame).into(),
+            _ => name.to_owned(),
+        }
+    }
+}
+
+/// Renders a picture or a sequence; the result is the exit code.
+pub fn run(arguments: &RenderArgs) -> Result<u8> {
+    let session = Session::new(arguments)?;
+    let result = match &arguments.sequence.frames {
+        None => single(arguments, &session),
+        Some(frames) => Sequence::new(arguments, &session).run(frames),
+    };
+    match &result {
+        Ok(0) => session.reporter.succeed(),
+        Err(error) => session.reporter.fail(&chain(error)),
+        Ok(_) => {}
+    }
+    result
+}
+
+fn single(arguments: &RenderArgs, session: &Session) -> Result<u8> {
+    session.reporter.begin(None);
+    let start = Instant::now();
+    let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
+    render::picture(arguments, Shot { scene: arguments.scene.clone(), imported, frame: None }, session, start)
+}
+
+/// A sequence under way.
+struct Sequence<'a> {
+    arguments: &'a RenderArgs,
+    session: &'a Session,
+    /// The scene, where one file has all frames.
+    whole: OnceCell<Imported>,
+}
+
+impl<'a> Sequence<'a> {
+    fn new(arguments: &'a RenderArgs, session: &'a Session) -> Self {
+        Self { arguments, session, whole: OnceCell::new() }
+    }
+
+    fn run(&self, frames: &FrameList) -> Result<u8> {
+        let reporter = &self.session.reporter;
+        let (skipped, todo): (Vec<i64>, Vec<i64>) = frames.numbers().iter().partition(|frame| self.is_done(**frame));
+        if !skipped.is_empty() {
+            let count = if skipped.len() == 1 { "1 frame is".to_owned() } else { format!("{} frames are", skipped.len()) };
+            reporter.say(&format!("{count} there already and skipped (--overwrite renders anew)"));
+        }
+        reporter.expect(todo.len());
+        let mut failures = Vec::new();
+        for frame in todo.iter().copied() {
+            reporter.begin(Some(frame));
+            let start = Instant::now();
+            let result = self.shot(frame).and_then(|shot| render::picture(self.arguments, shot, self.session, start));
+            match result {
+                Ok(0) => {}
+                Ok(code) => return Ok(code),
+                Err(error) => {
+                    let text = format!("frame {frame}: {}", chain(&error));
+                    log::message(Level::Error, &text);
+                    failures.push(exit_code(error.kind()));
+                    if !self.arguments.sequence.keep_going {
+                        reporter.fail(&text);
+                        break;
+                    }
+                    reporter.complete_frame();
+                }
+            }
+            if let Some(code) = self.session.interrupted() {
+                return Ok(code);
+            }
+        }
+        if todo.is_empty() {
+            reporter.complete_frame();
+        }
+        if self.arguments.sequence.keep_going && !failures.is_empty() {
+            reporter.fail(&format!("{} of {} frames failed", failures.len(), todo.len()));
+        }
+        Ok(failures.first().copied().unwrap_or(0))
+    }
+
+    /// Whether a frame's files, as far as the command line names them, are there already.
+    fn is_done(&self, frame: i64) -> bool {
+        let (outputs, anew) = (&self.arguments.output, self.arguments.sequence.overwrite);
+        let exists = |name: &String| Path::new(&file_of_frame(&with_frame_pattern(name), frame)).exists();
+        !anew && !outputs.is_empty() && outputs.iter().all(exists)
+    }
+
+    fn shot(&self, frame: i64) -> Result<Shot> {
+        let arguments = self.arguments;
+        let scene = scene_of_frame(&arguments.scene, frame);
+        let extension = scene.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let load = |seconds: f64| {
+            let mut import = arguments.import.clone();
+            import.time += seconds;
+            scene::load(&scene, &import, arguments.verbosity)
+        };
+        let imported = if is_scene_per_frame(&arguments.scene) {
+            load(0.0)?
+        } else if ["gltf", "glb"].contains(&extension.as_str()) {
+            load(frame as f64 / arguments.sequence.fps)?
+        } else {
+            if self.whole.get().is_none() {
+                let _ = self.whole.set(load(0.0)?);
+            }
+            let whole = self.whole.get().ok_or_else(|| Error::Internal("no scene".to_owned()))?;
+            let (assets, places) = (Arc::clone(&whole.assets), Arc::clone(&whole.places));
+            let mut desc = whole.desc.clone();
+            desc.camera.shutter = desc.camera.shutter.map(|time| time + frame as f64);
+            Imported { desc, assets, report: ImportReport::default(), places }
+        };
+        Ok(Shot { scene, imported, frame: Some(frame) })
+    }
+}

@@ -1,0 +1,13 @@
+//! What render farms need: lines of progress in their formats, sequences of frames, job scripts for Slurm, job templates of Open Job Description.
+
+mod frames;
+mod job;
+mod openjd;
+mod progress;
+mod slurm;
+
+pub use frames::{FrameList, file_of_frame, has_frame_pattern, is_scene_per_frame, scene_of_frame, with_frame_pattern};
+pub use job::{Job, quote};
+pub use openjd::openjd_template;
+pub use progress::{Event, FORMATS, Format, Status};
+pub use slurm::{Script, SlurmOptions, slurm_scripts};

@@ -1,0 +1,113 @@
+//! A job template of Open Job Description, version 2023-09.
+
+use serde_json::{Value, json};
+
+use super::job::{Job, quote};
+
+/// The template as JSON: a step of shards (and frames), and one that merges each frame when all shards are rendered. Whoever submits it may
+/// change the number of shards, the frames, the program, and the folder of shards and checkpoints.
+///
+/// A task that is cancelled gets two minutes to write its checkpoint.
+pub fn openjd_template(job: &Job) -> Value {
+    let has_frames = job.frames.is_some();
+    let file = |name: &str, path: &std::path::Path, object: &str, flow: &str, what: &str| json!({ "name": name, "type": "PATH", "objectType": object, "dataFlow": flow, "default": path.to_string_lossy(), "description": what });
+    let mut parameters = vec![
+        file("Scene", &job.scene, if has_frames { "DIRECTORY" } else { "FILE" }, "IN", "The scene"),
+        file("Work", &job.folder, "DIRECTORY", "INOUT", "The folder of shards and checkpoints"),
+        json!({ "name": "Program", "type": "STRING", "default": job.program.to_string_lossy(), "description": "The program steradian" }),
+        json!({ "name": "Shards", "type": "INT", "default": job.shards, "minValue": 1, "description": "Into how many shards a picture is split" }),
+    ];
+    // A scene for each frame is no single file, so its name travels as it is.
+    if has_frames {
+        parameters[0] = json!({ "name": "Scene", "type": "STRING", "default": job.scene.to_string_lossy(), "description": "The scene" });
+    }
+    for (i, output) in job.outputs.iter().enumerate() {
+        let what = "A picture to write";
+        parameters.push(if has_frames {
+            json!({ "name": format!("Output{}", i + 1), "type": "STRING", "default": output.to_string_lossy(), "description": what })
+        } else {
+            file(&format!("Output{}", i + 1), output, "FILE", "OUT", what)
+        });
+    }
+    let mut space = vec![json!({ "name": "Shard", "type": "INT", "range": "1-{{Param.Shards}}" })];
+    let frames = job.frames.as_ref().map(|frames| {
+        parameters.push(json!({ "name": "Frames", "type": "STRING", "default": frames.ranges(':'), "description": "The frames" }));
+        json!({ "name": "Frame", "type": "INT", "range": "{{Param.Frames}}" })
+    });
+    space.extend(frames.clone());
+    let merge_space = frames.map(|frame| json!({ "taskParameterDefinitions": [frame] }));
+    let mut merge = json!({
+        "name": "Merge",
+        "dependencies": [{ "dependsOn": "Render" }],
+        "script": script(&merge_script(job)),
+    });
+    if let Some(space) = merge_space {
+        merge["parameterSpace"] = space;
+    }
+    json!({
+        "specificationVersion": "jobtemplate-2023-09",
+        "name": job.name,
+        "parameterDefinitions": parameters,
+        "steps": [
+            { "name": "Render", "parameterSpace": { "taskParameterDefinitions": space }, "script": script(&render_script(job)) },
+            merge,
+        ],
+    })
+}
+
+/// An action that runs a text with bash.
+fn script(text: &str) -> Value {
+    json!({
+        "embeddedFiles": [{ "name": "Run", "type": "TEXT", "filename": "run.sh", "data": text }],
+        "actions": {
+            "onRun": {
+                "command": "bash",
+                "args": ["{{Task.File.Run}}"],
+                "cancelation": { "mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": 120 },
+            },
+        },
+    })
+}
+
+/// Names of a shard's files, without their extension, and of the option that names the frame.
+fn place(job: &Job, frame: &str) -> String {
+    let frame = if job.frames.is_some() { frame } else { "" };
+    format!("\"{{{{Param.Work}}}}/shards/{frame}\"")
+}
+
+const FRAME: &str = "frame{{Task.Param.Frame}}.";
+
+fn render_script(job: &Job) -> String {
+    let options: Vec<String> = job.options.iter().map(|option| quote(option)).collect();
+    let frames = if job.frames.is_some() { " --frames={{Task.Param.Frame}}" } else { "" };
+    let (name, pattern) = (place(job, FRAME), place(job, "frame#."));
+    let part = "{{Task.Param.Shard}}-of-{{Param.Shards}}";
+    [
+        "set -eu".to_owned(),
+        format!("part={name}{part}"),
+        "mkdir -p \"{{Param.Work}}/shards\"".to_owned(),
+        "[ ! -e \"$part.shard\" ] || exit 0".to_owned(),
+        format!("exec \"{{{{Param.Program}}}}\" render \"{{{{Param.Scene}}}}\"{frames} {} \\", options.join(" ")),
+        format!("    --shard {{{{Task.Param.Shard}}}}/{{{{Param.Shards}}}} -o {pattern}{part}.shard \\"),
+        format!("    --checkpoint \"$part.checkpoint\" --every {} --resume --progress openjd\n", job.every),
+    ]
+    .join("\n")
+}
+
+fn merge_script(job: &Job) -> String {
+    let outputs: Vec<String> = (1..=job.outputs.len()).map(|i| format!("\"{{{{Param.Output{i}}}}}\"")).collect();
+    let name = place(job, FRAME);
+    let fill = if job.frames.is_some() {
+        // `####` and `%04d` become the number.
+        "    hashes=${output//[!#]/}\n    [ -z \"$hashes\" ] || output=${output/\"$hashes\"/%0${#hashes}d}\n    \
+         case $output in *%*d*) printf -v output \"$output\" {{Task.Param.Frame}} ;; esac\n"
+    } else {
+        ""
+    };
+    format!(
+        "set -eu\nparts=()\nfor ((i = 1; i <= {{{{Param.Shards}}}}; i++)); do parts+=({name}$i-of-{{{{Param.Shards}}}}.shard); done\n\
+         outputs=()\nfor output in {}; do\n{fill}    outputs+=(-o \"$output\")\ndone\n\
+         \"{{{{Param.Program}}}}\" merge \"${{parts[@]}}\" \"${{outputs[@]}}\"\nrm -f \"${{parts[@]}}\" {name}*.checkpoint\n",
+        outputs.join(" ")
+    )
+}

@@ -1,0 +1,137 @@
+//! Sequences of frames from the command line.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::{Value, json};
+use steradian::output;
+
+/// A sphere that crosses the picture in four frames.
+fn scene() -> Value {
+    json!({
+        "film": { "width": 24, "height": 16 },
+        "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0], "shutter": [0, 0.5] },
+        "sampler": { "spp": 4 },
+        "shapes": [{ "type": "sphere", "radius": 0.5, "motion": [
+            { "time": 0, "transform": [{ "translate": [-1, 0, 0] }] },
+            { "time": 4, "transform": [{ "translate": [1, 0, 0] }] },
+        ] }],
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+    })
+}
+
+fn steradian(folder: &Path, arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
+    command.current_dir(folder).args(arguments.split_whitespace()).env("XDG_CONFIG_HOME", folder);
+    command
+}
+
+fn run(folder: &Path, arguments: &str) -> Output {
+    steradian(folder, arguments).output().unwrap()
+}
+
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn folder_with(scenes: &[(&str, Value)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, scene) in scenes {
+        std::fs::write(folder.path().join(name), scene.to_string()).unwrap();
+    }
+    folder
+}
+
+/// Everything that a file says of its pixels.
+fn pixels(path: &Path) -> Vec<u32> {
+    let image = output::read_exr(path).unwrap();
+    image.layers.iter().flat_map(|layer| layer.data.iter().map(|value| value.to_bits())).collect()
+}
+
+#[test]
+fn a_frame_is_the_scene_with_its_shutter_moved() {
+    let mut later = scene();
+    later["camera"]["shutter"] = json!([2, 2.5]);
+    let folder = folder_with(&[("a.json", scene()), ("later.json", later)]);
+    let output = run(folder.path(), "render a.json --frames 0-2 -o a.####.exr -o small_%02d.png --float --layers Z");
+    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    for (arguments, frame) in [("render a.json", "a.0000.exr"), ("render later.json --seed 2", "a.0002.exr")] {
+        assert!(run(folder.path(), &format!("{arguments} -o single.exr --float --layers Z")).status.success());
+        assert_eq!(pixels(&folder.path().join("single.exr")), pixels(&folder.path().join(frame)), "{frame}");
+    }
+    assert_ne!(pixels(&folder.path().join("a.0000.exr")), pixels(&folder.path().join("a.0001.exr")));
+    assert!(folder.path().join("small_02.png").exists());
+}
+
+#[test]
+fn frames_that_are_there_are_skipped_unless_they_are_to_be_overwritten() {
+    let folder = folder_with(&[("a.json", scene())]);
+    // Without a place for the number there is one before the extension; of a half-finished frame the other half is rendered.
+    std::fs::write(folder.path().join("a.0002.exr"), "stays").unwrap();
+    std::fs::write(folder.path().join("a.0002.png"), "stays").unwrap();
+    std::fs::write(folder.path().join("a.0003.exr"), "goes").unwrap();
+    let output = run(folder.path(), "render a.json --frames 1-3 -o a.exr -o a.png");
+    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    assert!(told(&output).contains("1 frame is there already"), "{}", told(&output));
+    let size = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().len();
+    assert!(size("a.0001.exr") > 5 && size("a.0002.exr") == 5 && size("a.0003.exr") > 5);
+    let again = run(folder.path(), "render a.json --frames 1-3 -o a.exr -o a.png");
+    assert!(told(&again).contains("3 frames are there") && told(&again).ends_with("Progress: 100%\n"), "{}", told(&again));
+    assert!(run(folder.path(), "render a.json --frames 2 -o a.exr -o a.png --overwrite").status.success());
+    assert!(size("a.0002.exr") > 5);
+}
+
+#[test]
+fn a_scene_for_each_frame_is_read_for_each_and_a_failure_stops_unless_told_otherwise() {
+    let mut bright = scene();
+    bright["lights"][0]["radiance"] = json!([4, 4, 4]);
+    let folder = folder_with(&[("s.0001.json", scene()), ("s.0003.json", bright)]);
+    let output = run(folder.path(), "render s.####.json --frames 1-3 -o o.exr");
+    assert_eq!(output.status.code(), Some(4), "{}", told(&output));
+    assert!(told(&output).contains("error: frame 2: s.0002.json"), "{}", told(&output));
+    assert!(folder.path().join("o.0001.exr").exists() && !folder.path().join("o.0003.exr").exists());
+
+    let output = run(folder.path(), "render s.####.json --frames 1-3 -o o.exr --keep-going");
+    assert_eq!(output.status.code(), Some(4));
+    let sum = |name: &str| output::read_exr(&folder.path().join(name)).unwrap().layers[0].data.iter().sum::<f32>();
+    assert!(sum("o.0003.exr") > 2.0 * sum("o.0001.exr"));
+}
+
+#[test]
+fn progress_is_that_of_the_sequence_and_complete_only_at_its_end() {
+    let folder = folder_with(&[("a.json", scene())]);
+    let output = run(folder.path(), "render a.json --frames 1-4 -o a.exr --progress alf -q");
+    let lines: Vec<String> = told(&output).lines().map(str::to_owned).collect();
+    let percents: Vec<u32> =
+        lines.iter().map(|l| l.strip_prefix("ALF_PROGRESS ").unwrap().strip_suffix('%').unwrap().parse().unwrap()).collect();
+    assert!(percents.is_sorted() && percents.last() == Some(&100), "{lines:?}");
+    assert_eq!(percents.iter().filter(|percent| **percent == 100).count(), 1);
+
+    let output = run(folder.path(), "render a.json --frames 7,9 -o b.exr --progress afanasy -q");
+    let told = told(&output);
+    let counted: Vec<&str> = told.lines().filter(|line| line.starts_with("FRAME: ")).collect();
+    assert_eq!(counted, ["FRAME: 7", "FRAME: 9"]);
+    assert!(told.ends_with("PROGRESS: 100%\n[ PARSER FINISHED SUCCESS ]\n"), "{told}");
+}
+
+#[test]
+fn an_interrupt_ends_the_sequence() {
+    let folder = folder_with(&[("a.json", scene())]);
+    let mut command = steradian(folder.path(), "render a.json --frames 1-100000 -o a.exr --spp 64 --progress afanasy");
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line == "FRAME: 2"));
+    assert!(Command::new("kill").arg("-INT").arg(child.id().to_string()).status().unwrap().success());
+    let rest: Vec<String> = lines.collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
+    assert!(!rest.iter().any(|line| line.contains("SUCCESS")));
+}
+
+#[test]
+fn wrong_frames_are_refused() {
+    let folder = folder_with(&[("a.json", scene())]);
+    for arguments in ["--frames 1-", "--frames x", "--overwrite", "--frames 1 --fps 0"] {
+        assert_eq!(run(folder.path(), &format!("render a.json {arguments}")).status.code(), Some(2), "{arguments}");
+    }
+}

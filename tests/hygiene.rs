@@ -1,0 +1,189 @@
+//! What batch systems and shells expect: progress, logs, colours, configuration, manual pages.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+const SCENE: &str = r#"{
+    "film": { "width": 24, "height": 16 },
+    "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
+    // Said in the scene, though it is the default.
+    "sampler": { "spp": 2, "seed": 0 },
+    "shapes": [{ "type": "sphere", "radius": 1 }],
+    "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
+}"#;
+
+/// A command in a folder that holds `scene.json`, clear of the user's own configuration.
+fn steradian(folder: &Path, arguments: &str) -> Command {
+    std::fs::write(folder.join("scene.json"), SCENE).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
+    command.current_dir(folder).args(arguments.split_whitespace()).env("XDG_CONFIG_HOME", folder.join("config"));
+    for variable in ["NO_COLOR", "CLICOLOR_FORCE", "SLURM_CPUS_PER_TASK", "CUE_THREADS"] {
+        command.env_remove(variable);
+    }
+    command
+}
+
+fn run(folder: &Path, arguments: &str) -> Output {
+    steradian(folder, arguments).output().unwrap()
+}
+
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn every_format_has_whole_lines_and_ends_with_all() {
+    let folder = tempfile::tempdir().unwrap();
+    for (format, last) in [
+        ("human", "Progress: 100%"),
+        ("plain", "Progress: 100%"),
+        ("openjd", "openjd_progress: 100.0"),
+        ("alf", "ALF_PROGRESS 100%"),
+        ("deadline", "Progress: 100%"),
+        ("afanasy", "[ PARSER FINISHED SUCCESS ]"),
+    ] {
+        let output = run(folder.path(), &format!("render scene.json -o a.exr --spp 64 --target-error 0.01 --progress {format}"));
+        let text = told(&output);
+        assert_eq!(output.status.code(), Some(0), "{text}");
+        assert!(text.ends_with(&format!("{last}\n")) && !text.contains(['\r', '\x1b']), "{format}: {text:?}");
+        assert_eq!(text.contains("Error"), false, "{text}");
+        // The files are told of before all is done.
+        let place = |what: &str| text.find(what).unwrap_or(usize::MAX);
+        assert!(place("wrote a.exr") < place("100"), "{text}");
+        assert!(output.stdout.is_empty());
+    }
+    let output = run(folder.path(), "render scene.json -o a.exr -q --progress alf");
+    assert_eq!(told(&output), "ALF_PROGRESS 100%\n");
+    assert_eq!(told(&run(folder.path(), "render scene.json -o a.exr -q")), "");
+}
+
+#[test]
+fn failures_are_told_in_the_farms_words() {
+    let folder = tempfile::tempdir().unwrap();
+    for (format, line) in
+        [("deadline", "Error: missing.json: "), ("openjd", "openjd_fail: missing.json: "), ("afanasy", "[ PARSER ERROR ] missing.json: ")]
+    {
+        let output = run(folder.path(), &format!("render missing.json --progress {format}"));
+        assert_eq!(output.status.code(), Some(4));
+        assert!(told(&output).lines().any(|l| l.starts_with(line)) && !told(&output).contains("100"), "{}", told(&output));
+    }
+}
+
+#[test]
+fn messages_are_json_and_go_to_files_if_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), "render scene.json -o a.exr --progress json --log-file log.txt");
+    let values: Vec<Value> = told(&output).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(values.iter().any(|v| v["message"] == "wrote a.exr" && v["level"] == "note" && v["time"].is_string()), "{values:?}");
+    let progress: Vec<&Value> = values.iter().filter(|v| v["event"] == "progress").collect();
+    assert_eq!(progress.last().unwrap()["percent"], 100.0);
+    assert_eq!(values.last().unwrap()["event"], "success");
+
+    // Another run adds to the file, whatever it says on stderr; each line has its time, level and text.
+    assert_eq!(told(&run(folder.path(), "render scene.json -o b.exr -q --log-format text --log-file log.txt")), "");
+    let log = std::fs::read_to_string(folder.path().join("log.txt")).unwrap();
+    let lines: Vec<&str> = log.lines().collect();
+    assert!(lines.iter().any(|line| line.contains("wrote a.exr")));
+    assert!(
+        lines.iter().any(|line| line.ends_with("Z note: wrote b.exr")) && lines.iter().any(|line| line.contains("Z info: Embree")),
+        "{log}"
+    );
+
+    let output = run(folder.path(), "render missing.json --log-format json");
+    let value: Value = serde_json::from_str(told(&output).trim()).unwrap();
+    assert_eq!((&value["level"], output.status.code()), (&Value::from("error"), Some(4)));
+    assert_eq!(run(folder.path(), "render scene.json --log-file missing/log.txt").status.code(), Some(5));
+}
+
+#[test]
+fn colours_are_shown_only_where_they_are_wanted() {
+    let folder = tempfile::tempdir().unwrap();
+    let colored = |arguments: &str, variable: Option<(&str, &str)>| {
+        let mut command = steradian(folder.path(), arguments);
+        told(&command.envs(variable).output().unwrap()).contains('\x1b')
+    };
+    for arguments in ["render missing.json", "render --nonsense"] {
+        assert!(!colored(arguments, None), "{arguments}");
+        assert!(colored(&format!("--color always {arguments}"), None), "{arguments}");
+        assert!(colored(arguments, Some(("CLICOLOR_FORCE", "1"))), "{arguments}");
+        assert!(!colored(&format!("{arguments} --color=never"), Some(("CLICOLOR_FORCE", "1"))), "{arguments}");
+    }
+}
+
+/// Flag, environment, project, user, scene, built-in: each speaks where those before it are silent.
+#[test]
+fn options_come_from_the_strongest_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = folder.path().join("steradian.toml");
+    let user = folder.path().join("config/steradian/config.toml");
+    std::fs::create_dir_all(user.parent().unwrap()).unwrap();
+    let spp = |arguments: &str, variable: Option<(&str, &str)>| -> u64 {
+        let mut command = steradian(folder.path(), &format!("render scene.json -q -o a.exr --json - {arguments}"));
+        let output = command.envs(variable).output().unwrap();
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["spp"].as_u64().unwrap()
+    };
+    assert_eq!(spp("", None), 2);
+    std::fs::write(&user, "spp = 3\nseed = 5").unwrap();
+    assert_eq!(spp("", None), 3);
+    std::fs::write(&project, "# ours\nspp = 4\n").unwrap();
+    assert_eq!(spp("", None), 4);
+    assert_eq!(spp("", Some(("STERADIAN_SPP", "5"))), 5);
+    assert_eq!(spp("--spp 6", Some(("STERADIAN_SPP", "5"))), 6);
+
+    let show = run(folder.path(), "config show --json scene.json");
+    let shown: Value = serde_json::from_slice(&show.stdout).unwrap();
+    let origin = |key: &str| shown[key]["origin"].as_str().unwrap_or_default().to_owned();
+    assert!(origin("spp").ends_with("steradian.toml:2") && origin("seed").ends_with("config.toml:2"), "{shown:#}");
+    assert_eq!((&shown["spp"]["value"], &shown["size"]["value"]), (&"4".into(), &"24x16".into()));
+    assert_eq!((origin("size").as_str(), origin("max-depth").as_str()), ("scene: scene.json", "built-in"));
+    let text = run(folder.path(), "config show --origin scene.json");
+    let text = String::from_utf8(text.stdout).unwrap();
+    assert!(text.lines().any(|line| line.starts_with("spp ") && line.ends_with("steradian.toml:2")), "{text}");
+
+    // The project's file lies in a folder above as well.
+    std::fs::create_dir(folder.path().join("shot")).unwrap();
+    std::fs::write(folder.path().join("shot/scene.json"), SCENE).unwrap();
+    let output = run(folder.path(), "render shot/scene.json -q -o a.exr --json -");
+    assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["spp"], 4);
+}
+
+#[test]
+fn unknown_keys_are_errors_with_file_and_line() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("steradian.toml"), "spp = 4\n\nthread = 2\n").unwrap();
+    for command in ["render scene.json", "config show scene.json"] {
+        let output = run(folder.path(), command);
+        assert_eq!(output.status.code(), Some(2));
+        let text = told(&output);
+        assert!(text.contains("steradian.toml:3: \"thread\" is no option of render (did you mean \"threads\"?)"), "{text}");
+    }
+}
+
+#[test]
+fn farms_say_how_many_processors_a_task_has() {
+    let folder = tempfile::tempdir().unwrap();
+    for (variable, arguments, threads) in
+        [("SLURM_CPUS_PER_TASK", "", 3), ("CUE_THREADS", "", 3), ("SLURM_CPUS_PER_TASK", "--threads 2", 2), ("STERADIAN_THREADS", "", 3)]
+    {
+        let mut command = steradian(folder.path(), &format!("render scene.json -o a.exr --json - -v {arguments}"));
+        let output = command.env(variable, "3").output().unwrap();
+        assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["threads"], threads, "{variable}");
+        assert_eq!(told(&output).contains(&format!("threads = 3 (environment: {variable})")), threads == 3, "{}", told(&output));
+    }
+}
+
+#[test]
+fn every_command_has_its_manual_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = String::from_utf8(run(folder.path(), "man").stdout).unwrap();
+    assert!(page.contains(".TH") && page.contains("steradian"), "{page}");
+    assert!(run(folder.path(), "man --dir man").status.success());
+    for name in ["steradian.1", "steradian-render.1", "steradian-farm-slurm.1", "steradian-config-show.1"] {
+        assert!(folder.path().join("man").join(name).exists(), "{name}");
+    }
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(String::from_utf8_lossy(&run(folder.path(), &format!("completions {shell}")).stdout).contains("progress"), "{shell}");
+    }
+}
