@@ -182,7 +182,8 @@ impl LayerKind {
             "motion",
             &["motion.X", "motion.Y"],
             Source::Surface(|s, out| out.copy_from_slice(&s.motion), Average::Samples),
-            "motion: from where the surface is when the shutter opens to where it is when it closes, in pixels to the right and down",
+            "motion: from where the surface is when the shutter opens to where it is when it closes, in pixels to the right and down; without a \
+             surface, that of a point infinitely far away",
         )
         .float(),
         LayerInfo::new(

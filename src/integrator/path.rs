@@ -338,7 +338,7 @@ impl PathIntegrator {
             pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
             if self.sorts() {
                 let way = || Way::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(shadow.toward));
-                sorting.push_pending(bounce, i, group_of(world.scene, shadow.light), way);
+                sorting.push_pending(self.parts, bounce, [i, group_of(world.scene, shadow.light)], way);
             }
         }
         if let Some((path, next, sample)) = self.scatter(world, path, &vertex, bounce, (steering, turns), draws.bsdf.of(i - first)) {

@@ -275,7 +275,7 @@ impl PathIntegrator {
             shadow_rays.push(ray);
             pending.push(Pending { contribution: self.clamped(contribution, bounce + 1), slot: path.slot });
             if self.sorts() {
-                sorting.push_pending(bounce, i, group_of(world.scene, shaded.light_of[lane]), || Way::DIFFUSE);
+                sorting.push_pending(self.parts, bounce, [i, group_of(world.scene, shaded.light_of[lane])], || Way::DIFFUSE);
             }
         }
 

@@ -50,8 +50,10 @@ impl Sorting {
     }
 
     /// Takes note of the light pending last, which the path `i` has found at its vertex number `bounce`: there it goes `way`, if that is the first.
-    pub fn push_pending(&mut self, bounce: u32, i: usize, group: usize, way: impl FnOnce() -> Way) {
-        let course = if bounce == 0 { Course::Direct(way()) } else { self.course(bounce + 1, i, Course::Emission) };
+    pub fn push_pending(&mut self, needs: PartNeeds, bounce: u32, [i, group]: [usize; 2], way: impl FnOnce() -> Way) {
+        // Without layers by scattering, any course will do.
+        let first = bounce == 0 && needs.by_scattering;
+        let course = if first { Course::Direct(way()) } else { self.course(bounce + 1, i, Course::Emission) };
         self.pending.push((course, group as u32));
     }
 
