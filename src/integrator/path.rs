@@ -298,8 +298,9 @@ impl PathIntegrator {
                     self.sort_escaped(world, (sorting, i), (path, bounce), (ray.direction, known), light, out);
                 }
             }
-            if !out.surfaces.is_empty() {
-                self.note_escape(world, sorting.clear_of(i), (path, bounce), (ray.direction, known), out);
+            let clear = sorting.clear_of(i);
+            if self.notes_surface(bounce, clear) {
+                self.note_escape(world, clear, (path, bounce), (ray.direction, known), out);
             }
             return;
         };
