@@ -1,10 +1,11 @@
 //! What things in a picture are called: for layers that pick objects, materials and assets.
 
 use std::borrow::Cow;
+use std::num::NonZeroU32;
 
 use super::ShapeKey;
 
-/// Nothing.
+/// No number.
 const NONE: u32 = u32::MAX;
 
 /// What the shapes of a scene are called, by [`ShapeKey`]. A few numbers for each shape and instance; names that are made of another one and a
@@ -20,25 +21,25 @@ pub struct Identities {
     /// By shape.
     shapes: Vec<ShapeIdentity>,
     placements: Vec<Placement>,
-    /// By instance of the geometry: its placement. [`NONE`] for those of shapes that move by themselves.
-    placement_of: Vec<u32>,
+    /// By instance of the geometry: its placement. None for those of shapes that move by themselves.
+    placement_of: Vec<Option<PlacementId>>,
 }
 
 /// A name of the table, or one with a number behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Label {
-    name: u32,
+    name: NameId,
     /// [`NONE`] without.
     number: u32,
 }
 
-/// A name of the table.
+/// A name of the table, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NameId(u32);
+pub struct NameId(NonZeroU32);
 
-/// A placement of an object.
+/// A placement of an object, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PlacementId(u32);
+pub struct PlacementId(NonZeroU32);
 
 /// What a shape is called.
 #[derive(Clone, Copy, Debug)]
@@ -57,8 +58,8 @@ pub struct ShapeIdentity {
 #[derive(Clone, Copy, Debug)]
 struct Placement {
     label: Label,
-    /// Around it; [`NONE`] in the world.
-    parent: u32,
+    /// Around it; none in the world.
+    parent: Option<PlacementId>,
     /// The object that the outermost placement has.
     asset: NameId,
 }
@@ -66,12 +67,12 @@ struct Placement {
 impl Label {
     /// A name alone.
     pub fn plain(name: NameId) -> Self {
-        Self { name: name.0, number: NONE }
+        Self { name, number: NONE }
     }
 
     /// A name and a number, joined by an underscore.
     pub fn numbered(name: NameId, number: u32) -> Self {
-        Self { name: name.0, number }
+        Self { name, number }
     }
 }
 
@@ -79,7 +80,7 @@ impl Identities {
     /// Adds a name to the table; who calls sees to it that none is there twice.
     pub fn add_name(&mut self, name: &str) -> NameId {
         self.names.push(name.into());
-        NameId(self.names.len() as u32 - 1)
+        NameId(last_of(self.names.len()))
     }
 
     /// Adds the next shape of the geometry.
@@ -89,14 +90,14 @@ impl Identities {
 
     /// Adds a placement of the object named `asset`, within another or in the world.
     pub fn add_placement(&mut self, label: Label, parent: Option<PlacementId>, asset: NameId) -> PlacementId {
-        let asset = parent.map_or(asset, |parent| self.placements[parent.0 as usize].asset);
-        self.placements.push(Placement { label, parent: parent.map_or(NONE, |parent| parent.0), asset });
-        PlacementId(self.placements.len() as u32 - 1)
+        let asset = parent.and_then(|parent| self.get(parent)).map_or(asset, |parent| parent.asset);
+        self.placements.push(Placement { label, parent, asset });
+        PlacementId(last_of(self.placements.len()))
     }
 
     /// Adds the next instance of the geometry; one without a placement is called after its shape.
     pub fn add_instance(&mut self, placement: Option<PlacementId>) {
-        self.placement_of.push(placement.map_or(NONE, |placement| placement.0));
+        self.placement_of.push(placement);
     }
 
     /// What the object is called that a shape belongs to; empty for a key that does not exist.
@@ -134,25 +135,33 @@ impl Identities {
     }
 
     fn placement(&self, key: ShapeKey) -> Option<&Placement> {
-        let of_instance = self.placement_of.get(key.instance as usize).copied().filter(|&placement| placement != NONE);
-        let placement = of_instance.or_else(|| self.shape(key)?.placement.map(|placement| placement.0))?;
-        self.placements.get(placement as usize)
+        let of_instance = self.placement_of.get(key.instance as usize).copied().flatten();
+        self.get(of_instance.or_else(|| self.shape(key)?.placement)?)
+    }
+
+    fn get(&self, placement: PlacementId) -> Option<&Placement> {
+        self.placements.get(placement.0.get() as usize - 1)
     }
 
     fn name(&self, name: NameId) -> &str {
-        self.names.get(name.0 as usize).map_or("", |name| name)
+        self.names.get(name.0.get() as usize - 1).map_or("", |name| name)
     }
 
     fn label(&self, label: Label) -> Cow<'_, str> {
-        let name = self.name(NameId(label.name));
+        let name = self.name(label.name);
         if label.number == NONE { Cow::Borrowed(name) } else { Cow::Owned(format!("{name}_{}", label.number)) }
     }
 
     fn placement_name(&self, placement: &Placement) -> Cow<'_, str> {
         let own = self.label(placement.label);
-        match self.placements.get(placement.parent as usize) {
+        match placement.parent.and_then(|parent| self.get(parent)) {
             None => own,
             Some(parent) => Cow::Owned(format!("{}/{own}", self.placement_name(parent))),
         }
     }
+}
+
+/// The number of the last of so many things, counted from 1.
+fn last_of(count: usize) -> NonZeroU32 {
+    NonZeroU32::new(count as u32).unwrap_or(NonZeroU32::MIN)
 }
