@@ -32,7 +32,7 @@ fn matrices_are_written_column_by_column() {
 #[test]
 fn a_mesh_that_is_seen_twice_is_an_object() {
     let mut asset = Asset::new(json!([
-        { "mesh": 0, "translation": [1, 0, 0] }, { "mesh": 1 }, { "mesh": 0, "translation": [2, 0, 0] }, { "mesh": 0, "scale": [0, 1, 1] }
+        { "mesh": 0, "translation": [1, 0, 0], "name": "left" }, { "mesh": 1, "name": "alone" }, { "mesh": 0, "translation": [2, 0, 0] }, { "mesh": 0, "scale": [0, 1, 1] }
     ]));
     asset.square(json!({ "name": "a" }));
     asset.square(json!({ "name": "b" }));
@@ -43,18 +43,21 @@ fn a_mesh_that_is_seen_twice_is_an_object() {
     for (instance, x) in imported.desc.instances.iter().zip([1.0, 2.0]) {
         assert_close(place_of(instance).translation, [x, 0.0, 0.0]);
     }
+    let names: Vec<_> = imported.desc.instances.iter().map(|instance| instance.name.as_deref()).collect();
+    assert_eq!((names, imported.desc.shapes[0].common().name), (vec![Some("left"), None], Some("alone")));
     // What is scaled to nothing cannot be seen.
     assert!(imported.report.entries.iter().any(|e| e.place == "nodes[3]" && e.outcome == Outcome::Ignored));
 }
 
 #[test]
 fn an_extension_places_a_mesh_many_times() {
-    let mut asset = Asset::new(json!([{ "mesh": 0, "translation": [0, 0, 5] }]));
+    let mut asset = Asset::new(json!([{ "mesh": 0, "translation": [0, 0, 5], "name": "grass" }]));
     asset.square(json!({}));
     let places = asset.floats(&[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
     asset.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": places } } });
     let imported = asset.read();
     assert_eq!(imported.desc.instances.len(), 3);
+    assert!(imported.desc.instances.iter().all(|instance| instance.name.is_none()));
     assert_close(place_of(&imported.desc.instances[2]).translation, [3.0, 0.0, 5.0]);
 }
 

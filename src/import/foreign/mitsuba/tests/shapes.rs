@@ -185,11 +185,12 @@ fn mirrored_shapes_are_inside_out_where_mitsubas_are() {
 fn instances_place_groups() {
     let imported = try_scene(
         r#"<shape type="shapegroup" id="g"><shape type="sphere"/><shape type="merge"><shape type="disk"/></shape></shape>
-<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="3"/></transform></shape><shape type="instance"><ref id="g"/></shape>"#,
+<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="3"/></transform></shape><shape type="instance" id="second"><ref id="g"/></shape>"#,
     )
     .unwrap();
     let desc = &imported.desc;
     assert_eq!((desc.shapes.len(), desc.instances.len(), desc.objects["g"].shapes.len()), (0, 2, 2));
+    assert_eq!(desc.instances[1].name.as_deref(), Some("second"));
     assert_point(moved(&desc.instances[0].transform, [0.0; 3]), [3.0, 0.0, 0.0]);
     assert!(message("<shape type=\"instance\"/>").contains("needs a shapegroup"));
     assert!(imported.places["instances[1]"].ends_with("s.xml:4:80") || imported.places.contains_key("instances[1]"));
