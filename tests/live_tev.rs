@@ -295,10 +295,9 @@ fn a_viewer_that_dies_and_comes_back_gets_everything_again() {
     let mut stream = listener.accept().unwrap().0;
     stream.read_exact(&mut [0; 1000]).unwrap();
     drop((stream, listener));
-    eventually("lost", || {
-        tev.offer(&snapshot(&second));
-        tev.counters().taken > 1 && !tev.wants_picture()
-    });
+    eventually("lost", || !tev.is_connected());
+    tev.offer(&snapshot(&second));
+    assert!(!tev.wants_picture());
 
     let listener = TcpListener::bind(&address).unwrap();
     let viewer = viewer(listener);
@@ -322,8 +321,6 @@ fn nobody_there_means_no_pictures_and_no_wait() {
     // Returns at once: the deadline is an hour away.
     assert!(!tev.wait(deadline()));
     assert_eq!((tev.counters().connections, tev.counters().sent), (0, 0));
-    // A name that leads nowhere is no different.
-    assert!(!Tev::new(options("no-such-host.invalid:1"), "a").wait(deadline()));
 }
 
 #[test]

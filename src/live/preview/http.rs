@@ -1,7 +1,7 @@
 //! As much of HTTP/1.1 as a page of one's own needs: GET, one request after the other.
 
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{IpAddr, TcpStream};
+use std::net::{IpAddr, Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
 /// The longest head of a request, in bytes.
@@ -9,6 +9,9 @@ const MAX_HEAD: usize = 8192;
 
 /// The most header lines of a request.
 const MAX_HEADERS: usize = 64;
+
+/// How long what is left of a refused request is read.
+const LINGER: Duration = Duration::from_secs(1);
 
 /// What the page may do: show what is in it, and ask its own server.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:; \
@@ -98,17 +101,20 @@ impl Connection {
         }
     }
 
-    /// Answers with a refusal.
+    /// Answers with a refusal, the last answer of the connection.
     pub fn refuse(&mut self, refusal: Refusal) -> io::Result<()> {
         let allow = if refusal == Refusal::Method { "Allow: GET\r\n" } else { "" };
-        let status = refusal.status();
-        self.stream.write_all(
-            format!(
-                "HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{status}",
-                status.len()
-            )
-            .as_bytes(),
-        )
+        let (status, length) = (refusal.status(), refusal.status().len());
+        let head = format!("HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n");
+        self.stream.write_all(format!("{head}{status}").as_bytes())?;
+        // A connection closed before all of the request is read would take the answer with it.
+        self.stream.shutdown(Shutdown::Write)?;
+        self.stream.set_read_timeout(Some(LINGER))?;
+        let (start, mut read) = (Instant::now(), 1);
+        while read > 0 && start.elapsed() < LINGER {
+            read = self.stream.read(&mut [0; 2048])?;
+        }
+        Ok(())
     }
 
     /// Starts an answer; the body of `length` bytes follows by [`Connection::write`].

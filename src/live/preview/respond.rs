@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `/` | the page |
 //! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and wants the next one, not so with `idle=1` |
-//! | `/layer?index=I&page=P` | a layer: version, width, height, channels as little-endian u32, then 16-bit floats, row by row from the top |
+//! | `/layer?index=I` | a layer: version, width, height, channels as little-endian u32, then 16-bit floats, row by row from the top |
 //! | `/pixel?x=X&y=Y` | every layer's exact values at a pixel as JSON |
 
 use std::io;
@@ -58,7 +58,7 @@ fn state(shared: &Shared) -> Value {
         "version": shown.version,
         "finished": shown.finished,
         "size": snapshot.map(Snapshot::size),
-        "origin": snapshot.map(|snapshot| [snapshot.image.crop.x, snapshot.image.crop.y]),
+        "origin": snapshot.map(Snapshot::origin),
         "picture_spp": snapshot.map(|snapshot| snapshot.spp),
         "layers": layers.unwrap_or_default(),
         "statistics": shared.statistics.numbers(),
@@ -83,9 +83,6 @@ fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io:
         bytes.extend(halves.iter().flat_map(|half| half.to_le_bytes()));
         connection.write(&bytes)?;
     }
-    if let Some(page) = request.number("page") {
-        shared.board.visit(page, shown.version, false);
-    }
     Ok(())
 }
 
@@ -101,11 +98,8 @@ fn pixel(request: &Request, shared: &Shared) -> Option<Value> {
     let values = |data: &[f32], channels: usize| -> Vec<Value> {
         data.chunks_exact(channels).nth(index).unwrap_or_default().iter().map(|value| number(*value)).collect()
     };
-    let layers: Vec<Value> = snapshot
-        .layers()
-        .filter(|(_, names)| !names.is_empty())
-        .map(|(layer, names)| json!({ "channels": names, "values": values(&layer.data, names.len()) }))
-        .collect();
+    let layers: Vec<Value> =
+        snapshot.layers().map(|(layer, names)| json!({ "channels": names, "values": values(&layer.data, names.len()) })).collect();
     Some(json!({ "version": shown.version, "x": x, "y": y, "layers": layers }))
 }
 

@@ -59,6 +59,11 @@ impl Tev {
         Self { queue }
     }
 
+    /// Whether tev is there, as far as known.
+    pub fn is_connected(&self) -> bool {
+        self.queue.is_connected()
+    }
+
     /// Whether tev is connected and could be sent a picture at once.
     pub fn wants_picture(&self) -> bool {
         self.queue.wants_picture()

@@ -79,6 +79,10 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    pub fn is_connected(&self) -> bool {
+        self.lock().viewer == Viewer::Connected
+    }
+
     pub fn wants_picture(&self) -> bool {
         let state = self.lock();
         let is_due = state.offered.is_none_or(|last| last.elapsed() >= self.period);
