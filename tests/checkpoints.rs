@@ -182,7 +182,7 @@ fn a_state_of_another_render_is_refused_and_named() {
         ("size: 41x37 in the checkpoint, 40x37 asked for", Overrides { size: Some([40, 37]), ..spp(4) }),
         ("crop: 0,0,41,37 in the checkpoint, 1,2,3,4 asked for", Overrides { crop: Some([1, 2, 3, 4]), ..spp(4) }),
         ("integrator.max_depth: 5 in the checkpoint, 6 asked for", Overrides { max_depth: Some(6), ..spp(4) }),
-        ("every pixel has 4 samples already, 3 asked for", spp(3)),
+        ("pixels have 4 samples already, 3 asked for", spp(3)),
     ];
     for (message, overrides) in cases {
         let refused = refusal(&scene("box"), &overrides, |_| {});
@@ -215,6 +215,41 @@ fn more_samples_are_refused_where_textures_depend_on_their_number() {
     let more = Kit::new(&textured, &spp(4));
     let read = RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings);
     assert!(depends && read.unwrap_err().to_string().contains("that textures are filtered for: 2 in the checkpoint, 4 asked for"));
+}
+
+/// Copies the first checkpoint, once it is there.
+struct Keep<'a> {
+    from: &'a Path,
+    to: &'a Path,
+}
+
+impl Progress for Keep<'_> {
+    fn tile_done(&self, _: u64) {
+        if self.from.exists() && !self.to.exists() {
+            std::fs::copy(self.from, self.to).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_state_in_the_middle_of_a_sample_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, copy) = (folder.path().join("a.state"), folder.path().join("copy.state"));
+    let mut large = scene("box");
+    large["film"]["width"] = json!(330);
+    large["film"]["height"] = json!(330);
+    large["integrator"] = json!({ "type": "path", "max_depth": 2 });
+    // One thread: none looks at the file while another copies it.
+    let kit = Kit::new(&large, &Overrides { threads: Some(1), ..spp(2) });
+    let header = kit.header(Shard::WHOLE);
+    let mut checkpoints =
+        Checkpoints::new(StateFile::take(&path).unwrap(), header.clone(), Duration::ZERO, AtomicBool::new(false).into());
+    let progress = Keep { from: &path, to: &copy };
+    let whole = kit.go_on_with(kit.start(Shard::WHOLE), Some(&mut checkpoints), &progress, &AtomicBool::new(false));
+    let state = RenderState::read(&copy, &header, &kit.prepared.scene, &kit.prepared.settings).unwrap();
+    assert!(state.done == 0 && state.tiles_ahead > 0 && !state.complete, "{}", state.tiles_ahead);
+    let resumed = kit.go_on(state, &Silent, &AtomicBool::new(false));
+    assert!(resumed.complete && bits(&resumed.film) == bits(&whole.film) && resumed.rays == whole.rays);
 }
 
 /// Counts warnings.
