@@ -97,8 +97,8 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         for desc in &settings.outputs {
             output::write(desc, &result.image, &info)?;
         }
+        live.show_final(&result.image, stats.spp_done);
     }
-    live.show_final(&result.image, stats.spp_done);
     if let Some(path) = &json {
         let run = Run { scene: &scene_file, load_seconds, build_seconds };
         stats::write(path, &stats::value(&run, &settings, &*accel, stats))?;
