@@ -8,7 +8,7 @@ scenes=$(realpath "$(dirname "$0")/../scenes")
 folder=$(mktemp -d)
 full=$folder/full
 failures=0
-trap 'umount "$full" 2>/dev/null; rm -rf "$folder"' EXIT
+trap 'umount "$full" 2>/dev/null; umount "$full" 2>/dev/null; rm -rf "$folder"' EXIT
 cd "$folder" || exit 1
 cp -r "$scenes/cornell.json" .
 
@@ -62,11 +62,11 @@ if mkdir "$full" && mount -t tmpfs -o size=3m tmpfs "$full" 2>/dev/null; then
     # The target becomes read-only while the render runs.
     "${render[@]}" --spp 3000 --time-limit 2 --checkpoint "$full/c.state" --every 0.1 >out.txt 2>err.txt &
     sleep 1
-    mount -o remount,ro "$full"
+    mount --bind "$full" "$full" && mount -o remount,ro,bind "$full"
     wait $!
     holds "read-only on the way: the picture is written" grep -q "wrote a.exr" err.txt
     holds "read-only on the way: it was told" grep -q "cannot write $full/c.state: Read-only file system" err.txt
-    mount -o remount,rw "$full"
+    umount "$full"
     expect "read-only on the way: continues" 0 "continuing after" "${render[@]}" --spp 3000 --time-limit 1 --checkpoint "$full/c.state" --resume
     umount "$full"
 else

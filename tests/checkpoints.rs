@@ -142,7 +142,7 @@ impl Progress for StopAfter<'_> {
 fn a_resumed_render_with_a_target_error_has_the_bits_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let file = StateFile::take(&folder.path().join("a.state")).unwrap();
-    let overrides = Overrides { target_error: Some(2e-3), threads: Some(2), ..Overrides::default() };
+    let overrides = Overrides { target_error: Some(5e-3), spp: Some(96), size: Some([24, 20]), threads: Some(2), ..Overrides::default() };
     let kit = Kit::new(&scene("mitchell"), &overrides);
     let reference = kit.render(Shard::WHOLE);
     let mut rng = Rng::new(5);
@@ -151,7 +151,7 @@ fn a_resumed_render_with_a_target_error_has_the_bits_of_one_run() {
         let mut runs = 0;
         loop {
             let stop = AtomicBool::new(false);
-            let progress = StopAfter { tiles: (1 + rng.below(12) as u32).into(), stop: &stop };
+            let progress = StopAfter { tiles: (1 + rng.below(6) as u32).into(), stop: &stop };
             state = kit.kept(&kit.go_on(state, &progress, &stop), &file);
             runs += 1;
             if state.complete {
@@ -182,7 +182,7 @@ fn a_state_of_another_render_is_refused_and_named() {
         ("size: 41x37 in the checkpoint, 40x37 asked for", Overrides { size: Some([40, 37]), ..spp(4) }),
         ("crop: 0,0,41,37 in the checkpoint, 1,2,3,4 asked for", Overrides { crop: Some([1, 2, 3, 4]), ..spp(4) }),
         ("integrator.max_depth: 5 in the checkpoint, 6 asked for", Overrides { max_depth: Some(6), ..spp(4) }),
-        ("every pixel has 4 samples already, 3 asked for", spp(3)),
+        ("pixels have 4 samples already, 3 asked for", spp(3)),
     ];
     for (message, overrides) in cases {
         let refused = refusal(&scene("box"), &overrides, |_| {});
@@ -206,15 +206,51 @@ fn a_state_of_another_render_is_refused_and_named() {
 fn more_samples_are_refused_where_textures_depend_on_their_number() {
     let folder = tempfile::tempdir().unwrap();
     let file = StateFile::take(&folder.path().join("a.state")).unwrap();
-    let mut textured = scene("box");
-    textured["textures"] = json!({ "tiles": { "type": "checker" } });
-    textured["materials"]["grey"] = json!({ "type": "diffuse", "albedo": { "texture": "tiles" } });
-    let few = Kit::new(&textured, &spp(2));
-    let depends = few.prepared.scene.features.filtered_textures;
+    let filtered = |samples: u32| {
+        let mut kit = Kit::new(&scene("box"), &spp(samples));
+        kit.prepared.scene.features.filtered_textures = true;
+        kit
+    };
+    let few = filtered(2);
     file.replace(|out| few.render(Shard::WHOLE).write(&few.header(Shard::WHOLE), out)).unwrap();
-    let more = Kit::new(&textured, &spp(4));
+    let more = filtered(4);
     let read = RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings);
-    assert!(depends && read.unwrap_err().to_string().contains("that textures are filtered for: 2 in the checkpoint, 4 asked for"));
+    let refused = read.unwrap_err().to_string();
+    assert!(refused.contains("that textures are filtered for: 2 in the checkpoint, 4 asked for"), "{refused}");
+}
+
+/// Copies the first checkpoint, once it is there.
+struct Keep<'a> {
+    from: &'a Path,
+    to: &'a Path,
+}
+
+impl Progress for Keep<'_> {
+    fn tile_done(&self, _: u64) {
+        if self.from.exists() && !self.to.exists() {
+            std::fs::copy(self.from, self.to).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_state_in_the_middle_of_a_sample_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, copy) = (folder.path().join("a.state"), folder.path().join("copy.state"));
+    let mut large = scene("box");
+    large["film"]["width"] = json!(330);
+    large["film"]["height"] = json!(330);
+    large["integrator"] = json!({ "type": "path", "max_depth": 2 });
+    // One thread: none looks at the file while another copies it.
+    let kit = Kit::new(&large, &Overrides { threads: Some(1), ..spp(2) });
+    let header = kit.header(Shard::WHOLE);
+    let mut checkpoints = Checkpoints::new(StateFile::take(&path).unwrap(), header.clone(), Duration::ZERO, AtomicBool::new(false).into());
+    let progress = Keep { from: &path, to: &copy };
+    let whole = kit.go_on_with(kit.start(Shard::WHOLE), Some(&mut checkpoints), &progress, &AtomicBool::new(false));
+    let state = RenderState::read(&copy, &header, &kit.prepared.scene, &kit.prepared.settings).unwrap();
+    assert!(state.done == 0 && state.tiles_ahead > 0 && !state.complete, "{}", state.tiles_ahead);
+    let resumed = kit.go_on(state, &Silent, &AtomicBool::new(false));
+    assert!(resumed.complete && bits(&resumed.film) == bits(&whole.film) && resumed.rays == whole.rays);
 }
 
 /// Counts warnings.
@@ -246,7 +282,7 @@ fn a_checkpoint_that_cannot_be_written_is_told_and_ends_nothing() {
 
 // What follows runs the program.
 
-const SLOW: &str = "render scene.json --checkpoint a.state --threads 2 --spp 160 --size 160x120 -q -o a.exr";
+const SLOW: &str = "render scene.json --checkpoint a.state --threads 2 --spp 64 --size 96x72 -q -o a.exr";
 
 fn command(folder: &Path, line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
@@ -319,8 +355,8 @@ fn killed_renders_go_on_and_leave_no_trace() {
     names.sort();
     assert_eq!(names, ["a.exr", "a.state", "b.exr", "b.state", "scene.json"]);
     // More samples continue from what is there.
-    assert_code(&run(folder, &format!("{} --resume", SLOW.replace("160 ", "200 "))), 0, "");
-    assert_code(&run(folder, &SLOW.replace("160 ", "200 ").replace("a.state", "c.state").replace("a.exr", "c.exr")), 0, "");
+    assert_code(&run(folder, &format!("{} --resume", SLOW.replace("64 ", "80 "))), 0, "");
+    assert_code(&run(folder, &SLOW.replace("64 ", "80 ").replace("a.state", "c.state").replace("a.exr", "c.exr")), 0, "");
     assert!(same_pictures(folder, "a.exr", "c.exr") && !same_pictures(folder, "b.exr", "c.exr"));
 }
 
@@ -351,16 +387,16 @@ fn signals_are_answered() {
 fn faults_of_checkpoints_have_their_codes() {
     let folder = folder_with_scene();
     let folder = folder.path();
-    let line = "render scene.json --spp 2 -q -o a.exr --checkpoint";
-    assert_code(&run(folder, &format!("{line} a.state")), 0, "");
+    let line = "render scene.json --size 24x20 -q -o a.exr --checkpoint";
+    assert_code(&run(folder, &format!("{line} a.state --spp 2")), 0, "");
     let whole = std::fs::read(folder.join("a.state")).unwrap();
     let cases = [
-        ("a.state", 2, "--resume continues from it"),
+        ("a.state --spp 2", 2, "--resume continues from it"),
         ("scene.json", 2, "there is such a file"),
         ("scene.json --resume", 6, "this is not a checkpoint"),
         ("missing/a.state", 5, "there is no folder missing"),
         ("/proc/a.state", 5, "no file can be created"),
-        ("a.state --resume --seed 4", 6, "seed: 0 in the checkpoint, 4 asked for"),
+        ("a.state --resume --spp 2 --seed 4", 6, "seed: 0 in the checkpoint, 4 asked for"),
         ("a.state --resume --spp 1", 6, "2 samples already"),
         ("b.state --guiding on", 2, "--checkpoint: not with guiding"),
         ("a.state --every x", 2, "--every"),

@@ -24,6 +24,10 @@ impl Progress for Fan<'_> {
         self.listeners.iter().for_each(|listener| listener.plan(samples, error, target));
     }
 
+    fn resumed(&self, samples: u64) {
+        self.listeners.iter().for_each(|listener| listener.resumed(samples));
+    }
+
     fn tile_done(&self, samples: u64) {
         self.listeners.iter().for_each(|listener| listener.tile_done(samples));
     }

@@ -224,7 +224,7 @@ pub(super) fn render(
             let is_last = to_refinement >= settings.spp - stats.spp_done;
             let guide = lessons.guide.take().map(|guide| Arc::new(if is_last { guide.finished() } else { guide }));
             job.integrator = integrator::build(&settings.integrator, Setup { guide: guide.clone(), ..job.setup.clone() });
-            rays.add(&render_pass(&job, pool, &mut film, stats.spp_done, samples, progress));
+            rays.add(&render_pass(&job, pool, film.tiles_mut(), stats.spp_done, samples, progress));
             // Drops its part of the guide.
             job.integrator = integrator::build(&settings.integrator, job.setup.clone());
             done += samples;

@@ -32,6 +32,11 @@ impl<'a> Run<'a> {
         Self { job, pool, settings, progress, limits: Limits::new(settings, stop), checkpoints }
     }
 
+    /// How long a pass may be, as far as checkpoints are due. Parts of a sample keep the processors less busy than all of it.
+    pub fn longest_pass(&self) -> Option<Duration> {
+        self.checkpoints.as_ref().map(|checkpoints| (checkpoints.every() / 4).max(PASS_TIME))
+    }
+
     /// Between two passes, the next of which is expected to take `next`: checkpoints, and pictures for whoever wants them.
     pub fn pass_done(&mut self, state: &mut RenderState, next: Duration) {
         if let Some(checkpoints) = &mut self.checkpoints {

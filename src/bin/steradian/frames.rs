@@ -27,7 +27,7 @@ pub struct Session {
 impl Session {
     fn new(arguments: &RenderArgs) -> Result<Self> {
         let reporter = Reporter::new(arguments.sequence.progress, arguments.verbosity.quiet);
-        Ok(Self { reporter, interrupt: Interrupt::listen()?, listens_to_stop: OnceCell::new() })
+        Ok(Self { reporter, interrupt: Interrupt::listen_to_requests()?, listens_to_stop: OnceCell::new() })
     }
 
     /// Listens to signals to stop from the first call on; until then they end the program at once.

@@ -28,8 +28,15 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Starts to listen to SIGUSR1, which would end the program otherwise. Signals to stop still do so.
+    /// Starts to listen.
     pub fn listen() -> Result<Self> {
+        let interrupt = Self::listen_to_requests()?;
+        interrupt.listen_to_stop()?;
+        Ok(interrupt)
+    }
+
+    /// Starts to listen to SIGUSR1, which would end the program otherwise. Signals to stop still do so.
+    pub fn listen_to_requests() -> Result<Self> {
         let interrupt = Self::default();
         flag::register(SIGUSR1, Arc::clone(&interrupt.checkpoint)).map_err(failed)?;
         Ok(interrupt)

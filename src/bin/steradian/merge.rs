@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use steradian::desc::OutputDesc;
+use steradian::film::Image;
 use steradian::output::{self, Format, RenderInfo};
 use steradian::render::{self, Header};
 use steradian::{Error, Result};
@@ -17,7 +18,7 @@ pub fn run(arguments: &MergeArgs) -> Result<()> {
         output::check_writable(Path::new(&output.file))?;
     }
     let merged = render::merge(&arguments.shards, arguments.partial)?;
-    let image = merged.state.film.resolve();
+    let image = Image { overscan: merged.header.overscan, ..merged.state.film.resolve() };
     let info = RenderInfo {
         samples_per_pixel: merged.state.done,
         render_seconds: merged.state.seconds,

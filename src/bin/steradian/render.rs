@@ -38,7 +38,10 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         check_outputs(&settings, shard_file.as_deref(), json.as_deref())?;
     }
     let checkpoint = arguments.state.checkpoint.as_deref().map(|path| shot.file_of(path));
-    let kept = Kept::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?;
+    let kept = match arguments.pixel {
+        None => Kept::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?,
+        Some(_) => None,
+    };
     let scene = compile::compile_imported(&shot.imported, &shot.scene)?;
     let mut info = RenderInfo {
         world_to_camera: Some(world_to_camera(&scene.camera)),
@@ -94,8 +97,8 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         for desc in &settings.outputs {
             output::write(desc, &result.image, &info)?;
         }
+        live.show_final(&result.image, stats.spp_done);
     }
-    live.show_final(&result.image, stats.spp_done);
     if let Some(path) = &json {
         let run = Run { scene: &scene_file, load_seconds, build_seconds };
         stats::write(path, &stats::value(&run, &settings, &*accel, stats))?;

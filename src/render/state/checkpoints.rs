@@ -28,6 +28,11 @@ impl Checkpoints {
         Self { file, header, every, asked, last: Instant::now(), cost: Duration::ZERO, failed: false }
     }
 
+    /// The interval.
+    pub(in crate::render) fn every(&self) -> Duration {
+        self.every
+    }
+
     /// A pass is done, `elapsed` after this run began, and the next one is expected to take `next`: writes the state if the interval would be
     /// over when that is in the file.
     pub(in crate::render) fn pass_done(&mut self, state: &RenderState, elapsed: Duration, next: Duration, progress: &dyn Progress) {

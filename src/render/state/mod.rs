@@ -40,6 +40,8 @@ pub struct RenderState {
     pub shard: Shard,
     /// How many of these every pixel has; with a target error their mean, rounded.
     pub done: u32,
+    /// How many tiles, the first of the film, have one sample more.
+    pub tiles_ahead: usize,
     /// Whether no sample is missing.
     pub complete: bool,
     /// With a target error, what every block of pixels has and is to get.
@@ -62,7 +64,7 @@ impl RenderState {
             layers.insert(LayerKind::Variance);
         }
         let film = Film::with_light_groups(settings.film_size(), settings.crop, &layers, light_groups(scene), TILE_SIZE)?;
-        Ok(Self { film, shard, done: 0, complete: false, blocks, rays: RayCounts::default(), seconds: 0.0 })
+        Ok(Self { film, shard, done: 0, tiles_ahead: 0, complete: false, blocks, rays: RayCounts::default(), seconds: 0.0 })
     }
 
     /// Continues from the state in a file.
@@ -78,6 +80,7 @@ impl RenderState {
             return Err(reader.fault("the film has other layers"));
         }
         state.done = reader.header().done;
+        state.tiles_ahead = (reader.header().tiles_ahead as usize).min(state.film.tiles().len() - 1);
         state.rays = rays(reader.header().rays);
         state.seconds = reader.header().render_seconds;
         for tile in state.film.tiles_mut() {
@@ -105,6 +108,7 @@ impl RenderState {
         let RayCounts { camera, indirect, shadow } = self.rays;
         let header = Header {
             done: self.done,
+            tiles_ahead: self.tiles_ahead as u64,
             complete: self.complete,
             film: FilmShape::of(&self.film),
             rays: [camera, indirect, shadow],
@@ -147,8 +151,8 @@ fn fits(reader: &Reader, wanted: &Header) -> Result<()> {
     } else if there.shard != Shard::WHOLE && there.spp != wanted.spp {
         // Other samples would belong to it.
         differences.push(format!("spp: {} in the checkpoint, {} asked for, and shards are parts of a fixed number", there.spp, wanted.spp));
-    } else if there.done > wanted.spp {
-        differences.push(format!("spp: every pixel has {} samples already, {} asked for", there.done, wanted.spp));
+    } else if there.done + u32::from(there.tiles_ahead > 0) > wanted.spp {
+        differences.push(format!("spp: pixels have {} samples already, {} asked for", there.done, wanted.spp));
     }
     if differences.is_empty() {
         return Ok(());
