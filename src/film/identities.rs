@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use serde::{Deserialize, Serialize};
+
 use super::ShapeKey;
 
 /// Nothing.
@@ -14,7 +16,7 @@ const NONE: u32 = u32::MAX;
 /// - Its asset is the object that the outermost instance places, else the file that the shape comes from, else the shape.
 ///
 /// What has no name is called after its kind, its file or its object, with the place in its list: `sphere_3`, `bunny_0`, `tree_17`.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identities {
     names: Vec<Box<str>>,
     /// By shape.
@@ -25,7 +27,7 @@ pub struct Identities {
 }
 
 /// A name of the table, or one with a number behind it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Label {
     name: u32,
     /// [`NONE`] without.
@@ -33,15 +35,15 @@ pub struct Label {
 }
 
 /// A name of the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NameId(u32);
 
 /// A placement of an object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlacementId(u32);
 
 /// What a shape is called.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShapeIdentity {
     /// Its own name.
     pub label: Label,
@@ -54,7 +56,7 @@ pub struct ShapeIdentity {
 }
 
 /// What an instance is called.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Placement {
     label: Label,
     /// Around it; [`NONE`] in the world.
@@ -121,6 +123,16 @@ impl Identities {
             (None, Some(shape)) => self.label(shape.label),
             (None, None) => Cow::Borrowed(""),
         }
+    }
+
+    /// Number of shapes.
+    pub fn shapes(&self) -> u32 {
+        self.shapes.len() as u32
+    }
+
+    /// Number of instances.
+    pub fn instances(&self) -> u32 {
+        self.placement_of.len() as u32
     }
 
     /// Bytes of the tables.
