@@ -1,6 +1,7 @@
 //! OpenEXR: the colour as R, G, B, A and every other layer as `layer.channel`, in one part or several.
 
 mod coverage;
+mod header_order;
 mod metadata;
 mod names;
 mod plan;

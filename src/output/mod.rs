@@ -60,12 +60,14 @@ pub struct RenderInfo {
     pub render_seconds: f64,
     /// World to camera, for row vectors (the translation in the last row); camera space has +X right, +Y up, +Z forward.
     pub world_to_camera: Option<[[f32; 4]; 4]>,
-    /// World to the picture, for row vectors: x and y from 0 to 1 over the display window, y down; z from 0 to 1 with the depth.
+    /// World to the picture, for row vectors: x and y from 0 to 1 over the display window, y down; z grows with the depth.
     pub world_to_ndc: Option<[[f32; 4]; 4]>,
     /// Width of a pixel over its height; 1 if not given.
     pub pixel_aspect: Option<f32>,
     /// Which parts of the samples are there, of a picture that lacks some, such as `shards 1,3 of 4`.
     pub partial: Option<String>,
+    /// Further attributes of text, by name.
+    pub texts: Vec<(String, String)>,
     /// Counts of the rendering.
     pub statistics: Option<RenderStatistics>,
     /// What shapes are called: needed for mattes and numbers of objects.

@@ -107,7 +107,7 @@ pub fn part_attributes(common: &Common, part: PartKind, first: bool, comments: &
             settings.insert("output".to_owned(), serde_json::to_value(output).unwrap_or_default());
             put(&mut attributes, SETTINGS, AttributeValue::Text(text(&Value::Object(settings).to_string())));
         }
-        for (name, value) in common.texts {
+        for (name, value) in info.texts.iter().chain(common.texts) {
             put(&mut attributes, name, AttributeValue::Text(text(value)));
         }
     }

@@ -375,3 +375,23 @@ fn dwa_loses_little() {
     }
     assert!(errors[0] < errors[1], "{errors:?}");
 }
+
+/// The same picture comes in the same file, to the byte.
+#[test]
+fn equal_pictures_come_in_equal_files() {
+    let folder = tempfile::tempdir().unwrap();
+    for profile in [ExrProfileDesc::Default, ExrProfileDesc::Multipart] {
+        let bytes = [0, 1, 2].map(|i| {
+            let path = folder.path().join(format!("{i}.exr"));
+            let info = RenderInfo { identities: Some(identities()), ..info() };
+            let output = OutputDesc { profile, layers: every_layer(), ..OutputDesc::new("a.exr") };
+            write_exr(&path, &full_picture(), &output, &info).unwrap();
+            std::fs::read(&path).unwrap()
+        });
+        assert!(bytes[0] == bytes[1] && bytes[1] == bytes[2]);
+        // In the order of their names.
+        let place = |name: &str| bytes[0].windows(name.len()).position(|window| window == name.as_bytes()).unwrap();
+        let names = ["channels\0", "comments\0", "cryptomatte/3ae39a5/name\0", "dataWindow\0", "steradian/object_id\0", "worldToCamera\0"];
+        assert!(names.windows(2).all(|pair| place(pair[0]) < place(pair[1])));
+    }
+}

@@ -1,12 +1,14 @@
 //! Writing of files: layers to channels, channels to parts.
 
 use std::borrow::Cow;
+use std::io::Write;
 use std::path::Path;
 
 use exr::meta::attribute::IntegerBounds;
 use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, ImageAttributes, LineOrder, Vec2, WritableImage};
 
 use super::coverage::{self, Matte};
+use super::header_order::sort_attributes;
 use super::metadata::{Common, Mattes, part_attributes, text};
 use super::names::{channel_name, plain_word};
 use super::plan::{self, PartKind};
@@ -32,7 +34,7 @@ pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderI
     if output.crypto_manifest == CryptoManifestDesc::Sidecar {
         for matte in &contents.mattes {
             let beside = path.with_file_name(mattes.sidecar(matte));
-            write_atomically(&beside, |out| std::io::Write::write_all(out, matte.manifest.as_bytes()).map_err(|e| e.to_string()))?;
+            write_atomically(&beside, |out| out.write_all(matte.manifest.as_bytes()).map_err(|e| e.to_string()))?;
         }
     }
     let common = Common { output, info, mattes, texts: &contents.texts, original: windows.original };
@@ -43,7 +45,10 @@ pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderI
     attributes.chromaticities = Some(REC709);
     attributes.pixel_aspect = info.pixel_aspect.unwrap_or(1.0);
     let file = exr::prelude::Image { attributes, layer_data: parts };
-    write_atomically(path, |out| file.write().to_buffered(out).map_err(|e| e.to_string()))
+    write_atomically(path, |out| {
+        file.write().to_buffered(&mut *out).map_err(|e| e.to_string())?;
+        out.flush().and_then(|()| sort_attributes(out.get_mut())).map_err(|e| e.to_string())
+    })
 }
 
 /// Windows of a file.
