@@ -29,6 +29,8 @@ mod cutouts;
 mod degenerate_input;
 /// The same picture for any number of threads, any crop, any accelerator; samples can be replayed.
 mod determinism;
+/// EXR files as users get them: profiles, checks, mattes, pictures rendered again.
+mod exr_files;
 /// Jobs for farms: their scripts with stand-ins for Slurm and the render.
 mod farm;
 /// Known flaws of renderers in camera and film: each test fails on the flawed formula.

@@ -2,6 +2,7 @@
 
 mod batch;
 mod lens;
+mod matrices;
 mod project;
 #[cfg(test)]
 mod tests;

@@ -21,7 +21,7 @@ pub use material::{
     AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc,
     ScalarDesc,
 };
-pub use output::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
+pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerDesc, OutputDesc, PixelTypeDesc};
 pub use principled::PrincipledDesc;
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
 pub use shape::{

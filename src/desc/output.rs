@@ -1,5 +1,7 @@
 //! Outputs as written.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -12,12 +14,39 @@ pub struct OutputDesc {
     /// EXR: what to store beside the picture. Default: nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub layers: Vec<LayerDesc>,
-    /// EXR: how colour is stored. Z and P are always 32-bit. Default: half.
+    /// EXR: how channels are named and put into parts, for the program that reads the file. Default: default.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub profile: ExrProfileDesc,
+    /// EXR: how colour and normals are stored. What 16 bits would spoil is always of 32. Default: half.
     #[serde(default)]
     pub pixel_type: PixelTypeDesc,
-    /// EXR: compression, always lossless. Default: zip.
-    #[serde(default)]
-    pub compression: CompressionDesc,
+    /// EXR: how single layers are stored in place of that, such as `{ "albedo": "float" }`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub pixel_types: BTreeMap<LayerDesc, PixelTypeDesc>,
+    /// EXR: compression. Default: zip; zips with the profile nuke.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compression: Option<CompressionDesc>,
+    /// EXR: how much dwaa and dwab lose; 0 is nearly nothing, 45 hard to see. Default: 45.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dwa_level: Option<f32>,
+    /// EXR: store the whole picture, black around the crop, for programs that ignore data windows. Default: false.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub uncropped: bool,
+    /// EXR: how many objects Cryptomatte tells apart in a pixel: an even number. Default: 6.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crypto_depth: Option<u32>,
+    /// EXR: where Cryptomatte's names are stored. Default: embedded.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub crypto_manifest: CryptoManifestDesc,
+    /// EXR: the attribute `owner`. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub owner: Option<String>,
+    /// EXR: text before what the attribute `comments` says of the layers. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comments: Option<String>,
+    /// EXR: the attribute `framesPerSecond`. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames_per_second: Option<f64>,
     /// PNG: exposure in stops before the sRGB curve. Default: 0.
     #[serde(default)]
     pub exposure: f32,
@@ -29,8 +58,17 @@ impl OutputDesc {
         Self {
             file: file.into(),
             layers: Vec::new(),
+            profile: ExrProfileDesc::default(),
             pixel_type: PixelTypeDesc::default(),
-            compression: CompressionDesc::default(),
+            pixel_types: BTreeMap::new(),
+            compression: None,
+            dwa_level: None,
+            uncropped: false,
+            crypto_depth: None,
+            crypto_manifest: CryptoManifestDesc::default(),
+            owner: None,
+            comments: None,
+            frames_per_second: None,
             exposure: 0.0,
         }
     }
@@ -126,7 +164,48 @@ pub enum PixelTypeDesc {
     Float,
 }
 
-/// Lossless EXR compression.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// Whom an EXR file is made for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ExrProfileDesc {
+    /// One part with names that every program reads.
+    #[default]
+    Default,
+    /// As the default, compressed line by line, which Nuke reads fastest.
+    Nuke,
+    /// One part with the names of Blender's passes.
+    Blender,
+    /// Three parts: picture and colour layers, data, Cryptomatte. A program reads only the parts it needs.
+    Multipart,
+}
+
+impl ExrProfileDesc {
+    /// Every profile with its name.
+    pub const ALL: [(Self, &'static str); 4] =
+        [(Self::Default, "default"), (Self::Nuke, "nuke"), (Self::Blender, "blender"), (Self::Multipart, "multipart")];
+
+    /// The profile's name.
+    pub fn name(self) -> &'static str {
+        Self::ALL[self as usize].1
+    }
+}
+
+/// Where Cryptomatte's names are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CryptoManifestDesc {
+    /// In the picture's metadata.
+    #[default]
+    Embedded,
+    /// In files beside the picture, one for each kind of matte.
+    Sidecar,
+}
+
+/// EXR compression; lossless except for dwaa and dwab.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CompressionDesc {
@@ -141,4 +220,8 @@ pub enum CompressionDesc {
     Rle,
     /// None.
     None,
+    /// Lossy cosine transform over blocks of 32 lines, for colour only.
+    Dwaa,
+    /// Lossy cosine transform over blocks of 256 lines, for colour only.
+    Dwab,
 }

@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::num::NonZeroU32;
 
+use serde::{Deserialize, Serialize};
+
 use super::ShapeKey;
 
 /// No number.
@@ -15,7 +17,7 @@ const NONE: u32 = u32::MAX;
 /// - Its asset is the object that the outermost instance places, else the file that the shape comes from, else the shape.
 ///
 /// What has no name is called after its kind, its file or its object, with the place in its list: `sphere_3`, `bunny_0`, `tree_17`.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identities {
     names: Vec<Box<str>>,
     /// By shape.
@@ -26,7 +28,7 @@ pub struct Identities {
 }
 
 /// A name of the table, or one with a number behind it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Label {
     name: NameId,
     /// [`NONE`] without.
@@ -34,15 +36,15 @@ pub struct Label {
 }
 
 /// A name of the table, counted from 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NameId(NonZeroU32);
 
 /// A placement of an object, counted from 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlacementId(NonZeroU32);
 
 /// What a shape is called.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShapeIdentity {
     /// Its own name.
     pub label: Label,
@@ -55,7 +57,7 @@ pub struct ShapeIdentity {
 }
 
 /// What an instance is called.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Placement {
     label: Label,
     /// Around it; none in the world.
@@ -122,6 +124,16 @@ impl Identities {
             (None, Some(shape)) => self.label(shape.label),
             (None, None) => Cow::Borrowed(""),
         }
+    }
+
+    /// Number of shapes.
+    pub fn shapes(&self) -> u32 {
+        self.shapes.len() as u32
+    }
+
+    /// Number of instances.
+    pub fn instances(&self) -> u32 {
+        self.placement_of.len() as u32
     }
 
     /// Bytes of the tables.

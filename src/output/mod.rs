@@ -1,12 +1,18 @@
 //! Picture files. Every file is written aside in its folder and renamed into place, so a reader never sees half of one.
 
 mod atomic;
+mod check;
+mod color_space;
 mod compare;
+pub mod cryptomatte;
 mod exr;
+mod matrices;
 mod png;
+mod role;
 
-pub use self::exr::{read_exr, write_exr};
+pub use self::exr::{check_output, read_exr, read_settings, write_exr};
 pub use atomic::{check_creatable, check_writable, write_atomically};
+pub use check::{Finding, RULES, Rule, Severity, check_exr};
 pub use compare::{Comparison, RELATIVE_FLOOR, compare};
 pub use png::write_png;
 
@@ -16,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::desc::OutputDesc;
 use crate::error::{Error, Result};
-use crate::film::Image;
+use crate::film::{Identities, Image};
 
 /// The kinds of files that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,10 +60,31 @@ pub struct RenderInfo {
     pub render_seconds: f64,
     /// World to camera, for row vectors (the translation in the last row); camera space has +X right, +Y up, +Z forward.
     pub world_to_camera: Option<[[f32; 4]; 4]>,
+    /// World to the picture, for row vectors: x and y from 0 to 1 over the display window, y down; z grows with the depth.
+    pub world_to_ndc: Option<[[f32; 4]; 4]>,
     /// Width of a pixel over its height; 1 if not given.
     pub pixel_aspect: Option<f32>,
     /// Which parts of the samples are there, of a picture that lacks some, such as `shards 1,3 of 4`.
     pub partial: Option<String>,
+    /// Further attributes of text, by name.
+    pub texts: Vec<(String, String)>,
+    /// Counts of the rendering.
+    pub statistics: Option<RenderStatistics>,
+    /// What shapes are called: needed for mattes and numbers of objects.
+    pub identities: Option<Identities>,
+    /// All that is needed to make the picture again, as a JSON object; files add how they are written.
+    pub settings: Option<serde_json::Value>,
+}
+
+/// Counts of a rendering that files tell of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RenderStatistics {
+    /// Threads that rendered.
+    pub threads: usize,
+    /// Rays of all kinds.
+    pub rays: u64,
+    /// Samples that were not finite and therefore left out.
+    pub nan_samples: u64,
 }
 
 /// Writes `image` where and how `output` says.

@@ -4,15 +4,19 @@
 //! replayed alone, and any split of the work gives the same picture bit for bit.
 
 mod adaptive;
+mod exr_overrides;
 mod guided;
 mod limits;
 mod plain;
 mod progress;
+mod recipe;
 mod run;
 mod settings;
 mod state;
 
+pub use exr_overrides::ExrOverrides;
 pub use progress::{Progress, Silent};
+pub use recipe::{Recipe, RecipeSettings};
 pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings};
 pub use state::{Checkpoints, FilmShape, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 

@@ -3,10 +3,12 @@
 use std::num::NonZero;
 use std::time::Duration;
 
+use super::ExrOverrides;
 use crate::accel::AccelKind;
 use crate::desc::{FilterDesc, IntegratorDesc, LayerDesc, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
+use crate::output::check_output;
 use crate::sampling::SamplerKind;
 
 /// Extensions of the files written if neither the scene nor the command line names one.
@@ -97,6 +99,8 @@ pub struct Overrides {
     pub layers: Vec<LayerDesc>,
     /// `--float`: for every EXR output.
     pub float: bool,
+    /// Of every EXR output.
+    pub exr: ExrOverrides,
     /// `--exposure`: for every PNG output.
     pub exposure: Option<f32>,
 }
@@ -280,6 +284,9 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides) -> Result<Vec<OutputDesc>> {
     };
     needs("--layers", !overrides.layers.is_empty(), ".exr")?;
     needs("--float", overrides.float, ".exr")?;
+    if let Some(option) = overrides.exr.given() {
+        needs(option, true, ".exr")?;
+    }
     needs("--exposure", overrides.exposure.is_some(), ".png")?;
     if overrides.exposure.is_some_and(|stops| !stops.is_finite()) {
         return Err(usage("--exposure: a finite number of stops"));
@@ -292,6 +299,8 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides) -> Result<Vec<OutputDesc>> {
             if overrides.float {
                 output.pixel_type = PixelTypeDesc::Float;
             }
+            overrides.exr.apply(output);
+            check_output(output)?;
         }
         if let Some(stops) = overrides.exposure.filter(|_| has_extension(output, ".png")) {
             output.exposure = stops;

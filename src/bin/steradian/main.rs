@@ -4,6 +4,7 @@ mod args;
 mod bench;
 mod bench_error;
 mod bench_scale;
+mod check_exr;
 mod compare;
 mod config;
 mod convert;
@@ -17,6 +18,7 @@ mod merge;
 mod names;
 mod progress;
 mod render;
+mod rerender;
 mod scene;
 mod stats;
 mod text;
@@ -68,6 +70,8 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Man { dir } => man(dir.as_deref()).map(|()| 0),
         Command::Schema => text::print(&import::schema()).map(|()| 0),
         Command::Merge(arguments) => merge::run(&arguments).map(|()| 0),
+        Command::CheckExr(arguments) => check_exr::run(&arguments),
+        Command::Rerender(arguments) => rerender::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
         Command::Completions { shell } => {
             let mut script = Vec::new();

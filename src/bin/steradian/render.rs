@@ -4,18 +4,17 @@ use std::path::Path;
 use std::time::Instant;
 
 use steradian::accel::{self, Accelerator};
-use steradian::camera::Camera;
 use steradian::film::LayerSet;
 use steradian::live::Fan;
-use steradian::math::Vec3;
-use steradian::output::{self, RenderInfo};
-use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Replayed, Settings, Stats};
+use steradian::output::{self, RenderInfo, RenderStatistics};
+use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Recipe, Replayed, Settings, Stats};
 use steradian::{Result, compile};
 
 use crate::args::RenderArgs;
 use crate::frames::{Session, Shot};
 use crate::kept::{self, Kept};
 use crate::progress::Reporter;
+use crate::rerender;
 use crate::stats::{self, Run};
 use crate::text;
 
@@ -26,6 +25,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
     let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?.map(|name| shot.file_of(&name));
     let mut settings = Settings::new(&shot.imported.desc, &overrides)?;
     shot.adapt(&mut settings);
+    let recipe = rerender::prepare(arguments, &shot, &mut settings)?;
     let is_there = match &shard_file {
         Some(file) => shot.frame.is_some() && !arguments.sequence.overwrite && file.exists(),
         None => shot.is_there(&settings, arguments.sequence.overwrite),
@@ -44,8 +44,11 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
     };
     let scene = compile::compile_imported(&shot.imported, &shot.scene)?;
     let mut info = RenderInfo {
-        world_to_camera: Some(world_to_camera(&scene.camera)),
+        world_to_camera: Some(scene.camera.world_to_camera()),
+        world_to_ndc: scene.camera.world_to_ndc(settings.size),
         pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
+        identities: settings.layers.needs_coverage().then(|| scene.identities.clone()),
+        settings: recipe.as_ref().map(Recipe::to_value),
         ..RenderInfo::default()
     };
     let header = match &kept {
@@ -89,6 +92,8 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
 
     info.samples_per_pixel = stats.spp_done;
     info.render_seconds = stats.render_seconds;
+    info.statistics = Some(RenderStatistics { threads: settings.threads, rays: stats.rays.total(), nan_samples: stats.nan_samples });
+    info.settings = recipe.map(|recipe| recipe.with_samples(stats.spp_done).to_value());
     let written: Vec<String> = match &shard_file {
         Some(file) => vec![file.display().to_string()],
         None => settings.outputs.iter().map(|output| output.file.clone()).collect(),
@@ -179,46 +184,9 @@ fn describe_sample(sample: &Replayed) -> String {
     .join("\n")
 }
 
-/// World to camera as OpenEXR has it: for row vectors, with +X right, +Y up and +Z forward.
-fn world_to_camera(camera: &Camera) -> [[f32; 4]; 4] {
-    let (forward, up) = (camera.axis(), camera.up());
-    let axes = [forward.cross(up), up, forward].map(Vec3::as_dvec3);
-    let position = camera.position();
-    let mut rows = [[0.0; 4]; 4];
-    for (column, axis) in axes.iter().enumerate() {
-        for (row, component) in axis.to_array().into_iter().enumerate() {
-            // Adding zero makes a negative zero positive.
-            rows[row][column] = component as f32 + 0.0;
-        }
-        rows[3][column] = -axis.dot(position) as f32 + 0.0;
-    }
-    rows[3][3] = 1.0;
-    rows
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use steradian::camera::Projection;
-    use steradian::math::{DAffine3, DVec3, Transform};
-
-    #[test]
-    fn points_before_the_camera_have_positive_depth_and_the_right_side_is_right() {
-        let turn = DAffine3::from_rotation_y(0.7) * DAffine3::from_rotation_x(-0.4);
-        let place = DAffine3::from_translation(DVec3::new(1.0, 2.0, 3.0)) * turn;
-        let camera = Camera::new(Transform::new(place).unwrap(), Projection::Environment);
-        let m = world_to_camera(&camera);
-        let map = |p: DVec3| -> [f64; 3] {
-            let row = [p.x, p.y, p.z, 1.0];
-            std::array::from_fn(|j| (0..4).map(|i| row[i] * f64::from(m[i][j])).sum())
-        };
-        // Camera space looks along -Z with +X right; OpenEXR's looks along +Z.
-        for p in [DVec3::new(0.0, 0.0, -5.0), DVec3::new(1.0, 0.0, -1.0), DVec3::new(0.0, 1.0, -2.0)] {
-            let measured = map(place.transform_point3(p));
-            let expected = [p.x, p.y, -p.z];
-            assert!(measured.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{measured:?} {expected:?}");
-        }
-    }
 
     #[test]
     fn default_outputs_are_named_after_the_scene() {

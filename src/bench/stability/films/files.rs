@@ -88,7 +88,7 @@ pub(super) fn m7_files(effort: Effort) -> Outcome {
         let image = picture(&mut rng);
         for (compression, pixel_type) in COMPRESSIONS.into_iter().flat_map(|c| [(c, PixelTypeDesc::Float), (c, PixelTypeDesc::Half)]) {
             let layers = vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo];
-            let desc = OutputDesc { layers, pixel_type, compression, ..OutputDesc::new("a.exr") };
+            let desc = OutputDesc { layers, pixel_type, compression: Some(compression), ..OutputDesc::new("a.exr") };
             let written = write_exr(&path, &image, &desc, &RenderInfo::default());
             let Ok(read) = written.and_then(|()| read_exr(&path)) else {
                 lost += 1;

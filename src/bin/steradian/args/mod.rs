@@ -4,6 +4,7 @@ mod bench;
 mod bench_error;
 mod bench_scale;
 mod config;
+mod exr;
 mod farm;
 mod frames;
 mod import;
@@ -20,10 +21,12 @@ use steradian::desc::{IntegratorDesc, LayerDesc, SamplerKindDesc, StrategyDesc};
 use steradian::render::Overrides;
 
 use crate::names;
+use crate::rerender::Repeat;
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
 pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
 pub use config::{ConfigCommand, ConfigShowArgs};
+pub use exr::{CheckExrArgs, ExrArgs, RerenderArgs};
 pub use farm::{FarmCommand, JobArgs, SlurmArgs};
 pub use frames::SequenceArgs;
 pub use import::{ConvertArgs, ImportArgs};
@@ -102,6 +105,16 @@ pub enum Command {
     /// Shards are what `render --shard` writes. All of them together are the picture of one run bit for bit, in every layer.
     #[command(after_help = MERGE_EXAMPLES)]
     Merge(MergeArgs),
+    /// Check EXR files against what the programs that read them expect
+    ///
+    /// Names every rule that a file breaks, what reads it wrongly, and how to mend it. docs/exr.md lists the rules.
+    #[command(after_help = exr::CHECK_EXAMPLES)]
+    CheckExr(CheckExrArgs),
+    /// Render the picture of an EXR file again
+    ///
+    /// The file names its scene with all settings; the picture is the same bit for bit. A scene or file of it that has changed is named and refused.
+    #[command(after_help = exr::RERENDER_EXAMPLES)]
+    Rerender(RerenderArgs),
     /// Compare a picture with its reference
     ///
     /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of (test - reference)² /
@@ -215,6 +228,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "I", requires = "pixel", help_heading = "Run")]
     pub sample: Option<u32>,
     #[command(flatten)]
+    pub exr: ExrArgs,
+    /// A picture to be made again.
+    #[arg(skip)]
+    pub repeat: Option<Box<Repeat>>,
+    #[command(flatten)]
     pub state: StateArgs,
     #[command(flatten)]
     pub live: live::LiveArgs,
@@ -304,6 +322,7 @@ impl RenderArgs {
             default_outputs,
             layers: self.layers.clone(),
             float: self.float,
+            exr: self.exr.overrides(self.sequence.frames.is_some().then_some(self.sequence.fps)),
             exposure: self.exposure,
         }
     }

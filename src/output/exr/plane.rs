@@ -1,0 +1,87 @@
+//! Channels to write, each with its own pixels.
+
+use std::borrow::Cow;
+
+use exr::prelude::{AnyChannel, FlatSamples, f16};
+use rayon::prelude::*;
+
+use crate::film::Crop;
+use crate::output::role::Role;
+
+/// A channel to write.
+pub struct Plane {
+    /// Full name.
+    pub name: String,
+    /// What it holds.
+    pub role: Role,
+    /// Its pixels, row by row from the top.
+    pub samples: FlatSamples,
+}
+
+/// Where values are taken from: pixels whose channels lie side by side.
+pub struct Source<'a> {
+    /// Full names of the channels, in the order of the data.
+    pub names: Vec<String>,
+    /// Values, pixel by pixel.
+    pub data: Cow<'a, [f32]>,
+    /// Stored in 16 bits.
+    pub half: bool,
+}
+
+/// Which part of a picture is stored, and around it black.
+#[derive(Clone, Copy)]
+pub struct Region {
+    /// The pixels that there are.
+    pub have: Crop,
+    /// The pixels to store.
+    pub want: Crop,
+}
+
+impl Region {
+    /// The values of one channel out of `stride` in the pixels to store.
+    fn values(self, data: &[f32], channel: usize, stride: usize) -> impl Iterator<Item = f32> + '_ {
+        let Self { have, want } = self;
+        (want.y..want.y + want.height).flat_map(move |y| {
+            (want.x..want.x + want.width).map(move |x| {
+                if !have.contains(x, y) {
+                    return 0.0;
+                }
+                let pixel = (y - have.y) as usize * have.width as usize + (x - have.x) as usize;
+                data.get(pixel * stride + channel).copied().unwrap_or(0.0)
+            })
+        })
+    }
+}
+
+/// The channels of all sources, in parallel. Numbers beyond what 16 bits hold become their largest, 65504.
+pub fn planes(sources: &[Source], region: Region) -> Vec<Plane> {
+    let jobs: Vec<(&Source, usize)> = sources.iter().flat_map(|source| (0..source.names.len()).map(move |i| (source, i))).collect();
+    jobs.into_par_iter()
+        .map(|(source, i)| {
+            let name = source.names[i].clone();
+            let stride = source.names.len();
+            let samples = if region.have == region.want {
+                let values = source.data.iter().skip(i).step_by(stride).copied();
+                collect(values, source.half)
+            } else {
+                collect(region.values(&source.data, i, stride), source.half)
+            };
+            Plane { role: Role::of(&name), name, samples }
+        })
+        .collect()
+}
+
+fn collect(values: impl Iterator<Item = f32>, half: bool) -> FlatSamples {
+    if half { FlatSamples::F16(values.map(to_half).collect()) } else { FlatSamples::F32(values.collect()) }
+}
+
+/// The nearest number of 16 bits; what is beyond becomes the largest.
+pub fn to_half(x: f32) -> f16 {
+    f16::from_f32(x.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))
+}
+
+impl From<Plane> for AnyChannel<FlatSamples> {
+    fn from(plane: Plane) -> Self {
+        Self { quantize_linearly: plane.role != Role::Color, ..Self::new(plane.name.as_str(), plane.samples) }
+    }
+}

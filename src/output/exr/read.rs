@@ -1,0 +1,86 @@
+//! Colour out of any EXR file.
+
+use std::path::Path;
+
+use exr::meta::attribute::{AttributeValue, IntegerBounds};
+use exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers, Vec2, read};
+
+use super::metadata::{SETTINGS, text};
+use crate::error::{Error, Result};
+use crate::film::{Crop, Image, Layer, LayerKind};
+
+/// Reads the colour of any EXR file: bare channels R, G, B (in upper or lower case), else a layer with such channels (the one with the
+/// shortest name, a "Combined" first), else Y as gray. Alpha is that of the same layer, or 1. The picture is the data window; where that
+/// reaches beyond the display window, the data window stands for the full picture.
+///
+/// # Errors
+/// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no such picture.
+pub fn read_exr(path: &Path) -> Result<Image> {
+    std::fs::File::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
+    let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
+    let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+    let file: FlatImage = reader.from_file(path).map_err(|e| malformed(e.to_string()))?;
+    for part in &file.layer_data {
+        let Some(choice) = choose_channels(&part.channel_data.list) else { continue };
+        let pixels = part.size.0 * part.size.1;
+        let mut data = vec![1.0; pixels * 4];
+        for (i, channel) in choice.iter().enumerate() {
+            let Some(channel) = channel else { continue };
+            if channel.sampling != Vec2(1, 1) {
+                return Err(malformed(format!("channel {} is subsampled", channel.name)));
+            }
+            for (to, value) in data.iter_mut().skip(i).step_by(4).zip(channel.sample_data.values_as_f32()) {
+                *to = value;
+            }
+        }
+        let (size, crop) = windows(&file.attributes.display_window, part.attributes.layer_position, part.size);
+        return Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() });
+    }
+    let names: Vec<String> = file.layer_data.iter().flat_map(|part| &part.channel_data.list).map(|c| c.name.to_string()).collect();
+    Err(malformed(format!("there are no channels R, G and B and no Y; it has {}", names.join(", "))))
+}
+
+type Channel = AnyChannel<FlatSamples>;
+
+/// Red, green, blue and (if there is one) alpha.
+fn choose_channels(list: &[Channel]) -> Option<[Option<&Channel>; 4]> {
+    let find = |name: &str| list.iter().find(|channel| channel.name == *name);
+    let layer = |prefix: &str, names: [&str; 4]| {
+        let [r, g, b, a] = names.map(|name| find(&format!("{prefix}{name}")));
+        (r.is_some() && g.is_some() && b.is_some()).then_some([r, g, b, a])
+    };
+    let mut prefixes: Vec<String> =
+        list.iter().filter_map(|c| c.name.to_string().strip_suffix(".R").map(|prefix| format!("{prefix}."))).collect();
+    prefixes.sort_by_key(|prefix| (!prefix.contains("ombined"), prefix.len()));
+    layer("", ["R", "G", "B", "A"])
+        .or_else(|| layer("", ["r", "g", "b", "a"]))
+        .or_else(|| prefixes.iter().find_map(|prefix| layer(prefix, ["R", "G", "B", "A"])))
+        .or_else(|| find("Y").map(|y| [Some(y), Some(y), Some(y), find("A")]))
+}
+
+fn windows(display: &IntegerBounds, position: Vec2<i32>, size: Vec2<usize>) -> ([u32; 2], Crop) {
+    let [width, height] = [size.0, size.1].map(|length| u32::try_from(length).unwrap_or(u32::MAX));
+    let whole = ([width, height], Crop::full([width, height]));
+    let offset = [position.0.checked_sub(display.position.0), position.1.checked_sub(display.position.1)];
+    let [Some(Ok(x)), Some(Ok(y))] = offset.map(|o| o.map(u32::try_from)) else { return whole };
+    let [Ok(full_width), Ok(full_height)] = [display.size.0, display.size.1].map(u32::try_from) else { return whole };
+    let crop = Crop { x, y, width, height };
+    if crop.fits([full_width, full_height]) { ([full_width, full_height], crop) } else { whole }
+}
+
+/// The settings that a file was rendered with: what [`RenderInfo::settings`](crate::output::RenderInfo::settings) had, and under `output` how it
+/// was written.
+///
+/// # Errors
+/// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no EXR file or has no settings.
+pub fn read_settings(path: &Path) -> Result<serde_json::Value> {
+    std::fs::File::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
+    let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
+    let headers = exr::meta::MetaData::read_from_file(path, false).map_err(|e| malformed(e.to_string()))?.headers;
+    match headers.first().and_then(|header| header.own_attributes.other.get(&text(SETTINGS))) {
+        Some(AttributeValue::Text(settings)) => {
+            serde_json::from_slice(settings.as_slice()).map_err(|e| malformed(format!("{SETTINGS}: {e}")))
+        }
+        _ => Err(malformed(format!("there is no attribute {SETTINGS}: no render of ours wrote it"))),
+    }
+}

@@ -1,0 +1,148 @@
+//! Writing of files: layers to channels, channels to parts.
+
+use std::borrow::Cow;
+use std::io::Write;
+use std::path::Path;
+
+use exr::meta::attribute::IntegerBounds;
+use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, ImageAttributes, LineOrder, Vec2, WritableImage};
+
+use super::coverage::{self, Matte};
+use super::header_order::sort_attributes;
+use super::metadata::{Common, Mattes, part_attributes, text};
+use super::names::{channel_name, plain_word};
+use super::plan::{self, PartKind};
+use super::plane::{Plane, Region, Source, planes};
+use crate::desc::{CryptoManifestDesc, ExrProfileDesc, OutputDesc};
+use crate::error::Result;
+use crate::film::{Crop, Identities, Image, LayerKind, LayerSet};
+use crate::output::color_space::REC709;
+use crate::output::{RenderInfo, write_atomically};
+
+type FileLayer = exr::prelude::Layer<AnyChannels<FlatSamples>>;
+
+/// Writes the picture's colour, those of `output`'s layers that it has, and the [noisy](LayerKind::Noisy) picture if there is one. The display
+/// window is the picture without its overscan, the data window what was rendered. Numbers beyond what 16 bits hold become their largest, 65504.
+///
+/// # Errors
+/// [`Error::Usage`] if `output` makes no sense ([`check_output`](super::check_output)), [`Error::Output`] if the file cannot be written.
+pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderInfo) -> Result<()> {
+    plan::check_output(output)?;
+    let contents = Contents::new(image, output, info);
+    let windows = Windows::new(image, output);
+    let mattes = Mattes { mattes: &contents.mattes, file: path, manifest: output.crypto_manifest };
+    if output.crypto_manifest == CryptoManifestDesc::Sidecar {
+        for matte in &contents.mattes {
+            let beside = path.with_file_name(mattes.sidecar(matte));
+            write_atomically(&beside, |out| out.write_all(matte.manifest.as_bytes()).map_err(|e| e.to_string()))?;
+        }
+    }
+    let common = Common { output, info, mattes, texts: &contents.texts, original: windows.original };
+    let planes = planes(&contents.sources, windows.region);
+    let parts = parts(planes, &contents, &common, &windows);
+
+    let mut attributes = ImageAttributes::new(windows.display);
+    attributes.chromaticities = Some(REC709);
+    attributes.pixel_aspect = info.pixel_aspect.unwrap_or(1.0);
+    let file = exr::prelude::Image { attributes, layer_data: parts };
+    write_atomically(path, |out| {
+        file.write().to_buffered(&mut *out).map_err(|e| e.to_string())?;
+        out.flush().and_then(|()| sort_attributes(out.get_mut())).map_err(|e| e.to_string())
+    })
+}
+
+/// Windows of a file.
+struct Windows {
+    display: IntegerBounds,
+    data: IntegerBounds,
+    /// What was rendered, if the data window is not the same.
+    original: Option<IntegerBounds>,
+    region: Region,
+}
+
+impl Windows {
+    fn new(image: &Image, output: &OutputDesc) -> Self {
+        let [width, height] = image.size.map(|side| side.saturating_sub(2 * image.overscan).max(1));
+        let shown = Crop { x: image.overscan, y: image.overscan, width, height };
+        let want = if output.uncropped { shown } else { image.crop };
+        // Coordinates of a film fit: memory ends long before.
+        let bounds = |crop: Crop| {
+            let corner = [crop.x, crop.y].map(|x| x as i32 - image.overscan as i32);
+            IntegerBounds::new(Vec2(corner[0], corner[1]), Vec2(crop.width as usize, crop.height as usize))
+        };
+        let original = (want != image.crop).then(|| bounds(image.crop));
+        Self { display: bounds(shown), data: bounds(want), original, region: Region { have: image.crop, want } }
+    }
+}
+
+/// What goes into a file.
+struct Contents<'a> {
+    sources: Vec<Source<'a>>,
+    mattes: Vec<Matte>,
+    texts: Vec<(String, String)>,
+    /// What is said of layers, by the part that they go to.
+    comments: Vec<(PartKind, &'static str)>,
+}
+
+impl<'a> Contents<'a> {
+    fn new(image: &'a Image, output: &OutputDesc, info: &RenderInfo) -> Self {
+        let wanted: LayerSet = output.layers.iter().collect();
+        let mut contents = Self { sources: Vec::new(), mattes: Vec::new(), texts: Vec::new(), comments: Vec::new() };
+        for layer in image.layers.iter().filter(|layer| wanted.contains(layer.kind) || layer.kind == LayerKind::Noisy) {
+            let group = layer.group.as_ref().map(|group| format!("light_{}.", plain_word(group)));
+            let names = match group {
+                Some(prefix) => layer.kind.info().channels.iter().map(|name| format!("{prefix}{name}")).collect(),
+                None => layer.channel_names(),
+            };
+            contents.add(layer.kind, names, Cow::Borrowed(&layer.data), output);
+        }
+        if let (Some(coverage), Some(identities)) = (&image.coverage, &info.identities) {
+            contents.add_covered(wanted, coverage, identities, output);
+        }
+        contents
+    }
+
+    fn add_covered(&mut self, wanted: LayerSet, coverage: &crate::film::Coverage, identities: &Identities, output: &OutputDesc) {
+        for layer in wanted.iter().filter(|layer| matches!(layer.source, crate::film::Source::Coverage)) {
+            if let Some(mut matte) = coverage::matte(layer.kind, coverage, identities, plan::crypto_depth(output)) {
+                self.add(layer.kind, matte.channels.clone(), Cow::Owned(std::mem::take(&mut matte.data)), output);
+                self.mattes.push(matte);
+            } else if let Some(numbers) = coverage::numbers(layer.kind, coverage, identities) {
+                let names = layer.channels.iter().map(|name| (*name).to_owned()).collect();
+                self.add(layer.kind, names, Cow::Owned(numbers.data), output);
+                self.texts.push((format!("steradian/{}", layer.name), numbers.names));
+            }
+        }
+    }
+
+    fn add(&mut self, kind: LayerKind, names: Vec<String>, data: Cow<'a, [f32]>, output: &OutputDesc) {
+        let part = names.first().map_or(PartKind::Beauty, |name| PartKind::of(crate::output::role::Role::of(name)));
+        if !self.comments.contains(&(part, kind.info().comment)) {
+            self.comments.push((part, kind.info().comment));
+        }
+        let names = names.iter().map(|name| channel_name(output.profile, name)).collect();
+        self.sources.push(Source { names, data, half: plan::is_half(output, kind) });
+    }
+}
+
+/// The parts of a file, the picture first.
+fn parts(planes: Vec<Plane>, contents: &Contents, common: &Common, windows: &Windows) -> exr::prelude::Layers<AnyChannels<FlatSamples>> {
+    let several = common.output.profile == ExrProfileDesc::Multipart;
+    let mut by_part: [Vec<AnyChannel<FlatSamples>>; 3] = Default::default();
+    for plane in planes {
+        let part = if several { PartKind::of(plane.role) } else { PartKind::Beauty };
+        by_part[part as usize].push(plane.into());
+    }
+    let mut parts = exr::prelude::Layers::new();
+    for (channels, (kind, name)) in by_part.into_iter().zip(PartKind::ALL).filter(|(channels, _)| !channels.is_empty()) {
+        let comments: Vec<&str> =
+            contents.comments.iter().filter(|(part, _)| !several || *part == kind).map(|(_, comment)| *comment).collect();
+        let mut attributes = part_attributes(common, kind, parts.is_empty(), &comments);
+        attributes.layer_position = windows.data.position;
+        attributes.layer_name = several.then(|| text(name));
+        let compression = plan::compression(common.output, kind);
+        let encoding = Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+        parts.push(FileLayer::new(windows.data.size, attributes, encoding, AnyChannels::sort(channels.into_iter().collect())));
+    }
+    parts
+}

@@ -1,0 +1,56 @@
+//! What the command line changes of EXR outputs.
+
+use crate::desc::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, OutputDesc};
+
+/// Changes of every EXR output; what is `None` stays as the scene says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ExrOverrides {
+    /// `--exr-profile`.
+    pub profile: Option<ExrProfileDesc>,
+    /// `--compression`.
+    pub compression: Option<CompressionDesc>,
+    /// `--dwa-level`.
+    pub dwa_level: Option<f32>,
+    /// `--uncropped`.
+    pub uncropped: bool,
+    /// `--crypto-depth`.
+    pub crypto_depth: Option<u32>,
+    /// `--crypto-manifest`.
+    pub crypto_manifest: Option<CryptoManifestDesc>,
+    /// `--owner`.
+    pub owner: Option<String>,
+    /// `--comments`.
+    pub comments: Option<String>,
+    /// Of a sequence of frames.
+    pub frames_per_second: Option<f64>,
+}
+
+impl ExrOverrides {
+    /// An option that was given, if any was.
+    pub fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("--exr-profile", self.profile.is_some()),
+            ("--compression", self.compression.is_some()),
+            ("--dwa-level", self.dwa_level.is_some()),
+            ("--uncropped", self.uncropped),
+            ("--crypto-depth", self.crypto_depth.is_some()),
+            ("--crypto-manifest", self.crypto_manifest.is_some()),
+            ("--owner", self.owner.is_some()),
+            ("--comments", self.comments.is_some()),
+        ];
+        given.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
+    }
+
+    /// Changes an output.
+    pub fn apply(&self, output: &mut OutputDesc) {
+        output.profile = self.profile.unwrap_or(output.profile);
+        output.compression = self.compression.or(output.compression);
+        output.dwa_level = self.dwa_level.or(output.dwa_level);
+        output.uncropped |= self.uncropped;
+        output.crypto_depth = self.crypto_depth.or(output.crypto_depth);
+        output.crypto_manifest = self.crypto_manifest.unwrap_or(output.crypto_manifest);
+        output.owner = self.owner.clone().or(output.owner.take());
+        output.comments = self.comments.clone().or(output.comments.take());
+        output.frames_per_second = output.frames_per_second.or(self.frames_per_second);
+    }
+}
