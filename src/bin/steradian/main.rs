@@ -9,6 +9,7 @@ mod config;
 mod convert;
 mod farm;
 mod frames;
+mod denoise;
 mod info;
 mod interrupt;
 mod kept;
@@ -69,6 +70,7 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Schema => text::print(&import::schema()).map(|()| 0),
         Command::Merge(arguments) => merge::run(&arguments).map(|()| 0),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
+        Command::Denoise(arguments) => denoise::run(&arguments).map(|()| 0),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "steradian", &mut script);

@@ -6,6 +6,7 @@ mod bench_scale;
 mod config;
 mod farm;
 mod frames;
+mod denoise;
 mod import;
 mod live;
 mod log;
@@ -26,6 +27,7 @@ pub use bench_scale::BenchScaleArgs;
 pub use config::{ConfigCommand, ConfigShowArgs};
 pub use farm::{FarmCommand, JobArgs, SlurmArgs};
 pub use frames::SequenceArgs;
+pub use denoise::DenoiseArgs;
 pub use import::{ConvertArgs, ImportArgs};
 pub use log::{ColorChoice, LogArgs, LogFormat};
 use state::MERGE_EXAMPLES;
@@ -111,6 +113,9 @@ pub enum Command {
     /// Write jobs for render farms
     #[command(subcommand)]
     Farm(FarmCommand),
+    /// Denoise an EXR file with Intel Open Image Denoise
+    #[command(long_about = denoise::ABOUT, after_help = denoise::EXAMPLES)]
+    Denoise(DenoiseArgs),
     /// Measure
     #[command(subcommand)]
     Bench(BenchCommand),
