@@ -10,6 +10,7 @@ use super::oidn::Triple;
 use super::prepared::Prepared;
 use super::{Denoiser, Report};
 use crate::error::{Error, Result};
+use crate::film::{LayerKind, Source};
 use crate::output::write_atomically;
 
 /// Names of layers that hold albedo, in lower case, the best first: ours, then those of Blender, pbrt, Mitsuba.
@@ -17,18 +18,6 @@ const ALBEDO: [&str; 4] = ["feature_albedo", "denoising albedo", "albedo", "diff
 
 /// The same for normals. Where a file has two kinds, the shading normals are the better ones.
 const NORMAL: [&str; 7] = ["feature_normal", "denoising normal", "ns", "n", "normal", "sh_normal", "nn"];
-
-/// Layers that add up to the picture: one of these sets, or the light groups.
-const KINDS_OF_LIGHT: [&str; 8] = [
-    "diffuse_direct",
-    "diffuse_indirect",
-    "specular_direct",
-    "specular_indirect",
-    "transmission_direct",
-    "transmission_indirect",
-    "emission",
-    "background",
-];
 
 /// How names of layers of light groups begin.
 const LIGHT_GROUP: &str = "light_";
@@ -102,7 +91,8 @@ impl Plan {
         }
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
         let groups: Vec<_> = layers.all_of(color).filter(|(name, _)| last(name).starts_with(LIGHT_GROUP)).collect();
-        let kinds: Vec<_> = layers.all_of(color).filter(|(name, _)| KINDS_OF_LIGHT.contains(&last(name).as_str())).collect();
+        let is_kind = |name: &str| LayerKind::ALL.iter().any(|info| matches!(info.source, Source::Part(_)) && info.name == last(name));
+        let kinds: Vec<_> = layers.all_of(color).filter(|(name, _)| is_kind(name)).collect();
         let mut sets = Vec::new();
         for (set, what) in [(groups, "light groups"), (kinds, "kinds of light")] {
             if set.is_empty() {

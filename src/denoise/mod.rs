@@ -6,6 +6,7 @@
 
 mod clean;
 mod file;
+mod image;
 mod layers;
 mod locate;
 mod oidn;
@@ -13,6 +14,7 @@ mod prepared;
 mod split;
 
 pub use file::{FileOptions, denoise_file};
+pub use image::{FEATURE_LAYERS, add_features, denoise_image};
 pub use locate::{Environment, FILE_NAME, VARIABLE};
 
 use std::path::Path;

@@ -19,18 +19,19 @@ pub struct Prepared<'d> {
 }
 
 impl<'d> Prepared<'d> {
-    /// Denoises the features of a picture of `size` (width, height) pixels, row by row. Albedo is cut to 0..1, normals to -1..1. The library
-    /// has no use for normals without albedo.
+    /// Denoises the features of a picture of `size` (width, height) pixels, row by row. Albedo is cut to 0..1, normals to -1..1. Features
+    /// that are 0 everywhere say nothing and are left out, as are normals without albedo, which the library has no use for.
     pub fn new(denoiser: &'d Denoiser, size: [usize; 2], albedo: Option<Vec<Triple>>, normal: Option<Vec<Triple>>) -> Result<Self> {
         let report = Report { version: denoiser.version(), ..Report::default() };
         let mut prepared = Self { denoiser, size, albedo: None, normal: None, report, start: Instant::now() };
-        let Some(mut albedo) = albedo else { return Ok(prepared) };
+        let says_something = |pixels: &Vec<Triple>| pixels.as_flattened().iter().any(|v| *v != 0.0);
+        let Some(mut albedo) = albedo.filter(says_something) else { return Ok(prepared) };
         prepared.clean(&mut albedo);
         albedo.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
         prepared.albedo = Some(prepared.filter(Inputs { albedo: Some(&albedo), ..Inputs::default() })?);
         prepared.report.features = Features::Albedo;
         drop(albedo);
-        if let Some(mut normal) = normal {
+        if let Some(mut normal) = normal.filter(says_something) {
             prepared.clean(&mut normal);
             normal.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(-1.0, 1.0));
             prepared.normal = Some(prepared.filter(Inputs { normal: Some(&normal), ..Inputs::default() })?);

@@ -17,14 +17,14 @@ use crate::film::{Crop, Image, Layer, LayerKind, LayerSet};
 const REC709: Chromaticities =
     Chromaticities { red: Vec2(0.64, 0.33), green: Vec2(0.30, 0.60), blue: Vec2(0.15, 0.06), white: Vec2(0.3127, 0.3290) };
 
-/// Writes the picture's colour and those of `output`'s layers that it has. The display window is the full picture, the data window the
+/// Writes the picture's colour, those of `output`'s layers that it has, and the [noisy](LayerKind::Noisy) picture if there is one. The display window is the full picture, the data window the
 /// crop. Numbers beyond what 16 bits hold become their largest, 65504.
 ///
 /// # Errors
 /// [`Error::Output`] if the file cannot be written.
 pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderInfo) -> Result<()> {
     let wanted: LayerSet = output.layers.iter().collect();
-    let layers: Vec<&Layer> = image.layers.iter().filter(|layer| wanted.contains(layer.kind)).collect();
+    let layers: Vec<&Layer> = image.layers.iter().filter(|layer| wanted.contains(layer.kind) || layer.kind == LayerKind::Noisy).collect();
     let channels = layers.iter().flat_map(|layer| channels(layer, output.pixel_type)).collect();
 
     let encoding = Encoding { compression: compression(output.compression), blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
@@ -79,6 +79,11 @@ fn layer_attributes(image: &Image, layers: &[&Layer], info: &RenderInfo) -> Laye
     attributes.other.insert(Text::from("renderTimeSeconds"), AttributeValue::F32(info.render_seconds as f32));
     if let Some(partial) = &info.partial {
         attributes.other.insert(Text::from("steradian/partial"), AttributeValue::Text(Text::from(partial.as_str())));
+    }
+    for (name, value) in &info.texts {
+        if let (Some(name), Some(value)) = (Text::new_or_none(name), Text::new_or_none(value)) {
+            attributes.other.insert(name, AttributeValue::Text(value));
+        }
     }
     attributes
 }

@@ -23,7 +23,7 @@ fn picture() -> Image {
 
 fn info() -> RenderInfo {
     let world_to_camera = Some([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.5, 2.5, 3.5, 1.0]]);
-    RenderInfo { samples_per_pixel: 64, render_seconds: 1.5, world_to_camera, pixel_aspect: Some(2.0), partial: None }
+    RenderInfo { samples_per_pixel: 64, render_seconds: 1.5, world_to_camera, pixel_aspect: Some(2.0), ..RenderInfo::default() }
 }
 
 fn output(path: &Path, pixel_type: PixelTypeDesc, compression: CompressionDesc) -> OutputDesc {

@@ -58,6 +58,8 @@ pub struct RenderInfo {
     pub pixel_aspect: Option<f32>,
     /// Which parts of the samples are there, of a picture that lacks some, such as `shards 1,3 of 4`.
     pub partial: Option<String>,
+    /// Further attributes of text, by name.
+    pub texts: Vec<(String, String)>,
 }
 
 /// Writes `image` where and how `output` says.

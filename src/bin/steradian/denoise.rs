@@ -3,12 +3,50 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use steradian::denoise::{Denoiser, FileOptions, Report, denoise_file};
+use steradian::denoise::{self, Denoiser, FileOptions, Report, denoise_file};
 use steradian::output::{self, Format};
 use steradian::{Error, Result};
 
-use crate::args::DenoiseArgs;
+use steradian::film::Image;
+use steradian::render::{Progress, Settings};
+
+use crate::args::{DenoiseArgs, RenderDenoiseArgs};
+use crate::progress::Reporter;
 use crate::text;
+
+/// The denoiser of a render, if it is asked for: opened before the render, so that it is not missed after it.
+pub fn prepare(arguments: &RenderDenoiseArgs, settings: &mut Settings) -> Result<Option<Denoiser>> {
+    if !arguments.denoise {
+        return Ok(None);
+    }
+    denoise::add_features(&mut settings.layers);
+    Denoiser::open(arguments.oidn.oidn_library.as_deref(), settings.threads).map(Some)
+}
+
+/// What became of a render's picture.
+#[derive(Default)]
+pub struct Denoised {
+    /// Attributes for files.
+    pub texts: Vec<(String, String)>,
+    /// For scripts; null if nothing was denoised.
+    pub statistics: Value,
+    /// Why the picture is as noisy as it was.
+    pub failure: Option<Error>,
+}
+
+/// Denoises a render's picture. If that fails, the picture is not lost: it is written as it is before the program ends with the failure.
+pub fn finish(denoiser: Option<&Denoiser>, image: &mut Image, reporter: &Reporter) -> Denoised {
+    let Some(denoiser) = denoiser else { return Denoised::default() };
+    match denoise::denoise_image(denoiser, image) {
+        Ok(report) => {
+            warnings(&report).iter().for_each(|warning| reporter.warn(warning));
+            reporter.say(&format!("denoised: {}", summary(&report)));
+            let texts = vec![(Report::ATTRIBUTE.to_owned(), report.attribute())];
+            Denoised { texts, statistics: value(&report, denoiser), failure: None }
+        }
+        Err(error) => Denoised { failure: Some(error), ..Denoised::default() },
+    }
+}
 
 /// Denoises a file, or every frame of a sequence.
 pub fn run(arguments: &DenoiseArgs) -> Result<()> {

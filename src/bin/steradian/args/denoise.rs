@@ -33,6 +33,19 @@ pub struct OidnArgs {
     pub oidn_library: Option<PathBuf>,
 }
 
+/// What `render` is asked to do with the picture.
+#[derive(Clone, Debug, Default, Args)]
+pub struct RenderDenoiseArgs {
+    /// Denoise the picture with Intel Open Image Denoise; EXR files keep the original as layer noisy
+    ///
+    /// The render also makes the layers feature_albedo and feature_normal, which are stored only if asked for. Light groups are denoised so that they
+    /// still sum to the picture. Shards are denoised when they are merged, by `steradian denoise`.
+    #[arg(long, conflicts_with = "shard", help_heading = "Picture")]
+    pub denoise: bool,
+    #[command(flatten)]
+    pub oidn: OidnArgs,
+}
+
 /// Arguments of `denoise`.
 #[derive(Debug, Args)]
 pub struct DenoiseArgs {

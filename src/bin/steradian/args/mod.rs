@@ -4,9 +4,9 @@ mod bench;
 mod bench_error;
 mod bench_scale;
 mod config;
+mod denoise;
 mod farm;
 mod frames;
-mod denoise;
 mod import;
 mod live;
 mod log;
@@ -25,9 +25,9 @@ pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityAr
 pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
 pub use config::{ConfigCommand, ConfigShowArgs};
+pub use denoise::{DenoiseArgs, RenderDenoiseArgs};
 pub use farm::{FarmCommand, JobArgs, SlurmArgs};
 pub use frames::SequenceArgs;
-pub use denoise::DenoiseArgs;
 pub use import::{ConvertArgs, ImportArgs};
 pub use log::{ColorChoice, LogArgs, LogFormat};
 use state::MERGE_EXAMPLES;
@@ -225,6 +225,8 @@ pub struct RenderArgs {
     pub live: live::LiveArgs,
     #[command(flatten)]
     pub sequence: SequenceArgs,
+    #[command(flatten)]
+    pub denoise: RenderDenoiseArgs,
     #[command(flatten)]
     pub import: ImportArgs,
     #[command(flatten)]
