@@ -215,7 +215,7 @@ fn mirror(spp: u32) -> Value {
         json!({
             "camera": { "position": [0, 1, 0.9], "look_at": [0, 1, 0], "vertical_fov_degrees": 60 },
             "materials": {
-                "mirror": { "type": "conductor", "eta": [0.2, 0.2, 0.2], "k": [3.9, 3.9, 3.9] },
+                "mirror": { "type": "mirror", "reflectance": 0.9 },
                 "tiles": { "type": "diffuse", "albedo": { "texture": "tiles" } }
             },
             "textures": { "tiles": { "type": "checker", "color0": [0.7, 0.7, 0.7], "color1": [0.1, 0.15, 0.3], "scale": [24, 24] } }
