@@ -70,7 +70,7 @@ pub struct Report {
     pub features: Features,
     /// Wall-clock seconds.
     pub seconds: f64,
-    /// Pixels that were not finite in some layer and were made from their neighbours before.
+    /// Pixels that were not finite and were made from their neighbours before, counted in each layer.
     pub cleaned: u64,
     /// Pixels of the picture with a negative channel, which counts as 0.
     pub negative: u64,

@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use steradian::denoise::{self, Denoiser, FileOptions, Report, denoise_file};
-use steradian::output::{self, Format};
-use steradian::{Error, Result};
-
 use steradian::film::Image;
+use steradian::output::{self, Format};
 use steradian::render::{Progress, Settings};
+use steradian::{Error, Result};
 
 use crate::args::{DenoiseArgs, RenderDenoiseArgs};
 use crate::progress::Reporter;
