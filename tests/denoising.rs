@@ -59,7 +59,7 @@ fn room(spp: u32, layers: &[&str]) -> Value {
         })
     };
     json!({
-        "film": { "width": 96, "height": 96, "filter": { "type": "box" } },
+        "film": { "width": 64, "height": 64, "filter": { "type": "box" } },
         "camera": { "position": [0, 1, 4.9], "look_at": [0, 1, 0], "vertical_fov_degrees": 30 },
         "sampler": { "spp": spp },
         "materials": {
@@ -166,7 +166,7 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
     let kinds: Vec<&str> =
         LayerKind::ALL.iter().filter(|info| matches!(info.source, steradian::film::Source::Part(_))).map(|info| info.name).collect();
     let layers: Vec<&str> = ["feature_albedo", "feature_normal", "light_groups", "variance"].into_iter().chain(kinds).collect();
-    let (reference, noisy) = (render(&room(4096, &[])), render(&room(16, &layers)));
+    let (reference, noisy) = (render(&room(4096, &["light_groups"])), render(&room(16, &layers)));
     let mut image = noisy.clone();
     let report = denoise_image(&denoiser, &mut image).unwrap();
     let (before, after) = (relmse(&reference, &noisy), relmse(&reference, &image));
@@ -189,12 +189,11 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
             for c in 0..3 {
                 let sum: f64 = parts.iter().map(|part| f64::from(part.data[3 * i + c])).sum();
                 let total = f64::from(pixel[c]);
-                assert!((sum - total).abs() <= 1e-6 * total, "pixel {i}: {sum} {total}");
+                assert!((sum - total).abs() <= 1e-6 * total + 1e-30, "pixel {i}: {sum} {total}");
             }
         }
     }
     // The groups are denoised, not merely scaled: each is nearer to its own reference.
-    let reference = render(&room(4096, &["light_groups"]));
     for (i, layer) in reference.layers.iter().enumerate().filter(|(_, layer)| layer.kind == LayerKind::LightGroups) {
         let alone = |image: &Image| {
             let group = image.layers.iter().find(|l| l.group == layer.group).unwrap();
@@ -313,7 +312,7 @@ fn the_program_denoises_renders_and_files() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     std::fs::write(root.join("room.json"), room(4, &[]).to_string()).unwrap();
-    let done = run(root, "render room.json --denoise --crop 8,8,64,48 -o a.exr -o a.png --json stats.json");
+    let done = run(root, "render room.json --denoise --crop 8,8,48,40 -o a.exr -o a.png --json stats.json");
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     let stats: Value = serde_json::from_str(&std::fs::read_to_string(root.join("stats.json")).unwrap()).unwrap();
     assert!(stats["denoise"]["seconds"].as_f64().unwrap() > 0.0 && stats["denoise"]["layers"] == json!(["color"]), "{stats}");
