@@ -18,7 +18,7 @@
 //! | 2 | `color`, `sampling`, `import` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
-//! | 5 | `scene` |
+//! | 5 | `scene`, `convert`, `denoise` |
 //! | 6 | `integrator`, `compile` |
 //! | 7 | `render` |
 //! | 8 | `bench`, `farm`, `live` |
@@ -31,6 +31,7 @@ pub mod camera;
 pub mod color;
 pub mod compile;
 pub mod convert;
+pub mod denoise;
 pub mod desc;
 pub mod error;
 pub mod farm;

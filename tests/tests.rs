@@ -27,6 +27,8 @@ mod conversion;
 mod cutouts;
 /// Rays and instances at the end of what is one.
 mod degenerate_input;
+/// Denoising; what needs Open Image Denoise is passed over without it.
+mod denoising;
 /// The same picture for any number of threads, any crop, any accelerator; samples can be replayed.
 mod determinism;
 /// EXR files as users get them: profiles, checks, mattes, pictures rendered again.

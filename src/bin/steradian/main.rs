@@ -8,6 +8,7 @@ mod check_exr;
 mod compare;
 mod config;
 mod convert;
+mod denoise;
 mod farm;
 mod frames;
 mod info;
@@ -73,6 +74,7 @@ fn run(cli: Cli) -> Result<u8> {
         Command::CheckExr(arguments) => check_exr::run(&arguments),
         Command::Rerender(arguments) => rerender::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
+        Command::Denoise(arguments) => denoise::run(&arguments).map(|()| 0),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "steradian", &mut script);

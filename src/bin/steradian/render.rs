@@ -11,6 +11,7 @@ use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Recipe, Replayed, Se
 use steradian::{Result, compile};
 
 use crate::args::RenderArgs;
+use crate::denoise;
 use crate::frames::{Session, Shot};
 use crate::kept::{self, Kept};
 use crate::progress::Reporter;
@@ -37,6 +38,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
     if arguments.pixel.is_none() {
         check_outputs(&settings, shard_file.as_deref(), json.as_deref())?;
     }
+    let denoiser = denoise::prepare(&arguments.denoise, &mut settings)?;
     let checkpoint = arguments.state.checkpoint.as_deref().map(|path| shot.file_of(path));
     let kept = match arguments.pixel {
         None => Kept::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?,
@@ -77,7 +79,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         reporter.say(&format!("preview: {url}"));
     }
     let fan = Fan::new([reporter as &dyn Progress, &live]);
-    let result = match (kept, &header) {
+    let mut result = match (kept, &header) {
         (Some(kept), Some(header)) => kept.render(&scene, &*accel, &settings, header, (reporter, &fan), interrupt)?,
         _ => {
             let result = render::render(&scene, &*accel, &settings, &fan, &interrupt.stop)?;
@@ -85,6 +87,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
             result
         }
     };
+    let denoised = denoise::finish(denoiser.as_ref(), &mut result.image, reporter);
     let stats = &result.stats;
     let first = load_seconds + build_seconds + stats.first_pass_seconds;
     tracing::info!("{first:.3} s until every pixel had its first sample");
@@ -94,6 +97,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
     info.render_seconds = stats.render_seconds;
     info.statistics = Some(RenderStatistics { threads: settings.threads, rays: stats.rays.total(), nan_samples: stats.nan_samples });
     info.settings = recipe.map(|recipe| recipe.with_samples(stats.spp_done).to_value());
+    info.texts = denoised.texts;
     let written: Vec<String> = match &shard_file {
         Some(file) => vec![file.display().to_string()],
         None => settings.outputs.iter().map(|output| output.file.clone()).collect(),
@@ -106,7 +110,12 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
     }
     if let Some(path) = &json {
         let run = Run { scene: &scene_file, load_seconds, build_seconds };
-        stats::write(path, &stats::value(&run, &settings, &*accel, stats))?;
+        let mut value = stats::value(&run, &settings, &*accel, stats);
+        value["denoise"] = denoised.statistics;
+        stats::write(path, &value)?;
+    }
+    if let Some(failure) = denoised.failure {
+        return Err(failure);
     }
     report(reporter, &settings, &*accel, stats, &written);
     if arguments.live.preview_hold {

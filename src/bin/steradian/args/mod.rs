@@ -4,6 +4,7 @@ mod bench;
 mod bench_error;
 mod bench_scale;
 mod config;
+mod denoise;
 mod exr;
 mod farm;
 mod frames;
@@ -26,6 +27,7 @@ pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityAr
 pub use bench_error::BenchErrorArgs;
 pub use bench_scale::BenchScaleArgs;
 pub use config::{ConfigCommand, ConfigShowArgs};
+pub use denoise::{DenoiseArgs, RenderDenoiseArgs};
 pub use exr::{CheckExrArgs, ExrArgs, RerenderArgs};
 pub use farm::{FarmCommand, JobArgs, SlurmArgs};
 pub use frames::SequenceArgs;
@@ -124,6 +126,9 @@ pub enum Command {
     /// Write jobs for render farms
     #[command(subcommand)]
     Farm(FarmCommand),
+    /// Denoise an EXR file with Intel Open Image Denoise
+    #[command(long_about = denoise::ABOUT, after_help = denoise::EXAMPLES)]
+    Denoise(DenoiseArgs),
     /// Measure
     #[command(subcommand)]
     Bench(BenchCommand),
@@ -238,6 +243,8 @@ pub struct RenderArgs {
     pub live: live::LiveArgs,
     #[command(flatten)]
     pub sequence: SequenceArgs,
+    #[command(flatten)]
+    pub denoise: RenderDenoiseArgs,
     #[command(flatten)]
     pub import: ImportArgs,
     #[command(flatten)]

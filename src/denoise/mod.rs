@@ -1,0 +1,96 @@
+//! Denoising with Intel Open Image Denoise, a library that is opened at run time if it is asked for.
+//!
+//! Albedo and normals are denoised first, each by a filter of its own; the picture is denoised with the help of both, linear and without a
+//! limit; alpha and parts of the picture (light groups, kinds of light) go through filters of their own with the same two. See
+//! `docs/denoise.md`.
+
+mod clean;
+mod file;
+mod image;
+mod layers;
+mod locate;
+mod oidn;
+mod prepared;
+mod split;
+
+pub use file::{FileOptions, denoise_file};
+pub use image::{FEATURE_LAYERS, add_features, denoise_image};
+pub use locate::{Environment, FILE_NAME, VARIABLE};
+
+use std::path::Path;
+
+use crate::error::Result;
+use oidn::Device;
+
+/// The library, ready to work.
+pub struct Denoiser {
+    device: Device,
+}
+
+impl Denoiser {
+    /// Opens the library: the file or folder `named`, else the one that the environment variable [`VARIABLE`] names, else the system's, else
+    /// that of Python's package `pyoidn`. Works with `threads` threads; 0 stands for all.
+    ///
+    /// # Errors
+    /// [`Error::Missing`](crate::Error::Missing) if there is no library that can be used: where was looked, and how to get it.
+    pub fn open(named: Option<&Path>, threads: usize) -> Result<Self> {
+        let device = locate::open_first(named, &Environment::of_process(), |file| Device::open(file, threads))?;
+        Ok(Self { device })
+    }
+
+    /// The library's version, such as 2.5.1.
+    pub fn version(&self) -> String {
+        self.device.version()
+    }
+
+    /// The library's file, or its bare name if the system found it.
+    pub fn library(&self) -> &Path {
+        self.device.file()
+    }
+}
+
+/// Which features helped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Features {
+    /// None.
+    #[default]
+    None,
+    /// Albedo.
+    Albedo,
+    /// Albedo and normals.
+    AlbedoAndNormal,
+}
+
+/// What denoising did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    /// The library's version.
+    pub version: String,
+    /// Which features helped.
+    pub features: Features,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Pixels that were not finite and were made from their neighbours before, counted in each layer.
+    pub cleaned: u64,
+    /// Pixels of the picture with a negative channel, which counts as 0.
+    pub negative: u64,
+    /// Names of the layers denoised, the picture first.
+    pub layers: Vec<String>,
+    /// What could not be done as one would expect.
+    pub notes: Vec<String>,
+}
+
+impl Report {
+    /// The attribute of EXR files that says how they were denoised.
+    pub const ATTRIBUTE: &str = "steradian/denoised";
+
+    /// The value of [`Report::ATTRIBUTE`], such as `OIDN 2.5.1, albedo and normal prefiltered`.
+    pub fn attribute(&self) -> String {
+        let features = match self.features {
+            Features::None => "without albedo and normal",
+            Features::Albedo => "albedo prefiltered",
+            Features::AlbedoAndNormal => "albedo and normal prefiltered",
+        };
+        format!("OIDN {}, {features}", self.version)
+    }
+}
