@@ -50,13 +50,15 @@ fn parse(recipe: &Recipe, file: &Path) -> Result<RenderArgs> {
         Err(error) => Err(malformed(format!("its arguments are of another version: {}", error.kind()))),
     };
     let plain = parse(&["render".to_owned(), recipe.scene_file.to_string_lossy().into_owned()])?;
-    let RenderArgs { state, live, mut sequence, verbosity, json, time_limit, output, .. } = plain;
+    let RenderArgs { state, live, mut sequence, verbosity, json, time_limit, .. } = plain;
     if let Some(frame) = recipe.frame {
         sequence.frames = Some(frame.to_string().parse().map_err(|_| malformed(format!("there is no frame {frame}")))?);
         sequence.overwrite = true;
     }
     let given = parse(&recipe.arguments)?;
     sequence.fps = given.sequence.fps;
+    // Options of both kinds of files need one to apply to; the recipe's output takes their place.
+    let output = ["a.exr", "a.png"].map(str::to_owned).to_vec();
     Ok(RenderArgs { state, live, sequence, verbosity, json, time_limit, output, pixel: None, sample: None, ..given })
 }
 

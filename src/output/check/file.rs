@@ -38,8 +38,12 @@ impl ExrFile {
         let file = Self { path: path.into(), headers: headers.into_vec(), pixels: OnceCell::new() };
         // Flat files are read as a whole, so that a truncated one is not called clean.
         if file.headers.iter().all(|header| !header.deep) {
-            let image = read_pixels(path).map_err(malformed)?;
-            let _ = file.pixels.set(Some(image));
+            let image = match read_pixels(path) {
+                // Of a compression that the library does not know, the headers can still be checked.
+                Err(exr::error::Error::NotSupported(_)) => None,
+                image => Some(image.map_err(malformed)?),
+            };
+            let _ = file.pixels.set(image);
         }
         Ok(file)
     }
@@ -54,7 +58,7 @@ impl ExrFile {
         })
     }
 
-    /// All pixels, if the file is flat.
+    /// All pixels, if the file is flat and its compression known.
     pub fn pixels(&self) -> Option<&FlatImage> {
         self.pixels.get_or_init(|| None).as_ref()
     }
