@@ -20,7 +20,7 @@ const SCENE: &str = r#"{
         { "type": "mesh", "file": "wall.obj", "name": "wall", "material": "chalk" }
     ],
     "lights": [
-        { "type": "point", "position": [2, 3, 4], "intensity": [20, 20, 20], "group": "key light" },
+        { "type": "point", "position": [2, 3, 4], "intensity": [20, 20, 20], "group": "key_light" },
         { "type": "environment", "radiance": [0.1, 0.1, 0.1] }
     ]
 }"#;
