@@ -152,7 +152,8 @@ fn a_file_is_rendered_again() {
     let dir = folder.path();
     let options = "--spp 5 --seed 7 --crop 3,4,30,20 --max-depth 3 --layers Z,albedo,crypto_object --float --crypto-depth 4";
     run_ok(dir, &format!("render scene.json -q -o a.exr -o a.png --json stats.json --threads 2 {options}"));
-    run_ok(dir, "rerender a.exr -o b.exr -q --threads 1");
+    let quiet = run(dir, "rerender a.exr -o b.exr -q --threads 1");
+    assert!(quiet.status.success() && quiet.stderr.is_empty() && quiet.stdout.is_empty(), "{}", text(&quiet.stderr));
     assert_eq!(channels(&dir.join("a.exr")), channels(&dir.join("b.exr")));
     // And again from the second, in place.
     run_ok(dir, "rerender b.exr -q");

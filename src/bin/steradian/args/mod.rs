@@ -294,6 +294,7 @@ impl Command {
         match self {
             Self::Render(arguments) => arguments.verbosity,
             Self::Info(arguments) => arguments.verbosity,
+            Self::Rerender(arguments) => Verbosity { quiet: arguments.quiet, verbose: 0 },
             Self::Convert(arguments) => Verbosity { quiet: arguments.quiet, verbose: arguments.verbose },
             _ => Verbosity::default(),
         }
