@@ -76,16 +76,18 @@ pub struct Common<'a> {
 /// The attributes of a part: the first has those of the whole file, since some programs read no other; every part describes the mattes.
 pub fn part_attributes(common: &Common, part: PartKind, first: bool, comments: &[&str]) -> LayerAttributes {
     let Common { output, info, .. } = common;
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Some(text(concat!("Steradian ", env!("CARGO_PKG_VERSION"))));
     let own = output.comments.iter().map(String::as_str).filter(|_| first);
     let lines: Vec<&str> = own.chain(comments.iter().copied()).filter(|line| !line.is_empty()).collect();
-    attributes.comments = (!lines.is_empty()).then(|| text(&lines.join("\n")));
-    attributes.owner = output.owner.as_deref().map(text);
-    attributes.frames_per_second = output.frames_per_second.map(rational);
-    attributes.world_to_camera = info.world_to_camera.map(flat);
-    attributes.world_to_normalized_device = info.world_to_ndc.map(flat);
-    attributes.original_data_window = common.original;
+    let mut attributes = LayerAttributes {
+        software_name: Some(text(concat!("Steradian ", env!("CARGO_PKG_VERSION")))),
+        comments: (!lines.is_empty()).then(|| text(&lines.join("\n"))),
+        owner: output.owner.as_deref().map(text),
+        frames_per_second: output.frames_per_second.map(rational),
+        world_to_camera: info.world_to_camera.map(flat),
+        world_to_normalized_device: info.world_to_ndc.map(flat),
+        original_data_window: common.original,
+        ..LayerAttributes::default()
+    };
     let space = if part == PartKind::Beauty { SCENE_LINEAR } else { DATA };
     put(&mut attributes, INTEROP_ID, AttributeValue::Text(text(space)));
     common.mattes.describe(&mut attributes);
