@@ -271,7 +271,7 @@ fn mattes_and_numbers_hold_what_covers_the_pixels() {
     assert_eq!((first("object_id.id"), first("instance_id.id")), (2.0, 0.0));
     assert_eq!(channels.iter().filter(|(_, name, _)| name.starts_with("CryptoObject")).count(), 8);
     let header = exr::meta::MetaData::read_from_file(&path, false).unwrap().headers.remove(0);
-    let text = |name: &str| format!("{:?}", header.own_attributes.other.iter().find(|(n, _)| n.to_string() == name).unwrap().1);
+    let text = |name: &str| format!("{:?}", header.own_attributes.other.iter().find(|(n, _)| **n == *name).unwrap().1);
     assert!(text("cryptomatte/3ae39a5/manifest").contains("f19c73fd"));
     assert!(text("steradian/object_id").contains("torus"));
     assert!(text("cryptomatte/be359d6/name").contains("CryptoMaterial"));
@@ -297,7 +297,7 @@ fn parts_hold_colour_data_and_mattes() {
     }
     let parts = exr::meta::MetaData::read_from_file(&path, false).unwrap().headers;
     for header in &parts {
-        assert!(header.own_attributes.other.keys().any(|name| name.to_string() == "cryptomatte/3ae39a5/name"));
+        assert!(header.own_attributes.other.keys().any(|name| *name == *"cryptomatte/3ae39a5/name"));
         let bounds = IntegerBounds::new(Vec2(-2, -2), Vec2(28, 20));
         assert_eq!((header.data_window(), header.shared_attributes.display_window.size), (bounds, Vec2(24, 16)));
     }
