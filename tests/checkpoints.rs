@@ -282,7 +282,8 @@ fn a_checkpoint_that_cannot_be_written_is_told_and_ends_nothing() {
 
 // What follows runs the program.
 
-const SLOW: &str = "render scene.json --checkpoint a.state --threads 2 --spp 64 --size 96x72 -q -o a.exr";
+const SLOW: &str =
+    "render scene.json --checkpoint a.state --threads 2 --spp 64 --size 96x72 --layers Z,N,albedo,variance,samples --float -q -o a.exr";
 
 fn command(folder: &Path, line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
