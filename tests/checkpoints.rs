@@ -154,6 +154,7 @@ fn a_resumed_render_with_a_target_error_has_the_bits_of_one_run() {
             let progress = StopAfter { tiles: (1 + rng.below(4) as u32).into(), stop: &stop };
             state = kit.kept(&kit.go_on(state, &progress, &stop), &file);
             runs += 1;
+            assert!(runs < 100, "no headway");
             if state.complete {
                 break;
             }
