@@ -60,6 +60,7 @@ if mkdir "$full" && mount -t tmpfs -o size=3m tmpfs "$full" 2>/dev/null; then
     expect "read-only: what is there cannot be continued" 5 "Read-only file system" "${render[@]}" --checkpoint "$full/a.state" --resume
     mount -o remount,rw "$full"
     # The target becomes read-only while the render runs.
+    rm "$full/a.state"
     "${render[@]}" --spp 3000 --time-limit 2 --checkpoint "$full/c.state" --every 0.1 >out.txt 2>err.txt &
     sleep 1
     mount --bind "$full" "$full" && mount -o remount,ro,bind "$full"
@@ -83,8 +84,8 @@ before=$(sha256sum <d.state)
 expect "scene removed before it goes on" 4 "cornell.json" "${render[@]}" --spp 100000 --checkpoint d.state --resume
 mv gone.json cornell.json
 cat >mesh.json <<END
-{ "camera": { "position": [0, 0, 4] }, "film": { "width": 64, "height": 64 }, "sampler": { "spp": 4 },
-  "shapes": [{ "type": "mesh", "file": "m.obj" }], "lights": [{ "type": "environment" }] }
+{ "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] }, "film": { "width": 64, "height": 64 }, "sampler": { "spp": 4 },
+  "shapes": [{ "type": "mesh", "file": "m.obj" }], "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] }
 END
 printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >m.obj
 expect "with a mesh" 0 "wrote m.exr" "$binary" render mesh.json --checkpoint m.state -o m.exr

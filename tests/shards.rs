@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use steradian::film::{FilmTile, Image};
+use steradian::film::{FilmTile, Image, Sums};
 use steradian::math::Rng;
 use steradian::render::{self, Overrides, Shard, StateFile};
 
@@ -148,6 +148,37 @@ fn tiles_take_only_their_own_bytes() {
         other[place] = rng.bits() as u8;
         // Other numbers are as good; other lengths are not.
         let _ = load(&tiles[0], &other);
+    }
+}
+
+/// Numbers of single precision over so many decades, split and added up again in any order: of one sign or of both, and in pairs that cancel.
+#[test]
+fn sums_do_not_depend_on_how_their_terms_are_split() {
+    let mut rng = Rng::new(4);
+    for (decades, signed, cancelling) in
+        [(10.0, false, false), (36.0, false, false), (75.0, false, false), (75.0, true, false), (10.0, true, true)]
+    {
+        for _ in 0..2000 {
+            let mut term = || {
+                let size = (rng.unit() * 10f64.powf(decades * (rng.unit() - 0.5))) as f32;
+                f64::from(if signed && rng.below(2) == 0 { -size } else { size })
+            };
+            let mut terms: Vec<f64> = (0..50).map(|_| term()).collect();
+            if cancelling {
+                (0..24).for_each(|i| terms[49 - i] = -terms[i]);
+            }
+            let sum = |terms: &[f64]| {
+                let mut sum = Sums::<1>::default();
+                terms.iter().for_each(|&x| sum.add([x]));
+                sum
+            };
+            let mut parts: Vec<Sums<1>> = terms.chunks(1 + rng.below(50)).map(sum).collect();
+            let mut merged = Sums::default();
+            while !parts.is_empty() {
+                merged.merge(&parts.swap_remove(rng.below(parts.len())));
+            }
+            assert_eq!(merged.values()[0].to_bits(), sum(&terms).values()[0].to_bits(), "{decades}, {signed}, {cancelling}: {terms:?}");
+        }
     }
 }
 

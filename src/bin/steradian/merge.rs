@@ -4,7 +4,7 @@ use std::path::Path;
 
 use steradian::desc::OutputDesc;
 use steradian::film::Image;
-use steradian::output::{self, Format, RenderInfo};
+use steradian::output::{self, Format, RenderInfo, RenderStatistics};
 use steradian::render::{self, Header};
 use steradian::{Error, Result};
 
@@ -19,7 +19,9 @@ pub fn run(arguments: &MergeArgs) -> Result<()> {
     }
     let merged = render::merge(&arguments.shards, arguments.partial)?;
     let image = Image { overscan: merged.header.overscan, ..merged.state.film.resolve() };
+    let (rays, nan_samples) = (merged.state.rays.total(), merged.state.film.dropped_count());
     let info = RenderInfo {
+        statistics: merged.header.info.statistics.map(|statistics| RenderStatistics { rays, nan_samples, ..statistics }),
         samples_per_pixel: merged.state.done,
         render_seconds: merged.state.seconds,
         partial: merged.partial.clone(),

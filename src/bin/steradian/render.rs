@@ -51,6 +51,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
         identities: settings.layers.needs_coverage().then(|| scene.identities.clone()),
         settings: recipe.as_ref().map(Recipe::to_value),
+        statistics: Some(RenderStatistics { threads: settings.threads, ..RenderStatistics::default() }),
         ..RenderInfo::default()
     };
     let header = match &kept {
@@ -87,7 +88,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
             result
         }
     };
-    let denoised = denoise::finish(denoiser.as_ref(), &mut result.image, reporter);
+    let denoised = denoise::finish(denoiser.as_ref().filter(|_| shard_file.is_none()), &mut result.image, reporter);
     let stats = &result.stats;
     let first = load_seconds + build_seconds + stats.first_pass_seconds;
     tracing::info!("{first:.3} s until every pixel had its first sample");

@@ -79,7 +79,7 @@ impl RenderState {
         if reader.header().film != FilmShape::of(&state.film) {
             return Err(reader.fault("the film has other layers"));
         }
-        state.done = reader.header().done;
+        (state.done, state.complete) = (reader.header().done, reader.header().complete);
         state.tiles_ahead = (reader.header().tiles_ahead as usize).min(state.film.tiles().len() - 1);
         state.rays = rays(reader.header().rays);
         state.seconds = reader.header().render_seconds;
