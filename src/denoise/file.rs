@@ -94,9 +94,8 @@ impl Plan {
         let is_kind = |name: &str| LayerKind::ALL.iter().any(|info| matches!(info.source, Source::Part(_)) && info.name == last(name));
         let kinds: Vec<_> = layers.all_of(color).filter(|(name, _)| is_kind(name)).collect();
         let mut sets = Vec::new();
-        for (set, what) in [(groups, "light groups"), (kinds, "kinds of light")] {
-            if set.is_empty() {
-            } else if adds_up(file, color, &set) {
+        for (set, what) in [(groups, "light groups"), (kinds, "kinds of light")].into_iter().filter(|(set, _)| !set.is_empty()) {
+            if adds_up(file, color, &set) {
                 sets.push(set);
             } else {
                 notes.push(format!("the {what} do not add up to the picture and stay as they are"));

@@ -41,15 +41,17 @@ impl Environment {
         }
     }
 
-    /// The folders in which Python's packages may be: of the active environment, of the `python3` on `PATH`, and the user's own.
+    /// The folders in which Python's packages may be: of the active environment, of every `python3` on `PATH`, and the user's own.
     fn site_packages(&self) -> Vec<PathBuf> {
         let mut prefixes: Vec<PathBuf> = self.virtual_env.iter().cloned().collect();
-        if let Some(python) = self.path.iter().map(|folder| folder.join("python3")).find(|file| file.is_file()) {
+        for python in self.path.iter().map(|folder| folder.join("python3")).filter(|file| file.is_file()) {
             let prefix = |file: &Path| file.parent().and_then(Path::parent).map(Path::to_owned);
             let own = prefix(&python);
             let behind = python.canonicalize().ok().and_then(|file| prefix(&file));
             // Debian keeps what pip installs apart from what apt installs.
             prefixes.extend(own.iter().chain(&behind).flat_map(|prefix| [prefix.join("local"), prefix.clone()]));
+            // The commands of pyenv stand beside the Pythons that they run.
+            prefixes.extend(own.iter().flat_map(|root| sorted(&root.join("versions"), "")));
         }
         prefixes.extend(self.home.as_ref().map(|home| home.join(".local")));
         let mut folders = Vec::new();
@@ -64,21 +66,24 @@ impl Environment {
 
 /// The folders of packages of every Python 3 below a prefix, in a fixed order.
 fn packages_below(prefix: &Path) -> Vec<PathBuf> {
-    let mut found: Vec<PathBuf> = ["lib", "lib64"]
-        .iter()
-        .filter_map(|lib| prefix.join(lib).read_dir().ok())
-        .flat_map(|entries| entries.flatten())
-        .filter(|entry| entry.file_name().to_string_lossy().starts_with("python3"))
-        .flat_map(|entry| ["site-packages", "dist-packages"].map(|name| entry.path().join(name)))
-        .filter(|folder| folder.is_dir())
-        .collect();
+    let pythons = ["lib", "lib64"].into_iter().flat_map(|lib| sorted(&prefix.join(lib), "python3"));
+    let packages = pythons.flat_map(|python| ["site-packages", "dist-packages"].map(|name| python.join(name)));
+    packages.filter(|folder| folder.is_dir()).collect()
+}
+
+/// What is in a folder and has a name that begins so, in order.
+fn sorted(folder: &Path, start: &str) -> Vec<PathBuf> {
+    let entries = folder.read_dir().into_iter().flatten().flatten();
+    let mut found: Vec<PathBuf> =
+        entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(start)).map(|entry| entry.path()).collect();
     found.sort();
     found
 }
 
-/// The library inside a folder, if it is there.
+/// The library inside a folder, if it is there; the folder may be an environment of Python.
 fn inside(folder: &Path) -> Option<PathBuf> {
-    INSIDE.iter().map(|below| folder.join(below).join(FILE_NAME)).find(|file| file.is_file())
+    let folders = std::iter::once(folder.to_owned()).chain(packages_below(folder));
+    folders.flat_map(|folder| INSIDE.map(|below| folder.join(below).join(FILE_NAME))).find(|file| file.is_file())
 }
 
 /// Opens the library with `open`: the file or folder that the user names, else the one that the environment variable names, else the
@@ -171,17 +176,20 @@ mod tests {
         let of_python = place(&root.join("usr/lib/python3.11").join(package));
         let debian = place(&root.join("usr/local/lib/python3.11/dist-packages/pyoidn/oidn/lib"));
         let own = place(&root.join("home/.local/lib/python3.11").join(package));
-        fs::create_dir_all(root.join("usr/bin")).unwrap();
-        fs::write(root.join("usr/bin/python3"), "").unwrap();
+        let pyenv = place(&root.join("pyenv/versions/3.12.1/lib/python3.12").join(package));
+        for folder in ["usr/bin", "pyenv/shims"] {
+            fs::create_dir_all(root.join(folder)).unwrap();
+            fs::write(root.join(folder).join("python3"), "").unwrap();
+        }
         let environment = Environment {
             variable: None,
             virtual_env: Some(root.join("venv")),
-            path: vec![root.join("nowhere"), root.join("usr/bin")],
+            path: ["nowhere", "pyenv/shims", "usr/bin"].map(|folder| root.join(folder)).to_vec(),
             home: Some(root.join("home")),
         };
         let mut tried = Vec::new();
         let text = message(open_first(None, &environment, refuse(&mut tried)));
-        assert_eq!(tried, [PathBuf::from(FILE_NAME), active, debian, of_python.clone(), own]);
+        assert_eq!(tried, [PathBuf::from(FILE_NAME), active, pyenv, debian, of_python.clone(), own]);
         assert!(text.contains("pip install pyoidn") && text.contains("usr/lib/python3.11/site-packages"), "{text}");
         assert!(!text.contains('\n'));
 
@@ -193,7 +201,8 @@ mod tests {
     fn what_is_named_is_used_or_refused() {
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path().canonicalize().unwrap();
-        let (one, two) = (place(&root.join("one/oidn/lib")), place(&root.join("two")));
+        let one = place(&root.join("one/lib/python3.11/site-packages/pyoidn/oidn/lib"));
+        let two = place(&root.join("two"));
         let environment = Environment { variable: Some(two.clone().into()), ..Environment::default() };
         let mut tried = Vec::new();
         let text = message(open_first(Some(&root.join("one")), &environment, refuse(&mut tried)));
@@ -203,7 +212,7 @@ mod tests {
         let text = message(open_first(None, &environment, refuse(&mut tried)));
         assert_eq!(tried, [two]);
         assert!(text.contains(VARIABLE), "{text}");
-        for absent in ["absent", "one/oidn/absent.so"] {
+        for absent in ["absent", "one/lib/absent.so"] {
             let text = message(open_first(Some(&root.join(absent)), &environment, |_| Ok(())));
             assert!(text.contains(absent) && text.contains("pip install pyoidn"), "{text}");
         }

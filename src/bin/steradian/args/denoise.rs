@@ -54,7 +54,7 @@ pub struct DenoiseArgs {
     /// The file to write, .exr; the same number takes the place of ####
     pub output: PathBuf,
     /// Write the denoised picture as .png, too; repeat for several
-    #[arg(short, long = "output", id = "png", value_name = "FILE")]
+    #[arg(short = 'o', long = "png", value_name = "FILE")]
     pub also: Vec<PathBuf>,
     /// The layer that holds the albedo: its name before the dot
     #[arg(long, value_name = "LAYER")]
