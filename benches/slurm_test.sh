@@ -4,8 +4,8 @@
 #
 #   benches/slurm_test.sh [PROGRAM]     PROGRAM: target/release/steradian unless given
 #
-# SCENE (scenes/cornell.json), SPP (512), SHARDS (4) and FRAMES (none) change what is rendered: a shard has to take some seconds. Needs root,
-# Debian's munge and slurm-wlm, and python3; ends with 77 where one of them is missing. Everything happens in a temporary folder, and
+# SCENE (scenes/cornell.json), SIZE (256x256), SPP (512), SHARDS (4) and FRAMES (none) change what is rendered: a shard has to take some seconds. Needs
+# root, Debian's munge and slurm-wlm, and python3; ends with 77 where one of them is missing. Everything happens in a temporary folder, and
 # nothing is left running.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -31,7 +31,7 @@ fail() {
     exit 1
 }
 seconds() { date +%s; }
-options=(--threads 1 --float --layers Z,N,albedo,variance,samples)
+options=(--size "${SIZE:-256x256}" --threads 1 --float --layers Z,N,albedo,variance,samples)
 
 echo "one run: $(basename "$scene"), $spp samples per pixel${frames:+, frames $frames}"
 start=$(seconds)

@@ -126,6 +126,11 @@ fn an_interrupt_ends_the_sequence() {
     let rest: Vec<String> = lines.collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
     assert!(!rest.iter().any(|line| line.contains("SUCCESS")));
+    // Whatever is there is complete.
+    let frames = rest.iter().filter(|line| line.starts_with("FRAME: ")).count() + 2;
+    let written =
+        std::fs::read_dir(folder.path()).unwrap().filter(|e| e.as_ref().unwrap().path().extension().is_some_and(|e| e == "exr")).count();
+    assert!(written == frames || written == frames - 1, "{written} of {frames}");
 }
 
 #[test]
