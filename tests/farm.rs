@@ -113,7 +113,7 @@ fn a_task_renders_its_shard_and_the_merge_takes_all_of_them() {
         calls,
         format!(
             "render {folder}/room.json --frames=7 --layers Z,N --shard 2/2 -o {folder}/room.farm/shards/frame#.2-of-2.shard \
-             --checkpoint {part}.checkpoint --every 5 --resume --progress plain\n"
+             --checkpoint {folder}/room.farm/shards/frame#.2-of-2.checkpoint --every 5 --resume --progress plain\n"
         )
     );
     // Such options exist: all but those of shards, which the render has in its own words.

@@ -81,7 +81,7 @@ fn render_script(job: &Job) -> String {
         "[ ! -e \"$part.shard\" ] || exit 0".to_owned(),
         format!("exec \"{{{{Param.Program}}}}\" render \"{{{{Param.Scene}}}}\"{frames} {} \\", options.join(" ")),
         format!("    --shard {{{{Task.Param.Shard}}}}/{{{{Param.Shards}}}} -o {pattern}{part}.shard \\"),
-        format!("    --checkpoint \"$part.checkpoint\" --every {} --resume --progress openjd\n", job.every),
+        format!("    --checkpoint {pattern}{part}.checkpoint --every {} --resume --progress openjd\n", job.every),
     ]
     .join("\n")
 }
