@@ -113,7 +113,7 @@ fn a_task_renders_its_shard_and_the_merge_takes_all_of_them() {
         calls,
         format!(
             "render {folder}/room.json --frames=7 --layers Z,N --shard 2/2 -o {folder}/room.farm/shards/frame#.2-of-2.shard \
-             --checkpoint {part}.checkpoint --every 5 --resume --progress plain\n"
+             --checkpoint {folder}/room.farm/shards/frame#.2-of-2.checkpoint --every 5 --resume --progress plain\n"
         )
     );
     // Such options exist: all but those of shards, which the render has in its own words.
@@ -196,7 +196,7 @@ fn an_openjd_template_renders_shards_and_merges_them() {
     farm.write("room.0007.json", r#"{ "camera": {} }"#);
     let render = farm.path().join("render");
     let arguments =
-        format!("farm openjd room.####.json --program {} --shards 2 --frames 7-9x2,12 -o out/a.####.exr -o b.%02d.png", render.display());
+        format!("farm openjd room.####.json --program {} --shards 2 --frames 7-11x2,20 -o out/a.####.exr -o b.%02d.png", render.display());
     let output = farm.steradian(&arguments);
     let template: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(template["specificationVersion"], "jobtemplate-2023-09");
@@ -210,7 +210,7 @@ fn an_openjd_template_renders_shards_and_merges_them() {
         let default = &parameters.iter().find(|p| p["name"] == name).unwrap_or_else(|| panic!("{name}"))["default"];
         default.as_str().map_or_else(|| default.to_string(), str::to_owned)
     };
-    assert_eq!(value("Frames"), "7-9:2,12");
+    assert_eq!(value("Frames"), "7-11:2,20");
     let run = |step: usize| {
         let mut text = template["steps"][step]["script"]["embeddedFiles"][0]["data"].as_str().unwrap().to_owned();
         for name in ["Scene", "Work", "Program", "Shards", "Output1", "Output2"] {

@@ -118,7 +118,7 @@ fn progress_is_that_of_the_sequence_and_complete_only_at_its_end() {
 #[test]
 fn an_interrupt_ends_the_sequence() {
     let folder = folder_with(&[("a.json", scene())]);
-    let mut command = steradian(folder.path(), "render a.json --frames 1-100000 -o a.exr --spp 64 --progress afanasy");
+    let mut command = steradian(folder.path(), "render a.json --frames 1-100000 -o a.exr --spp 4000 --progress afanasy");
     let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
     assert!(lines.any(|line| line == "FRAME: 2"));
@@ -126,6 +126,11 @@ fn an_interrupt_ends_the_sequence() {
     let rest: Vec<String> = lines.collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
     assert!(!rest.iter().any(|line| line.contains("SUCCESS")));
+    // Whatever is there counts as complete: of the frame under way there is nothing.
+    let is_frame = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().path().extension().is_some_and(|e| e == "exr");
+    let written = std::fs::read_dir(folder.path()).unwrap().filter_map(|entry| is_frame(entry).then_some(())).count();
+    let complete = 1 + rest.iter().filter(|line| line.starts_with("wrote a.")).count();
+    assert!(written == complete && !rest.iter().any(|line| line.contains("(interrupted)")), "{written} {rest:?}");
 }
 
 #[test]

@@ -36,22 +36,22 @@ fn told(output: &Output) -> String {
 #[test]
 fn every_format_has_whole_lines_and_ends_with_all() {
     let folder = tempfile::tempdir().unwrap();
-    for (format, last) in [
-        ("human", "Progress: 100%"),
-        ("plain", "Progress: 100%"),
-        ("openjd", "openjd_progress: 100.0"),
-        ("alf", "ALF_PROGRESS 100%"),
-        ("deadline", "Progress: 100%"),
-        ("afanasy", "[ PARSER FINISHED SUCCESS ]"),
+    for (format, all, last) in [
+        ("human", "Progress: 100%", ""),
+        ("plain", "Progress: 100%", ""),
+        ("openjd", "openjd_progress: 100.0", ""),
+        ("alf", "ALF_PROGRESS 100%", ""),
+        ("deadline", "Progress: 100%", ""),
+        ("afanasy", "PROGRESS: 100%", "[ PARSER FINISHED SUCCESS ]\n"),
     ] {
         let output = run(folder.path(), &format!("render scene.json -o a.exr --spp 64 --target-error 0.01 --progress {format}"));
         let text = told(&output);
         assert_eq!(output.status.code(), Some(0), "{text}");
-        assert!(text.ends_with(&format!("{last}\n")) && !text.contains(['\r', '\x1b']), "{format}: {text:?}");
-        assert_eq!(text.contains("Error"), false, "{text}");
+        assert!(text.ends_with(&format!("\n{all}\n{last}")) && !text.contains(['\r', '\x1b']), "{format}: {text:?}");
+        assert!(!text.contains("Error"), "{text}");
         // The files are told of before all is done.
         let place = |what: &str| text.find(what).unwrap_or(usize::MAX);
-        assert!(place("wrote a.exr") < place("100"), "{text}");
+        assert!(place("wrote a.exr") < place(all), "{text}");
         assert!(output.stdout.is_empty());
     }
     let output = run(folder.path(), "render scene.json -o a.exr -q --progress alf");
@@ -67,7 +67,7 @@ fn failures_are_told_in_the_farms_words() {
     {
         let output = run(folder.path(), &format!("render missing.json --progress {format}"));
         assert_eq!(output.status.code(), Some(4));
-        assert!(told(&output).lines().any(|l| l.starts_with(line)) && !told(&output).contains("100"), "{}", told(&output));
+        assert!(told(&output).lines().any(|l| l.starts_with(line)) && !told(&output).contains("100%"), "{}", told(&output));
     }
 }
 

@@ -1,5 +1,7 @@
 //! A job template of Open Job Description, version 2023-09.
 
+use std::path::PathBuf;
+
 use serde_json::{Value, json};
 
 use super::job::{Job, quote};
@@ -9,29 +11,19 @@ use super::job::{Job, quote};
 ///
 /// A task that is cancelled gets two minutes to write its checkpoint.
 pub fn openjd_template(job: &Job) -> Value {
-    let has_frames = job.frames.is_some();
-    let file = |name: &str, path: &std::path::Path, object: &str, flow: &str, what: &str| json!({ "name": name, "type": "PATH", "objectType": object, "dataFlow": flow, "default": path.to_string_lossy(), "description": what });
+    // Paths are strings: the specification wants defaults of type PATH relative to the template.
+    let text = |name: &str, value: &str, what: &str| json!({ "name": name, "type": "STRING", "default": value, "description": what });
     let mut parameters = vec![
-        file("Scene", &job.scene, if has_frames { "DIRECTORY" } else { "FILE" }, "IN", "The scene"),
-        file("Work", &job.folder, "DIRECTORY", "INOUT", "The folder of shards and checkpoints"),
-        json!({ "name": "Program", "type": "STRING", "default": job.program.to_string_lossy(), "description": "The program steradian" }),
+        text("Scene", &job.scene.to_string_lossy(), "The scene"),
+        text("Work", &job.folder.to_string_lossy(), "The folder of shards and checkpoints"),
+        text("Program", &job.program.to_string_lossy(), "The program steradian"),
         json!({ "name": "Shards", "type": "INT", "default": job.shards, "minValue": 1, "description": "Into how many shards a picture is split" }),
     ];
-    // A scene for each frame is no single file, so its name travels as it is.
-    if has_frames {
-        parameters[0] = json!({ "name": "Scene", "type": "STRING", "default": job.scene.to_string_lossy(), "description": "The scene" });
-    }
-    for (i, output) in job.outputs.iter().enumerate() {
-        let what = "A picture to write";
-        parameters.push(if has_frames {
-            json!({ "name": format!("Output{}", i + 1), "type": "STRING", "default": output.to_string_lossy(), "description": what })
-        } else {
-            file(&format!("Output{}", i + 1), output, "FILE", "OUT", what)
-        });
-    }
+    let output = |(i, output): (usize, &PathBuf)| text(&format!("Output{}", i + 1), &output.to_string_lossy(), "A picture to write");
+    parameters.extend(job.outputs.iter().enumerate().map(output));
     let mut space = vec![json!({ "name": "Shard", "type": "INT", "range": "1-{{Param.Shards}}" })];
     let frames = job.frames.as_ref().map(|frames| {
-        parameters.push(json!({ "name": "Frames", "type": "STRING", "default": frames.ranges(':'), "description": "The frames" }));
+        parameters.push(text("Frames", &frames.ranges(':'), "The frames"));
         json!({ "name": "Frame", "type": "INT", "range": "{{Param.Frames}}" })
     });
     space.extend(frames.clone());
@@ -89,7 +81,7 @@ fn render_script(job: &Job) -> String {
         "[ ! -e \"$part.shard\" ] || exit 0".to_owned(),
         format!("exec \"{{{{Param.Program}}}}\" render \"{{{{Param.Scene}}}}\"{frames} {} \\", options.join(" ")),
         format!("    --shard {{{{Task.Param.Shard}}}}/{{{{Param.Shards}}}} -o {pattern}{part}.shard \\"),
-        format!("    --checkpoint \"$part.checkpoint\" --every {} --resume --progress openjd\n", job.every),
+        format!("    --checkpoint {pattern}{part}.checkpoint --every {} --resume --progress openjd\n", job.every),
     ]
     .join("\n")
 }

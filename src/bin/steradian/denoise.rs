@@ -10,6 +10,7 @@ use steradian::render::{Progress, Settings};
 use steradian::{Error, Result};
 
 use crate::args::{DenoiseArgs, RenderDenoiseArgs};
+use crate::log::{self, Level};
 use crate::progress::Reporter;
 use crate::text;
 
@@ -62,10 +63,9 @@ pub fn run(arguments: &DenoiseArgs) -> Result<()> {
             let image = output::read_exr(&task.output)?;
             task.also.iter().try_for_each(|path| output::write_png(path, &image, arguments.exposure))?;
         }
-        if !arguments.quiet {
-            warnings(&report).iter().for_each(|warning| eprintln!("warning: {}: {warning}", task.input.display()));
-            eprintln!("wrote {}: {}", task.output.display(), summary(&report));
-        }
+        let input = task.input.display();
+        warnings(&report).iter().for_each(|warning| log::message(Level::Warning, &format!("{input}: {warning}")));
+        log::message(Level::Note, &format!("wrote {}: {}", task.output.display(), summary(&report)));
         if arguments.json {
             let mut value = value(&report, &denoiser);
             value["input"] = task.input.display().to_string().into();

@@ -99,7 +99,9 @@ impl<'a> Kept<'a> {
         let asked = || Arc::clone(&interrupt.checkpoint);
         let mut checkpoints = self.checkpoint.take().map(|file| Checkpoints::new(file, header.clone(), self.arguments.every, asked()));
         let (state, stats) = render::render_from(scene, accel, settings, state, checkpoints.as_mut(), progress, &interrupt.stop)?;
-        if let Some(file) = &self.shard_file {
+        // What an interrupted shard has is in its checkpoint; a shard that is there is complete.
+        let unfinished = stats.interrupted && checkpoints.is_some();
+        if let Some(file) = self.shard_file.as_ref().filter(|_| !unfinished) {
             file.replace(|out| state.write(header, out))?;
         }
         // Of a shard nobody looks at the picture.

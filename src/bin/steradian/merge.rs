@@ -9,6 +9,7 @@ use steradian::render::{self, Header};
 use steradian::{Error, Result};
 
 use crate::args::MergeArgs;
+use crate::log::{self, Level};
 
 /// Merges shards and writes the picture.
 pub fn run(arguments: &MergeArgs) -> Result<()> {
@@ -30,11 +31,10 @@ pub fn run(arguments: &MergeArgs) -> Result<()> {
     for output in &outputs {
         output::write(output, &image, &info)?;
     }
-    if !arguments.quiet {
-        let partial = merged.partial.map_or(String::new(), |partial| format!(" ({partial})"));
-        eprintln!("{}x{} pixels, {} samples per pixel{partial}", image.crop.width, image.crop.height, info.samples_per_pixel);
-        outputs.iter().for_each(|output| eprintln!("wrote {}", output.file));
-    }
+    let partial = merged.partial.map_or(String::new(), |partial| format!(" ({partial})"));
+    let [width, height] = [image.crop.width, image.crop.height];
+    log::message(Level::Note, &format!("{width}x{height} pixels, {} samples per pixel{partial}", info.samples_per_pixel));
+    outputs.iter().for_each(|output| log::message(Level::Note, &format!("wrote {}", output.file)));
     Ok(())
 }
 

@@ -58,7 +58,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         Some(kept) => Some(kept.header(&shot.imported, &shot.scene, &scene, &settings, info.clone())?),
         None => None,
     };
-    let scene_file = shot.scene.clone();
+    let (scene_file, frame) = (shot.scene.clone(), shot.frame);
     drop(shot);
     let load_seconds = start.elapsed().as_secs_f64();
 
@@ -93,6 +93,11 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
     let first = load_seconds + build_seconds + stats.first_pass_seconds;
     tracing::info!("{first:.3} s until every pixel had its first sample");
     warn_of_dropped(stats, reporter);
+    if let (Some(frame), true) = (frame, stats.interrupted) {
+        // A file that is there counts as a complete frame.
+        reporter.say(&format!("interrupted: frame {frame} is not written"));
+        return Ok(interrupt.exit_code());
+    }
 
     info.samples_per_pixel = stats.spp_done;
     info.render_seconds = stats.render_seconds;
@@ -100,6 +105,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
     info.settings = recipe.map(|recipe| recipe.with_samples(stats.spp_done).to_value());
     info.texts = denoised.texts;
     let written: Vec<String> = match &shard_file {
+        Some(_) if stats.interrupted && arguments.state.checkpoint.is_some() => Vec::new(),
         Some(file) => vec![file.display().to_string()],
         None => settings.outputs.iter().map(|output| output.file.clone()).collect(),
     };

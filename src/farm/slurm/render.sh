@@ -33,8 +33,10 @@ stopped=
 child=
 trap 'stopped=1; [ -z "$child" ] || kill -TERM "$child" 2>/dev/null' USR1 TERM
 
-"$program" render "$scene" ${frame:+"--frames=$frame"} "${options[@]}" --shard "$shard/$shards" \
-    -o "$folder/shards/${frame:+frame#.}$shard-of-$shards.shard" --checkpoint "$part.checkpoint" --every @EVERY@ --resume --progress plain &
+# The render puts the frame's number in the place of the #.
+name="$folder/shards/${frame:+frame#.}$shard-of-$shards"
+"$program" render "$scene" ${frame:+"--frames=$frame"} "${options[@]}" --shard "$shard/$shards" -o "$name.shard" \
+    --checkpoint "$name.checkpoint" --every @EVERY@ --resume --progress plain &
 child=$!
 # A signal ends `wait` before the render has ended.
 while wait "$child"; code=$?; kill -0 "$child" 2>/dev/null; do :; done

@@ -291,10 +291,13 @@ pub struct CompareArgs {
 impl Command {
     /// How much is said, where a command leaves it to the user.
     pub fn verbosity(&self) -> Verbosity {
+        let only = |quiet: bool| Verbosity { quiet, verbose: 0 };
         match self {
             Self::Render(arguments) => arguments.verbosity,
             Self::Info(arguments) => arguments.verbosity,
-            Self::Rerender(arguments) => Verbosity { quiet: arguments.quiet, verbose: 0 },
+            Self::Merge(arguments) => only(arguments.quiet),
+            Self::Rerender(arguments) => only(arguments.quiet),
+            Self::Denoise(arguments) => only(arguments.quiet),
             Self::Convert(arguments) => Verbosity { quiet: arguments.quiet, verbose: arguments.verbose },
             _ => Verbosity::default(),
         }
