@@ -97,11 +97,14 @@ class Browser:
 class Render:
     """A render that serves its page."""
 
+    processes = []
+
     def __init__(self, program, folder, *arguments):
         with open(os.path.join(folder, "ball.json"), "w") as file:
             json.dump(SCENE, file)
         line = [program, "render", "ball.json", "-o", "ball.exr", "--preview", "0", "--layers", "Z,N", *arguments]
         self.process = subprocess.Popen(line, cwd=folder, stderr=subprocess.PIPE, text=True)
+        self.processes.append(self.process)
         first = self.process.stderr.readline()
         assert first.startswith("preview: http://127.0.0.1:"), first
         self.url = first.split()[1]
@@ -349,6 +352,8 @@ def main():
             print("killed in the middle: passed")
     finally:
         browser.close()
+        for process in Render.processes:
+            process.kill()
     return 0
 
 

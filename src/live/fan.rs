@@ -45,6 +45,6 @@ impl Progress for Fan<'_> {
     }
 
     fn picture(&self, image: &Image, spp: u32) {
-        self.listeners.iter().filter(|listener| listener.wants_picture()).for_each(|listener| listener.picture(image, spp));
+        self.listeners.iter().for_each(|listener| listener.picture(image, spp));
     }
 }

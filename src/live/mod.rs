@@ -5,6 +5,7 @@
 //! replaced by that.
 
 mod fan;
+mod pace;
 mod preview;
 mod snapshot;
 mod statistics;
@@ -22,6 +23,7 @@ use std::time::{Duration, Instant};
 use crate::error::Result;
 use crate::film::Image;
 use crate::render::Progress;
+use pace::Pace;
 
 /// No viewer gets more pictures than one in this time.
 const PICTURE_PERIOD: Duration = Duration::from_millis(250);
@@ -45,6 +47,7 @@ pub struct Options {
 /// The viewers of a render.
 pub struct Live {
     statistics: Arc<Statistics>,
+    pace: Pace,
     tev: Option<Tev>,
     preview: Option<Preview>,
 }
@@ -58,7 +61,7 @@ impl Live {
         let statistics = Arc::new(Statistics::new(options.time_limit));
         let preview = options.preview.map(|preview| Preview::new(&preview, options.name.clone(), Arc::clone(&statistics))).transpose()?;
         let tev = options.tev.map(|tev| Tev::new(tev, &options.name));
-        Ok(Self { statistics, tev, preview })
+        Ok(Self { statistics, pace: Pace::default(), tev, preview })
     }
 
     /// Where the page is served, if it is.
@@ -102,16 +105,23 @@ impl Progress for Live {
     }
 
     fn wants_picture(&self) -> bool {
-        self.tev.as_ref().is_some_and(Tev::wants_picture) || self.preview.as_ref().is_some_and(Preview::wants_picture)
+        let is_wanted = self.tev.as_ref().is_some_and(Tev::wants_picture) || self.preview.as_ref().is_some_and(Preview::wants_picture);
+        is_wanted && self.pace.may_ask()
     }
 
     fn picture(&self, image: &Image, samples_per_pixel: u32) {
-        let snapshot = Arc::new(Snapshot::new(image, samples_per_pixel));
         // Those who do not want it yet would only have it replaced sooner.
-        if let Some(tev) = self.tev.as_ref().filter(|tev| tev.wants_picture()) {
+        let tev = self.tev.as_ref().filter(|tev| tev.wants_picture());
+        let preview = self.preview.as_ref().filter(|preview| preview.wants_picture());
+        if tev.is_none() && preview.is_none() {
+            return;
+        }
+        let snapshot = Arc::new(Snapshot::new(image, samples_per_pixel));
+        self.pace.made();
+        if let Some(tev) = tev {
             tev.offer(&snapshot);
         }
-        if let Some(preview) = self.preview.as_ref().filter(|preview| preview.wants_picture()) {
+        if let Some(preview) = preview {
             preview.show(&snapshot);
         }
     }
