@@ -89,7 +89,7 @@ impl Kit {
 
 /// Every bit of a film.
 pub fn bits(film: &Film) -> Vec<Vec<u8>> {
-    film.tiles().iter().map(|tile| tile.save()).collect()
+    film.tiles().iter().map(steradian::film::FilmTile::save).collect()
 }
 
 fn spp(spp: u32) -> Overrides {

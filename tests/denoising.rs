@@ -188,9 +188,9 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
     assert_eq!(report.layers.len(), 12);
     for parts in sums {
         for (i, pixel) in image.layers[0].pixels().enumerate() {
-            for c in 0..3 {
+            for (c, &total) in pixel[..3].iter().enumerate() {
                 let sum: f64 = parts.iter().map(|part| f64::from(part.data[3 * i + c])).sum();
-                let total = f64::from(pixel[c]);
+                let total = f64::from(total);
                 assert!((sum - total).abs() <= 1e-6 * total + 1e-30, "pixel {i}: {sum} {total}");
             }
         }

@@ -57,10 +57,10 @@ fn assert_sum(image: &Image, layers: &[&Layer], what: &str) {
     let color = image.layer(LayerKind::Color).unwrap();
     let mut lit = 0;
     for (i, pixel) in color.pixels().enumerate() {
-        for channel in 0..3 {
+        for (channel, &expected) in pixel[..3].iter().enumerate() {
             let terms = layers.iter().map(|layer| f64::from(layer.data[3 * i + channel]));
             let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), term| (sum + term, size + f64::abs(term)));
-            let expected = f64::from(pixel[channel]);
+            let expected = f64::from(expected);
             assert!((sum - expected).abs() <= 1e-5 * size.max(expected.abs()) + 1e-9, "{what}, pixel {i}: {sum} for {expected}");
             lit += usize::from(size > 0.0);
         }

@@ -21,10 +21,10 @@ impl<const N: usize> Sums<N> {
     /// Adds to each sum.
     #[inline(always)]
     pub fn add(&mut self, terms: [f64; N]) {
-        for k in 0..N {
-            let (high, error) = two_sum(self.high[k], terms[k]);
-            self.high[k] = high;
-            self.low[k] += error;
+        for ((high, low), term) in self.high.iter_mut().zip(&mut self.low).zip(terms) {
+            let (sum, error) = two_sum(*high, term);
+            *high = sum;
+            *low += error;
         }
     }
 

@@ -49,10 +49,10 @@ pub struct FilmTile {
     pub(super) samples: Vec<u32>,
     /// With `w` the weight: sums of `(w - 1)` times radiance and alpha, then of `w - 1`. Empty until a weight differs from 1.
     pub(super) corrections: Vec<Sums<5>>,
-    /// The parts of the radiance, a pixel's [values](slice) side by side, and beside `corrections` the same of `(w - 1)` times them.
+    /// The parts of the radiance, a pixel's [values](mod@slice) side by side, and beside `corrections` the same of `(w - 1)` times them.
     pub(super) parts: Vec<f64>,
     pub(super) part_corrections: Vec<f64>,
-    /// Layers of surfaces, a pixel's [values](slice) side by side. Empty without such layers, and so is `hits`.
+    /// Layers of surfaces, a pixel's [values](mod@slice) side by side. Empty without such layers, and so is `hits`.
     pub(super) surfaces: Vec<f64>,
     pub(super) hits: Vec<u32>,
     /// Only of layers that need it.

@@ -6,7 +6,7 @@
 use crate::bsdf::{Bsdf, BsdfSample};
 use crate::color::Rgb;
 use crate::film::{Part, PartNeeds};
-use crate::id::LightId;
+use crate::id::{LightGroupId, LightId};
 use crate::math::Vec3;
 use crate::scene::Scene;
 
@@ -56,7 +56,7 @@ pub(super) enum Course {
 
 /// The place of a light's group among the groups.
 pub(super) fn group_of(scene: &Scene, light: LightId) -> usize {
-    scene.light_groups.of(light).map_or(scene.light_groups.names().len(), |group| group.index())
+    scene.light_groups.of(light).map_or(scene.light_groups.names().len(), LightGroupId::index)
 }
 
 /// Adds light to the parts of its sample by the course it took.

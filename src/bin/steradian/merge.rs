@@ -58,8 +58,8 @@ mod tests {
 
     #[test]
     fn files_have_the_layers_of_the_render() {
-        let mut header = Header::default();
-        header.outputs = vec![OutputDesc { layers: vec![LayerDesc::Z], ..OutputDesc::new("a.exr") }];
+        let of_render = vec![OutputDesc { layers: vec![LayerDesc::Z], ..OutputDesc::new("a.exr") }];
+        let header = Header { outputs: of_render, ..Header::default() };
         let named = outputs(&header, &["b.EXR".to_owned(), "c.png".to_owned()]).unwrap();
         assert_eq!((named[0].file.as_str(), named[0].layers.as_slice()), ("b.EXR", &[LayerDesc::Z][..]));
         assert_eq!((named[1].file.as_str(), named[1].layers.len()), ("c.png", 0));

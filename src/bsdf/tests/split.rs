@@ -7,7 +7,7 @@ const COLOR: Rgb = Rgb { r: 0.7, g: 0.3, b: 0.0 };
 
 /// Pairs of directions on one side, either side.
 fn pairs() -> impl Iterator<Item = (Vec3, Vec3)> {
-    random_points(9, 400).into_iter().enumerate().map(|(k, u)| {
+    random_points(9, 400).enumerate().map(|(k, u)| {
         let side = if k % 2 == 0 { 1.0 } else { -1.0 };
         let at = |cos: f32, turns: f32| direction(side * (0.05 + 0.95 * cos), turns);
         (at(u[0], u[1]), at(u[2], u[3]))

@@ -25,7 +25,7 @@ type FileLayer = exr::prelude::Layer<AnyChannels<FlatSamples>>;
 /// window is the picture without its overscan, the data window what was rendered. Numbers beyond what 16 bits hold become their largest, 65504.
 ///
 /// # Errors
-/// [`Error::Usage`] if `output` makes no sense ([`check_output`](super::check_output)), [`Error::Output`] if the file cannot be written.
+/// [`Error::Usage`](crate::Error::Usage) if `output` makes no sense ([`check_output`](super::check_output)), [`Error::Output`](crate::Error::Output) if the file cannot be written.
 pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderInfo) -> Result<()> {
     plan::check_output(output)?;
     let contents = Contents::new(image, output, info);

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use super::adaptive::Blocks;
 use super::{Settings, TILE_SIZE, light_groups};
 use crate::error::{Error, Result};
-use crate::film::{Film, Image, LayerKind};
+use crate::film::{Film, FilmTile, Image, LayerKind};
 use crate::integrator::RayCounts;
 use crate::scene::Scene;
 use container::{Reader, Writer};
@@ -70,7 +70,7 @@ impl RenderState {
     /// Continues from the state in a file.
     ///
     /// # Errors
-    /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Checkpoint`](crate::Error::Checkpoint) if it is damaged or
+    /// [`Error::Missing`] if it cannot be read, [`Error::Checkpoint`] if it is damaged or
     /// belongs to another picture than `header`.
     pub fn read(path: &Path, header: &Header, scene: &Scene, settings: &Settings) -> Result<Self> {
         let mut reader = Reader::open(path)?;
@@ -117,7 +117,7 @@ impl RenderState {
         };
         let mut writer = Writer::new(out, &header)?;
         for tiles in self.film.tiles().chunks(TILES_AT_ONCE) {
-            let blocks: Vec<Vec<u8>> = tiles.par_iter().map(|tile| tile.save()).collect();
+            let blocks: Vec<Vec<u8>> = tiles.par_iter().map(FilmTile::save).collect();
             blocks.iter().try_for_each(|block| writer.block(block))?;
         }
         if let Some(blocks) = &self.blocks {
@@ -163,7 +163,7 @@ fn fits(reader: &Reader, wanted: &Header) -> Result<()> {
 /// Whether the state of a render can be kept, and the render be split.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) naming the option if not.
+/// [`Error::Usage`] naming the option if not.
 pub fn check_kept(settings: &Settings, shard: Shard) -> Result<()> {
     let option = if shard == Shard::WHOLE { "--checkpoint" } else { "--shard" };
     if settings.is_guided() {
