@@ -73,7 +73,10 @@ impl Pass {
                 Self { samples: 1, tiles: fitting.clamp(1, all) }
             }
             None if self.tiles < all => Self { samples: 1, tiles: all },
-            None => Self { samples: next_pass(self.samples, elapsed, run.limits.remaining()), tiles: all },
+            None => {
+                let limit = run.limits.remaining().into_iter().chain(run.longest_pass()).min();
+                Self { samples: next_pass(self.samples, elapsed, limit), tiles: all }
+            }
         };
         Planned { pass, expected: of_one_tile.mul_f64(f64::from(pass.samples) * pass.tiles as f64) }
     }

@@ -9,6 +9,9 @@ use super::{Checkpoints, Job, Progress, RenderState, Settings};
 /// A pass aims at this time: long enough to cost nothing, short enough that an interrupt is answered soon.
 const PASS_TIME: Duration = Duration::from_millis(500);
 
+/// Passes are not made shorter than this for the sake of checkpoints.
+const LEAST_PASS_TIME: Duration = Duration::from_millis(50);
+
 /// A render under way.
 pub(super) struct Run<'a> {
     pub job: &'a Job<'a>,
@@ -34,7 +37,7 @@ impl<'a> Run<'a> {
 
     /// How long a pass may be, as far as checkpoints are due. Parts of a sample keep the processors less busy than all of it.
     pub fn longest_pass(&self) -> Option<Duration> {
-        self.checkpoints.as_ref().map(|checkpoints| (checkpoints.every() / 4).max(PASS_TIME))
+        self.checkpoints.as_ref().map(|checkpoints| (checkpoints.every() / 4).max(LEAST_PASS_TIME))
     }
 
     /// Between two passes, the next of which is expected to take `next`: checkpoints, and pictures for whoever wants them.
