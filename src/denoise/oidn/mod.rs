@@ -133,7 +133,7 @@ impl Device {
                     0,
                     0,
                     0,
-                )
+                );
             }
         };
         for (name, picture) in pictures {
