@@ -245,7 +245,8 @@ fn a_state_in_the_middle_of_a_sample_goes_on() {
     // One thread: none looks at the file while another copies it.
     let kit = Kit::new(&large, &Overrides { threads: Some(1), ..spp(2) });
     let header = kit.header(Shard::WHOLE);
-    let mut checkpoints = Checkpoints::new(StateFile::take(&path).unwrap(), header.clone(), Duration::ZERO, AtomicBool::new(false).into());
+    let mut checkpoints =
+        Checkpoints::new(StateFile::take(&path).unwrap(), header.clone(), Duration::from_secs(1000), AtomicBool::new(true).into());
     let progress = Keep { from: &path, to: &copy };
     let whole = kit.go_on_with(kit.start(Shard::WHOLE), Some(&mut checkpoints), &progress, &AtomicBool::new(false));
     let state = RenderState::read(&copy, &header, &kit.prepared.scene, &kit.prepared.settings).unwrap();
