@@ -136,7 +136,7 @@ fn an_interrupt_ends_the_sequence() {
 #[test]
 fn wrong_frames_are_refused() {
     let folder = folder_with(&[("a.json", scene())]);
-    for arguments in ["--frames 1-", "--frames x", "--overwrite", "--frames 1 --fps 0"] {
+    for arguments in ["--frames 1-", "--frames x", "--overwrite", "--frames 1 --fps 0", "--frames 1-2 --preview 0 --preview-hold"] {
         assert_eq!(run(folder.path(), &format!("render a.json {arguments}")).status.code(), Some(2), "{arguments}");
     }
 }

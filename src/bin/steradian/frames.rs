@@ -92,6 +92,9 @@ pub fn run(arguments: &RenderArgs) -> Result<u8> {
     let session = Session::new(arguments)?;
     let result = match &arguments.sequence.frames {
         None => single(arguments, &session),
+        Some(_) if arguments.live.preview_hold => Err(Error::Usage(
+            "--preview-hold: a sequence goes on with its next frame; leave out one of --frames and --preview-hold".to_owned(),
+        )),
         Some(frames) => Sequence::new(arguments, &session).run(frames),
     };
     match &result {
