@@ -1,35 +1,12 @@
 //! The program as its users and scripts see it.
 
 use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 use serde_json::Value;
 use steradian::output;
 
-const SCENE: &str = r#"{
-    "film": { "width": 24, "height": 16 },
-    "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
-    "sampler": { "spp": 2 },
-    "shapes": [{ "type": "sphere", "radius": 1 }],
-    "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
-}"#;
-
-/// A command in a folder that holds `scene.json`.
-fn steradian(folder: &Path, arguments: &str) -> Command {
-    std::fs::write(folder.join("scene.json"), SCENE).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
-    command.current_dir(folder).args(arguments.split_whitespace());
-    command
-}
-
-fn run(folder: &Path, arguments: &str) -> Output {
-    steradian(folder, arguments).output().unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
+use crate::util::program::{run, steradian, told};
 
 #[test]
 fn faults_have_their_exit_codes_and_one_line() {
@@ -50,8 +27,8 @@ fn faults_have_their_exit_codes_and_one_line() {
     ];
     for (arguments, code) in cases {
         let output = run(folder.path(), arguments);
-        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", stderr(&output));
-        assert_eq!(stderr(&output).matches("error:").count(), usize::from(code != 0), "{arguments}");
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", told(&output));
+        assert_eq!(told(&output).matches("error:").count(), usize::from(code != 0), "{arguments}");
         assert_eq!(output.stdout.is_empty(), code != 0, "{arguments}");
     }
     // Nothing was left behind.
@@ -62,8 +39,8 @@ fn faults_have_their_exit_codes_and_one_line() {
 fn without_outputs_the_files_are_named_after_the_scene() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), "render scene.json --layers Z --json stats.json");
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let told = stderr(&output);
+    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    let told = told(&output);
     assert!(told.contains("wrote scene.exr\n") && told.contains("wrote scene.png\n") && told.ends_with("Progress: 100%\n"), "{told}");
     assert!(folder.path().join("scene.png").exists());
     let image = output::read_exr(&folder.path().join("scene.exr")).unwrap();
@@ -95,7 +72,7 @@ fn without_outputs_the_files_are_named_after_the_scene() {
 fn quiet_runs_say_nothing_and_statistics_go_to_stdout() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), "render scene.json -q -o a.exr --json -");
-    assert_eq!((output.status.code(), stderr(&output).as_str()), (Some(0), ""));
+    assert_eq!((output.status.code(), told(&output).as_str()), (Some(0), ""));
     let stats: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(stats["outputs"], serde_json::json!(["a.exr"]));
 

@@ -1,37 +1,8 @@
 //! What batch systems and shells expect: progress, logs, colours, configuration, manual pages.
 
-use std::path::Path;
-use std::process::{Command, Output};
-
 use serde_json::Value;
 
-const SCENE: &str = r#"{
-    "film": { "width": 24, "height": 16 },
-    "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
-    // Said in the scene, though it is the default.
-    "sampler": { "spp": 2, "seed": 0 },
-    "shapes": [{ "type": "sphere", "radius": 1 }],
-    "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
-}"#;
-
-/// A command in a folder that holds `scene.json`, clear of the user's own configuration.
-fn steradian(folder: &Path, arguments: &str) -> Command {
-    std::fs::write(folder.join("scene.json"), SCENE).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
-    command.current_dir(folder).args(arguments.split_whitespace()).env("XDG_CONFIG_HOME", folder.join("config"));
-    for variable in ["NO_COLOR", "CLICOLOR_FORCE", "SLURM_CPUS_PER_TASK", "CUE_THREADS"] {
-        command.env_remove(variable);
-    }
-    command
-}
-
-fn run(folder: &Path, arguments: &str) -> Output {
-    steradian(folder, arguments).output().unwrap()
-}
-
-fn told(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
+use crate::util::program::{SCENE, run, steradian, told};
 
 #[test]
 fn every_format_has_whole_lines_and_ends_with_all() {

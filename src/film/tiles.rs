@@ -143,35 +143,43 @@ impl Film {
     /// value as weight.
     pub fn resolve(&self) -> Image {
         let pixels = self.crop.area() as usize;
-        let mut layers = Vec::new();
+        let (mut layers, mut firsts, mut channel) = (Vec::new(), Vec::new(), 0);
         for (kind, group) in self.stored() {
-            let data = vec![0.0; pixels * kind.info().channels.len()];
-            layers.push(Layer { kind, group: group.map(|group| self.light_groups[group].clone()), data });
+            let info = kind.info();
+            layers.push(Layer {
+                kind,
+                group: group.map(|group| self.light_groups[group].clone()),
+                data: vec![0.0; pixels * info.channels.len()],
+            });
+            firsts.push(match info.source {
+                Source::Part(part) => part as usize,
+                Source::LightGroups => self.layers.parts.first_group() + group.unwrap_or_default(),
+                _ => channel,
+            });
+            if matches!(info.source, Source::Surface(..)) {
+                channel += info.channels.len();
+            }
         }
-        for tile in &self.tiles {
-            let active = tile.active;
-            for y in active.y..active.y + active.height {
-                for x in active.x..active.x + active.width {
-                    let from = tile.index(x, y);
-                    let to = (y - self.crop.y) as usize * self.crop.width as usize + (x - self.crop.x) as usize;
-                    let mut channel = 0;
-                    for (layer, (kind, group)) in layers.iter_mut().zip(self.stored()) {
-                        let info = kind.info();
-                        let out = &mut layer.data[to * info.channels.len()..(to + 1) * info.channels.len()];
-                        let first = match info.source {
-                            Source::Part(part) => part as usize,
-                            Source::LightGroups => self.layers.parts.first_group() + group.unwrap_or_default(),
-                            _ => channel,
-                        };
-                        tile.layer_at(from, info, first, out);
-                        if matches!(info.source, Source::Surface(..)) {
-                            channel += info.channels.len();
-                        }
-                    }
-                }
+        for (tile, from, to) in self.places() {
+            for (layer, &first) in layers.iter_mut().zip(&firsts) {
+                let info = layer.kind.info();
+                let out = &mut layer.data[to * info.channels.len()..(to + 1) * info.channels.len()];
+                tile.layer_at(from, info, first, out);
             }
         }
         Image { size: self.size, crop: self.crop, overscan: 0, layers, coverage: self.coverage() }
+    }
+
+    /// Every pixel of the picture: its tile, its index there and in the picture.
+    fn places(&self) -> impl Iterator<Item = (&FilmTile, usize, usize)> {
+        self.tiles.iter().flat_map(move |tile| {
+            let active = tile.active;
+            let all = (active.y..active.y + active.height).flat_map(move |y| (active.x..active.x + active.width).map(move |x| (x, y)));
+            all.map(move |(x, y)| {
+                let to = (y - self.crop.y) as usize * self.crop.width as usize + (x - self.crop.x) as usize;
+                (tile, tile.index(x, y), to)
+            })
+        })
     }
 
     /// The picture's layers, and of those of groups of lights, which.
@@ -189,15 +197,8 @@ impl Film {
             return None;
         }
         let mut counts = vec![None; self.crop.area() as usize];
-        for tile in &self.tiles {
-            let active = tile.active;
-            for y in active.y..active.y + active.height {
-                for x in active.x..active.x + active.width {
-                    let from = tile.index(x, y);
-                    let to = (y - self.crop.y) as usize * self.crop.width as usize + (x - self.crop.x) as usize;
-                    counts[to] = tile.coverage.as_ref().map(|coverage| (coverage.of(from), tile.samples[from]));
-                }
-            }
+        for (tile, from, to) in self.places() {
+            counts[to] = tile.coverage.as_ref().map(|coverage| (coverage.of(from), tile.samples[from]));
         }
         Some(Coverage::new(counts.into_iter().map(Option::unwrap_or_default)))
     }
