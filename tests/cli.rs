@@ -114,3 +114,22 @@ fn interrupted_renders_write_their_picture() {
         assert!(output::read_exr(&folder.path().join("a.exr")).is_ok());
     }
 }
+
+/// A file that cannot be written in the end is an error, and the others are there.
+#[test]
+fn a_file_that_cannot_be_written_does_not_take_the_others_along() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("gone")).unwrap();
+    let line = "render scene.json --spp 2000000000 --time-limit 60 -o gone/a.exr -o b.png -o c.exr --threads 1";
+    let mut child = steradian(folder.path(), line).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    assert!(lines.next().unwrap().unwrap().starts_with("Progress: "));
+    std::fs::remove_dir_all(folder.path().join("gone")).unwrap();
+    assert!(Command::new("kill").arg("-INT").arg(child.id().to_string()).status().unwrap().success());
+    let rest: Vec<String> = lines.map_while(Result::ok).collect();
+    assert_eq!(child.wait().unwrap().code(), Some(5), "{rest:?}");
+    assert!(rest.iter().any(|line| line.starts_with("error: cannot write gone/a.exr")), "{rest:?}");
+    for file in ["b.png", "c.exr"] {
+        assert!(rest.contains(&format!("wrote {file}")) && folder.path().join(file).exists(), "{rest:?}");
+    }
+}

@@ -1,18 +1,21 @@
 //! `steradian render`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use steradian::accel::{self, Accelerator};
+use steradian::denoise::Denoiser;
 use steradian::film::LayerSet;
-use steradian::live::Fan;
+use steradian::live::{Fan, Live};
 use steradian::output::{self, RenderInfo, RenderStatistics};
-use steradian::render::{self, DEFAULT_EXTENSIONS, Progress, Recipe, Replayed, Settings, Stats};
+use steradian::render::{self, DEFAULT_EXTENSIONS, Header, Progress, Recipe, RenderResult, Replayed, Settings, Stats};
+use steradian::scene::Scene;
 use steradian::{Result, compile};
 
 use crate::args::RenderArgs;
 use crate::denoise;
 use crate::frames::{Session, Shot};
+use crate::interrupt::Interrupt;
 use crate::kept::{self, Kept};
 use crate::progress::Reporter;
 use crate::rerender;
@@ -21,114 +24,179 @@ use crate::text;
 
 /// Renders a picture and writes what was asked for; the result is the exit code. `start` is when the scene's reading began.
 pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Instant) -> Result<u8> {
-    let json = arguments.json.as_deref().map(|path| shot.file(path));
-    let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
-    let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?.map(|name| shot.file_of(&name));
-    let mut settings = Settings::new(&shot.imported.desc, &overrides)?;
-    shot.adapt(&mut settings);
-    let recipe = rerender::prepare(arguments, &shot, &mut settings)?;
-    let is_there = match &shard_file {
-        Some(file) => shot.frame.is_some() && !arguments.sequence.overwrite && file.exists(),
-        None => shot.is_there(&settings, arguments.sequence.overwrite),
-    };
-    if is_there {
+    let Some(mut plan) = Plan::new(arguments, &shot)? else {
         session.reporter.complete_frame();
         return Ok(0);
-    }
-    if arguments.pixel.is_none() {
-        check_outputs(&settings, shard_file.as_deref(), json.as_deref())?;
-    }
-    let denoiser = denoise::prepare(&arguments.denoise, &mut settings)?;
-    let checkpoint = arguments.state.checkpoint.as_deref().map(|path| shot.file_of(path));
-    let kept = match arguments.pixel {
-        None => Kept::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?,
-        Some(_) => None,
     };
     let scene = compile::compile_imported(&shot.imported, &shot.scene)?;
-    let mut info = RenderInfo {
-        world_to_camera: Some(scene.camera.world_to_camera()),
-        world_to_ndc: scene.camera.world_to_ndc(settings.size),
-        pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
-        identities: settings.layers.needs_coverage().then(|| scene.identities.clone()),
-        settings: recipe.as_ref().map(Recipe::to_value),
-        statistics: Some(RenderStatistics { threads: settings.threads, ..RenderStatistics::default() }),
-        ..RenderInfo::default()
-    };
-    let header = match &kept {
-        Some(kept) => Some(kept.header(&shot.imported, &shot.scene, &scene, &settings, info.clone())?),
-        None => None,
-    };
-    let (scene_file, frame) = (shot.scene.clone(), shot.frame);
+    let header = plan.header(&shot, &scene)?;
+    // Descriptions of meshes take as much memory as the meshes.
     drop(shot);
     let load_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
-    let accel = accel::build(settings.accel, &scene.geometry, settings.threads)?;
-    let build_seconds = start.elapsed().as_secs_f64();
-    tracing::info!("{}; {load_seconds:.3} s to load, {build_seconds:.3} s to build", accel.description());
+    let accel = accel::build(plan.settings.accel, &scene.geometry, plan.settings.threads)?;
+    let run = Run { scene: &plan.scene_file.clone(), load_seconds, build_seconds: start.elapsed().as_secs_f64() };
+    tracing::info!("{}; {load_seconds:.3} s to load, {:.3} s to build", accel.description(), run.build_seconds);
 
     if let (Some(pixel), Some(sample)) = (arguments.pixel, arguments.sample) {
-        settings.layers = LayerSet::FULL;
-        let value = render::replay(&scene, &*accel, &settings, pixel, sample)?;
+        plan.settings.layers = LayerSet::FULL;
+        let value = render::replay(&scene, &*accel, &plan.settings, pixel, sample)?;
         return text::print(&describe_sample(&value)).map(|()| 0);
     }
 
-    let (interrupt, reporter) = (session.interrupt()?, &session.reporter);
-    reporter.limit_time(settings.time_limit);
-    let live = arguments.live.start(&scene_file, settings.time_limit)?;
-    if let Some(url) = live.preview_url() {
-        reporter.say(&format!("preview: {url}"));
-    }
-    let fan = Fan::new([reporter as &dyn Progress, &live]);
-    let mut result = match (kept, &header) {
-        (Some(kept), Some(header)) => kept.render(&scene, &*accel, &settings, header, (reporter, &fan), interrupt)?,
-        _ => {
-            let result = render::render(&scene, &*accel, &settings, &fan, &interrupt.stop)?;
-            kept::warn_of_request(interrupt, reporter);
-            result
-        }
-    };
-    let denoised = denoise::finish(denoiser.as_ref().filter(|_| shard_file.is_none()), &mut result.image, reporter);
-    let stats = &result.stats;
-    let first = load_seconds + build_seconds + stats.first_pass_seconds;
+    let interrupt = session.interrupt()?;
+    let live = plan.watch(session)?;
+    let result = plan.render(&scene, &*accel, header.as_ref(), (session, &live), interrupt)?;
+    let first = load_seconds + run.build_seconds + result.stats.first_pass_seconds;
     tracing::info!("{first:.3} s until every pixel had its first sample");
-    warn_of_dropped(stats, reporter);
-    if let (Some(frame), true) = (frame, stats.interrupted) {
+    warn_of_dropped(&result.stats, &session.reporter);
+    let exit_code = if result.stats.interrupted { interrupt.exit_code() } else { 0 };
+    if let (Some(frame), true) = (plan.frame, result.stats.interrupted) {
         // A file that is there counts as a complete frame.
-        reporter.say(&format!("interrupted: frame {frame} is not written"));
-        return Ok(interrupt.exit_code());
+        session.reporter.say(&format!("interrupted: frame {frame} is not written"));
+        return Ok(exit_code);
     }
-
-    info.samples_per_pixel = stats.spp_done;
-    info.render_seconds = stats.render_seconds;
-    info.statistics = Some(RenderStatistics { threads: settings.threads, rays: stats.rays.total(), nan_samples: stats.nan_samples });
-    info.settings = recipe.map(|recipe| recipe.with_samples(stats.spp_done).to_value());
-    info.texts = denoised.texts;
-    let written: Vec<String> = match &shard_file {
-        Some(_) if stats.interrupted && arguments.state.checkpoint.is_some() => Vec::new(),
-        Some(file) => vec![file.display().to_string()],
-        None => settings.outputs.iter().map(|output| output.file.clone()).collect(),
-    };
-    if shard_file.is_none() {
-        for desc in &settings.outputs {
-            output::write(desc, &result.image, &info)?;
-        }
-        live.show_final(&result.image, stats.spp_done);
-    }
-    if let Some(path) = &json {
-        let run = Run { scene: &scene_file, load_seconds, build_seconds };
-        let mut value = stats::value(&run, &settings, &*accel, stats);
-        value["denoise"] = denoised.statistics;
-        stats::write(path, &value)?;
-    }
-    if let Some(failure) = denoised.failure {
-        return Err(failure);
-    }
-    report(reporter, &settings, &*accel, stats, &written);
+    plan.write(&scene, &*accel, result, &run, (session, &live))?;
     if arguments.live.preview_hold {
         interrupt.wait();
     }
-    Ok(if stats.interrupted { interrupt.exit_code() } else { 0 })
+    Ok(exit_code)
+}
+
+/// What is to be done for one picture.
+struct Plan<'a> {
+    arguments: &'a RenderArgs,
+    settings: Settings,
+    scene_file: PathBuf,
+    frame: Option<i64>,
+    /// Where statistics go.
+    json: Option<PathBuf>,
+    /// Where the shard goes, if the render is of one.
+    shard_file: Option<PathBuf>,
+    recipe: Option<Recipe>,
+    denoiser: Option<Denoiser>,
+    kept: Option<Kept<'a>>,
+}
+
+impl<'a> Plan<'a> {
+    /// Checks all that can be checked before the scene is made; `None` if the frame is there already.
+    fn new(arguments: &'a RenderArgs, shot: &Shot) -> Result<Option<Self>> {
+        let json = arguments.json.as_deref().map(|path| shot.file(path));
+        let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
+        let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?.map(|name| shot.file_of(&name));
+        let mut settings = Settings::new(&shot.imported.desc, &overrides)?;
+        shot.adapt(&mut settings);
+        let recipe = rerender::prepare(arguments, shot, &mut settings)?;
+        let is_there = match &shard_file {
+            Some(file) => shot.frame.is_some() && !arguments.sequence.overwrite && file.exists(),
+            None => shot.is_there(&settings, arguments.sequence.overwrite),
+        };
+        if is_there {
+            return Ok(None);
+        }
+        if arguments.pixel.is_none() {
+            check_outputs(&settings, shard_file.as_deref(), json.as_deref())?;
+        }
+        let denoiser = denoise::prepare(&arguments.denoise, &mut settings)?;
+        let checkpoint = arguments.state.checkpoint.as_deref().map(|path| shot.file_of(path));
+        let kept = match arguments.pixel {
+            None => Kept::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?,
+            Some(_) => None,
+        };
+        let (scene_file, frame) = (shot.scene.clone(), shot.frame);
+        Ok(Some(Self { arguments, settings, scene_file, frame, json, shard_file, recipe, denoiser, kept }))
+    }
+
+    /// What files tell of the rendering before it is done.
+    fn info(&self, scene: &Scene) -> RenderInfo {
+        RenderInfo {
+            world_to_camera: Some(scene.camera.world_to_camera()),
+            world_to_ndc: scene.camera.world_to_ndc(self.settings.size),
+            pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
+            identities: self.settings.layers.needs_coverage().then(|| scene.identities.clone()),
+            settings: self.recipe.as_ref().map(Recipe::to_value),
+            statistics: Some(RenderStatistics { threads: self.settings.threads, ..RenderStatistics::default() }),
+            ..RenderInfo::default()
+        }
+    }
+
+    /// What the state of the render says of itself, if it is kept.
+    fn header(&self, shot: &Shot, scene: &Scene) -> Result<Option<Header>> {
+        let header = |kept: &Kept| kept.header(&shot.imported, &shot.scene, scene, &self.settings, self.info(scene));
+        self.kept.as_ref().map(header).transpose()
+    }
+
+    /// Starts what shows the picture on its way.
+    fn watch(&self, session: &Session) -> Result<Live> {
+        session.reporter.limit_time(self.settings.time_limit);
+        let live = self.arguments.live.start(&self.scene_file, self.settings.time_limit)?;
+        if let Some(url) = live.preview_url() {
+            session.reporter.say(&format!("preview: {url}"));
+        }
+        Ok(live)
+    }
+
+    fn render(
+        &mut self,
+        scene: &Scene,
+        accel: &dyn Accelerator,
+        header: Option<&Header>,
+        (session, live): (&Session, &Live),
+        interrupt: &Interrupt,
+    ) -> Result<RenderResult> {
+        let reporter = &session.reporter;
+        let fan = Fan::new([reporter as &dyn Progress, live]);
+        if let (Some(kept), Some(header)) = (self.kept.take(), header) {
+            return kept.render(scene, accel, &self.settings, header, (reporter, &fan), interrupt);
+        }
+        let result = render::render(scene, accel, &self.settings, &fan, &interrupt.stop)?;
+        kept::warn_of_request(interrupt, reporter);
+        Ok(result)
+    }
+
+    /// Denoises the picture, and writes all files. One that cannot be written is no reason to lose the others.
+    fn write(
+        &self,
+        scene: &Scene,
+        accel: &dyn Accelerator,
+        RenderResult { mut image, stats }: RenderResult,
+        run: &Run,
+        (session, live): (&Session, &Live),
+    ) -> Result<()> {
+        let denoised = denoise::finish(self.denoiser.as_ref().filter(|_| self.shard_file.is_none()), &mut image, &session.reporter);
+        let info = RenderInfo {
+            samples_per_pixel: stats.spp_done,
+            render_seconds: stats.render_seconds,
+            statistics: Some(RenderStatistics { threads: self.settings.threads, rays: stats.rays.total(), nan_samples: stats.nan_samples }),
+            settings: self.recipe.clone().map(|recipe| recipe.with_samples(stats.spp_done).to_value()),
+            texts: denoised.texts,
+            ..self.info(scene)
+        };
+        let mut failure = denoised.failure;
+        let mut written = Vec::new();
+        if let Some(file) = &self.shard_file {
+            // One that is to be taken up again is not written.
+            if !(stats.interrupted && self.arguments.state.checkpoint.is_some()) {
+                written.push(file.display().to_string());
+            }
+        } else {
+            for desc in &self.settings.outputs {
+                match output::write(desc, &image, &info) {
+                    Ok(()) => written.push(desc.file.clone()),
+                    Err(error) => failure = failure.or(Some(error)),
+                }
+            }
+            live.show_final(&image, stats.spp_done);
+        }
+        if let Some(path) = &self.json {
+            let mut value = stats::value(run, &self.settings, accel, &stats);
+            value["denoise"] = denoised.statistics;
+            stats::write(path, &value)?;
+        }
+        report(&session.reporter, &self.settings, accel, &stats, (&written, failure.is_none()));
+        failure.map_or(Ok(()), Err)
+    }
 }
 
 /// Files named after the scene, in the working directory.
@@ -159,7 +227,7 @@ fn warn_of_dropped(stats: &Stats, reporter: &Reporter) {
     ));
 }
 
-fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, stats: &Stats, written: &[String]) {
+fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, stats: &Stats, (written, all): (&[String], bool)) {
     let seconds = stats.render_seconds.max(1e-9);
     let ended = match (stats.interrupted, stats.time_limited) {
         (true, _) => " (interrupted)",
@@ -181,7 +249,7 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
         reporter.say(&format!("relative squared error about {error:.3e}, asked for {target:.3e}"));
     }
     written.iter().for_each(|file| reporter.say(&format!("wrote {file}")));
-    if !stats.interrupted {
+    if all && !stats.interrupted {
         reporter.complete_frame();
     }
 }
