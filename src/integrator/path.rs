@@ -180,11 +180,13 @@ impl PathIntegrator {
                 counts.indirect += self.arrive_all(world, scratch);
             }
 
+            let layers = self.sorts() || self.needs != SurfaceNeeds::default();
             match (in_media, self.guide.is_some()) {
-                (false, false) => self.shade_all::<false, false>(world, bounce, out, scratch),
-                (true, false) => self.shade_all::<true, false>(world, bounce, out, scratch),
-                (false, true) => self.shade_all::<false, true>(world, bounce, out, scratch),
-                (true, true) => self.shade_all::<true, true>(world, bounce, out, scratch),
+                (false, false) if !layers => self.shade_all::<false, false, false>(world, bounce, out, scratch),
+                (false, false) => self.shade_all::<false, false, true>(world, bounce, out, scratch),
+                (true, false) => self.shade_all::<true, false, true>(world, bounce, out, scratch),
+                (false, true) => self.shade_all::<false, true, true>(world, bounce, out, scratch),
+                (true, true) => self.shade_all::<true, true, true>(world, bounce, out, scratch),
             }
 
             let shadows = scratch.shadow_rays.len();
@@ -243,8 +245,14 @@ impl PathIntegrator {
     /// Shades every living path's hit; afterwards the scratch holds the paths that go on, their rays, and the shadow rays to trace.
     ///
     /// Large results stay where they were returned and are read through references: a copy would have to wait for them.
-    /// `MEDIA` is whether the scene has media, `GUIDED` whether there is a guide.
-    fn shade_all<const MEDIA: bool, const GUIDED: bool>(&self, world: &World, bounce: u32, out: &mut SampleBatch, scratch: &mut Scratch) {
+    /// `MEDIA` is whether the scene has media, `GUIDED` whether there is a guide, `LAYERS` whether any layer needs more than the picture.
+    fn shade_all<const MEDIA: bool, const GUIDED: bool, const LAYERS: bool>(
+        &self,
+        world: &World,
+        bounce: u32,
+        out: &mut SampleBatch,
+        scratch: &mut Scratch,
+    ) {
         scratch.shadow_rays.clear();
         scratch.pending.clear();
         scratch.sorting.clear_pending();
@@ -260,13 +268,13 @@ impl PathIntegrator {
             scratch.escapes.look(world, self.strategy.found_by(), &scratch.rays[first..last], &scratch.hits[first..last]);
             scratch.shaded.clear();
             if side_by_side {
-                self.shade_side_by_side(world, bounce, first..last, out, scratch);
+                self.shade_side_by_side::<LAYERS>(world, bounce, first..last, out, scratch);
             }
             for i in first..last {
                 if let Some(lane) = scratch.shaded.lane(i - first) {
-                    self.collect(world, bounce, [i, first], lane, out, scratch, &mut alive);
+                    self.collect::<LAYERS>(world, bounce, [i, first], lane, out, scratch, &mut alive);
                 } else {
-                    self.shade::<MEDIA, GUIDED>(world, bounce, [i, first], out, scratch, &mut alive);
+                    self.shade::<MEDIA, GUIDED, LAYERS>(world, bounce, [i, first], out, scratch, &mut alive);
                 }
             }
         }
@@ -276,7 +284,7 @@ impl PathIntegrator {
 
     /// Shades the hit of the path `i`, of the batch that starts with `first`.
     #[inline(always)]
-    fn shade<const MEDIA: bool, const GUIDED: bool>(
+    fn shade<const MEDIA: bool, const GUIDED: bool, const LAYERS: bool>(
         &self,
         world: &World,
         bounce: u32,
@@ -294,12 +302,11 @@ impl PathIntegrator {
             if bounce > 0 || !self.hide_emitters {
                 let light = self.clamped(path.throughput * self.escaped(world, path, ray.direction, known), bounce);
                 sample.radiance += light;
-                if self.sorts() {
+                if LAYERS && self.sorts() {
                     self.sort_escaped(world, (sorting, i), (path, bounce), (ray.direction, known), light, out);
                 }
             }
-            let clear = sorting.clear_of(i);
-            if self.notes_surface(bounce, clear) {
+            if let (true, Some(clear)) = (LAYERS, self.notes_surface(bounce, sorting.clear_of(i))) {
                 self.note_escape(world, clear, (path, bounce), (ray.direction, known), out);
             }
             return;
@@ -309,14 +316,13 @@ impl PathIntegrator {
         if bounce == 0 {
             sample.alpha = 1.0;
         }
-        let clear = sorting.clear_of(i);
-        if self.notes_surface(bounce, clear) {
+        if let (true, Some(clear)) = (LAYERS, self.notes_surface(bounce, sorting.clear_of(i))) {
             let albedo = || albedo_at(world, at, ray, footprint);
             self.note_surface(world, (bounce, clear, path.slot), (at, hits[i].as_ref()), albedo, out);
         }
         let light = self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
         out.pixels[path.slot as usize].radiance += light;
-        if self.sorts() && !light.is_black() {
+        if LAYERS && self.sorts() && !light.is_black() {
             self.sort_emitted(world, (sorting, i), at, (path.slot, bounce), light, out);
         }
         if bounce + 1 >= self.max_depth {
@@ -337,12 +343,18 @@ impl PathIntegrator {
             }
             shadow_rays.push(shadow.ray);
             pending.push(Pending { contribution: self.clamped(shadow.contribution, bounce + 1), slot: path.slot });
-            if self.sorts() {
+            if LAYERS && self.sorts() {
                 let way = || Way::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(shadow.toward));
                 sorting.push_pending(self.parts, bounce, [i, group_of(world.scene, shadow.light)], way);
             }
         }
-        if let Some((path, next, sample)) = self.scatter(world, path, &vertex, bounce, (steering, turns), draws.bsdf.of(i - first)) {
+        let note = |sample: &BsdfSample| {
+            if LAYERS {
+                let way = || Way::of_sample(vertex.bsdf, vertex.wo, sample);
+                sorting.follow(self.parts, bounce, [i, *alive], way, || seen_through(vertex.bsdf, sample));
+            }
+        };
+        if let Some((path, next)) = self.scatter(world, path, &vertex, bounce, (steering, turns), draws.bsdf.of(i - first), note) {
             if MEDIA {
                 let here = world.media_toward(at, ray.direction, next.direction, &media[i].here);
                 media[*alive] = MediaState { here, ..media[i] };
@@ -350,8 +362,6 @@ impl PathIntegrator {
             if let Some(cone) = cone {
                 cones[*alive] = world.scattered_cone(cone, at.t, path.pdf);
             }
-            let way = || Way::of_sample(vertex.bsdf, vertex.wo, &sample);
-            sorting.follow(self.parts, bounce, [i, *alive], way, || seen_through(vertex.bsdf, &sample));
             paths[*alive] = path;
             rays[*alive] = next;
             *alive += 1;
@@ -428,7 +438,8 @@ impl PathIntegrator {
         Some(ShadowRay { ray: sample.shadow_ray(start), contribution, light: choice.id, toward: sample.wi })
     }
 
-    /// The path after its next scattering with its next ray and how it was scattered, unless it ends here.
+    /// The path after its next scattering with its next ray, unless it ends here; `note` learns how it is scattered.
+    #[allow(clippy::too_many_arguments)]
     #[inline(always)]
     fn scatter(
         &self,
@@ -438,7 +449,8 @@ impl PathIntegrator {
         bounce: u32,
         (steering, turns): (Option<Steering>, &mut Turns),
         u: [f32; 4],
-    ) -> Option<(Path, Ray, BsdfSample)> {
+        note: impl FnOnce(&BsdfSample),
+    ) -> Option<(Path, Ray)> {
         let steered = match steering {
             None => {
                 let (sample, ray) = vertex.sample(world, u[0], [u[1], u[2]])?;
@@ -469,7 +481,8 @@ impl PathIntegrator {
         }
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
-        Some((Path { throughput, pdf, roulette_scale, from: vertex.receiver(), ..*path }, *ray, *sample))
+        note(sample);
+        Some((Path { throughput, pdf, roulette_scale, from: vertex.receiver(), ..*path }, *ray))
     }
 }
 

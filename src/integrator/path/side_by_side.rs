@@ -107,11 +107,18 @@ impl PathIntegrator {
     }
 
     /// Shades the vertices of a batch that can be shaded side by side, up to [`collect`](Self::collect).
-    pub(super) fn shade_side_by_side(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut SampleBatch, scratch: &mut Scratch) {
+    pub(super) fn shade_side_by_side<const LAYERS: bool>(
+        &self,
+        world: &World,
+        bounce: u32,
+        batch: Range<usize>,
+        out: &mut SampleBatch,
+        scratch: &mut Scratch,
+    ) {
         let smooth = world.scene.features.shading_normals;
         self.find_diffuse(world, batch.clone(), scratch);
         scratch.shaded.lanes.place(smooth);
-        self.settle(world, bounce, batch, out, scratch);
+        self.settle::<LAYERS>(world, bounce, batch, out, scratch);
         let Scratch { shaded: Shaded { lanes, vertex_of, .. }, draws, .. } = scratch;
         if lanes.count() == 0 {
             return;
@@ -192,7 +199,7 @@ impl PathIntegrator {
     }
 
     /// Leaves those that turn out to be elsewhere, and adds other vertices on diffuse surfaces.
-    fn settle(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut SampleBatch, scratch: &mut Scratch) {
+    fn settle<const LAYERS: bool>(&self, world: &World, bounce: u32, batch: Range<usize>, out: &mut SampleBatch, scratch: &mut Scratch) {
         let Scratch { paths, rays, hits, cones, shaded, sorting, .. } = scratch;
         let first = batch.start;
         let smooth = world.scene.features.shading_normals;
@@ -202,8 +209,9 @@ impl PathIntegrator {
                 shaded.lane_of[vertex] = ALONE;
                 continue;
             }
-            let (i, clear) = (first + vertex, sorting.clear_of(first + vertex));
-            if self.notes_surface(bounce, clear)
+            let i = first + vertex;
+            if LAYERS
+                && let Some(clear) = self.notes_surface(bounce, sorting.clear_of(i))
                 && let Some(hit) = &hits[i]
             {
                 let at = shaded.lanes.interaction(lane, hit, rays[i].time, smooth);
@@ -220,13 +228,12 @@ impl PathIntegrator {
             let footprint = || world.footprint(cone.as_ref(), ray, hits[i].as_ref(), at);
             let mut place = None;
             let Bsdf::Lambert(Lambert { albedo }) = *world.scene.bsdf(at, ray.direction, footprint, &mut place) else { continue };
-            let clear = sorting.clear_of(i);
-            if self.notes_surface(bounce, clear) {
+            if let (true, Some(clear)) = (LAYERS, self.notes_surface(bounce, sorting.clear_of(i))) {
                 self.note_surface(world, (bounce, clear, path.slot), (at, hits[i].as_ref()), || albedo, out);
             }
             let light = self.clamped(path.throughput * self.emitted(world, path, ray, at), bounce);
             out.pixels[path.slot as usize].radiance += light;
-            if self.sorts() && !light.is_black() {
+            if LAYERS && self.sorts() && !light.is_black() {
                 self.sort_emitted(world, (sorting, i), at, (path.slot, bounce), light, out);
             }
             let lane = shaded.lanes.push_known(ray, at, path.throughput, path.roulette_scale, albedo);
@@ -237,7 +244,7 @@ impl PathIntegrator {
     /// Takes up what became of the path `i`, of the batch that starts with `first`.
     #[allow(clippy::too_many_arguments)]
     #[inline(always)]
-    pub(super) fn collect(
+    pub(super) fn collect<const LAYERS: bool>(
         &self,
         world: &World,
         bounce: u32,
@@ -274,7 +281,7 @@ impl PathIntegrator {
         if let Some((ray, contribution)) = shadow {
             shadow_rays.push(ray);
             pending.push(Pending { contribution: self.clamped(contribution, bounce + 1), slot: path.slot });
-            if self.sorts() {
+            if LAYERS && self.sorts() {
                 sorting.push_pending(self.parts, bounce, [i, group_of(world.scene, shaded.light_of[lane])], || Way::DIFFUSE);
             }
         }
@@ -285,16 +292,16 @@ impl PathIntegrator {
                 let path = Path { throughput: lanes.throughput(lane), pdf, from: lanes.receiver(lane), ..path };
                 Some((path, Ray { time, ..next_ray }))
             }
-            (Found::Hidden, Some(vertex)) => {
-                self.scatter(world, &path, vertex, bounce, (None, turns), draws.bsdf.of(i - first)).map(|(path, ray, _)| (path, ray))
-            }
+            (Found::Hidden, Some(vertex)) => self.scatter(world, &path, vertex, bounce, (None, turns), draws.bsdf.of(i - first), |_| ()),
             _ => None,
         };
         if let Some((path, ray)) = next {
             if let Some(cone) = cone {
                 cones[*alive] = world.scattered_cone(cone, lanes.t(lane), path.pdf);
             }
-            sorting.follow(self.parts, bounce, [i, *alive], || Way::DIFFUSE, || None);
+            if LAYERS {
+                sorting.follow(self.parts, bounce, [i, *alive], || Way::DIFFUSE, || None);
+            }
             paths[*alive] = path;
             rays[*alive] = ray;
             *alive += 1;

@@ -184,10 +184,10 @@ impl PathIntegrator {
         }
     }
 
-    /// Whether layers of surfaces show a surface that a path meets after so many bounces: the first one, or one behind mirrors and clear glass.
+    /// `clear` if layers of surfaces show a surface that a path meets after so many bounces: the first one, or one behind mirrors and clear glass.
     #[inline]
-    pub(super) fn notes_surface(&self, bounce: u32, clear: Option<Rgb>) -> bool {
-        clear.is_some() || (bounce == 0 && self.needs != SurfaceNeeds::default())
+    pub(super) fn notes_surface(&self, bounce: u32, clear: Option<Rgb>) -> Option<Option<Rgb>> {
+        (clear.is_some() || (bounce == 0 && self.needs != SurfaceNeeds::default())).then_some(clear)
     }
 
     /// What layers of surfaces show of a surface of this albedo that the path with this `slot` meets after so many bounces; mirrors and clear
