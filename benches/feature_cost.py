@@ -26,8 +26,9 @@ NEVER = "unsafe { std::hint::unreachable_unchecked() }"
 
 
 # Not needed to render: parts of the library, and crates of the command line and of the benchmarks.
-UNNEEDED = {"bench", "convert", "bin"}
-UNUSED = ["clap", "clap_complete", "indicatif", "plotters", "rustix", "signal-hook", "tracing-subscriber", "twofloat"]
+UNNEEDED = {"bench", "convert", "bin", "denoise", "farm", "live"}
+UNUSED = ["clap", "clap_complete", "clap_mangen", "httparse", "indicatif", "libloading", "plotters", "rustix", "signal-hook"]
+UNUSED += ["tev_client", "toml", "tracing-subscriber", "twofloat"]
 
 # Renders a scene as the command line does and prints a digest of the picture.
 PROGRAM = """//! Renders SCENE with so many samples, on one thread.
@@ -119,10 +120,11 @@ FEATURES = {
     "media": ("`Features::media`, a constant of `shade_all`", [flag("media")]),
     "anisotropy": ("`Features::anisotropic`, `Features::parameters`", [flag("anisotropic"), flag("parameters")]),
     "layers beside the colour": (
-        "`SurfaceNeeds`, `LayerSet`",
+        "a constant of `shade_all`, `LayerSet`",
         [
             ("src/integrator/path.rs", r"self\.needs != SurfaceNeeds::default\(\)", "false"),
-            ("src/film/tile.rs", r"self\.layers\.needs_surface\(\) &&", "false &&"),
+            ("src/integrator/path.rs", r"self\.sorts\(\)", "false"),
+            ("src/film/tile.rs", r"self\.layers\.beside_color\(\)", "false"),
         ],
     ),
     "variance": ("`FilmTile::wants_groups`", [("src/film/tile.rs", r"!self\.spread\.is_empty\(\)", "false")]),
@@ -147,7 +149,7 @@ def copy_sources(work):
     shutil.rmtree(work / "src", ignore_errors=True)
     shutil.copytree(ROOT / "src", work / "src", ignore=lambda folder, names: UNNEEDED if Path(folder) == ROOT / "src" else set())
     library = work / "src/lib.rs"
-    library.write_text(re.sub(r"pub mod (bench|convert);\n", "", library.read_text()))
+    library.write_text(re.sub(r"pub mod (bench|convert|denoise|farm|live);\n", "", library.read_text()))
     (work / "src/main.rs").write_text(PROGRAM)
     manifest = (ROOT / "Cargo.toml").read_text()
     manifest = re.sub(r"(?ms)^\[(\[bin\]\]|\[test\]\]|\[bench\]\]|dev-dependencies\]|profile[^\n]*\]).*?(?=^\[|\Z)", "", manifest)
