@@ -83,6 +83,17 @@ pub mod slice {
         }
     }
 
+    /// Adds terms to the sums from this index on.
+    #[inline]
+    pub fn add_at<const N: usize>(sums: &mut [f64], first: usize, terms: [f64; N]) {
+        let (high, low) = sums.split_at_mut(sums.len() / 2);
+        for ((high, low), term) in high[first..first + N].iter_mut().zip(&mut low[first..first + N]).zip(terms) {
+            let (sum, error) = two_sum(*high, term);
+            *high = sum;
+            *low += error;
+        }
+    }
+
     /// Adds the sums of other terms.
     pub fn merge(sums: &mut [f64], other: &[f64]) {
         let count = sums.len() / 2;

@@ -2,6 +2,7 @@
 
 use super::sum::{Sums, slice};
 use super::{Average, CoverageCounts, Crop, FilmLayers, LayerInfo, LayerKind, PixelSample, Sample, Source};
+use crate::color::Rgb;
 
 /// How many dropped samples a tile remembers; it counts all of them.
 pub(super) const DROPPED_KEPT: usize = 16;
@@ -135,10 +136,9 @@ impl FilmTile {
                 self.drop_sample(pixel, sample);
                 return false;
             }
-            let parts = parts.iter().flat_map(|part| part.to_array()).map(f64::from);
             let stride = self.layers.part_stride();
             if stride > 0 {
-                add_each(&mut self.parts[pixel * stride..(pixel + 1) * stride], parts);
+                add_parts(&mut self.parts[pixel * stride..(pixel + 1) * stride], parts, 1.0);
             }
         }
         self.color[pixel].add(color.map(f64::from));
@@ -321,14 +321,13 @@ impl FilmTile {
         }
     }
 
-    fn correct(&mut self, pixel: usize, color: [f32; 4], parts: &[crate::color::Rgb], excess: f32) {
+    fn correct(&mut self, pixel: usize, color: [f32; 4], parts: &[Rgb], excess: f32) {
         self.begin_corrections();
         let [r, g, b, a] = color.map(|value| f64::from(excess * value));
         self.corrections[pixel].add([r, g, b, a, f64::from(excess)]);
         let stride = self.layers.part_stride();
         if stride > 0 {
-            let parts = parts.iter().flat_map(|part| part.to_array()).map(|value| f64::from(excess * value));
-            add_each(&mut self.part_corrections[pixel * stride..(pixel + 1) * stride], parts);
+            add_parts(&mut self.part_corrections[pixel * stride..(pixel + 1) * stride], parts, excess);
         }
     }
 
@@ -408,16 +407,11 @@ impl FilmTile {
     }
 }
 
-/// As [`slice::add`], of terms whose number is half that of the sums.
+/// Adds each part times `factor` to its sums. Most parts of a sample are black.
 #[inline]
-fn add_each(sums: &mut [f64], terms: impl Iterator<Item = f64>) {
-    let mut values = [0.0; 48];
-    let half = sums.len() / 2;
-    if half <= values.len() {
-        values.iter_mut().zip(terms).for_each(|(to, from)| *to = from);
-        slice::add(sums, values[..half].iter().copied());
-    } else {
-        slice::add(sums, terms.collect::<Vec<_>>().into_iter());
+fn add_parts(sums: &mut [f64], parts: &[Rgb], factor: f32) {
+    for (k, part) in parts.iter().enumerate().filter(|(_, part)| !part.is_black()) {
+        slice::add_at(sums, 3 * k, part.to_array().map(|value| f64::from(factor * value)));
     }
 }
 
