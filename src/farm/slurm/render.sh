@@ -29,17 +29,17 @@ fi
 
 # Slurm sends SIGUSR1 two minutes before the time limit, SIGTERM where a job that matters more needs the node: the render writes its
 # checkpoint and ends, and the task is queued again.
-stopped=
+signals=0
 child=
-trap 'stopped=1; [ -z "$child" ] || kill -TERM "$child" 2>/dev/null' USR1 TERM
+trap 'signals=$((signals + 1)); [ -z "$child" ] || kill -TERM "$child" 2>/dev/null' USR1 TERM
 
 # The render puts the frame's number in the place of the #.
 name="$folder/shards/${frame:+frame#.}$shard-of-$shards"
 "$program" render "$scene" ${frame:+"--frames=$frame"} "${options[@]}" --shard "$shard/$shards" -o "$name.shard" \
     --checkpoint "$name.checkpoint" --every @EVERY@ --resume --progress plain &
 child=$!
-# A signal ends `wait` before the render has ended.
-while wait "$child"; code=$?; kill -0 "$child" 2>/dev/null; do :; done
+# A signal ends `wait` before the render has ended, or tells of itself and not of the render.
+while seen=$signals; wait "$child"; code=$?; [ "$signals" != "$seen" ]; do :; done
 
 again() {
     echo "$1: queued again"
@@ -48,7 +48,7 @@ again() {
 
 if [ "$code" = 0 ]; then
     rm -f "$part.checkpoint" "$part.failures"
-elif [ -n "$stopped" ]; then
+elif [ "$signals" != 0 ]; then
     # Who cancels a job does not want it back.
     case $(squeue --noheader --jobs="$task" --format=%T 2>/dev/null) in
         RUNNING | PREEMPTED | TIMEOUT) again "stopped" ;;
