@@ -377,3 +377,21 @@ fn uv_are_those_of_surfaces_without_textures_too() {
         assert!(paths.layer(LayerKind::Uv).unwrap().data.iter().any(|value| *value > 0.0), "{name}");
     }
 }
+
+/// A group called as that of the lights in no group is theirs: no file could hold two layers of one name.
+#[test]
+fn a_group_called_default_is_that_of_the_rest() {
+    let image = full_of(&json!({
+        "film": { "width": 16, "height": 16 },
+        "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
+        "sampler": { "spp": 2 },
+        "shapes": [{ "type": "sphere", "radius": 1 }],
+        "lights": [
+            { "type": "point", "position": [2, 2, 2], "intensity": [5, 5, 5], "group": "default" },
+            { "type": "environment", "radiance": [0.1, 0.1, 0.1] }
+        ]
+    }));
+    let groups = groups(&image);
+    assert_eq!(groups.iter().map(|layer| layer.group.as_deref()).collect::<Vec<_>>(), [Some("default")]);
+    assert_sum(&image, &groups, "the only group");
+}

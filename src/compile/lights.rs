@@ -23,7 +23,7 @@ pub struct LightTable {
 impl LightTable {
     /// The id of a group's name; a new one if it is new.
     pub fn group(&mut self, files: &Files, path: &str, name: Option<&str>) -> Result<Option<LightGroupId>> {
-        let Some(name) = name else { return Ok(None) };
+        let Some(name) = name.filter(|name| *name != LightGroups::OF_THE_REST) else { return Ok(None) };
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             let message = format!("\"{name}\" must be made of letters, digits and underscores: it becomes the name of a layer");
             return Err(files.error(&format!("{path}.group"), message));

@@ -14,6 +14,9 @@ pub struct LightGroups {
 const NO_GROUP: u32 = u32::MAX;
 
 impl LightGroups {
+    /// What the lights in no group are called together; a group of this name is theirs.
+    pub const OF_THE_REST: &str = "default";
+
     /// Groups by [`LightGroupId`], and the group of each light.
     pub fn new(names: Vec<String>, of_light: impl ExactSizeIterator<Item = Option<LightGroupId>>) -> Self {
         let of_light = if names.is_empty() { Vec::new() } else { of_light.map(|id| id.map_or(NO_GROUP, |id| id.0)).collect() };

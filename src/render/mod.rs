@@ -32,6 +32,7 @@ use crate::film::{
     Crop, DroppedSample, Film, FilmTile, Filter, Image, LayerKind, LayerSet, PartNeeds, PixelSample, SampleBatch, SurfaceSample,
 };
 use crate::integrator::{self, CameraSample, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
+use crate::light::LightGroups;
 use crate::math::rows::BATCH;
 use crate::math::{Ray, Vec2};
 use crate::sampling::{Numbers, Requests, Sampler};
@@ -98,9 +99,6 @@ struct Job<'a> {
     size: [u32; 2],
 }
 
-/// The group of lights that are in none.
-const DEFAULT_GROUP: &str = "default";
-
 /// The picture of a film, in these layers.
 fn picture(film: &Film, layers: LayerSet, overscan: u32) -> Image {
     let mut image = film.resolve();
@@ -110,7 +108,7 @@ fn picture(film: &Film, layers: LayerSet, overscan: u32) -> Image {
 
 /// Names of the groups of lights that a picture of the scene may tell apart.
 fn light_groups(scene: &Scene) -> Vec<String> {
-    scene.light_groups.names().iter().map(String::as_str).chain([DEFAULT_GROUP]).map(str::to_owned).collect()
+    scene.light_groups.names().iter().map(String::as_str).chain([LightGroups::OF_THE_REST]).map(str::to_owned).collect()
 }
 
 impl<'a> Job<'a> {
