@@ -14,13 +14,29 @@ case "${1:-render}" in
     *) echo "setup.sh: unknown command '$1' (render, test, install or package)" >&2; exit 2 ;;
 esac
 
+# Whether bindgen finds the library that it loads (libclang.so, libclang-14.so.1 or the like; libclang-cpp.so is another library).
+has_libclang() {
+    local file
+    for file in ${LIBCLANG_PATH:+"$LIBCLANG_PATH"/libclang*.so*} /usr/lib/llvm-*/lib/libclang*.so* /usr/lib/*-linux-gnu*/libclang*.so* /usr/local/lib/libclang*.so*; do
+        case "${file##*/}" in
+            libclang-cpp*) ;;
+            *) if [ -e "$file" ]; then return 0; fi ;;
+        esac
+    done
+    return 1
+}
+
 as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 
 # What the build needs, as Debian packages: a C compiler, libclang for bindgen, Embree's headers.
+case "${1:-render}" in
+    render) echo "Steradian: installs what is missing, builds (about 3 minutes with 2 cores), renders scenes/gallery.json (about 40 s) to $PWD/gallery.png and gallery.exr" >&2 ;;
+    test) echo "Steradian: installs what is missing, builds and runs all tests (about 10 minutes with 2 cores)" >&2 ;;
+esac
 packages=()
 command -v cc >/dev/null || packages+=(build-essential)
 command -v curl >/dev/null || packages+=(curl ca-certificates)
-ls /usr/lib/llvm-*/lib/libclang*.so* >/dev/null 2>&1 || packages+=(libclang-dev)
+has_libclang || packages+=(libclang-dev)
 [ -e /usr/include/embree3/rtcore.h ] || [ -e /usr/include/embree4/rtcore.h ] || packages+=(libembree-dev)
 if [ ${#packages[@]} -gt 0 ]; then
     echo "Installing: ${packages[*]}" >&2
@@ -37,7 +53,11 @@ if ! command -v cargo >/dev/null; then
 fi
 
 case "${1:-render}" in
-    render) cargo run --release --locked -- render scenes/gallery.json -o gallery.exr -o gallery.png ;;
+    render)
+        cargo build --release --locked
+        target/release/steradian render scenes/gallery.json -o gallery.exr -o gallery.png
+        echo "The picture: $PWD/gallery.png (for a screen) and $PWD/gallery.exr (linear, for compositing)" >&2
+        ;;
     test) cargo test --locked ;;
     install) cargo install --locked --path . ;;
     package)
