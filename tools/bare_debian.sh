@@ -40,7 +40,7 @@ trap clean_up EXIT
 trap 'exit 130' INT TERM
 
 if [ ! -e "$root/etc/debian_version" ]; then
-    mirror=$(sed -nE 's/^(URIs:|deb( \[[^]]*\])?) +(https?:[^ ]+).*/\3/p' /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2>/dev/null | head -1)
+    mirror=$(sed -nE 's/^(URIs:|deb( \[[^]]*\])?) +(https?:[^ ]+).*/\3/p' /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2>/dev/null | head -1 || true)
     mkdir -p "$root"
     debootstrap --variant=minbase "$suite" "$root" "${mirror:-http://deb.debian.org/debian}" >"$root/debootstrap.log" 2>&1 \
         || { tail -5 "$root/debootstrap.log" >&2; unavailable "debootstrap failed"; }
