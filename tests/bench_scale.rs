@@ -4,6 +4,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use crate::util::folder::Folder;
+use crate::util::program::{Running, Signal};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_steradian");
 
@@ -104,12 +105,12 @@ fn every_sweep_has_its_costs_and_their_slopes() {
 
 #[test]
 fn an_interrupted_run_reports_what_there_is() {
-    let mut child =
-        command(&["spp", "resolution", "--size", "64x64", "--repeat", "500", "--json", "-q"]).stdout(Stdio::piped()).spawn().unwrap();
+    let mut command = command(&["spp", "resolution", "--size", "64x64", "--repeat", "500", "--json", "-q"]);
+    let mut child = Running::start(command.stdout(Stdio::piped()));
     std::thread::sleep(Duration::from_secs(2));
-    let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(status.success() && child.try_wait().unwrap().is_none());
-    let run = child.wait_with_output().unwrap();
+    child.signal(Signal::INT);
+    assert!(child.try_wait().unwrap().is_none());
+    let run = child.output();
     assert_eq!(run.status.code(), Some(130));
     let report: Value = serde_json::from_slice(&run.stdout).unwrap();
     assert!(report["interrupted"] == true && report["sweeps"].as_array().unwrap().len() == 2, "{report}");

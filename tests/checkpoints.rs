@@ -1,7 +1,7 @@
 //! Renders that go on where they were stopped: the same bits as in one run, and files that are refused by name.
 
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -12,6 +12,7 @@ use steradian::import::SceneFingerprint;
 use steradian::math::Rng;
 use steradian::render::{self, Checkpoints, Header, Overrides, Progress, RenderState, Shard, Silent, StateFile};
 
+use crate::util::program::{Running, Signal};
 use crate::util::render::{Prepared, prepare};
 
 /// Glass, metal, lights of two groups and none, motion, a lens and a filter with negative lobes.
@@ -303,10 +304,6 @@ fn assert_code(output: &Output, code: i32, part: &str) {
     assert!(output.status.code() == Some(code) && text.contains(part), "{:?}: {text}", output.status);
 }
 
-fn signal(child: &Child, name: &str) {
-    assert!(Command::new("kill").arg(name).arg(child.id().to_string()).status().unwrap().success());
-}
-
 /// Waits until there is a file that is newer than `than`.
 fn wait_for(path: &Path, than: Option<std::time::SystemTime>) {
     let start = Instant::now();
@@ -344,7 +341,7 @@ fn killed_renders_go_on_and_leave_no_trace() {
     assert_code(&run(folder, &SLOW.replace("a.state", "b.state").replace("a.exr", "b.exr")), 0, "");
     let mut rng = Rng::new(11);
     for kill in 0..3 {
-        let mut child = command(folder, &format!("{SLOW} --every 0.05 --resume")).spawn().unwrap();
+        let mut child = Running::start(&mut command(folder, &format!("{SLOW} --every 0.05 --resume")));
         let there = std::fs::metadata(folder.join("a.state")).ok().and_then(|m| m.modified().ok());
         wait_for(&folder.join("a.state"), there);
         std::thread::sleep(Duration::from_millis(rng.below(60) as u64));
@@ -370,17 +367,17 @@ fn signals_are_answered() {
     let endless = "render scene.json --checkpoint a.state --resume --every 1000 --spp 2000000000 -q -o a.exr";
     let done = || Header::read(&folder.join("a.state")).unwrap().done;
     let mut before = 0;
-    for (name, code) in [("-TERM", 143), ("-INT", 130)] {
+    for (signal, code) in [(Signal::TERM, 143), (Signal::INT, 130)] {
         let there = std::fs::metadata(folder.join("a.state")).ok().and_then(|m| m.modified().ok());
-        let child = command(folder, endless).spawn().unwrap();
+        let child = Running::start(&mut command(folder, endless));
         // From its lock file on, the program listens to SIGUSR1; the signal is repeated, for it may come before that.
         wait_for(&folder.join(".a.state.lock"), None);
-        signal(&child, "-USR1");
+        child.signal(Signal::USR1);
         wait_for(&folder.join("a.state"), there);
         let asked = done();
         assert!(asked > before);
-        signal(&child, name);
-        assert_code(&child.wait_with_output().unwrap(), code, "");
+        child.signal(signal);
+        assert_code(&child.output(), code, "");
         before = done();
         assert!(before >= asked && folder.join("a.exr").exists());
     }

@@ -1,12 +1,12 @@
 //! The program as its users and scripts see it.
 
 use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use serde_json::Value;
 use steradian::output;
 
-use crate::util::program::{run, steradian, told};
+use crate::util::program::{Running, Signal, run, steradian, told};
 
 #[test]
 fn faults_have_their_exit_codes_and_one_line() {
@@ -99,15 +99,15 @@ fn a_replay_prints_the_sample_and_writes_nothing() {
 /// The first signal finishes the samples under way, writes the picture and gives the signal's code.
 #[test]
 fn interrupted_renders_write_their_picture() {
-    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+    for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
         let folder = tempfile::tempdir().unwrap();
         let mut command = steradian(folder.path(), "render scene.json --spp 2000000000 --time-limit 60 -o a.exr --threads 1");
-        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = Running::start(command.stderr(Stdio::piped()));
         // With the first line of progress the program listens.
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let first = lines.next().unwrap().unwrap();
         assert!(first.starts_with("Progress: "), "{first}");
-        assert!(Command::new("kill").arg(signal).arg(child.id().to_string()).status().unwrap().success());
+        child.signal(signal);
         let rest: Vec<String> = lines.map_while(Result::ok).collect();
         assert_eq!(child.wait().unwrap().code(), Some(code), "{rest:?}");
         assert!(rest.iter().any(|line| line == "wrote a.exr"), "{rest:?}");
@@ -121,11 +121,11 @@ fn a_file_that_cannot_be_written_does_not_take_the_others_along() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("gone")).unwrap();
     let line = "render scene.json --spp 2000000000 --time-limit 60 -o gone/a.exr -o b.png -o c.exr --threads 1";
-    let mut child = steradian(folder.path(), line).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = Running::start(steradian(folder.path(), line).stderr(Stdio::piped()));
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
     assert!(lines.next().unwrap().unwrap().starts_with("Progress: "));
     std::fs::remove_dir_all(folder.path().join("gone")).unwrap();
-    assert!(Command::new("kill").arg("-INT").arg(child.id().to_string()).status().unwrap().success());
+    child.signal(Signal::INT);
     let rest: Vec<String> = lines.map_while(Result::ok).collect();
     assert_eq!(child.wait().unwrap().code(), Some(5), "{rest:?}");
     assert!(rest.iter().any(|line| line.starts_with("error: cannot write gone/a.exr")), "{rest:?}");

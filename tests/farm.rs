@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use crate::util::program::{Running, Signal};
+
 /// A render that does as the file `behaviour` says: `sleep`, or an exit code; 0 writes the shard that `-o` names.
 const RENDER: &str = r#"#!/bin/bash
 echo "$@" >>calls
@@ -149,18 +151,18 @@ fn a_failure_is_tried_again_if_that_may_help_and_not_for_ever() {
 
 #[test]
 fn a_task_that_must_leave_keeps_its_state_and_comes_back() {
-    for (state, signal, back) in [("RUNNING", "-USR1", true), ("PREEMPTED", "-TERM", true), ("CANCELLED", "-TERM", false)] {
+    for (state, signal, back) in [("RUNNING", Signal::USR1, true), ("PREEMPTED", Signal::TERM, true), ("CANCELLED", Signal::TERM, false)] {
         let farm = Farm::new();
         farm.job("--shards 2");
         farm.write("behaviour", "sleep");
         farm.write("state", state);
-        let mut task = farm.task("").stdout(std::process::Stdio::null()).spawn().unwrap();
+        let mut task = Running::start(farm.task("").stdout(std::process::Stdio::null()));
         let start = Instant::now();
         while !farm.path().join("sleeping").exists() {
             assert!(start.elapsed() < Duration::from_secs(60));
             std::thread::sleep(Duration::from_millis(20));
         }
-        assert!(Command::new("kill").arg(signal).arg(task.id().to_string()).status().unwrap().success());
+        task.signal(signal);
         assert_eq!(task.wait().unwrap().code(), Some(143));
         let calls = farm.calls();
         assert!(calls.contains("terminated") && calls.contains("scontrol requeue 9_2") == back, "{state}: {calls}");

@@ -7,6 +7,8 @@ use std::process::{Command, Output, Stdio};
 use serde_json::{Value, json};
 use steradian::output;
 
+use crate::util::program::{Running, Signal};
+
 /// A sphere that crosses the picture in four frames.
 fn scene() -> Value {
     json!({
@@ -119,10 +121,10 @@ fn progress_is_that_of_the_sequence_and_complete_only_at_its_end() {
 fn an_interrupt_ends_the_sequence() {
     let folder = folder_with(&[("a.json", scene())]);
     let mut command = steradian(folder.path(), "render a.json --frames 1-100000 -o a.exr --spp 4000 --progress afanasy");
-    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = Running::start(command.stderr(Stdio::piped()));
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
     assert!(lines.any(|line| line == "FRAME: 2"));
-    assert!(Command::new("kill").arg("-INT").arg(child.id().to_string()).status().unwrap().success());
+    child.signal(Signal::INT);
     let rest: Vec<String> = lines.collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
     assert!(!rest.iter().any(|line| line.contains("SUCCESS")));

@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::process::{Child, ChildStderr, Command, Stdio};
+use std::process::{ChildStderr, Command, Stdio};
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -12,6 +12,8 @@ use serde_json::{Value, json};
 use steradian::film::{Crop, Image, Layer, LayerKind};
 use steradian::live::{Fan, Live, Options, Preview, PreviewOptions, Snapshot, Statistics};
 use steradian::render::Progress;
+
+use crate::util::program::{Running, Signal};
 
 /// An answer: status, head, body.
 struct Answer {
@@ -233,13 +235,13 @@ fn pictures_are_made_only_for_those_who_look() {
 }
 
 /// A program that serves its page.
-struct Running {
-    child: Child,
+struct Watched {
+    child: Running,
     stderr: BufReader<ChildStderr>,
     address: SocketAddr,
 }
 
-impl Running {
+impl Watched {
     fn start(folder: &std::path::Path, arguments: &str) -> Self {
         let scene = r#"{
             "film": { "width": 24, "height": 16 },
@@ -250,16 +252,12 @@ impl Running {
         std::fs::write(folder.join("ball.json"), scene).unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
         command.current_dir(folder).args(["render", "ball.json", "-o", "a.exr", "--float"]).args(arguments.split_whitespace());
-        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = Running::start(command.stderr(Stdio::piped()));
         let mut stderr = BufReader::new(child.stderr.take().unwrap());
         let mut line = String::new();
         stderr.read_line(&mut line).unwrap();
         let url = line.strip_prefix("preview: ").unwrap_or_else(|| panic!("{line}")).trim();
         Self { child, stderr, address: address(url) }
-    }
-
-    fn signal(&self, signal: &str) {
-        assert!(Command::new("kill").arg(signal).arg(self.child.id().to_string()).status().unwrap().success());
     }
 
     fn end(mut self) -> Option<i32> {
@@ -272,7 +270,7 @@ impl Running {
 #[test]
 fn a_render_is_watched_until_it_is_interrupted() {
     let folder = tempfile::tempdir().unwrap();
-    let running = Running::start(folder.path(), "--preview 0 --spp 2000000000 --time-limit 100 --threads 1");
+    let running = Watched::start(folder.path(), "--preview 0 --spp 2000000000 --time-limit 100 --threads 1");
     let mut client = Client::new(running.address);
     let (mut have, start) = (0, Instant::now());
     while have < 3 {
@@ -289,14 +287,14 @@ fn a_render_is_watched_until_it_is_interrupted() {
         have = version;
         thread::sleep(Duration::from_millis(20));
     }
-    running.signal("-INT");
+    running.child.signal(Signal::INT);
     assert_eq!(running.end(), Some(130));
 }
 
 #[test]
 fn a_held_page_shows_the_picture_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
-    let running = Running::start(folder.path(), "--preview 0 --preview-hold --spp 4");
+    let running = Watched::start(folder.path(), "--preview 0 --preview-hold --spp 4");
     let mut client = Client::new(running.address);
     let start = Instant::now();
     while client.get("/state").json()["finished"] == false {
@@ -310,7 +308,7 @@ fn a_held_page_shows_the_picture_of_the_file() {
         let told: Vec<f32> = values.iter().map(|value| value.to_string().parse().unwrap()).collect();
         assert_eq!(told, image.pixel(LayerKind::Color, x, y).unwrap());
     }
-    running.signal("-INT");
+    running.child.signal(Signal::INT);
     assert_eq!(running.end(), Some(0));
 }
 

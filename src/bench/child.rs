@@ -8,6 +8,8 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Signal, kill_process_group};
+
 /// Characters of a failed command's messages that are shown.
 const TAIL: usize = 400;
 
@@ -61,7 +63,7 @@ fn wait(child: &mut Child, stop: &AtomicBool) -> std::io::Result<Option<ExitStat
         }
         if stop.load(Ordering::Relaxed) {
             // It may have ended in between, which is as well.
-            let _ = Command::new("sh").args(["-c", &format!("kill -TERM -{}", child.id())]).stderr(Stdio::null()).status();
+            let _ = kill_process_group(Pid::from_child(child), Signal::TERM);
             child.wait()?;
             return Ok(None);
         }
@@ -88,5 +90,31 @@ mod tests {
         let ended = ended.unwrap().unwrap();
         assert_eq!((ended.status.code(), ended.said.as_str(), ended.complained.as_str()), (Some(3), "a text", "no"));
         assert_eq!(tail(&"ab ".repeat(1000)).chars().count(), TAIL);
+    }
+
+    #[test]
+    fn a_stopped_command_ends_with_all_it_started() {
+        let folder = tempfile::tempdir().unwrap();
+        let (started, grandchild) = (folder.path().join("started"), folder.path().join("pid"));
+        let stop = AtomicBool::new(false);
+        let ended = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let start = Instant::now();
+                while !started.exists() && start.elapsed() < Duration::from_secs(60) {
+                    std::thread::sleep(PERIOD);
+                }
+                stop.store(true, Ordering::Relaxed);
+            });
+            run(Command::new("sh").args(["-c", "sleep 300 & echo $! >pid; touch started; wait"]).current_dir(&folder), None, &stop)
+        });
+        assert!(ended.unwrap().is_none() && started.exists());
+        // Whoever takes over an orphan reaps it later; until then it is a zombie.
+        let pid = std::fs::read_to_string(grandchild).unwrap();
+        let is_running = || std::fs::read_to_string(format!("/proc/{}/stat", pid.trim())).is_ok_and(|stat| !stat.contains(") Z "));
+        let start = Instant::now();
+        while is_running() {
+            assert!(start.elapsed() < Duration::from_secs(60));
+            std::thread::sleep(PERIOD);
+        }
     }
 }
