@@ -1,7 +1,7 @@
 #!/bin/bash
 # Faults of disks and files while a render keeps its state: each is to be told clearly and to leave earlier files as they were.
 #
-#   benches/faults.sh [BINARY]     as root, for a full disk and one that cannot be written are made of small file systems in memory
+#   tools/faults.sh [BINARY]     as root, for a full disk and one that cannot be written are made of small file systems in memory
 set -u
 binary=$(realpath "${1:-target/release/steradian}")
 scenes=$(realpath "$(dirname "$0")/../scenes")

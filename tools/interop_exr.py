@@ -2,7 +2,7 @@
 """Reads the EXR files of every profile with the programs that they are made for, and prints a table.
 
     pip install openimageio bpy        # bpy is Blender as a module; what is not installed is left out
-    benches/interop_exr.py [--program target/release/steradian] [--scene scenes/shapes.json] [--out FOLDER]
+    tools/interop_exr.py [--program target/release/steradian] [--scene scenes/shapes.json] [--out FOLDER]
 
 Checks: order and types of channels in OpenImageIO (alpha is channel 3, depth channel 4), equal pixels in all profiles (idiff), passes and
 Cryptomatte in Blender, and `steradian check-exr`. Ends with 1 if anything is not as it should be.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills renders that write checkpoints at random moments, and looks at what is left.
 
-    benches/kill_test.py [--kills 200] [--every 0.2] [--seed 1] [--binary target/release/steradian] [--scene scenes/cornell.json] [OPTION...]
+    tools/kill_test.py [--kills 200] [--every 0.2] [--seed 1] [--binary target/release/steradian] [--scene scenes/cornell.json] [OPTION...]
 
 A render is started, killed with SIGKILL after a random time, and started again with --resume, until it ends; then comes the next one, until
 there were so many kills. Reported are

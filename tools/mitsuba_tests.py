@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Mitsuba 3's own render tests, rendered by Steradian and judged as Mitsuba judges itself.
 
-usage: PYTHON benches/mitsuba_tests.py [FOLDER] [--steradian target/release/steradian] [--spp N] [--only NAME,...]
+usage: PYTHON tools/mitsuba_tests.py FOLDER [--steradian target/release/steradian] [--spp N] [--only NAME,...]
 
-FOLDER (default ../shared/scenes/extra/mitsuba3-refs/tests/scenes) has NAME/test_*.xml and NAME/refs/test_*_ref_rgb.exr with
+FOLDER is `tests/scenes` of https://github.com/mitsuba-renderer/mitsuba-data (the data of Mitsuba's render tests): it has NAME/test_*.xml and NAME/refs/test_*_ref_rgb.exr with
 ..._ref_rgb_var.exr, the variance of one sample. PYTHON has numpy and mitsuba. For each pixel and channel in XYZ a z-test against the
 reference (variance at least 1e-4), at the level 0.01 corrected by Šidák for the number of pixels; a picture passes if 99.75 % do.
 """
@@ -32,7 +32,7 @@ def samples(scene):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder", nargs="?", default="../shared/scenes/extra/mitsuba3-refs/tests/scenes")
+    parser.add_argument("folder")
     parser.add_argument("--steradian", default="target/release/steradian")
     parser.add_argument("--spp", type=int)
     parser.add_argument("--only", default="")

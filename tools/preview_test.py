@@ -2,7 +2,7 @@
 """The page of --preview in a real browser: starts renders, opens their pages in headless Chromium and checks what the canvas shows, the exposure, layers,
 zoom, pixel values, numbers, several tabs, and what is left when the program has ended.
 
-    benches/preview_test.py [STERADIAN] [--pictures FOLDER]
+    tools/preview_test.py [STERADIAN] [--pictures FOLDER]
 
 Needs chromium and chromedriver (Debian: chromium, chromium-driver); without them it says so and ends with exit code 77."""
 

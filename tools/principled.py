@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares the principled material with Mitsuba 3's, lobe by lobe and at the corners of its parameters; see docs/materials.md.
 
-usage: PYTHON benches/principled.py   where PYTHON has the packages mitsuba and numpy
+usage: PYTHON tools/principled.py   where PYTHON has the packages mitsuba and numpy
 Both are evaluated for the same 1200 pairs of directions. Prints, for every set of parameters, the ratio of the sums of all values, ours over
 Mitsuba's, and the largest and the median difference of a value, relative to the larger of the two.
 """
@@ -44,7 +44,7 @@ def pairs():
 
 def ours(materials, wo, wi):
     request = {"materials": materials, "pairs": np.stack([wo, wi], 1).tolist()}
-    command = os.environ.get("EVAL", "cargo run -q --release --locked --example eval_materials").split()
+    command = os.environ.get("EVAL", "cargo xtask eval_materials").split()
     out = subprocess.run(command, input=json.dumps(request), stdout=subprocess.PIPE, text=True, check=True).stdout
     return np.array(json.loads(out))[..., :3]
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Scenes of other renderers, each rendered by Steradian and by Mitsuba 3, and by Steradian from its other formats: ratios of means.
 
-usage: PYTHON benches/real_scenes.py [FOLDER] [--spp 64] [--scale 0.25] [--steradian target/release/steradian] [--only NAME,...] [--plain]
+usage: PYTHON tools/real_scenes.py FOLDER [--spp 64] [--scale 0.25] [--steradian target/release/steradian] [--only NAME,...] [--plain]
 
-FOLDER (default ../shared/scenes/real) has a folder for each scene with scene_mitsuba3.xml, scene-v4.pbrt or *.gltf, and perhaps
+FOLDER has a folder for each scene, such as those of Benedikt Bitterli's "Rendering Resources" (https://benedikt-bitterli.me/resources), with scene_mitsuba3.xml, scene-v4.pbrt or *.gltf, and perhaps
 reference/*.exr. With --plain both get the XML with smooth metals in place of rough ones and diffuse surfaces in place of plastics, whose models
 differ: what remains must agree. PYTHON has numpy and mitsuba (DRJIT_LIBLLVM_PATH set if need be). Prints a table in Markdown: for each scene the ratio of the
 means (red, green, blue) to Mitsuba's picture of the same XML, with its standard error from blocks, and the time of each.
@@ -81,7 +81,7 @@ def text(test, reference):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder", nargs="?", default="../shared/scenes/real")
+    parser.add_argument("folder")
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--scale", type=float, default=0.25)
     parser.add_argument("--steradian", default="target/release/steradian")

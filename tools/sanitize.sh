@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Undefined behaviour, wrong addresses, leaks and data races, by Rust's nightly toolchain (with the components miri and rust-src).
 #
-#   tests/sanitize.sh miri       what needs no Embree, interpreted by Miri
-#   tests/sanitize.sh address    renders and checks through Embree under AddressSanitizer and LeakSanitizer
-#   tests/sanitize.sh thread     the same under ThreadSanitizer, with a standard library built for it
-#   tests/sanitize.sh            all three
+#   tools/sanitize.sh miri       what needs no Embree, interpreted by Miri
+#   tools/sanitize.sh address    renders and checks through Embree under AddressSanitizer and LeakSanitizer
+#   tools/sanitize.sh thread     the same under ThreadSanitizer, with a standard library built for it
+#   tools/sanitize.sh            all three
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -41,7 +41,7 @@ address() {
 
 thread() {
     RUSTFLAGS="-Zsanitizer=thread" cargo +nightly build -Zbuild-std --target $target --target-dir target/sanitize-thread --bin steradian
-    TSAN_OPTIONS=suppressions=$PWD/tests/tsan.supp renders thread
+    TSAN_OPTIONS=suppressions=$PWD/tools/tsan.supp renders thread
 }
 
 case "${1:-all}" in

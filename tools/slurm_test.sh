@@ -2,14 +2,14 @@
 # A picture split over a real Slurm cluster of two nodes on this machine, one of which is lost in the middle, is bit for bit the picture of
 # one run.
 #
-#   benches/slurm_test.sh [PROGRAM]     PROGRAM: target/release/steradian unless given
+#   tools/slurm_test.sh [PROGRAM]     PROGRAM: target/release/steradian unless given
 #
 # SCENE (scenes/cornell.json), SIZE (256x256), SPP (512), SHARDS (4) and FRAMES (none) change what is rendered: a shard has to take some seconds. Needs
 # root, Debian's munge and slurm-wlm, and python3; ends with 77 where one of them is missing. Everything happens in a temporary folder, and
 # nothing is left running.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-. benches/slurm_cluster.sh
+. tools/slurm_cluster.sh
 
 program=$(realpath "${1:-target/release/steradian}")
 scene=$(realpath "${SCENE:-scenes/cornell.json}")
