@@ -1,7 +1,12 @@
-//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name.
+//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name. On docs.rs, which has neither Embree nor
+//! libclang, checked-in bindings serve. Also finds out which tests can run here: those that cannot are reported as ignored.
 
 use std::env;
 use std::path::{Path, PathBuf};
+
+#[allow(dead_code)]
+#[path = "src/denoise/search.rs"]
+mod oidn;
 
 /// Major versions this crate is written for, the one it is measured with first. Debian 12 has 3, Debian 13 has 4.
 const EMBREE_VERSIONS: [u32; 2] = [3, 4];
@@ -9,8 +14,12 @@ const EMBREE_VERSIONS: [u32; 2] = [3, 4];
 fn main() {
     println!("cargo::rerun-if-changed=ffi");
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-env-changed=EMBREE_DIR");
-    if let Err(message) = build() {
+    for variable in ["DOCS_RS", "EMBREE_DIR"] {
+        println!("cargo::rerun-if-env-changed={variable}");
+    }
+    look_for_needs_of_tests();
+    let built = if env::var_os("DOCS_RS").is_some() { use_checked_in_bindings() } else { build() };
+    if let Err(message) = built {
         println!("cargo::error={message}");
     }
 }
@@ -41,6 +50,47 @@ fn build() -> Result<(), String> {
     Ok(())
 }
 
+/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3.
+fn use_checked_in_bindings() -> Result<(), String> {
+    let file = "ffi/embree_docs.rs";
+    std::fs::copy(file, bindings_file()?).map(drop).map_err(|error| format!("cannot copy {file}: {error}"))
+}
+
+fn bindings_file() -> Result<PathBuf, String> {
+    Ok(PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?).join("embree.rs"))
+}
+
+/// Sets `cfg(oidn)` and `cfg(exr_tools)`, without which tests that need Open Image Denoise, or the programs of OpenEXR and OpenImageIO, are
+/// ignored. With the environment variables STERADIAN_REQUIRE_OIDN=1 and STERADIAN_REQUIRE_EXR_TOOLS=1 they run in any case, and fail if what they need
+/// is missing. Run `touch build.rs` after it is installed.
+fn look_for_needs_of_tests() {
+    let environment = oidn::Environment::of_process();
+    let has_programs =
+        || ["exrheader", "oiiotool", "idiff"].iter().all(|program| environment.path.iter().any(|folder| folder.join(program).is_file()));
+    set_if("oidn", "STERADIAN_REQUIRE_OIDN", || has_oidn(&environment));
+    set_if("exr_tools", "STERADIAN_REQUIRE_EXR_TOOLS", has_programs);
+}
+
+fn set_if(cfg: &str, variable: &str, condition: impl FnOnce() -> bool) {
+    println!("cargo::rustc-check-cfg=cfg({cfg})");
+    println!("cargo::rerun-if-env-changed={variable}");
+    if env::var_os(variable).is_some_and(|value| value == "1") || condition() {
+        println!("cargo::rustc-cfg={cfg}");
+    }
+}
+
+/// Whether the library is where the program looks for it: it is not loaded here.
+fn has_oidn(environment: &oidn::Environment) -> bool {
+    println!("cargo::rerun-if-env-changed={}", oidn::VARIABLE);
+    if let Some(named) = environment.variable.as_ref().map(Path::new) {
+        return named.is_file() || oidn::inside(named).is_some();
+    }
+    let loader: Vec<PathBuf> = env::split_paths(&env::var_os("LD_LIBRARY_PATH").unwrap_or_default()).collect();
+    let system = ["/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/local/lib", "/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu"];
+    let system = loader.into_iter().chain(system.map(PathBuf::from)).any(|folder| folder.join(oidn::FILE_NAME).is_file());
+    system || environment.site_packages().iter().any(|folder| oidn::inside(folder).is_some())
+}
+
 /// The first prefix with Embree's headers, and the major version found there.
 fn find_embree(prefixes: &[PathBuf]) -> Option<(&Path, u32)> {
     let has = |prefix: &Path, version: u32| prefix.join(format!("include/embree{version}/rtcore.h")).is_file();
@@ -69,7 +119,7 @@ fn bind(arguments: &[&str]) -> Result<(), String> {
         Ok(Err(error)) => return Err(format!("Embree's headers cannot be read ({})", one_line(&error))),
         Ok(Ok(bindings)) => bindings,
     };
-    let out = PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?).join("embree.rs");
+    let out = bindings_file()?;
     bindings.write_to_file(&out).map_err(|error| format!("cannot write {}: {error}", out.display()))
 }
 

@@ -1,18 +1,15 @@
 //! Rays per second of every accelerator, and of two other crates, on a lumpy mesh of 70,000 triangles and on scans where they are at hand. The
 //! answers are compared before anything is timed. One thread.
 
-#[path = "common/mod.rs"]
-mod common;
-
 use std::hint::black_box;
 use std::time::Duration;
 
-use common::models::{Model, hare, scans};
-use common::others::{BvhCrate, ObvhsCrate, Other};
-use common::rays::{RaySet, ray_sets};
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use steradian::accel::{self, AccelKind, Accelerator};
+use steradian_benches::models::{Model, hare, scans};
+use steradian_benches::others::{BvhCrate, ObvhsCrate, Other};
+use steradian_benches::rays::{RaySet, ray_sets};
 
 /// Pixels along each side of the picture that the rays are of.
 const RESOLUTION: usize = 128;

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Embree through the shim against bare loops in C over the same recorded rays and mesh: both programs in turn, medians over the rounds.
 # usage: benches/bare_embree.sh [ROUNDS] [RESOLUTION] [PASSES]     (default 5 512 10; quick: 1 128 2)
-# CC, CFLAGS (default -O3) and STERADIAN_SCANS (the folder of bunny.ply and dragon.ply) are its variables.
+# CC, CFLAGS (default -O3) and STERADIAN_SCANS (the folder of bunny.ply and dragon_res2.ply, default scenes/scans) are its variables.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 rounds=${1:-5} resolution=${2:-512} passes=${3:-10}
 aside=$(mktemp -d)
 trap 'rm -rf "$aside"' EXIT
-shim=$(cargo bench --locked --bench shim --no-run 2>&1 | tee /dev/stderr | sed -n 's/.*Executable.*(\(.*\))$/\1/p')
+shim=$(cargo bench --locked --package steradian-benches --bench shim --no-run 2>&1 | tee /dev/stderr | sed -n 's/.*Executable.*(\(.*\))$/\1/p')
 # shellcheck disable=SC2086
 ${CC:-cc} ${CFLAGS:--O3} -std=gnu11 -Wall -Wextra -o "$aside/bare" benches/bare_embree/main.c -lembree3
 "$shim" dump "$aside" "$resolution"

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""What features cost scenes that do not use them: instructions of the program as it is against those of one without the feature.
+"""What the code of features costs a scene that does not use them: instructions of the program as it is against those of one without the feature.
 
-    benches/feature_cost.py [--only media,textures] [--scenes FOLDER] [--json FILE] [--work FOLDER] [--check]
+    benches/feature_cost.py [--only media,textures] [--json FILE] [--work FOLDER] [--check]
 
 The sources are copied to a work folder and the feature is taken out there: every place that decides whether a scene uses it is told that no scene
 does, so that the compiler removes what follows. A place that is no longer found ends the run: the list below then needs care. Program and
 variants are built alike (optimised, incrementally, so without LTO). Instructions are those of callgrind, one thread, 64 x 64 pixels, 8 samples
-less those with 2, so that starting, reading and building are not among them. Needs valgrind. An hour or so; each variant takes a build.
+less those with 2, so that starting, reading and building are not among them. The scene is benches/scenes/cornell.xml: triangles, diffuse surfaces, one rough
+metal, one lamp. Needs valgrind and `cargo xtask bench_scenes`. An hour or so; each variant takes a build.
 """
 
 import argparse
@@ -148,11 +149,14 @@ def copy_sources(work):
             (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, work / name)
     shutil.rmtree(work / "src", ignore_errors=True)
     shutil.copytree(ROOT / "src", work / "src", ignore=lambda folder, names: UNNEEDED if Path(folder) == ROOT / "src" else set())
+    # The build script includes this file.
+    (work / "src/denoise").mkdir()
+    shutil.copy(ROOT / "src/denoise/search.rs", work / "src/denoise/search.rs")
     library = work / "src/lib.rs"
     library.write_text(re.sub(r"pub mod (bench|convert|denoise|farm|live);\n", "", library.read_text()))
     (work / "src/main.rs").write_text(PROGRAM)
     manifest = (ROOT / "Cargo.toml").read_text()
-    manifest = re.sub(r"(?ms)^\[(\[bin\]\]|\[test\]\]|\[bench\]\]|dev-dependencies\]|profile[^\n]*\]).*?(?=^\[|\Z)", "", manifest)
+    manifest = re.sub(r"(?ms)^\[(\[bin\]\]|\[test\]\]|workspace\]|dev-dependencies\]|profile[^\n]*\]).*?(?=^\[|\Z)", "", manifest)
     manifest = re.sub(rf"(?m)^({'|'.join(UNUSED)}) = .*\n", "", manifest)
     if not (work / "Cargo.toml").exists() or (work / "Cargo.toml").read_text() != manifest:
         (work / "Cargo.toml").write_text(manifest)
@@ -208,7 +212,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=Path, default=Path(os.environ.get("TMPDIR", "/tmp")) / "steradian-feature-cost")
     parser.add_argument("--only", type=lambda text: text.split(","), help="features, by comma")
-    parser.add_argument("--scenes", type=Path, default=ROOT / "benches/scenes", help="folder of cornell.json")
     parser.add_argument("--json", type=Path, help="figures as JSON")
     parser.add_argument("--check", action="store_true", help="only take out every feature and have the compiler check what is left")
     arguments = parser.parse_args()
@@ -219,19 +222,23 @@ def main():
     work = arguments.work
     work.mkdir(parents=True, exist_ok=True)
     used_somewhere = {feature for used in USED.values() for feature in used}
-    scenes = {name: (arguments.scenes / f"{name}.json").resolve() for name in USED}
+    scenes = {name: ROOT / f"benches/scenes/{name}.xml" for name in USED}
     if arguments.check:
         copy_sources(work)
         for feature in FEATURES:
             take_out(work, feature)
         checked = run(["cargo", "check", "--target-dir", work / "check"], cwd=work)
         sys.exit(checked.stderr[-6000:] if checked.returncode else 0)
+    if not (ROOT / "benches/scenes/meshes/floor.ply").exists():
+        sys.exit("feature_cost.py: the meshes of benches/scenes are missing: cargo xtask bench_scenes")
+    if not shutil.which("valgrind"):
+        sys.exit("feature_cost.py: valgrind is missing (Debian: apt-get install valgrind)")
 
     copy_sources(work)
     program = build(work)
     whole = {name: measure(program, scene) for name, scene in scenes.items()}
     figures = {"whole program": {name: count for name, (count, _) in whole.items()}}
-    print("| feature | what decides | " + " | ".join(f"{name}: cost of having it" for name in scenes) + " |\n|---|---|" + "---|" * len(scenes), flush=True)
+    print("| feature | what decides | " + " | ".join(f"{name}: cost of the unused code" for name in scenes) + " |\n|---|---|" + "---|" * len(scenes), flush=True)
     again = [f"{100 * (whole[name][0] / measure(program, scene)[0] - 1):+.2f} %" for name, scene in scenes.items()]
     print("| (the same program again) | | " + " | ".join(again) + " |", flush=True)
     for feature in names:

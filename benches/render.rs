@@ -28,7 +28,7 @@ fn mean_and_different(a: &Image, b: &Image) -> (f64, usize) {
 
 fn renders(criterion: &mut Criterion) {
     for name in ["cornell", "knot", "gallery"] {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("json");
+        let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes")).join(name).with_extension("json");
         let desc = import::load_scene(&file).expect("loads");
         let overrides = Overrides { size: Some(SIZE), spp: Some(SPP), default_outputs: vec!["unused.png".into()], ..Overrides::default() };
         let settings = Settings::new(&desc, &overrides).expect("valid");

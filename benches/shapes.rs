@@ -2,19 +2,16 @@
 //! Answers are compared before anything is timed. One thread. At the end a table of surfaces of revolution by the number of their segments
 //! and the kind of ray, beside a sphere.
 
-#[path = "common/mod.rs"]
-mod common;
-
 use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use common::models::tessellated_sphere;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use steradian::accel::{self, AccelKind, Accelerator};
 use steradian::geometry::{Analytic, Disk, Frustum, Geometry, Hit, Placed, Profile, Quad, Revolution, Shape, Sphere};
 use steradian::id::{PrimId, ShapeId};
 use steradian::math::{DVec3, Ray, Rng, Transform, Vec3};
+use steradian_benches::models::tessellated_sphere;
 
 const RAYS: usize = 16_384;
 

@@ -3,9 +3,6 @@
 //! `shim dump FOLDER RESOLUTION` writes a file for each model; `shim trace FILE PASSES` prints `set query ns_per_ray hits checksum` a line, timed
 //! as in C: the sum over blocks of rays of the smallest time of all passes, which other load on the machine hardly touches.
 
-#[path = "common/mod.rs"]
-mod common;
-
 use std::error::Error;
 use std::hint::black_box;
 use std::io::{self, Read, Write};
@@ -13,12 +10,12 @@ use std::path::Path;
 use std::time::Instant;
 use std::{env, fs};
 
-use common::models;
-use common::rays::ray_sets;
 use steradian::accel::{Accelerator, Coherence, EmbreeAccel};
 use steradian::geometry::{Geometry, Hit, Mesh, Shape};
 use steradian::id::ShapeId;
 use steradian::math::{Ray, Vec3};
+use steradian_benches::models;
+use steradian_benches::rays::ray_sets;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).filter(|a| a != "--bench").collect();

@@ -1,4 +1,4 @@
-//! What the page's server answers, and to whom; the page itself is tried by `benches/preview_test.py`.
+//! What the page's server answers, and to whom; the page itself is tried by `tools/preview_test.py`.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};

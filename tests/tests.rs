@@ -45,7 +45,7 @@ mod flaws_of_light;
 mod flaws_of_textures;
 /// Sequences of frames from the command line.
 mod frames;
-/// What fuzzing found, read again.
+/// Files that once broke readers, and the corpus of the fuzz targets.
 mod fuzz_corpus;
 /// The scenes that come with the program.
 mod gallery;

@@ -1,5 +1,4 @@
-//! What the benchmarks share: models, rays, and what others' accelerators answer. Each benchmark uses a part.
-#![allow(dead_code)]
+//! What the benchmarks share: models, rays, and the accelerators of other crates.
 
 pub mod models;
 pub mod others;

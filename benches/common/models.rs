@@ -87,18 +87,19 @@ pub fn hills(cells: u32) -> Model {
     Model::new("hills", positions, triangles)
 }
 
-/// The scans `bunny.ply` and `dragon.ply`, where `STERADIAN_SCANS` (default `../shared/scenes/common/meshes`) has them.
+/// The scans `bunny.ply` and `dragon_res2.ply`, those of them that are in the folder `STERADIAN_SCANS` (default: `scenes/scans`, which
+/// `scenes/get_scans.sh` fills).
 pub fn scans() -> Vec<Model> {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let folder = std::env::var_os("STERADIAN_SCANS").map_or_else(|| root.join("../shared/scenes/common/meshes"), PathBuf::from);
-    let scan = |name: &'static str| {
-        let data = read_ply(&folder.join(name).with_extension("ply")).ok();
+    let default = || concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/scans").into();
+    let folder: PathBuf = std::env::var_os("STERADIAN_SCANS").map_or_else(default, PathBuf::from);
+    let scan = |name: &'static str, file: &str| {
+        let data = read_ply(&folder.join(file)).ok();
         if data.is_none() {
-            eprintln!("{name}.ply is not in {}: left out", folder.display());
+            eprintln!("{file} is not in {}: left out", folder.display());
         }
         data.map(|data| Model::new(name, data.positions, data.triangles))
     };
-    ["bunny", "dragon"].into_iter().filter_map(scan).collect()
+    [("bunny", "bunny.ply"), ("dragon", "dragon_res2.ply")].into_iter().filter_map(|(name, file)| scan(name, file)).collect()
 }
 
 /// A sphere of 8 `cells`² triangles, radius 1, around the origin, without a floor.

@@ -1,4 +1,4 @@
-//! Rays with exact hits from arithmetic of 256 bits, as `examples/make_vectors.rs` writes them.
+//! Rays with exact hits from arithmetic of 256 bits, as `xtask/src/make_vectors.rs` writes them.
 
 use crate::math::{DVec3, Ray, Vec3};
 

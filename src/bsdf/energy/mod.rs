@@ -8,7 +8,7 @@
 //! ```
 //!
 //! times the colour that several reflections leave gives back exactly what is missing, and is reciprocal (Kulla and Conty, "Revisiting
-//! Physically Based Shading at Imageworks"). `E` comes from tables that `cargo run --release --example bake_energy` computes.
+//! Physically Based Shading at Imageworks"). `E` comes from tables that `cargo xtask bake_energy` computes.
 //!
 //! Directions are unit, local, on the upper side.
 

@@ -23,7 +23,7 @@ checks! {
     "R1" r1_agreement "independent renders of one scene agree":
         "a room of 32 x 32 pixels, mean and variance by renders with other seeds: each pixel by Welch's test, 99.75 % of them within Šidák's level of \
          1 %, p-values uniform, the whole picture (Mitsuba 3, test_renders; against our own renders: Mitsuba's are compared by \
-         examples/compare_refs)";
+         xtask/src/compare_refs)";
     "R3" r3_power "power of that test":
         "the same room with a lamp 1 % brighter, one material 1 % whiter, paths one segment longer: each must be rejected";
     "R5" r5_convergence "error against samples":
