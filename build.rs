@@ -1,12 +1,8 @@
 //! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name. On docs.rs, which has neither Embree nor
-//! libclang, checked-in bindings serve. Also finds out which tests can run here: those that cannot are reported as ignored.
+//! libclang, checked-in bindings serve.
 
 use std::env;
 use std::path::{Path, PathBuf};
-
-#[allow(dead_code)]
-#[path = "src/denoise/search.rs"]
-mod oidn;
 
 /// Major versions this crate is written for, the one it is measured with first. Debian 12 has 3, Debian 13 has 4.
 const EMBREE_VERSIONS: [u32; 2] = [3, 4];
@@ -17,7 +13,6 @@ fn main() {
     for variable in ["DOCS_RS", "EMBREE_DIR"] {
         println!("cargo::rerun-if-env-changed={variable}");
     }
-    look_for_needs_of_tests();
     let built = if env::var_os("DOCS_RS").is_some() { use_checked_in_bindings() } else { build() };
     if let Err(message) = built {
         println!("cargo::error={message}");
@@ -58,37 +53,6 @@ fn use_checked_in_bindings() -> Result<(), String> {
 
 fn bindings_file() -> Result<PathBuf, String> {
     Ok(PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?).join("embree.rs"))
-}
-
-/// Sets `cfg(oidn)` and `cfg(exr_tools)`, without which tests that need Open Image Denoise, or the programs of OpenEXR and OpenImageIO, are
-/// ignored. With the environment variables STERADIAN_REQUIRE_OIDN=1 and STERADIAN_REQUIRE_EXR_TOOLS=1 they run in any case, and fail if what they need
-/// is missing. Run `touch build.rs` after it is installed.
-fn look_for_needs_of_tests() {
-    let environment = oidn::Environment::of_process();
-    let has_programs =
-        || ["exrheader", "oiiotool", "idiff"].iter().all(|program| environment.path.iter().any(|folder| folder.join(program).is_file()));
-    set_if("oidn", "STERADIAN_REQUIRE_OIDN", || has_oidn(&environment));
-    set_if("exr_tools", "STERADIAN_REQUIRE_EXR_TOOLS", has_programs);
-}
-
-fn set_if(cfg: &str, variable: &str, condition: impl FnOnce() -> bool) {
-    println!("cargo::rustc-check-cfg=cfg({cfg})");
-    println!("cargo::rerun-if-env-changed={variable}");
-    if env::var_os(variable).is_some_and(|value| value == "1") || condition() {
-        println!("cargo::rustc-cfg={cfg}");
-    }
-}
-
-/// Whether the library is where the program looks for it: it is not loaded here.
-fn has_oidn(environment: &oidn::Environment) -> bool {
-    println!("cargo::rerun-if-env-changed={}", oidn::VARIABLE);
-    if let Some(named) = environment.variable.as_ref().map(Path::new) {
-        return named.is_file() || oidn::inside(named).is_some();
-    }
-    let loader: Vec<PathBuf> = env::split_paths(&env::var_os("LD_LIBRARY_PATH").unwrap_or_default()).collect();
-    let system = ["/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/local/lib", "/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu"];
-    let system = loader.into_iter().chain(system.map(PathBuf::from)).any(|folder| folder.join(oidn::FILE_NAME).is_file());
-    system || environment.site_packages().iter().any(|folder| oidn::inside(folder).is_some())
 }
 
 /// The first prefix with Embree's headers, and the major version found there.

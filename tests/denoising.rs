@@ -1,4 +1,4 @@
-//! Denoising. Tests that need Intel Open Image Denoise are ignored where the build script finds none; see `build.rs`.
+//! Denoising. Tests that need Intel Open Image Denoise are ignored unless asked for: `cargo test -- --include-ignored`.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -106,7 +106,7 @@ fn an_absent_library_or_another_file_is_named() {
 }
 
 #[test]
-#[cfg_attr(not(oidn), ignore = "needs Open Image Denoise: pip install pyoidn")]
+#[ignore = "needs Open Image Denoise: pip install pyoidn"]
 fn constant_pictures_stay_and_faulty_pixels_are_made_from_their_neighbours() {
     let denoiser = denoiser(2);
     for level in [0.01f32, 1.0, 300.0] {
@@ -146,7 +146,7 @@ fn constant_pictures_stay_and_faulty_pixels_are_made_from_their_neighbours() {
 
 /// Every number of threads gives the same bits.
 #[test]
-#[cfg_attr(not(oidn), ignore = "needs Open Image Denoise: pip install pyoidn")]
+#[ignore = "needs Open Image Denoise: pip install pyoidn"]
 fn the_result_does_not_depend_on_threads() {
     let (one, two) = (denoiser(1), denoiser(2));
     let noisy = render(&room(2, &["feature_albedo", "feature_normal"]));
@@ -157,7 +157,7 @@ fn the_result_does_not_depend_on_threads() {
 }
 
 #[test]
-#[cfg_attr(not(oidn), ignore = "needs Open Image Denoise: pip install pyoidn")]
+#[ignore = "needs Open Image Denoise: pip install pyoidn"]
 fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
     let denoiser = denoiser(2);
     let kinds: Vec<&str> =
@@ -233,7 +233,7 @@ fn mirror(spp: u32, strategy: &str) -> Value {
 }
 
 #[test]
-#[cfg_attr(not(oidn), ignore = "needs Open Image Denoise: pip install pyoidn")]
+#[ignore = "needs Open Image Denoise: pip install pyoidn"]
 fn features_keep_what_a_mirror_shows_sharp() {
     let denoiser = denoiser(2);
     let (reference, noisy) = (render(&mirror(512, "mis")), render(&mirror(16, "bsdf")));
@@ -271,7 +271,7 @@ fn read(path: &Path) -> FlatImage {
 }
 
 #[test]
-#[cfg_attr(not(oidn), ignore = "needs Open Image Denoise: pip install pyoidn")]
+#[ignore = "needs Open Image Denoise: pip install pyoidn"]
 fn everything_else_of_a_file_stays() {
     let denoiser = denoiser(2);
     let folder = tempfile::tempdir().unwrap();
@@ -303,7 +303,7 @@ fn everything_else_of_a_file_stays() {
 }
 
 #[test]
-#[cfg_attr(not(oidn), ignore = "needs Open Image Denoise: pip install pyoidn")]
+#[ignore = "needs Open Image Denoise: pip install pyoidn"]
 fn the_program_denoises_renders_and_files() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();

@@ -7,8 +7,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 limit=$((10 * 1000 * 1000)) # crates.io: 10 MB
 
-# Builds the unpacked crate in target/package. A work tree with changes is packaged as it is.
-cargo package --locked --allow-dirty --package steradian
+# A work tree with changes is packaged as it is.
+cargo package --locked --allow-dirty --no-verify --package steradian
 crate=$(ls -t target/package/steradian-*.crate | head -1)
 size=$(stat -c %s "$crate")
 echo "$(basename "$crate"): $(tar -tzf "$crate" | wc -l) files, $size bytes"
@@ -17,6 +17,12 @@ for file in LICENSE-MIT LICENSE-APACHE README.md build.rs ffi/embree_docs.rs; do
     tar -tzf "$crate" | grep -q "/$file\$" || { echo "check_package.sh: $file is missing in the crate" >&2; exit 1; }
 done
 
+# It compiles from its own files.
+unpacked=$(mktemp -d)
+trap 'rm -rf "$unpacked"' EXIT
+tar -xzf "$crate" -C "$unpacked" --strip-components=1
+target=${CARGO_TARGET_DIR:-$PWD/target}
+(cd "$unpacked" && cargo check --locked --target-dir "$target")
+
 # Neither is looked for on docs.rs, so that wrong paths do no harm.
-DOCS_RS=1 EMBREE_DIR=/nonexistent LIBCLANG_PATH=/nonexistent CC=/nonexistent \
-    cargo doc --locked --no-deps --lib --package steradian --target-dir target/docs_rs
+(cd "$unpacked" && DOCS_RS=1 EMBREE_DIR=/nonexistent LIBCLANG_PATH=/nonexistent CC=/nonexistent cargo doc --locked --no-deps --lib --target-dir "$target")

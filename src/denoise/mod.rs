@@ -11,12 +11,11 @@ mod layers;
 mod locate;
 mod oidn;
 mod prepared;
-mod search;
 mod split;
 
 pub use file::{FileOptions, denoise_file};
 pub use image::{FEATURE_LAYERS, add_features, denoise_image};
-pub use search::{Environment, FILE_NAME, VARIABLE};
+pub use locate::{Environment, FILE_NAME, VARIABLE};
 
 use std::path::Path;
 
