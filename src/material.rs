@@ -5,7 +5,7 @@ mod inputs;
 pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, RangedInput, ScalarInput};
 
 use crate::bsdf::{
-    BeckmannBsdf, Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Plastic, Principled,
+    BeckmannBsdf, Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
     PrincipledParameters, ThinDielectric,
 };
 use crate::color::Rgb;
@@ -88,6 +88,8 @@ pub enum Varying {
         specular: ColorInput,
         /// Exponent.
         exponent: RangedInput,
+        /// Whether the highlight is Phong's own lobe in place of GGX.
+        cosine: bool,
     },
     /// Cook and Torrance's model.
     CookTorrance {
@@ -234,13 +236,18 @@ impl Varying {
                     Facets::Beckmann => Bsdf::Beckmann(BeckmannBsdf::Dielectric(Dielectric::beckmann(*ior, alpha))),
                 }
             }
-            Self::Phong { diffuse, specular, exponent } => {
+            Self::Phong { diffuse, specular, exponent, cosine } => {
                 // What exceeds 1 together is taken from the diffuse part.
                 let specular = specular.at(textures, footprint);
                 let diffuse = diffuse.at(textures, footprint);
                 let left = Rgb::WHITE - specular;
                 let diffuse = Rgb::new(diffuse.r.min(left.r), diffuse.g.min(left.g), diffuse.b.min(left.b));
-                Bsdf::Glossy(Glossy::phong(diffuse, specular, exponent.at(textures, footprint)))
+                let exponent = exponent.at(textures, footprint);
+                if *cosine {
+                    Bsdf::Phong(Phong::new(diffuse, specular, exponent))
+                } else {
+                    Bsdf::Glossy(Glossy::phong(diffuse, specular, exponent))
+                }
             }
             Self::CookTorrance { albedo, d, s, m, f0 } => {
                 // What exceeds 1 together is taken from the diffuse part.
@@ -280,7 +287,7 @@ impl Varying {
         match self {
             Self::Diffuse { albedo, roughness } => found.extend(albedo.texture().into_iter().chain(roughness.texture())),
             Self::DiffuseTransmission { reflectance: a, transmittance: b } => found.extend(a.texture().into_iter().chain(b.texture())),
-            Self::Phong { diffuse, specular, exponent } => {
+            Self::Phong { diffuse, specular, exponent, .. } => {
                 found.extend([diffuse.texture(), specular.texture(), exponent.texture()].into_iter().flatten());
             }
             Self::CookTorrance { albedo, d, s, m, f0 } => {

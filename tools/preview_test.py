@@ -142,6 +142,23 @@ def encoded(value, stops):
     return math.floor(min(max(value, 0), 1) * 255 + 0.5)
 
 
+def agx(light, stops):
+    """The byte that AgX makes of a colour's red, green and blue after so many stops, by the definition in src/output/view.rs."""
+    shares = [0.2119946, 0.3921508, 0.3958546]
+    light = [half(v) * 2**stops for v in light]
+
+    def curve(v):
+        x = min(max((math.log2(max(v, 1e-38) / 0.18) + 10) / 16.5, 0), 1)
+        pivot = 10 / 16.5
+        reach, power = (pivot, 3) if x < pivot else (1 - pivot, 3.25)
+        return 0.5 + 2 * (x - pivot) / (1 + ((4 * reach) ** power - 1) * (abs(x - pivot) / reach) ** power) ** (1 / power)
+
+    mixed = sum(s * v for s, v in zip(shares, light))
+    codes = [curve(0.8 * v + 0.2 * mixed) for v in light]
+    mixed = sum(s * v for s, v in zip(shares, codes))
+    return [math.floor(min(max((v - 0.2 * mixed) / 0.8, 0), 1) * 255 + 0.5) for v in codes]
+
+
 SHOWN = """
     // The canvas where the middle of this pixel of the picture is.
     const [x, y] = arguments, at = [0, 1].map(k => Math.floor(pan[k] + ([x, y][k] + 0.5) * zoom));
@@ -171,7 +188,11 @@ def version(browser):
 
 
 def check_colors(browser):
-    """Exposure: the sky is the same in every picture."""
+    """Views and exposure: the sky is the same in every picture."""
+    for stops in [0, 2, -3]:
+        browser.run("setExposure(arguments[0])", stops)
+        assert same(shown(browser, 2, 3), [*agx(SKY, stops), 255], 1), (stops, shown(browser, 2, 3), agx(SKY, stops))
+    choose(browser, "tone", "srgb")
     for stops in [0, 1, -2.5, 4]:
         browser.run("setExposure(arguments[0])", stops)
         expected = [encoded(v, stops) for v in SKY]

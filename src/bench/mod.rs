@@ -20,7 +20,7 @@ pub use measure::{AccelReport, BuildReport, KindReport, Mode, Options, RateRepor
 pub use mesh::{bumpy_sphere, head};
 pub use naive::{MatrixLinear, NaiveBvh, NaiveKdTree, NaiveOctree};
 pub use record::{RayKind, RaySet, record};
-pub use reports::{Comparison, ReportsOptions, ReportsReport, Row, bench_reports};
+pub use reports::{Comparison, FrameTiming, ReportsOptions, ReportsReport, Row, bench_reports};
 pub use scaling::{Fit, ScalingPoint, ScalingReport, bench_scaling, fit, fitted_slope};
 
 /// Is told what a benchmark is doing, and may end it.

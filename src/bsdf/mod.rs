@@ -15,6 +15,7 @@ mod glossy;
 mod lambert;
 mod microfacet;
 mod mirror;
+mod phong;
 mod plastic;
 mod principled;
 mod split;
@@ -33,6 +34,7 @@ pub use glossy::Glossy;
 pub use lambert::{DiffuseDirection, Lambert};
 pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA};
 pub use mirror::Mirror;
+pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{Principled, PrincipledParameters};
 pub use thin::{DiffuseTransmission, ThinDielectric};
@@ -87,6 +89,8 @@ pub enum Bsdf {
     ThinDielectric(ThinDielectric),
     /// Diffuse beside a highlight.
     Glossy(Glossy),
+    /// Diffuse beside Phong's cosine lobe.
+    Phong(Phong),
     /// A diffuse base under a smooth or rough dielectric coat.
     Plastic(Plastic),
     /// Disney's model.
@@ -109,6 +113,7 @@ macro_rules! each {
             Bsdf::Mirror($bsdf) => $body,
             Bsdf::ThinDielectric($bsdf) => $body,
             Bsdf::Glossy($bsdf) => $body,
+            Bsdf::Phong($bsdf) => $body,
             Bsdf::Conductor($bsdf) => $body,
             Bsdf::Dielectric($bsdf) => $body,
             Bsdf::Plastic($bsdf) => $body,
@@ -158,7 +163,8 @@ impl Bsdf {
             | Self::DiffuseTransmission(_)
             | Self::Mirror(_)
             | Self::ThinDielectric(_)
-            | Self::Glossy(_) => false,
+            | Self::Glossy(_)
+            | Self::Phong(_) => false,
             Self::Conductor(bsdf) => bsdf.is_anisotropic(),
             Self::Dielectric(bsdf) => bsdf.is_anisotropic(),
             Self::Plastic(bsdf) => bsdf.is_anisotropic(),
@@ -181,6 +187,7 @@ impl Bsdf {
             | Self::Conductor(_)
             | Self::Plastic(_)
             | Self::Glossy(_)
+            | Self::Phong(_)
             | Self::Coated(_) => false,
         }
     }

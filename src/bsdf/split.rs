@@ -13,6 +13,7 @@ impl Bsdf {
             Self::Lambert(_) | Self::Eon(_) | Self::DiffuseTransmission(_) => Rgb::WHITE,
             Self::Mirror(_) | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Beckmann(_) => Rgb::BLACK,
             Self::Glossy(bsdf) => bsdf.diffuse_fraction(wo, wi),
+            Self::Phong(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Plastic(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Principled(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Coated(bsdf) => bsdf.diffuse_fraction(wo, wi),

@@ -112,6 +112,13 @@ impl Camera {
         }
     }
 
+    /// Takes the lens away: everything is in focus.
+    pub fn remove_lens(&mut self) {
+        if let Projection::Perspective { lens, .. } = &mut self.projection {
+            *lens = None;
+        }
+    }
+
     /// The framing; without a meaning for environment cameras.
     pub fn framing(&self) -> Framing {
         self.framing

@@ -7,7 +7,7 @@ use super::Files;
 use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, DistributionDesc, MaterialDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc};
+use crate::desc::{ColorDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc};
 use crate::error::Result;
 use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
@@ -187,13 +187,13 @@ impl Compiler<'_> {
                 if glass.is_medium() { Material::Varying(Box::new(boundary)) } else { boundary.into() }
             }
             MaterialDesc::ThinDielectric { ior } => Varying::ThinDielectric { ior: self.ior(path, ior, 0.1)? }.into(),
-            MaterialDesc::Phong { diffuse, specular, exponent } => {
+            MaterialDesc::Phong { diffuse, specular, exponent, lobe } => {
                 let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
                     let is_sound = exponent >= 0.0 && exponent.is_finite();
                     if is_sound { Ok(()) } else { Err(files.error(path, format!("must be finite and not negative, not {exponent}"))) }
                 })?;
                 let [diffuse, specular] = self.sum_to_one(path, ("diffuse", diffuse), ("specular", specular))?;
-                Varying::Phong { diffuse, specular, exponent }.into()
+                Varying::Phong { diffuse, specular, exponent, cosine: *lobe == PhongLobeDesc::Cosine }.into()
             }
             MaterialDesc::CookTorrance { albedo, d, s, m, f0 } => {
                 let albedo = self.color(&format!("{path}.albedo"), albedo)?;

@@ -25,7 +25,7 @@ impl Builder {
                 let value = self.files.within(&path, f64::from(*value), 0.0, 1.0)? as f32;
                 (value < 1.0).then(|| textures.push(Texture::Constant(Rgb::splat(value))))
             }
-            OpacityDesc::Texture { texture: name } => {
+            OpacityDesc::Texture { texture: name, threshold } => {
                 let place = format!("{path}.texture");
                 let named = textures.find_by_uv(&self.files, &place, name, TextureUse::Data)?;
                 let alpha = match textures.get(named) {
@@ -41,7 +41,10 @@ impl Builder {
                         .files
                         .error(&place, format!("the texture \"{name}\" reaches from {min} to {max}, opacity from 0 to 1")));
                 }
-                Some(id)
+                let Some(threshold) = threshold else { return Ok(Some(id)) };
+                let threshold = self.files.within(&format!("{path}.threshold"), f64::from(*threshold), 0.0, 1.0)? as f32;
+                let step = Texture::Step(Box::new(textures.get(id).clone()), threshold);
+                Some(textures.push(step))
             }
         })
     }

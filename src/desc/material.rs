@@ -76,6 +76,18 @@ pub enum RoughnessDesc {
     },
 }
 
+/// The highlight of Phong's model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PhongLobeDesc {
+    /// A GGX lobe of the same width, alpha = sqrt(2 / (exponent + 2)): like a rough surface, longer at an angle.
+    #[default]
+    Ggx,
+    /// Phong's own, `(exponent + 2) / (2 pi) cos^exponent` of the angle to the mirror direction, normalised (the modified Phong model of Lafortune
+    /// and Willems): at an angle a part of it is lost below the horizon. An exponent of 1e6 counts at most.
+    Cosine,
+}
+
 /// How the normals of microfacets are distributed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -196,7 +208,7 @@ pub enum MaterialDesc {
     },
     /// Disney's principled model, for most surfaces.
     Principled(Box<PrincipledDesc>),
-    /// Phong's model, by its parameters: the highlight becomes a GGX lobe of the same width, alpha = sqrt(2 / (exponent + 2)).
+    /// Phong's model, by its parameters: a diffuse part beside a highlight.
     Phong {
         /// Diffuse reflectance, kd. Default: 0.5.
         #[serde(default = "half")]
@@ -207,6 +219,9 @@ pub enum MaterialDesc {
         /// Exponent of the highlight, at least 0. Default: 32.
         #[serde(default = "phong_exponent")]
         exponent: RangedDesc,
+        /// What the highlight is. Default: ggx.
+        #[serde(default, skip_serializing_if = "is_ggx_lobe")]
+        lobe: PhongLobeDesc,
     },
     /// Cook and Torrance's model, by its parameters: `d albedo / pi + s D F G / (4 |cos wo| |cos wi|)` with the GGX distribution of alpha `m`,
     /// Smith's `G` and Schlick's `F`.
@@ -357,6 +372,10 @@ fn half_scalar() -> ScalarDesc {
 
 fn black() -> ColorDesc {
     ColorDesc::Grey(0.0)
+}
+
+fn is_ggx_lobe(lobe: &PhongLobeDesc) -> bool {
+    *lobe == PhongLobeDesc::Ggx
 }
 
 fn phong_exponent() -> RangedDesc {

@@ -18,10 +18,10 @@ mod transform;
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
 pub use material::{
-    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc,
-    ScalarDesc,
+    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, RangedDesc,
+    RoughnessDesc, ScalarDesc,
 };
-pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerDesc, OutputDesc, PixelTypeDesc};
+pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerDesc, OutputDesc, PixelTypeDesc, ViewDesc};
 pub use principled::PrincipledDesc;
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
 pub use shape::{

@@ -47,9 +47,12 @@ pub struct OutputDesc {
     /// EXR: the attribute `framesPerSecond`. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames_per_second: Option<f64>,
-    /// PNG: exposure in stops before the sRGB curve. Default: 0.
+    /// PNG: exposure in stops before the view. Default: 0.
     #[serde(default)]
     pub exposure: f32,
+    /// PNG: how light becomes colours of the display. Default: agx; srgb with the integrators that show data in place of light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view: Option<ViewDesc>,
 }
 
 impl OutputDesc {
@@ -70,6 +73,7 @@ impl OutputDesc {
             comments: None,
             frames_per_second: None,
             exposure: 0.0,
+            view: None,
         }
     }
 }
@@ -166,6 +170,29 @@ pub enum PixelTypeDesc {
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
+}
+
+/// How scene-linear light becomes the 8-bit colours of an sRGB display.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ViewDesc {
+    /// AgX (Troy Sobotka): 16.5 stops, bright colours tend to white; middle grey, 0.18, is code value 0.5.
+    #[default]
+    Agx,
+    /// The filmic curve of Uncharted 2 (John Hable), each channel by itself; 5.6 and more is white.
+    Filmic,
+    /// The sRGB curve alone: 1 and more is white. For data and exact values.
+    Srgb,
+}
+
+impl ViewDesc {
+    /// Every view with its name.
+    pub const ALL: [(Self, &'static str); 3] = [(Self::Agx, "agx"), (Self::Filmic, "filmic"), (Self::Srgb, "srgb")];
+
+    /// The view's name.
+    pub fn name(self) -> &'static str {
+        Self::ALL[self as usize].1
+    }
 }
 
 /// Whom an EXR file is made for.

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::ViewDesc;
+
 /// The picture's size and its pixel filter.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -198,6 +200,16 @@ pub enum IntegratorDesc {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         distance: Option<f32>,
     },
+}
+
+impl IntegratorDesc {
+    /// The view that suits what is shown: light, or data that a tone curve would falsify.
+    pub fn view(&self) -> ViewDesc {
+        match self {
+            Self::Path { .. } | Self::Whitted { .. } => ViewDesc::default(),
+            _ => ViewDesc::Srgb,
+        }
+    }
 }
 
 impl Default for IntegratorDesc {

@@ -352,7 +352,7 @@ fn quad_edge_v() -> [f64; 3] {
 
 /// How much of a surface is there, from 0 to 1.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged, deny_unknown_fields, expecting = "expected an opacity: a number, or { \"texture\": name }")]
+#[serde(untagged, deny_unknown_fields, expecting = "expected an opacity: a number, or { \"texture\": name, \"threshold\": number }")]
 pub enum OpacityDesc {
     /// The same everywhere.
     Number(f32),
@@ -360,6 +360,10 @@ pub enum OpacityDesc {
     Texture {
         /// The texture's name. An image with alpha that names no `channel` stands for its alpha, other textures for their luminance.
         texture: String,
+        /// Where the texture is below this number within `[0, 1]` there is a hole, elsewhere all of the surface: an alpha test, of the texture as
+        /// filtered. Default: none, the texture is the fraction of light that the surface stops.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        threshold: Option<f32>,
     },
 }
 

@@ -9,6 +9,7 @@ mod exr;
 mod matrices;
 mod png;
 mod role;
+mod view;
 
 pub use self::exr::{check_output, read_exr, read_settings, write_exr};
 pub use atomic::{check_creatable, check_writable, write_atomically};
@@ -29,7 +30,7 @@ use crate::film::{Identities, Image};
 pub enum Format {
     /// OpenEXR: linear, with layers and metadata.
     Exr,
-    /// PNG: 8 bits, sRGB-encoded.
+    /// PNG: 8 bits, through a view.
     Png,
 }
 
@@ -95,6 +96,6 @@ pub fn write(output: &OutputDesc, image: &Image, info: &RenderInfo) -> Result<()
     let path = Path::new(&output.file);
     match Format::from_path(path)? {
         Format::Exr => write_exr(path, image, output, info),
-        Format::Png => write_png(path, image, output.exposure),
+        Format::Png => write_png(path, image, output.exposure, output.view.unwrap_or_default()),
     }
 }

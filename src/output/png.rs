@@ -1,23 +1,25 @@
-//! PNG: 8 bits a channel, sRGB-encoded.
+//! PNG: 8 bits a channel, for an sRGB display.
 
 use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
+use super::view::code_values;
 use super::write_atomically;
-use crate::color::srgb_from_linear;
+use crate::color::Rgb;
+use crate::desc::ViewDesc;
 use crate::error::Result;
 use crate::film::{Crop, Image, LayerKind};
 
-/// Writes the picture's colour as 8-bit sRGB after `exposure` stops. Colour is premultiplied, so leaving out alpha shows the picture over
+/// Writes the picture's colour in 8 bits through a view, after `exposure` stops. Colour is premultiplied, so leaving out alpha shows the picture over
 /// black. Ordered dithering hides the steps of dark gradients; a value that 8 bits hold exactly is not dithered.
 ///
 /// # Errors
 /// [`Error::Output`](crate::Error::Output) if the file cannot be written.
-pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<()> {
+pub fn write_png(path: &Path, image: &Image, exposure: f32, view: ViewDesc) -> Result<()> {
     let shown = shown(image);
-    let bytes = encode(image, &shown, exposure);
+    let bytes = encode(image, &shown, exposure, view);
     write_atomically(path, |out| {
         let encoder = PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive);
         encoder.write_image(&bytes, shown.width, shown.height, ExtendedColorType::Rgb8).map_err(|e| e.to_string())
@@ -31,7 +33,7 @@ fn shown(image: &Image) -> Crop {
     image.crop.intersection(&Crop { x: o, y: o, width, height })
 }
 
-fn encode(image: &Image, shown: &Crop, exposure: f32) -> Vec<u8> {
+fn encode(image: &Image, shown: &Crop, exposure: f32, view: ViewDesc) -> Vec<u8> {
     let scale = exposure.exp2();
     let width = image.crop.width.max(1);
     let mut bytes = Vec::with_capacity(shown.area() as usize * 3);
@@ -43,10 +45,8 @@ fn encode(image: &Image, shown: &Crop, exposure: f32) -> Vec<u8> {
         }
         // The place in the full picture, so that a crop equals the same part of the whole.
         let threshold = dither(x - image.overscan, y - image.overscan);
-        bytes.extend(pixel[..3].iter().map(|linear| {
-            let encoded = srgb_from_linear((linear * scale).clamp(0.0, 1.0));
-            (encoded * 255.0 + threshold) as u8
-        }));
+        let light = Rgb::new(pixel[0], pixel[1], pixel[2]) * scale;
+        bytes.extend(code_values(view, light).to_array().map(|code| (code * 255.0 + threshold) as u8));
     }
     bytes
 }
@@ -61,7 +61,7 @@ fn dither(x: u32, y: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::linear_from_srgb;
+    use crate::color::{linear_from_srgb, srgb_from_linear};
 
     fn picture(size: [u32; 2], value: impl Fn(u32) -> f32) -> Image {
         let data = (0..size[0] * size[1]).flat_map(|i| [value(i), value(i), value(i), 1.0]).collect();
@@ -69,7 +69,29 @@ mod tests {
     }
 
     fn encode_all(image: &Image, exposure: f32) -> Vec<u8> {
-        encode(image, &shown(image), exposure)
+        encode(image, &shown(image), exposure, ViewDesc::Srgb)
+    }
+
+    #[test]
+    fn views_are_of_exposed_light_and_srgb_is_the_curve_alone() {
+        let image = picture([64, 1], |i| 0.02 * i as f32);
+        let bytes = |exposure: f32, view: ViewDesc| encode(&image, &shown(&image), exposure, view);
+        for (i, pixel) in bytes(0.0, ViewDesc::Srgb).chunks(3).enumerate() {
+            let exact = srgb_from_linear((0.02 * i as f32).min(1.0)) * 255.0;
+            assert!(pixel.iter().all(|byte| (f32::from(*byte) - exact).abs() < 1.0), "{i}");
+        }
+        let half = picture([64, 1], |i| 0.01 * i as f32);
+        for (view, name) in ViewDesc::ALL {
+            assert_eq!(bytes(-1.0, view), encode(&half, &shown(&half), 0.0, view), "{name}");
+        }
+        // Middle grey.
+        let grey = encode_view(&picture([64, 64], |_| 0.18), ViewDesc::Agx);
+        assert!(grey.iter().all(|byte| (127..=128).contains(byte)));
+        assert!(bytes(0.0, ViewDesc::Agx) != bytes(0.0, ViewDesc::Srgb) && bytes(0.0, ViewDesc::Agx) != bytes(0.0, ViewDesc::Filmic));
+    }
+
+    fn encode_view(image: &Image, view: ViewDesc) -> Vec<u8> {
+        encode(image, &shown(image), 0.0, view)
     }
 
     #[test]

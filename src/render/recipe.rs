@@ -58,6 +58,13 @@ pub struct RecipeSettings {
     pub integrator: IntegratorDesc,
     /// What finds hits.
     pub accel: String,
+    /// Whether the camera's lens blurs what is out of focus.
+    #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    pub depth_of_field: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 impl Recipe {
@@ -85,6 +92,7 @@ impl Recipe {
                 seed: settings.seed,
                 integrator: settings.integrator,
                 accel: settings.accel.to_string(),
+                depth_of_field: settings.depth_of_field,
             },
             output: None,
         }
@@ -133,6 +141,7 @@ impl Recipe {
         settings.seed = own.seed;
         settings.integrator = own.integrator;
         settings.accel = own.accel.parse().map_err(|e| Error::Usage(format!("accelerator {}: {e}", own.accel)))?;
+        settings.depth_of_field = own.depth_of_field;
         settings.time_limit = None;
         if let Some(output) = &self.output {
             settings.layers = output.layers.iter().collect();

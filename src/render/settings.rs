@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::ExrOverrides;
 use crate::accel::AccelKind;
-use crate::desc::{FilterDesc, IntegratorDesc, LayerDesc, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc};
+use crate::desc::{FilterDesc, IntegratorDesc, LayerDesc, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc, ViewDesc};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
 use crate::output::check_output;
@@ -46,6 +46,9 @@ pub struct Settings {
     pub integrator: IntegratorDesc,
     /// What finds hits.
     pub accel: AccelKind,
+    /// Whether the camera's lens blurs what is out of focus; if not, [`Camera::remove_lens`](crate::camera::Camera::remove_lens) belongs before the
+    /// render.
+    pub depth_of_field: bool,
     /// Whether paths shade diffuse surfaces side by side: faster, with the same picture bit for bit.
     pub side_by_side: bool,
     /// Number of threads, at least 1.
@@ -79,6 +82,8 @@ pub struct Overrides {
     pub integrator: Option<IntegratorDesc>,
     /// `--accel`.
     pub accel: Option<AccelKind>,
+    /// `--no-depth-of-field`.
+    pub no_depth_of_field: bool,
     /// `--sampler`.
     pub sampler: Option<SamplerKindDesc>,
     /// `--max-depth`.
@@ -103,6 +108,8 @@ pub struct Overrides {
     pub exr: ExrOverrides,
     /// `--exposure`: for every PNG output.
     pub exposure: Option<f32>,
+    /// `--view`: for every PNG output.
+    pub view: Option<ViewDesc>,
 }
 
 impl Settings {
@@ -113,7 +120,8 @@ impl Settings {
     pub fn new(desc: &SceneDesc, overrides: &Overrides) -> Result<Self> {
         let size = size(desc, overrides)?;
         let overscan = overscan(desc, overrides, size)?;
-        let outputs = outputs(desc, overrides)?;
+        let integrator = integrator(desc, overrides)?;
+        let outputs = outputs(desc, overrides, &integrator)?;
         let layers = outputs.iter().flat_map(|output| &output.layers).collect();
         let sampler = match overrides.sampler.unwrap_or(desc.sampler.kind) {
             SamplerKindDesc::Sobol => SamplerKind::Sobol,
@@ -131,8 +139,9 @@ impl Settings {
             spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() { MOST_SAMPLES } else { desc.sampler.spp }),
             target_error: target_error(overrides)?,
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
-            integrator: integrator(desc, overrides)?,
+            integrator,
             accel: overrides.accel.unwrap_or_default(),
+            depth_of_field: !overrides.no_depth_of_field,
             side_by_side: true,
             threads: threads(overrides)?,
             time_limit: time_limit(overrides)?,
@@ -144,6 +153,11 @@ impl Settings {
     /// Whether paths are guided: a sample then depends on all that were before.
     pub fn is_guided(&self) -> bool {
         matches!(self.integrator, IntegratorDesc::Path { guiding: true, .. })
+    }
+
+    /// The view of the first PNG file; without one, that which suits the integrator.
+    pub fn view(&self) -> ViewDesc {
+        self.outputs.iter().find_map(|output| output.view).unwrap_or_else(|| self.integrator.view())
     }
 
     /// Width and height of what is rendered: the picture with its overscan.
@@ -261,7 +275,7 @@ fn time_limit(overrides: &Overrides) -> Result<Option<Duration>> {
     limit.map(Some).ok_or_else(|| usage(format!("--time-limit {seconds}: a number of seconds above 0")))
 }
 
-fn outputs(desc: &SceneDesc, overrides: &Overrides) -> Result<Vec<OutputDesc>> {
+fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc) -> Result<Vec<OutputDesc>> {
     let by_name = |names: &[String]| -> Vec<OutputDesc> { names.iter().map(OutputDesc::new).collect() };
     let mut outputs = if !overrides.outputs.is_empty() {
         by_name(&overrides.outputs)
@@ -288,6 +302,7 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides) -> Result<Vec<OutputDesc>> {
         needs(option, true, ".exr")?;
     }
     needs("--exposure", overrides.exposure.is_some(), ".png")?;
+    needs("--view", overrides.view.is_some(), ".png")?;
     if overrides.exposure.is_some_and(|stops| !stops.is_finite()) {
         return Err(usage("--exposure: a finite number of stops"));
     }
@@ -302,8 +317,9 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides) -> Result<Vec<OutputDesc>> {
             overrides.exr.apply(output);
             check_output(output)?;
         }
-        if let Some(stops) = overrides.exposure.filter(|_| has_extension(output, ".png")) {
-            output.exposure = stops;
+        if has_extension(output, ".png") {
+            output.exposure = overrides.exposure.unwrap_or(output.exposure);
+            output.view = overrides.view.or(output.view).or(Some(integrator.view()));
         }
     }
     Ok(outputs)
@@ -355,6 +371,7 @@ mod tests {
             integrator: Some(IntegratorDesc::default()),
             accel: Some(AccelKind::Linear),
             sampler: Some(SamplerKindDesc::Sobol),
+            no_depth_of_field: true,
             max_depth: Some(4),
             strategy: Some(StrategyDesc::Light),
             clamp: Some(2.5),
@@ -362,11 +379,13 @@ mod tests {
             layers: vec![LayerDesc::Z, LayerDesc::Albedo],
             float: true,
             exposure: Some(-2.0),
+            view: Some(ViewDesc::Filmic),
             ..Overrides::default()
         };
         let s = Settings::new(&scene(SCENE), &overrides).unwrap();
         assert_eq!((s.size, s.crop, s.threads), ([200, 80], Crop { x: 0, y: 0, width: 5, height: 6 }, 3));
         assert_eq!((s.sampler, s.spp, s.seed, s.accel), (SamplerKind::Sobol, 7, 1, AccelKind::Linear));
+        assert!(!s.depth_of_field && Settings::new(&scene(SCENE), &Overrides::default()).unwrap().depth_of_field);
         // The same integrator: parameters that are not changed stay the scene's.
         let changed = IntegratorDesc::Path {
             max_depth: 4,
@@ -382,8 +401,22 @@ mod tests {
             (s.outputs[0].layers.as_slice(), s.outputs[0].pixel_type),
             (&[LayerDesc::Z, LayerDesc::Albedo][..], PixelTypeDesc::Float)
         );
-        assert_eq!((s.outputs[1].exposure, s.outputs[1].layers.len()), (-2.0, 0));
+        assert_eq!((s.outputs[1].exposure, s.outputs[1].view, s.outputs[1].layers.len()), (-2.0, Some(ViewDesc::Filmic), 0));
+        assert_eq!(s.outputs[0].view, None);
         assert!(s.layers.contains(LayerKind::Albedo) && !s.layers.contains(LayerKind::N));
+    }
+
+    #[test]
+    fn png_files_have_a_view_that_suits_the_integrator() {
+        let view = |png: &str, overrides: &Overrides| {
+            let desc = scene(&format!(r#"{{ "camera": {{}}, "outputs": [{{ "file": "b.png" {png} }}] }}"#));
+            Settings::new(&desc, overrides).unwrap().outputs[0].view
+        };
+        let normals = Overrides { integrator: Some(IntegratorDesc::Normal), ..Overrides::default() };
+        assert_eq!(view("", &Overrides::default()), Some(ViewDesc::Agx));
+        assert_eq!(view("", &normals), Some(ViewDesc::Srgb));
+        assert_eq!(view(r#", "view": "filmic""#, &normals), Some(ViewDesc::Filmic));
+        assert_eq!(view(r#", "view": "filmic""#, &Overrides { view: Some(ViewDesc::Srgb), ..normals }), Some(ViewDesc::Srgb));
     }
 
     #[test]
@@ -425,6 +458,7 @@ mod tests {
             ("--float", Overrides { float: true, outputs: vec!["a.png".to_owned()], ..d() }),
             ("--exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
             ("--exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),
+            ("--view", Overrides { view: Some(ViewDesc::Agx), outputs: vec!["a.exr".to_owned()], ..d() }),
             ("two outputs", Overrides { outputs: vec!["a.png".to_owned(), "a.png".to_owned()], ..d() }),
         ];
         for (option, overrides) in cases {

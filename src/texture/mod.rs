@@ -33,6 +33,8 @@ pub enum Texture {
     VertexColor,
     /// The product of several textures.
     Product(Box<[Texture]>),
+    /// 1 where the [number](Texture::scalar) of a texture reaches a threshold, else 0; never filtered.
+    Step(Box<Texture>, f32),
 }
 
 impl Texture {
@@ -45,6 +47,7 @@ impl Texture {
             Self::Bitmap(bitmap) => bitmap.color(uv),
             Self::VertexColor => Rgb::WHITE,
             Self::Product(factors) => factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color(uv)),
+            Self::Step(..) => Rgb::splat(self.scalar(uv)),
         }
     }
 
@@ -54,6 +57,7 @@ impl Texture {
         match self {
             Self::Bitmap(bitmap) => bitmap.scalar(uv),
             Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar(uv)),
+            Self::Step(of, threshold) => f32::from(of.scalar(uv) >= *threshold),
             Self::Constant(_) | Self::Checker(_) | Self::VertexColor => self.color(uv).luminance(),
         }
     }
@@ -62,7 +66,7 @@ impl Texture {
     #[inline]
     pub fn color_over(&self, footprint: &Footprint) -> Rgb {
         match self {
-            Self::Constant(_) | Self::Checker(_) => self.color(footprint.uv),
+            Self::Constant(_) | Self::Checker(_) | Self::Step(..) => self.color(footprint.uv),
             Self::Bitmap(bitmap) => bitmap.color_over(footprint),
             Self::VertexColor => footprint.color,
             Self::Product(factors) => factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color_over(footprint)),
@@ -76,14 +80,14 @@ impl Texture {
             Self::Bitmap(bitmap) => bitmap.scalar_over(footprint),
             Self::VertexColor => footprint.color.luminance(),
             Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar_over(footprint)),
-            Self::Constant(_) | Self::Checker(_) => self.scalar(footprint.uv),
+            Self::Constant(_) | Self::Checker(_) | Self::Step(..) => self.scalar(footprint.uv),
         }
     }
 
     /// Whether a footprint has a say in it.
     pub fn is_filtered(&self) -> bool {
         match self {
-            Self::Constant(_) | Self::Checker(_) | Self::VertexColor => false,
+            Self::Constant(_) | Self::Checker(_) | Self::VertexColor | Self::Step(..) => false,
             Self::Bitmap(bitmap) => bitmap.filter == Filter::Trilinear,
             Self::Product(factors) => factors.iter().any(Self::is_filtered),
         }
@@ -95,6 +99,7 @@ impl Texture {
             Self::Constant(_) | Self::VertexColor => false,
             Self::Checker(_) | Self::Bitmap(_) => true,
             Self::Product(factors) => factors.iter().any(Self::uses_uv),
+            Self::Step(of, _) => of.uses_uv(),
         }
     }
 
@@ -104,6 +109,7 @@ impl Texture {
             Self::Constant(_) | Self::Checker(_) | Self::Bitmap(_) => false,
             Self::VertexColor => true,
             Self::Product(factors) => factors.iter().any(Self::uses_vertex_colors),
+            Self::Step(of, _) => of.uses_vertex_colors(),
         }
     }
 
@@ -113,6 +119,7 @@ impl Texture {
             Self::Constant(_) | Self::Checker(_) | Self::VertexColor => None,
             Self::Bitmap(bitmap) => Some(bitmap.texel()),
             Self::Product(factors) => factors.iter().filter_map(Self::texel).reduce(Vec2::min),
+            Self::Step(of, _) => of.texel(),
         }
     }
 
@@ -120,6 +127,7 @@ impl Texture {
     pub fn axes(&self) -> [Vec2; 2] {
         match self {
             Self::Bitmap(bitmap) => bitmap.transform.axes(),
+            Self::Step(of, _) => of.axes(),
             Self::Constant(_) | Self::Checker(_) | Self::VertexColor | Self::Product(_) => [Vec2::X, Vec2::Y],
         }
     }
@@ -132,8 +140,8 @@ impl Texture {
             Self::Constant(color) => of(*color),
             Self::Checker(checker) => join(of(checker.colors[0]), of(checker.colors[1])),
             Self::Bitmap(bitmap) => bitmap.range(),
-            // As meshes are checked.
-            Self::VertexColor => [0.0, 1.0],
+            // Of vertices as meshes are checked.
+            Self::VertexColor | Self::Step(..) => [0.0, 1.0],
             Self::Product(factors) => factors.iter().map(Self::range).fold([1.0; 2], |a, b| {
                 let products = [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]];
                 products.into_iter().fold([f32::INFINITY, f32::NEG_INFINITY], |range, p| join(range, [p; 2]))

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::Report;
-use crate::bench::{AccelReport, Comparison, Mode, ReportsReport, SceneReport};
+use crate::bench::{AccelReport, Mode, SceneReport};
 
 /// A table by its heads and rows.
 pub struct Table {
@@ -201,48 +201,6 @@ pub fn add(out: &mut String, table: &Table) {
     for row in &table.rows {
         out.push_str(&line(row));
     }
-}
-
-/// The comparisons of reports.
-pub fn write_reports(report: &ReportsReport) -> String {
-    let m = &report.machine;
-    let load = m.load.map_or(String::new(), |load| format!(", load {load:.2} before"));
-    let [width, height] = report.size;
-    let mut out = format!(
-        "# What reports say of accelerators, repeated\n\n{} ({}{load}), steradian {}. Pictures of normals, {width}x{height}, one sample a pixel, one \
-         thread; medians of frames in turn.\n",
-        m.processor, m.instruction_set, m.version
-    );
-    for comparison in &report.comparisons {
-        let _ = write!(out, "\n## {}\n\nReported: {}\n", comparison.title, comparison.claim);
-        add(&mut out, &reports_table(comparison));
-        out.push('\n');
-        for reason in &comparison.reasons {
-            let _ = writeln!(out, "- {reason}");
-        }
-    }
-    out
-}
-
-fn reports_table(comparison: &Comparison) -> Table {
-    let heads =
-        ["accelerator", "reported", "build ms", "frame s", "accelerator s", "times faster", "triangles per ray", "different pixels"];
-    let first = comparison.rows.first().map_or(f64::NAN, |row| row.accel_seconds);
-    let rows = comparison.rows.iter().map(|row| {
-        let scaled = row.scaled_from.map_or(String::new(), |[w, h]| format!(" (from {w}x{h})"));
-        vec![
-            row.name.clone(),
-            row.reported.unwrap_or("").to_owned(),
-            format!("{:.2}", row.build_milliseconds),
-            format!("{:.3}{scaled}", row.frame_seconds[0]),
-            format!("{:.4}", row.accel_seconds),
-            format!("{:.1}", first / row.accel_seconds),
-            row.tests_per_ray.map_or("-".to_owned(), |tests| format!("{tests:.1}")),
-            row.different_pixels.to_string(),
-        ]
-    });
-    let title = format!("{} triangles; times faster: the first line's time within the accelerator over this one's.", comparison.triangles);
-    Table { title, heads: heads.map(str::to_owned).to_vec(), rows: rows.collect() }
 }
 
 /// The middle, and the ends if they differ from it.

@@ -4,12 +4,13 @@ pub(super) mod csv;
 pub(super) mod html;
 pub(super) mod markdown;
 pub(super) mod plot;
+mod reports;
 
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Machine, ReportsReport, ScalingReport, SceneReport};
+use super::{Machine, ScalingReport, SceneReport};
 use crate::error::{Error, Result};
 
 /// Everything a benchmark of accelerators has found.
@@ -23,21 +24,6 @@ pub struct Report {
     pub scenes: Vec<SceneReport>,
     /// Cost over the number of triangles, if asked for.
     pub scaling: Option<ScalingReport>,
-}
-
-impl ReportsReport {
-    /// As JSON.
-    ///
-    /// # Errors
-    /// None in practice.
-    pub fn json(&self) -> Result<String> {
-        serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))
-    }
-
-    /// Tables, each with the sentences that explain its ratios.
-    pub fn markdown(&self) -> String {
-        markdown::write_reports(self)
-    }
 }
 
 impl Report {

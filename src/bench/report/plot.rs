@@ -39,7 +39,23 @@ fn failed(error: impl std::fmt::Display) -> Error {
 
 /// Bars side by side in groups.
 pub fn bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String> {
-    let top = series.iter().flat_map(|s| s.values.iter().flatten()).map(|v| v[2]).fold(0.0, f64::max).max(1e-9) * 1.05;
+    bars_over(groups, series, unit, |v| v)
+}
+
+/// The same for positive values on a logarithmic axis, with bars from 1.
+pub fn log_bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String> {
+    let log = |s: &Series| {
+        let values = s.values.iter().map(|value| value.map(|v| v.map(f64::log10))).collect();
+        Series { name: s.name.clone(), values }
+    };
+    bars_over(groups, &series.iter().map(log).collect::<Vec<_>>(), unit, |v| 10f64.powf(v))
+}
+
+/// Bars whose axis is labelled by a function of their values.
+fn bars_over(groups: &[&str], series: &[Series], unit: &str, label: fn(f64) -> f64) -> Result<String> {
+    let ends = || series.iter().flat_map(|s| s.values.iter().flatten());
+    let top = ends().map(|v| v[2]).fold(0.0, f64::max).max(1e-9) * 1.05;
+    let bottom = ends().map(|v| v[1]).fold(0.0, f64::min) * 1.05;
     let last = groups.len() as f64 - 0.5;
     let mut svg = String::new();
     {
@@ -50,7 +66,7 @@ pub fn bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String> {
             .margin_right(20)
             .x_label_area_size(34)
             .y_label_area_size(64)
-            .build_cartesian_2d(-0.5..last, 0.0..top)
+            .build_cartesian_2d(-0.5..last, bottom..top)
             .map_err(failed)?;
         let name = |x: &f64| {
             let near = (x - x.round()).abs() < 1e-6 && *x > -0.25;
@@ -62,6 +78,7 @@ pub fn bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String> {
             .disable_x_mesh()
             .x_labels(labels)
             .x_label_formatter(&name)
+            .y_label_formatter(&|y| short(label(*y)))
             .y_desc(unit)
             .label_style(("sans-serif", 14))
             .axis_desc_style(("sans-serif", 14))

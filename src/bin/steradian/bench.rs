@@ -36,9 +36,7 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         return replay(arguments, ray).map(|()| 0);
     }
     if let Some(folder) = &arguments.out {
-        // A slip in the name is found before the work, not after it.
-        std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.clone(), message: e.to_string() })?;
-        steradian::output::check_creatable(&folder.join("accel.json"))?;
+        check_folder(folder, "accel.json")?;
     }
     let interrupt = Interrupt::listen()?;
     let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
@@ -79,14 +77,26 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
     Ok(if watch.is_stopped() { interrupt.exit_code() } else { 0 })
 }
 
+/// Makes a folder for results: a slip in its name is found before the work, not after it.
+fn check_folder(folder: &Path, file: &str) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.to_owned(), message: e.to_string() })?;
+    steradian::output::check_creatable(&folder.join(file))
+}
+
 fn reports(arguments: &BenchReportsArgs) -> Result<u8> {
+    if let Some(folder) = &arguments.out {
+        check_folder(folder, "reports.json")?;
+    }
     let interrupt = Interrupt::listen()?;
     let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };
     let defaults = ReportsOptions::default();
     let tests = if arguments.full { u64::MAX } else { defaults.tests };
     let report = bench_reports(&ReportsOptions { size: arguments.size, rounds: arguments.rounds as usize, tests }, &watch)?;
     watch.bar.finish_and_clear();
-    text::print(if arguments.json { report.json()? } else { report.markdown() }.trim_end())?;
+    match &arguments.out {
+        Some(folder) => report.write_to(folder)?,
+        None => text::print(if arguments.json { report.json()? } else { report.markdown() }.trim_end())?,
+    }
     Ok(if watch.is_stopped() { interrupt.exit_code() } else { 0 })
 }
 
@@ -99,8 +109,7 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
         return Ok(0);
     }
     if let Some(folder) = &arguments.out {
-        std::fs::create_dir_all(folder).map_err(|e| Error::Output { file: folder.clone(), message: e.to_string() })?;
-        steradian::output::check_creatable(&folder.join("stability.json"))?;
+        check_folder(folder, "stability.json")?;
     }
     let interrupt = Interrupt::listen()?;
     let watch = Steps { bar: spinner(arguments.quiet), interrupt: &interrupt, lines: false };

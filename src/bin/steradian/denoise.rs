@@ -61,7 +61,7 @@ pub fn run(arguments: &DenoiseArgs) -> Result<()> {
         let report = denoise_file(&denoiser, &task.input, &task.output, &options)?;
         if !task.also.is_empty() {
             let image = output::read_exr(&task.output)?;
-            task.also.iter().try_for_each(|path| output::write_png(path, &image, arguments.exposure))?;
+            task.also.iter().try_for_each(|path| output::write_png(path, &image, arguments.exposure, arguments.view))?;
         }
         let input = task.input.display();
         warnings(&report).iter().for_each(|warning| log::message(Level::Warning, &format!("{input}: {warning}")));

@@ -28,7 +28,10 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         session.reporter.complete_frame();
         return Ok(0);
     };
-    let scene = compile::compile_imported(&shot.imported, &shot.scene)?;
+    let mut scene = compile::compile_imported(&shot.imported, &shot.scene)?;
+    if !plan.settings.depth_of_field {
+        scene.camera.remove_lens();
+    }
     let header = plan.header(&shot, &scene)?;
     // Descriptions of meshes take as much memory as the meshes.
     drop(shot);
@@ -130,7 +133,7 @@ impl<'a> Plan<'a> {
     /// Starts what shows the picture on its way.
     fn watch(&self, session: &Session) -> Result<Live> {
         session.reporter.limit_time(self.settings.time_limit);
-        let live = self.arguments.live.start(&self.scene_file, self.settings.time_limit)?;
+        let live = self.arguments.live.start(&self.scene_file, &self.settings)?;
         if let Some(url) = live.preview_url() {
             session.reporter.say(&format!("preview: {url}"));
         }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
+use steradian::desc::OutputDesc;
 use steradian::import::scene_fingerprint;
 use steradian::output::{self, Format};
 use steradian::render::{Recipe, Settings};
@@ -31,7 +32,7 @@ pub fn run(arguments: &RerenderArgs) -> Result<u8> {
     if let Some(output) = recipe.output.as_mut().filter(|_| format == Format::Exr) {
         output.file = file;
     } else {
-        recipe.output = Some(steradian::desc::OutputDesc::new(file));
+        recipe.output = Some(OutputDesc { view: Some(recipe.settings.integrator.view()), ..OutputDesc::new(file) });
     }
     recipe.settings.spp = arguments.spp.unwrap_or(recipe.settings.spp);
     render.scene = scene_file(arguments, &recipe);

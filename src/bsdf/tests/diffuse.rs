@@ -16,6 +16,10 @@ fn phong(exponent: f32) -> Bsdf {
     Bsdf::Glossy(Glossy::phong(Rgb::new(0.6, 0.3, 0.2), Rgb::splat(0.4), exponent))
 }
 
+fn cosine_lobe(exponent: f32) -> Bsdf {
+    Bsdf::Phong(Phong::new(Rgb::new(0.6, 0.3, 0.2), Rgb::splat(0.4), exponent))
+}
+
 fn leaf() -> Bsdf {
     Bsdf::DiffuseTransmission(DiffuseTransmission::new(Rgb::new(0.3, 0.5, 0.1), Rgb::new(0.6, 0.5, 0.2)))
 }
@@ -29,6 +33,9 @@ fn all() -> Vec<(&'static str, Bsdf)> {
         ("cook_torrance 0.6", cook_torrance(0.6)),
         ("phong 40", phong(40.0)),
         ("phong 0", phong(0.0)),
+        ("cosine lobe 0", cosine_lobe(0.0)),
+        ("cosine lobe 3.5", cosine_lobe(3.5)),
+        ("cosine lobe 60", cosine_lobe(60.0)),
         ("leaf", leaf()),
     ]
 }
@@ -87,10 +94,52 @@ fn hardly_rough_diffuse_surfaces_are_ideal_ones() {
 
 #[test]
 fn older_models_never_scatter_more_than_they_receive() {
-    for bsdf in [cook_torrance(0.05), cook_torrance(0.3), cook_torrance(1.0), phong(0.0), phong(10.0), phong(1e6)] {
+    let ggx = [cook_torrance(0.05), cook_torrance(0.3), cook_torrance(1.0), phong(0.0), phong(10.0), phong(1e6)];
+    for bsdf in ggx.into_iter().chain(COSINE_EXPONENTS.map(cosine_lobe)) {
         for cos in [1.0, 0.5, 0.1, 0.01] {
             let total = scattered(&bsdf, direction(cos, 0.2));
             assert!(total.max_channel() <= 1.01 && total.r > 0.3, "{bsdf:?} {cos}: {total:?}");
+        }
+    }
+}
+
+/// Exponents of Phong's own lobe, up to the largest that counts and beyond.
+const COSINE_EXPONENTS: [f32; 6] = [0.0, 1.0, 10.0, 300.0, 1e6, 1e30];
+
+#[test]
+fn phongs_lobe_is_reciprocal_and_reflects_its_share_from_ahead() {
+    for exponent in COSINE_EXPONENTS {
+        let bsdf = cosine_lobe(exponent);
+        for u in random_points(6, 2_000) {
+            let (a, b) = (direction(0.02 + 0.98 * u[0], u[1]), direction(0.02 + 0.98 * u[2], u[3]));
+            let (there, back) = (bsdf.eval(a, b).value.g / b.z, bsdf.eval(b, a).value.g / a.z);
+            assert!((there - back).abs() <= 1e-4 * there, "{exponent} {a} {b}: {there} {back}");
+        }
+        // From ahead (n + 2) / (2 pi) cos^n times the cosine integrates to 1: kd + ks, here 0.3 + 0.4.
+        let ahead = scattered(&bsdf, direction(1.0, 0.0)).g;
+        assert!((ahead - 0.7).abs() < 0.01, "{exponent}: {ahead}");
+        // In the mirror direction the closed form.
+        let o = direction(0.5, 0.1);
+        let peak = bsdf.eval(o, vec3(-o.x, -o.y, o.z)).value.g;
+        let expected = 0.5 * (0.3 / std::f32::consts::PI + 0.4 * (exponent.min(1e6) + 2.0) / std::f32::consts::TAU);
+        assert!((peak - expected).abs() <= 1e-3 * expected, "{exponent}: {peak} {expected}");
+    }
+}
+
+#[test]
+fn phongs_lobe_is_finite_at_the_ends_of_its_ranges() {
+    let last = 1.0 - f32::EPSILON / 2.0;
+    for bsdf in COSINE_EXPONENTS.map(cosine_lobe) {
+        for cos in [1.0f32, 1e-3, 1e-12, 1e-38, 0.0, -1e-6, -1.0] {
+            let wo = direction(cos, 0.2);
+            for (x, y) in [(0.0, 0.0), (0.0, last), (last, 0.0), (last, last), (0.5, 0.5)] {
+                for lobe in [0.0, last] {
+                    let Some(s) = bsdf.sample(wo, lobe, [x, y]) else { continue };
+                    assert!(s.wi.is_finite() && s.weight.is_finite() && s.pdf > 0.0 && s.pdf.is_finite(), "{bsdf:?} {wo} {s:?}");
+                }
+                let eval = bsdf.eval(wo, direction(cos * x, y));
+                assert!(eval.value.is_finite() && eval.pdf.is_finite() && eval.pdf >= 0.0, "{bsdf:?} {wo} {eval:?}");
+            }
         }
     }
 }

@@ -31,6 +31,8 @@ fn shares_are_what_the_diffuse_part_adds() {
     for alpha in [0.1, 0.5] {
         let glossy = |diffuse: Rgb| Bsdf::Glossy(Glossy::new(diffuse, Rgb::splat(0.1), Rgb::splat(0.3), alpha));
         assert_split("glossy", &glossy(COLOR), &glossy(Rgb::BLACK));
+        let phong = |diffuse: Rgb| Bsdf::Phong(Phong::new(diffuse, Rgb::splat(0.3), 2.0 / alpha));
+        assert_split("phong", &phong(COLOR), &phong(Rgb::BLACK));
         let plastic = |diffuse: Rgb| Bsdf::Plastic(Plastic::new(diffuse, 1.5, [alpha, 0.3]));
         assert_split("plastic", &plastic(COLOR), &plastic(Rgb::BLACK));
         let coated = |albedo: Rgb, tint: Rgb| {

@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use super::{Snapshot, Statistics};
+use crate::desc::ViewDesc;
 use crate::error::{Error, Result};
 use board::Board;
 use http::{Connection, Refusal};
@@ -33,12 +34,14 @@ pub struct PreviewOptions {
     pub host: String,
     /// The port; 0 stands for any that is free.
     pub port: u16,
+    /// How light is shown until the page's user chooses.
+    pub view: ViewDesc,
 }
 
 impl Default for PreviewOptions {
     /// Only this machine, any port.
     fn default() -> Self {
-        Self { host: Ipv4Addr::LOCALHOST.to_string(), port: 0 }
+        Self { host: Ipv4Addr::LOCALHOST.to_string(), port: 0, view: ViewDesc::default() }
     }
 }
 
@@ -47,6 +50,7 @@ struct Shared {
     board: Board,
     statistics: Arc<Statistics>,
     name: String,
+    view: ViewDesc,
     /// The host asked for: requests may name it.
     host: String,
     connections: AtomicUsize,
@@ -75,6 +79,7 @@ impl Preview {
             board: Board::default(),
             statistics,
             name,
+            view: options.view,
             host: host.to_ascii_lowercase(),
             connections: AtomicUsize::new(0),
             closing: AtomicBool::new(false),

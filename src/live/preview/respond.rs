@@ -55,6 +55,7 @@ fn state(shared: &Shared) -> Value {
     });
     json!({
         "name": shared.name,
+        "view": shared.view.name(),
         "version": shown.version,
         "finished": shown.finished,
         "size": snapshot.map(Snapshot::size),

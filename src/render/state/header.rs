@@ -191,6 +191,9 @@ fn named(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
     put("sampler", format!("{:?}", settings.sampler).to_lowercase());
     put("accel", settings.accel.to_string());
     put("layers", settings.layers.iter().map(|info| info.name).collect::<Vec<_>>().join(","));
+    if !settings.depth_of_field {
+        put("depth-of-field", "off".to_owned());
+    }
     if let Some(target) = settings.target_error {
         put("target-error", target.to_string());
         put("spp", settings.spp.to_string());

@@ -5,7 +5,7 @@ use half::f16;
 use super::{Effort, Outcome, bytes, mean_by_film};
 use crate::bench::stability::geometry::Rng;
 use crate::color::linear_from_srgb;
-use crate::desc::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc};
+use crate::desc::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc, ViewDesc};
 use crate::film::{Crop, Image, Layer, LayerInfo, LayerKind};
 use crate::output::{RenderInfo, read_exr, write_exr, write_png};
 
@@ -28,7 +28,7 @@ pub(super) fn differing_files(images: &[Image]) -> usize {
     let Ok(folder) = tempfile::tempdir() else { return images.len() };
     let written = |image: &Image| {
         let path = folder.path().join("a.png");
-        write_png(&path, image, 0.0).ok()?;
+        write_png(&path, image, 0.0, ViewDesc::Srgb).ok()?;
         std::fs::read(&path).ok()
     };
     let first = written(&images[0]);
@@ -60,7 +60,7 @@ fn changed_codes(folder: &std::path::Path) -> usize {
     let size = [256, 9];
     let data = (0..size[0] * size[1]).flat_map(|i| [ramp(i), ramp(i + 85), ramp(i + 170), 1.0]).collect();
     let image = Image::of_color(size, data);
-    let Some(read) = write_png(&path, &image, 0.0).ok().and_then(|()| image::open(&path).ok()) else { return 256 };
+    let Some(read) = write_png(&path, &image, 0.0, ViewDesc::Srgb).ok().and_then(|()| image::open(&path).ok()) else { return 256 };
     let code = |x: u32, shift: u32| ((x + shift) % 256) as u8;
     read.into_rgb8().enumerate_pixels().filter(|(x, _, pixel)| pixel.0 != [code(*x, 0), code(*x, 85), code(*x, 170)]).count()
 }

@@ -1,7 +1,7 @@
 //! BSDFs of every kind, and directions to look at them from.
 
 use crate::bsdf::{
-    Bsdf, Coat, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Plastic, Principled,
+    Bsdf, Coat, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
     PrincipledParameters, ThinDielectric,
 };
 use crate::color::Rgb;
@@ -116,6 +116,7 @@ pub fn rough() -> Vec<Material> {
     let eon = |roughness| Bsdf::Eon(Eon { albedo: COLOR, roughness });
     let torrance = |alpha| Bsdf::Glossy(Glossy::new(Rgb::new(0.4, 0.2, 0.1), Rgb::new(0.3, 0.18, 0.06), Rgb::splat(0.6), alpha));
     let phong = |exponent| Bsdf::Glossy(Glossy::phong(Rgb::new(0.6, 0.3, 0.2), Rgb::splat(0.4), exponent));
+    let cosine = |exponent| Bsdf::Phong(Phong::new(Rgb::new(0.6, 0.3, 0.2), Rgb::splat(0.4), exponent));
     let leaf = DiffuseTransmission::new(Rgb::new(0.3, 0.5, 0.1), Rgb::new(0.6, 0.5, 0.2));
     let plastic = |alpha| Bsdf::Plastic(Plastic::new(Rgb::new(0.1, 0.2, 0.7), 1.5, alpha));
     let mut list = vec![
@@ -128,6 +129,8 @@ pub fn rough() -> Vec<Material> {
         Material::new("cook-torrance 0.6", torrance(0.6)),
         Material::new("phong 40", phong(40.0)),
         Material::new("phong 0", phong(0.0)),
+        Material::new("cosine lobe 0", cosine(0.0)),
+        Material::new("cosine lobe 40", cosine(40.0)),
         Material::new("plastic, smooth", plastic([0.0; 2])),
         Material::new("metal, once", Bsdf::Conductor(white_metal([0.5; 2]).single_scattering())),
         Material { ior: 1.5, ..Material::new("glass, once", Bsdf::Dielectric(Dielectric::new(1.5, [0.5; 2]).single_scattering())) },

@@ -74,6 +74,7 @@ fn materials() -> Vec<(&'static str, Whiteness, Value)> {
         ("principled cloth", Lossy, principled(json!({ "sheen": 1, "subsurface": 1, "roughness": 1 }))),
         ("principled lacquer", Lossy, principled(json!({ "clearcoat": 1, "specular": 1 }))),
         ("phong", Lossy, json!({ "m": { "type": "phong", "diffuse": 0.5, "specular": 0.5 } })),
+        ("phong, cosine lobe", Lossy, json!({ "m": { "type": "phong", "diffuse": 0.5, "specular": 0.5, "lobe": "cosine" } })),
         ("cook and torrance", Lossy, json!({ "m": { "type": "cook_torrance", "albedo": 1.0, "f0": 1.0 } })),
     ]
 }

@@ -103,10 +103,13 @@ pub struct BenchReportsArgs {
     /// Frames of each accelerator
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub rounds: u32,
-    /// Render full frames even where every triangle is tested: minutes in place of seconds
+    /// Render full frames even where every triangle is tested: hours in place of seconds
     #[arg(long)]
     pub full: bool,
-    /// JSON instead of tables
+    /// Folder for reports.html, reports.md and reports.json; without it tables go to stdout
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Without --out: print JSON instead of tables
     #[arg(long)]
     pub json: bool,
     /// Say nothing but results and errors

@@ -3,6 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use steradian::desc::ViewDesc;
+
+use crate::names;
 
 pub const ABOUT: &str = "\
 Denoise an EXR file with Intel Open Image Denoise
@@ -68,6 +71,9 @@ pub struct DenoiseArgs {
     /// PNG: exposure in stops; 1 is twice as bright
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,
+    /// PNG: how light becomes colours of the display
+    #[arg(long, value_name = "NAME", default_value = ViewDesc::default().name(), value_parser = names::plain::<ViewDesc>())]
+    pub view: ViewDesc,
     /// Number of threads; 0 stands for all
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     pub threads: usize,

@@ -1,11 +1,11 @@
 //! The command line of the live view.
 
 use std::path::Path;
-use std::time::Duration;
 
 use clap::Args;
 use steradian::Result;
 use steradian::live::{DEFAULT_ADDRESS, Live, Options, PreviewOptions, TevOptions};
+use steradian::render::Settings;
 
 /// Who can watch a render.
 #[derive(Clone, Debug, Default, Args)]
@@ -18,7 +18,7 @@ pub struct LiveArgs {
     pub tev: Option<String>,
     /// Serve a web page that shows the picture as it grows, at this port; 0 stands for any that is free
     ///
-    /// The address is told on stderr. The page shows every layer, with exposure, zoom, the exact values of pixels and what is left to do. It is
+    /// The address is told on stderr. The page shows every layer, with exposure, views, zoom, the exact values of pixels and what is left to do. It is
     /// there for this machine alone unless --preview-bind says otherwise.
     #[arg(long, value_name = "PORT")]
     pub preview: Option<u16>,
@@ -35,14 +35,14 @@ impl LiveArgs {
     ///
     /// # Errors
     /// [`steradian::Error::Usage`] if the page cannot be served at the address and port.
-    pub fn start(&self, scene: &Path, time_limit: Option<Duration>) -> Result<Live> {
+    pub fn start(&self, scene: &Path, settings: &Settings) -> Result<Live> {
         let tev = self.tev.as_ref().map(|address| TevOptions { address: address.clone(), ..TevOptions::default() });
         let preview = self.preview.map(|port| {
             let host = self.preview_bind.clone().unwrap_or(PreviewOptions::default().host);
-            PreviewOptions { host, port }
+            PreviewOptions { host, port, view: settings.view() }
         });
         let name = scene.file_stem().map_or_else(|| "picture".to_owned(), |stem| stem.to_string_lossy().into_owned());
-        Live::new(Options { name, time_limit, tev, preview })
+        Live::new(Options { name, time_limit: settings.time_limit, tev, preview })
     }
 }
 

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use clap_complete::Shell;
 use steradian::accel::AccelKind;
-use steradian::desc::{IntegratorDesc, LayerDesc, SamplerKindDesc, StrategyDesc};
+use steradian::desc::{IntegratorDesc, LayerDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 use steradian::render::Overrides;
 
 use crate::names;
@@ -188,6 +188,12 @@ pub struct RenderArgs {
     /// PNG: exposure in stops; 1 is twice as bright
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
     pub exposure: Option<f32>,
+    /// PNG: how light becomes colours of the display; EXR files stay linear
+    ///
+    /// agx shows 16.5 stops and lets bright colours tend to white, filmic is the curve of Uncharted 2, srgb is the sRGB curve alone: 1 is white.
+    /// Default: the scene's; else agx, or srgb with integrators that show data, such as normal.
+    #[arg(long, value_name = "NAME", value_parser = names::plain::<ViewDesc>(), help_heading = "Picture")]
+    pub view: Option<ViewDesc>,
 
     /// The algorithm
     #[arg(long, value_name = "NAME", value_parser = names::tagged::<IntegratorDesc>(), help_heading = "Algorithm")]
@@ -213,6 +219,9 @@ pub struct RenderArgs {
     /// A different seed gives different noise
     #[arg(long, value_name = "N", help_heading = "Algorithm")]
     pub seed: Option<u64>,
+    /// Render everything in focus, as if the camera had no lens
+    #[arg(long, help_heading = "Picture")]
+    pub no_depth_of_field: bool,
     /// What finds hits: embree, bvh, kdtree, octree or linear, with options such as embree:high
     #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
@@ -324,6 +333,7 @@ impl RenderArgs {
             integrator: self.integrator,
             accel: self.accel,
             sampler: self.sampler,
+            no_depth_of_field: self.no_depth_of_field,
             max_depth: self.max_depth,
             strategy: self.strategy,
             clamp: self.clamp,
@@ -335,6 +345,7 @@ impl RenderArgs {
             float: self.float,
             exr: self.exr.overrides(self.sequence.frames.is_some().then_some(self.sequence.fps)),
             exposure: self.exposure,
+            view: self.view,
         }
     }
 }
@@ -387,7 +398,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_overrides() {
         let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path --accel linear \
-                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 -vv";
+                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic --no-depth-of-field -vv";
         let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
         let o = arguments.overrides(vec!["d.exr".to_owned()]);
         assert_eq!((o.spp, o.size, o.crop, o.threads, o.seed), (Some(5), Some([20, 10]), Some([1, 2, 3, 4]), Some(2), Some(9)));
@@ -396,9 +407,12 @@ mod tests {
             (Some(AccelKind::Linear), Some(SamplerKindDesc::Independent), Some(StrategyDesc::Light))
         );
         assert_eq!((o.integrator, o.max_depth, o.clamp, o.time_limit), (Some(IntegratorDesc::default()), Some(3), Some(2.5), Some(1.5)));
-        assert_eq!((o.layers, o.float, o.exposure), (vec![LayerDesc::Z, LayerDesc::Albedo], true, Some(-1.5)));
+        assert_eq!(
+            (o.layers, o.float, o.exposure, o.view),
+            (vec![LayerDesc::Z, LayerDesc::Albedo], true, Some(-1.5), Some(ViewDesc::Filmic))
+        );
         assert_eq!((o.outputs, o.default_outputs), (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()]));
-        assert_eq!(o.guiding, Some(true));
+        assert!(o.guiding == Some(true) && o.no_depth_of_field);
         assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
     }
 

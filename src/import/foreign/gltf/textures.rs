@@ -1,7 +1,6 @@
 //! Textures, samplers and images, and how an extension moves them.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
@@ -12,7 +11,7 @@ use super::buffers::Uri;
 use super::extensions::{TextureInfo, TextureTransform};
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
-use crate::import::{Draft, ImageData, Samples, read_image, read_image_bytes};
+use crate::import::{Draft, ImageData, read_image_bytes};
 
 /// A texture as a material names it.
 #[derive(Clone, Debug)]
@@ -25,21 +24,10 @@ pub struct TextureRef {
     transform: TextureTransform,
 }
 
-/// The parts of a texture that make a difference to what is seen.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum ImageKind {
-    Plain,
-    /// Its alpha, times a factor, cut off: bits of both numbers.
-    Cut {
-        factor: u32,
-        cutoff: u32,
-    },
-}
-
 /// Textures and images that have been added.
 #[derive(Debug, Default)]
 pub struct TextureSet {
-    files: BTreeMap<(usize, ImageKind), String>,
+    files: BTreeMap<usize, String>,
     names: BTreeMap<String, String>,
     /// That of the vertices' colours.
     vertex_colors: Option<String>,
@@ -72,30 +60,6 @@ impl TextureSet {
         color_space: ColorSpaceDesc,
         channel: Option<ChannelDesc>,
     ) -> Result<Option<String>> {
-        self.add_kind(source, draft, texture, ImageKind::Plain, color_space, channel)
-    }
-
-    /// Adds a texture that is 1 where alpha times `factor` reaches `cutoff`, else 0.
-    pub fn add_cut(&mut self, source: Source, draft: &mut Draft, texture: &TextureRef, factor: f32, cutoff: f32) -> Result<Option<String>> {
-        let kind = ImageKind::Cut { factor: factor.to_bits(), cutoff: cutoff.to_bits() };
-        self.add_kind(source, draft, texture, kind, ColorSpaceDesc::Linear, Some(ChannelDesc::R))
-    }
-
-    /// The texture of the vertices' colours.
-    pub fn vertex_colors(&mut self, draft: &mut Draft, place: &str) -> ColorDesc {
-        let add = || draft.add_texture("vertex_color", place, TextureDesc::VertexColor);
-        ColorDesc::Texture { texture: self.vertex_colors.get_or_insert_with(add).clone() }
-    }
-
-    fn add_kind(
-        &mut self,
-        source: Source,
-        draft: &mut Draft,
-        texture: &TextureRef,
-        kind: ImageKind,
-        color_space: ColorSpaceDesc,
-        channel: Option<ChannelDesc>,
-    ) -> Result<Option<String>> {
         let json = source.root.textures.get(texture.index);
         let json = json.ok_or_else(|| source.fault(&texture.place, format!("there is no textures[{}]", texture.index)))?;
         let path = format!("textures[{}]", texture.index);
@@ -104,7 +68,7 @@ impl TextureSet {
             draft.ignored(&path, "texture", "source", "the image is in a format of an extension that is not read");
             return Ok(None);
         };
-        let file = self.image(source, draft, image, &kind)?;
+        let file = self.image(source, draft, image)?;
         let sampler = json.sampler.and_then(|index| source.root.samplers.get(index.value()));
         let (filter, wrap) = sampler.map_or((TextureFilterDesc::Trilinear, WrapDesc::default()), lookup);
         let (offset, scale, rotation) = flipped(&texture.transform);
@@ -138,32 +102,22 @@ impl TextureSet {
         Ok(Some(name))
     }
 
-    /// The file of an image, or what stands for it.
-    fn image(&mut self, source: Source, draft: &mut Draft, index: usize, kind: &ImageKind) -> Result<String> {
-        let key = (index, kind.clone());
-        if let Some(file) = self.files.get(&key) {
+    /// The texture of the vertices' colours.
+    pub fn vertex_colors(&mut self, draft: &mut Draft, place: &str) -> ColorDesc {
+        let add = || draft.add_texture("vertex_color", place, TextureDesc::VertexColor);
+        ColorDesc::Texture { texture: self.vertex_colors.get_or_insert_with(add).clone() }
+    }
+
+    /// The file of an image.
+    fn image(&mut self, source: Source, draft: &mut Draft, index: usize) -> Result<String> {
+        if let Some(file) = self.files.get(&index) {
             return Ok(file.clone());
         }
-        let name = format!("image_{index}");
-        let file = match kind {
-            ImageKind::Plain => match location(source, index)? {
-                Location::File(file) => file,
-                Location::Bytes(bytes) => draft.keep_image(&name, decode(source, index, &bytes)?),
-            },
-            ImageKind::Cut { factor, cutoff } => {
-                let plain = self.image(source, draft, index, &ImageKind::Plain)?;
-                let cut = match draft.assets.images.get(&plain) {
-                    Some(image) => cut(image, f32::from_bits(*factor), f32::from_bits(*cutoff)),
-                    None => {
-                        let path = source.file.parent().unwrap_or(Path::new("")).join(&plain);
-                        let image = read_image(&path).map_err(|e| e.at(source.file, &format!("images[{index}]"), &path))?;
-                        cut(&image, f32::from_bits(*factor), f32::from_bits(*cutoff))
-                    }
-                };
-                draft.keep_image(&format!("{name}_cut"), cut)
-            }
+        let file = match location(source, index)? {
+            Location::File(file) => file,
+            Location::Bytes(bytes) => draft.keep_image(&format!("image_{index}"), decode(source, index, &bytes)?),
         };
-        self.files.insert(key, file.clone());
+        self.files.insert(index, file.clone());
         Ok(file)
     }
 }
@@ -220,25 +174,6 @@ fn flipped(transform: &TextureTransform) -> ([f32; 2], [f32; 2], f64) {
     let ([offset_u, offset_v], [scale_u, scale_v]) = (transform.offset.map(f64::from), transform.scale.map(f64::from));
     let offset = [offset_u + sin * scale_v, 1.0 - offset_v - cos * scale_v];
     (offset.map(|x| x as f32), [scale_u as f32, scale_v as f32], rotation)
-}
-
-/// One channel that is 255 where alpha times `factor` reaches `cutoff`, else 0.
-fn cut(image: &ImageData, factor: f32, cutoff: f32) -> ImageData {
-    let (channels, pixels) = (image.channels, image.width * image.height);
-    let alpha = |i: usize| -> f32 {
-        if channels != 2 && channels != 4 {
-            return 1.0;
-        }
-        let at = i * channels + channels - 1;
-        match &image.samples {
-            Samples::U8(samples) => samples.get(at).map_or(1.0, |&a| f32::from(a) / 255.0),
-            Samples::U16(samples) => samples.get(at).map_or(1.0, |&a| f32::from(a) / 65_535.0),
-            Samples::F16(samples) => samples.get(at).map_or(1.0, |a| a.to_f32()),
-            Samples::F32(samples) => samples.get(at).copied().unwrap_or(1.0),
-        }
-    };
-    let samples = (0..pixels).map(|i| if alpha(i) * factor >= cutoff { 255 } else { 0 }).collect();
-    ImageData { width: image.width, height: image.height, channels: 1, samples: Samples::U8(samples) }
 }
 
 #[cfg(test)]

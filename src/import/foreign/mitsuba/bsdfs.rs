@@ -270,7 +270,7 @@ impl<'a> Reader<'a> {
                 element.ignored("opacity", "opacity has no colours of vertices: 1");
                 OpacityDesc::Number(1.0)
             }
-            ScalarDesc::Texture { texture } => OpacityDesc::Texture { texture: self.without_alpha(&texture, element) },
+            ScalarDesc::Texture { texture } => OpacityDesc::Texture { texture: self.without_alpha(&texture, element), threshold: None },
         };
         if inner.opacity.is_some() {
             element.ignored("", "the holes of the bsdf inside are left out");

@@ -75,7 +75,7 @@ impl Texture {
         match self {
             Self::Constant(value) if value[0] >= 1.0 => None,
             Self::Constant(value) => Some(OpacityDesc::Number(value[0].max(0.0))),
-            named => named.name(draft, place).map(|texture| OpacityDesc::Texture { texture }),
+            named => named.name(draft, place).map(|texture| OpacityDesc::Texture { texture, threshold: None }),
         }
     }
 }

@@ -22,21 +22,15 @@ impl Builder<'_, '_> {
                 Ok(None)
             }
             AlphaMode::Mask => {
+                self.mapped("alphaCutoff");
                 let cutoff = self.json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0);
-                let cut = match &texture {
-                    Some(texture) => self.inputs.cut(self.source, self.draft, texture, factor, cutoff)?,
-                    None => None,
-                };
-                match cut {
-                    Some(texture) => {
-                        self.approximated("alphaCutoff", "cut off at the image's pixels, not between them");
-                        Ok(Some(OpacityDesc::Texture { texture }))
-                    }
-                    None => {
-                        self.mapped("alphaCutoff");
-                        Ok((factor < cutoff).then_some(OpacityDesc::Number(0.0)))
-                    }
-                }
+                let alpha = self.inputs.scalar(self.source, self.draft, texture.as_ref(), ChannelDesc::A, factor)?;
+                Ok(match alpha {
+                    // Alpha is at most 1.
+                    _ if cutoff > 1.0 => Some(OpacityDesc::Number(0.0)),
+                    ScalarDesc::Constant(alpha) => (alpha < cutoff).then_some(OpacityDesc::Number(0.0)),
+                    ScalarDesc::Texture { texture } => Some(OpacityDesc::Texture { texture, threshold: Some(cutoff.max(0.0)) }),
+                })
             }
             AlphaMode::Blend => {
                 self.mapped("alphaMode");
@@ -44,7 +38,7 @@ impl Builder<'_, '_> {
                 Ok(match alpha {
                     ScalarDesc::Constant(1.0) => None,
                     ScalarDesc::Constant(alpha) => Some(OpacityDesc::Number(alpha)),
-                    ScalarDesc::Texture { texture } => Some(OpacityDesc::Texture { texture }),
+                    ScalarDesc::Texture { texture } => Some(OpacityDesc::Texture { texture, threshold: None }),
                 })
             }
         }

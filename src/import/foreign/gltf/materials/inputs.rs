@@ -64,12 +64,6 @@ impl<'b> Inputs<'b> {
         self.textures.add(source, draft, texture, ColorSpaceDesc::Linear, channel)
     }
 
-    /// A texture that is 1 where alpha times a factor reaches the cutoff, by name.
-    pub fn cut(&mut self, source: Source, draft: &mut Draft, texture: &TextureRef, factor: f32, cutoff: f32) -> Result<Option<String>> {
-        self.sets.push(texture.uv_set);
-        self.textures.add_cut(source, draft, texture, factor, cutoff)
-    }
-
     /// A colour: a factor, times a texture if there is one.
     pub fn color(&mut self, source: Source, draft: &mut Draft, texture: Option<&TextureRef>, factor: [f32; 3]) -> Result<ColorDesc> {
         let factor = factor.map(|f| self.share(f));

@@ -89,16 +89,16 @@ fn alpha_counts_as_its_mode_says() {
     assert!(matches!(look("MASK", 0.49, false).1, Some(OpacityDesc::Number(0.0))));
 
     let (imported, opacity) = look("BLEND", 0.5, true);
-    let Some(OpacityDesc::Texture { texture }) = opacity else { panic!() };
+    let Some(OpacityDesc::Texture { texture, threshold: None }) = opacity else { panic!() };
     let (_, channel, _, factor) = image(&imported, &texture);
     assert_eq!(channel, Some(ChannelDesc::A));
     assert!(matches!(factor, Some(ColorDesc::Grey(0.5))));
 
-    let (imported, opacity) = look("MASK", 1.0, true);
-    let Some(OpacityDesc::Texture { texture }) = opacity else { panic!() };
-    let (file, ..) = image(&imported, &texture);
-    assert_eq!(imported.assets.images[file].samples, Samples::U8(vec![255, 255, 0, 0]));
-    assert_eq!(outcome(&imported, "alphaCutoff"), Some(Outcome::Approximated));
+    let (imported, opacity) = look("MASK", 0.5, true);
+    let Some(OpacityDesc::Texture { texture, threshold: Some(0.5) }) = opacity else { panic!() };
+    let (_, channel, _, factor) = image(&imported, &texture);
+    assert!(channel == Some(ChannelDesc::A) && matches!(factor, Some(ColorDesc::Grey(0.5))));
+    assert_eq!(outcome(&imported, "alphaCutoff"), Some(Outcome::Mapped));
 }
 
 #[test]

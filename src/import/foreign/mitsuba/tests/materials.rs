@@ -174,7 +174,7 @@ fn masks_and_null_are_holes_of_the_shape() {
     assert!(matches!(opacity(mask).0, Some(OpacityDesc::Number(v)) if v == 0.25));
     let (textured, textures) = opacity(&format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("opacity", "")));
     // The luminance counts, not the alpha that the image may have: the product of one factor is no image.
-    let Some(OpacityDesc::Texture { texture }) = textured else { panic!() };
+    let Some(OpacityDesc::Texture { texture, .. }) = textured else { panic!() };
     assert!(matches!(textures[&texture], TextureDesc::Product { .. }));
     // What gives off light has no holes here.
     let lamp = r#"<shape type="sphere"><bsdf type="null"/><emitter type="area"/></shape>"#;

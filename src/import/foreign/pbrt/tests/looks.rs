@@ -169,7 +169,7 @@ fn textures_keep_their_two_kinds_apart() {
     assert!(matches!(&factors[..], [ColorDesc::Texture { .. }, ColorDesc::Rgb([0.5, 0.5, 0.5])]));
     let TextureDesc::Image { scale, offset, color_space, channel, .. } = &imported.desc.textures["t"] else { panic!() };
     assert_eq!((*scale, *offset, *color_space, *channel), ([2.0, 1.0], [0.0, 0.5], ColorSpaceDesc::Srgb, None));
-    let Some(OpacityDesc::Texture { texture }) = common.opacity else { panic!() };
+    let Some(OpacityDesc::Texture { texture, .. }) = common.opacity else { panic!() };
     let TextureDesc::Image { file, color_space, channel, .. } = &imported.desc.textures[texture] else { panic!() };
     assert_eq!((file.as_str(), *color_space, *channel), ("m.png", ColorSpaceDesc::Linear, None));
 }

@@ -1,0 +1,202 @@
+//! Frames of one kind with each accelerator in turn, timed.
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use serde_json::json;
+
+use super::{Entry, FrameTiming, ReportsOptions};
+use crate::accel::{self, AccelKind, Accelerator, Coherence};
+use crate::bench::{Watch, median_and_range};
+use crate::compile;
+use crate::error::Result;
+use crate::film::{Image, LayerKind};
+use crate::geometry::{Hit, Mesh};
+use crate::import::parse_scene;
+use crate::math::{Aabb, Ray};
+use crate::render::{self, Overrides, Settings, Silent};
+
+/// Rays whose primitive tests are counted, about.
+const COUNTED: usize = 20_000;
+
+/// What is rendered.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// The mesh's normals.
+    Normals,
+    /// The mesh on a floor under a sky and a sun, path traced.
+    Paths,
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        if self == Self::Paths { "path traced" } else { "normals" }
+    }
+
+    fn scene(self, mesh: &Mesh) -> serde_json::Value {
+        let mut scene = json!({
+            "camera": { "position": [0.9, -4.2, 0.6], "look_at": [0, 0, 0], "up": [0, 0, 1], "vertical_fov_degrees": 35 },
+            "integrator": { "type": "normal" },
+            "sampler": { "type": "independent", "spp": 1 },
+            "shapes": [{ "type": "mesh", "positions": mesh.positions(), "triangles": mesh.triangles() }],
+        });
+        if self == Self::Paths {
+            scene["integrator"] = json!({ "type": "path", "max_depth": 5 });
+            scene["lights"] = json!([
+                { "type": "environment", "radiance": [0.4, 0.45, 0.5] },
+                { "type": "directional", "direction": [-0.4, 0.6, -1], "irradiance": [2, 1.9, 1.7] }
+            ]);
+            // Of two triangles: accelerators of the reports know no other shapes.
+            scene["shapes"].as_array_mut().map(|shapes| {
+                shapes.push(json!({
+                    "type": "mesh", "triangles": [[0, 1, 2], [0, 2, 3]],
+                    "positions": [[-6, -6, -1.2], [6, -6, -1.2], [6, 6, -1.2], [-6, 6, -1.2]]
+                }))
+            });
+        }
+        scene
+    }
+
+    /// Rays of a pixel, about.
+    fn rays(self) -> u64 {
+        if self == Self::Paths { 5 } else { 1 }
+    }
+}
+
+/// What was found of one accelerator.
+pub struct Found {
+    pub build_milliseconds: f64,
+    pub timing: FrameTiming,
+    pub tests_per_ray: Option<f64>,
+    pub different_pixels: usize,
+}
+
+/// Times every accelerator on frames of a kind; fewer if it is stopped.
+pub fn measure(title: &str, kind: Kind, mesh: &Mesh, entries: &[Entry], options: &ReportsOptions, watch: &dyn Watch) -> Result<Vec<Found>> {
+    let full = u64::from(options.size[0]) * u64::from(options.size[1]);
+    // The smallest divisor of the sides that keeps a linear frame within its budget.
+    let tests = mesh.triangles().len() as u64 * kind.rays();
+    let divisor = (1..256).find(|d| full / (d * d) * tests <= options.tests).unwrap_or(256) as u32;
+    let sizes = [1, divisor].map(|d| options.size.map(|side| (side / d).max(1)));
+    let file = Path::new("bench reports");
+    let desc = parse_scene(&kind.scene(mesh).to_string(), file)?;
+    let scene = compile::compile(&desc, file)?;
+    let settings = |size: [u32; 2]| {
+        let overrides =
+            Overrides { size: Some(size), threads: Some(1), default_outputs: vec!["unused.png".into()], ..Overrides::default() };
+        Settings::new(&desc, &overrides)
+    };
+    let frame = |size: [u32; 2], accel: &dyn Accelerator| -> Result<(f64, Image)> {
+        let result = render::render(&scene, accel, &settings(size)?, &Silent, &AtomicBool::new(false))?;
+        Ok((result.stats.render_seconds, result.image))
+    };
+
+    let name = kind.name();
+    let mut subjects = Vec::new();
+    for Entry(accel, _, _, build) in entries {
+        watch.step(&format!("{title}, {name}: building {accel}"));
+        let start = Instant::now();
+        let subject = build(&scene.geometry)?;
+        subjects.push((subject, start.elapsed().as_secs_f64() * 1e3));
+    }
+    // Our BVH answers as the linear loop does, which would take too long for full frames.
+    let oracle = accel::build(AccelKind::Bvh(accel::BvhOptions::default()), &scene.geometry, 1)?;
+    let pictures = [frame(sizes[0], &*oracle)?.1, frame(sizes[1], &*oracle)?.1];
+    let mut times = vec![(Vec::new(), Vec::new()); entries.len()];
+    let (mut different, mut tests) = (vec![0; entries.len()], vec![None; entries.len()]);
+    for round in 0..options.rounds.max(1) {
+        for (i, (Entry(accel, _, is_linear, _), (subject, _))) in entries.iter().zip(&subjects).enumerate() {
+            if watch.is_stopped() {
+                break;
+            }
+            watch.step(&format!("{title}, {name}: {accel}, round {} of {}", round + 1, options.rounds));
+            let timed = Timed { inner: &*subject.accel, state: Mutex::default() };
+            let which = usize::from(*is_linear);
+            let (seconds, image) = frame(sizes[which], &timed)?;
+            let state = timed.state.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let scale = full as f64 / (f64::from(sizes[which][0]) * f64::from(sizes[which][1]));
+            times[i].0.push(seconds * scale);
+            times[i].1.push(state.seconds * scale);
+            if round == 0 {
+                different[i] = different_pixels(&image, &pictures[which]);
+                let step = (state.rays.len() / COUNTED).max(1);
+                let counts: Option<Vec<f64>> = state.rays.iter().step_by(step).map(|ray| (subject.tests)(&*subject.accel, ray)).collect();
+                tests[i] = counts.map(|counts| counts.iter().sum::<f64>() / counts.len().max(1) as f64);
+            }
+        }
+    }
+    let found = |i: usize| Found {
+        build_milliseconds: subjects[i].1,
+        timing: FrameTiming {
+            frame_seconds: median_and_range(&times[i].0),
+            accel_seconds: median_and_range(&times[i].1)[0],
+            scaled_from: (entries[i].2 && divisor > 1).then_some(sizes[1]),
+        },
+        tests_per_ray: tests[i],
+        different_pixels: different[i],
+    };
+    Ok((0..entries.len()).take_while(|i| !times[*i].0.is_empty()).map(found).collect())
+}
+
+fn different_pixels(a: &Image, b: &Image) -> usize {
+    match (a.layer(LayerKind::Color), b.layer(LayerKind::Color)) {
+        (Some(a), Some(b)) => a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count(),
+        _ => 0,
+    }
+}
+
+/// Takes the time of what is inside, and keeps the rays.
+struct Timed<'a> {
+    inner: &'a dyn Accelerator,
+    state: Mutex<TimedState>,
+}
+
+#[derive(Default)]
+struct TimedState {
+    seconds: f64,
+    rays: Vec<Ray>,
+}
+
+impl Timed<'_> {
+    fn time<T>(&self, rays: &[Ray], trace: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let answer = trace();
+        let seconds = start.elapsed().as_secs_f64();
+        let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        state.seconds += seconds;
+        state.rays.extend_from_slice(rays);
+        answer
+    }
+}
+
+impl Accelerator for Timed<'_> {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.time(std::slice::from_ref(ray), || self.inner.intersect(ray))
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.time(std::slice::from_ref(ray), || self.inner.occluded(ray))
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
+        self.time(rays, || self.inner.intersect_batch(rays, hits, coherence));
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
+        self.time(rays, || self.inner.occluded_batch(rays, occluded, coherence));
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.inner.bounds()
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.inner.memory_bytes()
+    }
+
+    fn description(&self) -> String {
+        self.inner.description()
+    }
+}
