@@ -60,15 +60,22 @@ fn bindings_file() -> Result<PathBuf, String> {
     Ok(PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?).join("embree.rs"))
 }
 
-/// Sets `cfg(oidn)` and `cfg(exr_tools)`, without which tests that need Open Image Denoise, or the programs of OpenEXR and OpenImageIO, are
-/// ignored. With the environment variables STERADIAN_REQUIRE_OIDN=1 and STERADIAN_REQUIRE_EXR_TOOLS=1 they run in any case, and fail if what they need
-/// is missing. Run `touch build.rs` after it is installed.
+/// Sets `cfg(oidn)` and the like, without which tests that need Open Image Denoise, the programs of OpenEXR and OpenImageIO, the fetched scans
+/// or an instruction set are ignored. With the environment variable STERADIAN_REQUIRE_OIDN=1, and so on, they run in any case, and fail if what
+/// they need is missing. Run `touch build.rs` after it is installed.
 fn look_for_needs_of_tests() {
     let environment = oidn::Environment::of_process();
     let has_programs =
         || ["exrheader", "oiiotool", "idiff"].iter().all(|program| environment.path.iter().any(|folder| folder.join(program).is_file()));
     set_if("oidn", "STERADIAN_REQUIRE_OIDN", || has_oidn(&environment));
     set_if("exr_tools", "STERADIAN_REQUIRE_EXR_TOOLS", has_programs);
+    set_if("scans", "STERADIAN_REQUIRE_SCANS", || Path::new("scenes/scans/dragon.ply").is_file());
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::is_x86_feature_detected as has;
+        set_if("avx2", "STERADIAN_REQUIRE_AVX2", || has!("avx2") && has!("fma"));
+        set_if("avx512", "STERADIAN_REQUIRE_AVX512", || has!("avx512f") && has!("avx512bw") && has!("avx512dq") && has!("avx512vl"));
+    }
 }
 
 fn set_if(cfg: &str, variable: &str, condition: impl FnOnce() -> bool) {
