@@ -13,6 +13,7 @@ fn main() {
     for variable in ["DOCS_RS", "EMBREE_DIR"] {
         println!("cargo::rerun-if-env-changed={variable}");
     }
+    look_for_instructions();
     let built = if env::var_os("DOCS_RS").is_some() { use_checked_in_bindings() } else { build() };
     if let Err(message) = built {
         println!("cargo::error={message}");
@@ -53,6 +54,23 @@ fn use_checked_in_bindings() -> Result<(), String> {
 
 fn bindings_file() -> Result<PathBuf, String> {
     Ok(PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?).join("embree.rs"))
+}
+
+/// Sets `cfg(avx2)` and `cfg(avx512)`: tests of these instructions are reported as ignored without them.
+fn look_for_instructions() {
+    for name in ["avx2", "avx512"] {
+        println!("cargo::rustc-check-cfg=cfg({name})");
+    }
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::is_x86_feature_detected as has;
+        if has!("avx2") && has!("fma") {
+            println!("cargo::rustc-cfg=avx2");
+        }
+        if has!("avx512f") && has!("avx512bw") && has!("avx512dq") && has!("avx512vl") {
+            println!("cargo::rustc-cfg=avx512");
+        }
+    }
 }
 
 /// The first prefix with Embree's headers, and the major version found there.

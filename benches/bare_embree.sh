@@ -5,6 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 rounds=${1:-5} resolution=${2:-512} passes=${3:-10}
+[ -e /usr/include/embree3/rtcore.h ] || { echo "bare_embree.sh: the loops in C are written for Embree 3 (Debian 12: libembree-dev)" >&2; exit 1; }
 aside=$(mktemp -d)
 trap 'rm -rf "$aside"' EXIT
 shim=$(cargo bench --locked --package steradian-benches --bench shim --no-run 2>&1 | tee /dev/stderr | sed -n 's/.*Executable.*(\(.*\))$/\1/p')

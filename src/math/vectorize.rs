@@ -29,3 +29,26 @@ pub fn with_each<K: Kernel>(mut make: impl FnMut() -> K) -> Vec<K::Output> {
     outputs.extend(V4::try_new().map(|simd| simd.vectorize(make())));
     outputs
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Three;
+
+    impl Kernel for Three {
+        type Output = u32;
+
+        #[inline(always)]
+        fn call(self) -> u32 {
+            3
+        }
+    }
+
+    /// Ignored where tests of kernels have fewer instruction sets to compare.
+    #[test]
+    #[cfg_attr(any(miri, not(avx512)), ignore = "needs AVX-512")]
+    fn kernels_are_tested_with_every_instruction_set() {
+        assert_eq!(with_each(|| Three), [3, 3, 3]);
+    }
+}

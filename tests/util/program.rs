@@ -84,7 +84,7 @@ impl Drop for Running {
         drop((child.stdin.take(), child.stdout.take(), child.stderr.take()));
         // An error means that nothing of the group is left.
         let _ = kill_process_group(group, Signal::TERM);
-        while matches!(child.try_wait(), Ok(None)) && start.elapsed() < Duration::from_secs(5) {
+        while matches!(child.try_wait(), Ok(None)) && start.elapsed() < Duration::from_secs(1) {
             std::thread::sleep(Duration::from_millis(5));
         }
         let _ = kill_process_group(group, Signal::KILL);

@@ -130,10 +130,10 @@ fn run_tests(tree: &Path, tests: &[&str]) -> Result<Ending> {
 
 /// Copies the files that a build needs; those that are the same stay untouched, so that what was built stays fresh.
 fn copy_tree(root: &Path, tree: &Path) -> Result<()> {
-    for name in ["Cargo.toml", "Cargo.lock", "build.rs", "README.md"] {
+    for name in ["Cargo.toml", "Cargo.lock", "build.rs", "README.md", "fuzz/harness.rs", "fuzz/corpus.tar.gz"] {
         copy_if_changed(&root.join(name), &tree.join(name))?;
     }
-    for folder in ["src", "tests", "benches", "examples", "fuzz", "scenes", "docs", "ffi", "xtask"] {
+    for folder in ["src", "tests", "benches", "examples", "scenes", "docs", "ffi", "xtask"] {
         let mut folders: Vec<PathBuf> = vec![folder.into()];
         while let Some(folder) = folders.pop() {
             for entry in fs::read_dir(root.join(&folder))? {
