@@ -16,6 +16,7 @@ mkdir -p pictures
 # Picture, scene, size, samples per pixel or seconds ("8s"), further options.
 table='
 gallery         gallery         288x162  512
+revolution      revolution      288x120  512
 shrine          shrine          240x240  256
 cornell         cornell         208x208  1024
 glass           glass           208x208  4096
@@ -34,6 +35,9 @@ textures        textures        288x144  1024
 tree            tree            240x240  256
 smooth_normals  smooth_normals  320x140  512
 depth_of_field  depth_of_field  288x162  1024
+depth_of_field_without depth_of_field 288x162 1024 --no-depth-of-field
+gloss           gloss           240x120  512
+gloss_without   gloss_without   240x120  512
 classic         classic         288x144  64
 classic_path    classic         288x144  1024  --integrator path
 motion          motion          288x162  1024

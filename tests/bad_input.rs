@@ -74,6 +74,7 @@ fn opacities() {
     assert_faults(&[
         ("shapes[0].opacity", json!(1.5), "shapes[0].opacity", "from 0 to 1, not 1.5"),
         ("shapes[0].opacity", json!(-0.25), "shapes[0].opacity", "-0.25"),
+        ("shapes[0].opacity", json!({ "texture": "tiles", "threshold": 1.5 }), "shapes[0].opacity.threshold", "from 0 to 1, not 1.5"),
         ("shapes[0].opacity", json!([1, 1, 1]), "shapes[0].opacity", "expected an opacity"),
         ("shapes[0].opacity", json!({ "texture": "tilse" }), "shapes[0].opacity.texture", "did you mean \"tiles\"?"),
     ]);

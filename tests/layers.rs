@@ -215,6 +215,7 @@ fn highlights_and_what_is_below_are_parted_by_their_lobes() {
     for material in [
         json!({ "type": "plastic", "albedo": [0.8, 0.5, 0.2], "roughness": 0.4 }),
         json!({ "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20 }),
+        json!({ "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20, "lobe": "cosine" }),
         json!({ "type": "plastic", "albedo": [0.8, 0.5, 0.2] }),
     ] {
         let floor = |material: Value| {

@@ -82,6 +82,7 @@ fn roughness_and_colours_can_be_textures() {
         (json!({ "type": "diffuse_transmission", "reflectance": 0.4, "transmittance": 0.6 }), "transmittance"),
         (json!({ "type": "phong", "diffuse": 0.6, "specular": 0.3 }), "diffuse"),
         (json!({ "type": "phong", "diffuse": 0.5, "specular": 0.3, "exponent": 6 }), "exponent"),
+        (json!({ "type": "phong", "diffuse": 0.5, "specular": 0.3, "exponent": 6, "lobe": "cosine" }), "exponent"),
         (json!({ "type": "cook_torrance", "m": 0.6 }), "m"),
         (json!({ "type": "cook_torrance", "d": 0.3, "s": 0.6 }), "s"),
         (json!({ "type": "cook_torrance", "d": 0.6, "s": 0.3 }), "d"),

@@ -89,6 +89,41 @@ fn a_leaf_card_is_seen_and_casts_a_shadow_only_where_the_leaf_is() {
 }
 
 #[test]
+fn a_threshold_makes_all_or_nothing_of_an_opacity_for_every_accelerator() {
+    let folder = Folder::new();
+    // From left to right 0.2, 0.4, 0.6, 0.8.
+    ImageBuffer::from_fn(4, 1, |x, _| Luma([51 * (x as u8 + 1)])).save(folder.path("steps.png")).unwrap();
+    let solid = |opacity: Value, filter: &str| -> Vec<bool> {
+        let mut scene = card_before_a_wall(quad(opacity));
+        scene["textures"] = json!({ "steps": { "type": "image", "file": "steps.png", "filter": filter, "wrap": "clamp" } });
+        scene["materials"]["leaf"]["albedo"] = json!(0.5);
+        let scene = folder.compile(&scene).unwrap();
+        let mut found: Option<Vec<bool>> = None;
+        for (kind, name) in AccelKind::ALL {
+            let accel = accel::build(kind, &scene.geometry, 1).unwrap();
+            // Many rays over the card, from u = 0 to 1: an opacity without threshold lets some of them pass at every u.
+            let rays = (0..200).map(|i| Ray::new(vec3(-0.995 + 0.01 * i as f32, 0.1, 5.0), -Vec3::Z));
+            let hits: Vec<bool> = rays.map(|ray| accel.occluded(&Ray { t_max: 4.5, ..ray })).collect();
+            assert_eq!(*found.get_or_insert(hits.clone()), hits, "{name}");
+        }
+        found.unwrap()
+    };
+    let count = |solid: &[bool]| solid.iter().filter(|hit| **hit).count();
+    let part = |threshold: f64| json!({ "texture": "steps", "threshold": threshold });
+    for (threshold, first) in [(0.0, 0), (0.2, 0), (0.21, 50), (0.5, 100), (0.8, 150), (0.81, 200), (1.0, 200)] {
+        let expected: Vec<bool> = (0..200).map(|i| i >= first).collect();
+        assert_eq!(solid(part(threshold), "nearest"), expected, "{threshold}");
+    }
+    // Of the filtered texture: it is a half in the middle between the second texel and the third, and 0.45 a quarter of a texel before.
+    for (threshold, first) in [(0.5, 100), (0.45, 88)] {
+        let found = solid(part(threshold), "bilinear");
+        assert!(found.iter().enumerate().all(|(i, hit)| *hit == (i >= first) || i.abs_diff(first) <= 1), "{threshold}: {found:?}");
+    }
+    let veil = count(&solid(json!({ "texture": "steps" }), "nearest"));
+    assert!((60..140).contains(&veil), "{veil}");
+}
+
+#[test]
 fn a_number_is_the_part_of_the_light_that_a_surface_stops() {
     for (shape, layers) in [("quad", 1), ("sphere", 2)] {
         let scene = json!({
@@ -154,7 +189,8 @@ fn an_image_of_floats_beyond_1_is_no_opacity() {
 #[test]
 fn light_comes_from_what_is_there_of_a_shape_with_holes() {
     // Textures with u below 1/2 cut out; a point below the middle of a square sees a quarter of it in the fraction f of all directions.
-    let textures = json!({ "half": { "type": "checker", "color0": [0, 0, 0], "color1": [1, 1, 1], "scale": [1, 0] } });
+    let textures = json!({ "half": { "type": "checker", "color0": [0, 0, 0], "color1": [1, 1, 1], "scale": [1, 0] },
+        "dim": { "type": "checker", "color0": [0.4, 0.4, 0.4], "color1": [0.6, 0.6, 0.6], "scale": [1, 0] } });
     let f = FRAC_1_SQRT_2 * FRAC_1_SQRT_2.atan() / PI;
     let half = json!({ "texture": "half" });
     let quad = json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": half });
@@ -163,9 +199,11 @@ fn light_comes_from_what_is_there_of_a_shape_with_holes() {
         "type": "mesh", "positions": [[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], "triangles": [[0, 1, 2], [0, 2, 3]],
         "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]], "opacity": half
     });
+    let mut cut = quad.clone();
+    cut["opacity"] = json!({ "texture": "dim", "threshold": 0.5 });
     let sphere = json!({ "type": "sphere", "radius": 0.5, "opacity": 0.5, "transform": [{ "translate": [0, 1, 0] }] });
     for (shape, two_sided, expected) in
-        [(quad, false, 2.0 * f), (veil, false, 2.0 * f), (mesh, false, 2.0 * f), (sphere, true, 0.75 * 0.25)]
+        [(quad, false, 2.0 * f), (cut, false, 2.0 * f), (veil, false, 2.0 * f), (mesh, false, 2.0 * f), (sphere, true, 0.75 * 0.25)]
     {
         let mut light = shape.clone();
         merge(&mut light, json!({ "material": "black", "emission": { "radiance": [1, 1, 1], "two_sided": two_sided } }));

@@ -100,3 +100,5 @@ mod tidy;
 mod util;
 /// Colours of vertices: in pictures, from every kind of file, and what is refused.
 mod vertex_colors;
+/// What the command line says of how a picture is shown and focused.
+mod views;

@@ -1,5 +1,5 @@
-//! Makes meshes of `scenes/` (a knot of 72,000 triangles and a coarse one of 1,920, a terrain of 131,072, plants, an island, the beams of a
-//! gate), a sky, and the scene `shrine.json`, in which more than a thousand of the plants stand.
+//! Makes meshes of `scenes/` (a knot of 72,000 triangles and a coarse one of 1,920, a terrain of 131,072, a vase of 320, plants, an island, the beams
+//! of a gate), a sky, and the scene `shrine.json`, in which more than a thousand of the plants stand.
 //!
 //! `cargo xtask make_meshes` overwrites them, byte for byte the same.
 
@@ -24,6 +24,7 @@ pub fn run() -> Outcome {
     fs::write(scenes.join("meshes/terrain.ply"), ply(&grid(256, 256, false, terrain)))?;
     let coarse = Mesh { normals: Vec::new(), ..grid(96, 10, true, knot) };
     fs::write(scenes.join("meshes/coarse_knot.ply"), ply(&coarse))?;
+    fs::write(scenes.join("meshes/vase.ply"), ply(&grid(8, 20, false, vase)))?;
     let tree = plants::tree();
     fs::write(scenes.join("meshes/tree_wood.ply"), ply(&tree.wood))?;
     fs::write(scenes.join("meshes/tree_leaves.ply"), ply(&tree.leaves))?;
@@ -85,6 +86,17 @@ pub fn knot(u: f32, v: f32) -> V {
     let angle = TAU * v;
     let groove = 1.0 + 0.12 * (5.0 * angle + 36.0 * TAU * u).sin();
     center(u) + (side * angle.cos() + up * angle.sin()) * (0.075 * groove)
+}
+
+/// The vase of `scenes/revolution.json`: its profile of two Bezier curves, turned about y.
+fn vase(u: f32, v: f32) -> V {
+    const PROFILE: [[f32; 2]; 7] = [[0.26, 0.0], [0.62, 0.1], [0.66, 0.6], [0.36, 0.86], [0.2, 1.0], [0.2, 1.16], [0.33, 1.3]];
+    let (first, t) = if u < 0.5 { (0, 2.0 * u) } else { (3, 2.0 * u - 1.0) };
+    let s = 1.0 - t;
+    let weights = [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t];
+    let at = |axis: usize| (0..4).map(|k| weights[k] * PROFILE[first + k][axis]).sum::<f32>();
+    let angle = TAU * v;
+    vec3(at(0) * angle.cos(), at(1), at(0) * angle.sin())
 }
 
 /// Rolling hills over 20 x 20 units, flat in the middle.
