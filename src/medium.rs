@@ -22,7 +22,7 @@ pub struct Medium {
     pub priority: i32,
     /// Index of refraction for red, green and blue; that of empty space is 1.
     pub ior: [f32; 3],
-    /// Absorption coefficient for red, green and blue, per world unit, finite and not negative.
+    /// Absorption coefficient for red, green and blue, per unit of length, finite and not negative.
     pub absorption: Rgb,
 }
 
@@ -157,6 +157,13 @@ impl Media {
         list.sort_by(Medium::precedence);
         list.dedup();
         Self { list }
+    }
+
+    /// These where a unit of length is `factor` of the unit so far.
+    pub fn rescale(&mut self, factor: f64) {
+        for medium in &mut self.list {
+            medium.absorption = medium.absorption.map(|a| (f64::from(a) * factor) as f32);
+        }
     }
 
     /// Whether there are none.

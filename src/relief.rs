@@ -19,7 +19,7 @@ pub enum Relief {
     BumpMap {
         /// The texture.
         texture: TextureId,
-        /// World units for a value of 1.
+        /// Units of length for a value of 1.
         height: f32,
         /// Distance in uv over which slopes are measured.
         step: Vec2,
@@ -41,6 +41,13 @@ impl Relief {
     pub fn bump_map(texture: TextureId, height: f32, textures: &[Texture]) -> Self {
         let texel = textures[texture.index()].texel();
         Self::BumpMap { texture, height, step: texel.unwrap_or(Vec2::splat(1.0 / 1024.0)) }
+    }
+
+    /// This relief where lengths are `factor` times what they were.
+    pub fn rescale(&mut self, factor: f64) {
+        if let Self::BumpMap { height, .. } = self {
+            *height = (f64::from(*height) * factor) as f32;
+        }
     }
 
     /// The shading normal at a point with its change with v: unit, in the hemisphere of the geometric normal.

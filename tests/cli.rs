@@ -115,6 +115,41 @@ fn interrupted_renders_write_their_picture() {
     }
 }
 
+/// A box of mirrors, whose paths never end: neither does the first pass.
+const MIRRORS: &str = r#"{
+    "film": { "width": 8, "height": 8 }, "sampler": { "spp": 1 },
+    "camera": { "position": [0, 0, 0], "look_at": [0.3, 0.2, -1] },
+    "materials": { "m": { "type": "mirror" } },
+    "shapes": [{ "type": "cube", "material": "m" }],
+    "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+    "integrator": { "type": "path", "max_depth": 4294967295, "rr_depth": 4294967295 }
+}"#;
+
+#[test]
+fn signals_and_time_limits_end_a_pass_that_does_not_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let limited = |options: &str| {
+        let mut command = steradian(folder.path(), &format!("render mirrors.json -o a.exr --threads 1 {options}"));
+        std::fs::write(folder.path().join("mirrors.json"), MIRRORS).unwrap();
+        command.stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let output = limited("--time-limit 0.1").wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("--time-limit 0.1: "), "{message}");
+
+    for options in ["", "--guiding on", "--target-error 0.1"] {
+        let mut child = limited(options);
+        // With the first line of progress the program listens.
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        lines.next().unwrap().unwrap();
+        assert!(Command::new("kill").arg("-INT").arg(child.id().to_string()).status().unwrap().success());
+        let rest: Vec<String> = lines.map_while(Result::ok).collect();
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{options}: {rest:?}");
+    }
+    assert!(!folder.path().join("a.exr").exists());
+}
+
 /// A file that cannot be written in the end is an error, and the others are there.
 #[test]
 fn a_file_that_cannot_be_written_does_not_take_the_others_along() {

@@ -82,6 +82,8 @@ mod opacity;
 mod own_accelerators;
 /// Normal maps, bump maps and smooth normals, without leaks and black rims.
 mod relief;
+/// Scenes far too small, too large or too far away for 32-bit coordinates.
+mod scale;
 /// Meshes, comments, names and transforms of scene files, read as users write them.
 mod scene_files;
 /// Rays that leave a surface do not find it again, and do not leak out of closed boxes.

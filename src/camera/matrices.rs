@@ -28,7 +28,7 @@ impl Camera {
                 [[scale_x, 0.0, 0.0, 0.0], [0.0, scale_y, 0.0, 0.0], [x, y, 1.0, 1.0], [0.0, 0.0, -1.0, 0.0]]
             }
             Projection::Orthographic { half_height } => {
-                let (scale_x, scale_y) = scales(half_height);
+                let (scale_x, scale_y) = scales(self.render_space().world_length(half_height));
                 [[scale_x, 0.0, 0.0, 0.0], [0.0, scale_y, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [x, y, 0.0, 1.0]]
             }
             Projection::Environment => return None,
@@ -39,7 +39,7 @@ impl Camera {
     fn world_to_view(&self) -> Rows {
         let (forward, up) = (self.axis(), self.up());
         let axes = [forward.cross(up), up, forward].map(Vec3::as_dvec3);
-        let position = self.position();
+        let position = self.render_space().world_point(self.position());
         let mut rows = [[0.0; 4]; 4];
         for (column, axis) in axes.iter().enumerate() {
             for (row, component) in axis.to_array().into_iter().enumerate() {

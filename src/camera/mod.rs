@@ -12,7 +12,7 @@ pub use lens::{Blades, Lens, lens_equation};
 
 use std::f64::consts::{PI, TAU};
 
-use crate::math::{DVec3, Motion, Ray, RayCone, Transform, Vec2, Vec3};
+use crate::math::{DVec3, Motion, Ray, RayCone, RenderSpace, Transform, Vec2, Vec3};
 
 /// How points of the picture become directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +49,8 @@ impl Default for Framing {
     }
 }
 
-/// A camera that looks along its local -Z with +Y up.
+/// A camera that looks along its local -Z with +Y up. It is placed in the scene's [render space](RenderSpace), which is the world unless
+/// [`in_render_space`](Self::in_render_space) made it another; there are its rays and the points it is given.
 #[derive(Clone, Debug)]
 pub struct Camera {
     /// At the opening of the shutter, if the camera moves.
@@ -60,12 +61,21 @@ pub struct Camera {
     framing: Framing,
     near: f64,
     shutter: [f64; 2],
+    render_space: RenderSpace,
 }
 
 impl Camera {
     /// A camera placed by a rotation and translation.
     pub fn new(world_from_camera: Transform, projection: Projection) -> Self {
-        Self { world_from_camera, motion: None, projection, framing: Framing::default(), near: 0.0, shutter: [0.0, 1.0] }
+        Self {
+            world_from_camera,
+            motion: None,
+            projection,
+            framing: Framing::default(),
+            near: 0.0,
+            shutter: [0.0, 1.0],
+            render_space: RenderSpace::WORLD,
+        }
     }
 
     /// This camera with another framing; environment cameras have none.
@@ -92,6 +102,32 @@ impl Camera {
         let world_from_camera = Transform::new(motion.map_at(0.0))?;
         let motion = motion.as_constant().is_none().then(|| Box::new(motion));
         Some(Self { world_from_camera, motion, ..self })
+    }
+
+    /// This camera, which is in the world, in a render space. `None` if that leaves no regular transform.
+    pub fn in_render_space(self, space: RenderSpace) -> Option<Self> {
+        if space.is_world() {
+            return Some(self);
+        }
+        let scale = space.scale();
+        let projection = match self.projection {
+            Projection::Perspective { half_height, lens } => Projection::Perspective {
+                half_height,
+                lens: lens.map(|lens| Lens { radius: lens.radius * scale, focus_distance: lens.focus_distance * scale, ..lens }),
+            },
+            Projection::Orthographic { half_height } => Projection::Orthographic { half_height: half_height * scale },
+            Projection::Environment => Projection::Environment,
+        };
+        let unscale = Motion::constant(RenderSpace::unscaling(scale));
+        let motion = self.motion.map(|motion| Box::new(space.place_motion(&motion).after(&unscale)));
+        let world_from_camera = Transform::new(space.place_rigid(&self.world_from_camera.world_from_object))?;
+        Some(Self { world_from_camera, motion, projection, near: self.near * scale, render_space: space, ..self })
+    }
+
+    /// The space in which the camera is placed.
+    #[inline]
+    pub fn render_space(&self) -> &RenderSpace {
+        &self.render_space
     }
 
     /// Whether the camera moves while the shutter is open.
@@ -210,17 +246,18 @@ impl Camera {
         DVec3::new(x, y, -1.0)
     }
 
-    /// Depth of a world point at the [time of a ray](Ray::time): along the view axis, or the distance from an environment camera.
+    /// Depth of a point in world units at the [time of a ray](Ray::time): along the view axis, or the distance from an environment camera.
     #[inline]
     pub fn depth(&self, p: DVec3, time: f32) -> f32 {
         let local = match &self.motion {
             None => self.world_from_camera.inverse_point(p),
             Some(motion) => motion.map_at(f64::from(time)).inverse().transform_point3(p),
         };
-        match self.projection {
-            Projection::Perspective { .. } | Projection::Orthographic { .. } => -local.z as f32,
-            Projection::Environment => local.length() as f32,
-        }
+        let depth = match self.projection {
+            Projection::Perspective { .. } | Projection::Orthographic { .. } => -local.z,
+            Projection::Environment => local.length(),
+        };
+        self.render_space.world_length(depth) as f32
     }
 
     /// Unit view direction in the world when the shutter opens.

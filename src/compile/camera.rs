@@ -5,7 +5,7 @@ use super::transforms::Shutter;
 use crate::camera::{Blades, Camera, Framing, Lens, Projection, lens_equation};
 use crate::desc::{CameraDesc, CameraKindDesc, KeyframeDesc, LensDesc};
 use crate::error::Result;
-use crate::math::{DAffine3, DMat3, DVec3, Motion, Transform};
+use crate::math::{DAffine3, DMat3, DVec3, Motion, RenderSpace, Transform};
 
 const DEFAULT_FOV_DEGREES: f64 = 40.0;
 
@@ -39,6 +39,15 @@ pub fn compile(files: &Files, desc: &CameraDesc) -> Result<Camera> {
     let motion = motion(files, &desc.motion, &map, shutter(files, desc)?)?;
     let camera = Camera::new(transform, projection).with_framing(framing(files, desc)?).with_near(desc.near).with_shutter(desc.shutter);
     camera.with_motion(motion).ok_or_else(|| files.error("camera.motion", "the motion is singular"))
+}
+
+/// The camera in a render space.
+pub fn compile_in(files: &Files, desc: &CameraDesc, space: RenderSpace) -> Result<Camera> {
+    let camera = compile(files, desc)?;
+    let place = if desc.position.is_some() { "camera.position" } else { "camera.transform" };
+    let position = camera.position();
+    files.reachable(place, position, &space)?;
+    camera.in_render_space(space).ok_or_else(|| files.error(place, "the camera cannot be placed beside a scene of this size"))
 }
 
 /// When the shutter is open.

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::id::{LightGroupId, LightId};
 use crate::import::{AssetError, read_ies, read_rgb_image};
 use crate::light::{DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, SpotLight};
-use crate::math::{DAffine3, DMat3, DVec3};
+use crate::math::{DAffine3, DMat3, DVec3, RenderSpace};
 
 /// All lights so far, with their groups.
 #[derive(Default)]
@@ -49,17 +49,17 @@ impl LightTable {
     }
 }
 
-/// One entry of `lights`.
-pub fn compile(files: &Files, path: &str, desc: &LightDesc) -> Result<Light> {
+/// One entry of `lights`, placed into `space`.
+pub fn compile(files: &Files, path: &str, desc: &LightDesc, space: &RenderSpace) -> Result<Light> {
     let at = |key: &str| format!("{path}.{key}");
     Ok(match desc {
         LightDesc::Point(light) => Light::Point(PointLight {
-            position: files.vector(&at("position"), light.position)?,
-            intensity: files.emitted(&at("intensity"), light.intensity)?.into(),
+            position: files.placed(&at("position"), light.position, space)?,
+            intensity: files.intensity(&at("intensity"), light.intensity, space)?,
         }),
         LightDesc::Spot(light) => {
-            let position = files.vector(&at("position"), light.position)?;
-            let toward = files.vector(&at("look_at"), light.look_at)? - position;
+            let position = files.placed(&at("position"), light.position, space)?;
+            let toward = files.position(&at("look_at"), light.look_at)? - files.position(&at("position"), light.position)?;
             let axis = toward.try_normalize().ok_or_else(|| files.error(&at("look_at"), "is the light's own position"))?;
             let cutoff = light.cutoff_angle_degrees;
             if !(cutoff > 0.0 && cutoff <= 180.0) {
@@ -67,10 +67,10 @@ pub fn compile(files: &Files, path: &str, desc: &LightDesc) -> Result<Light> {
             }
             let beam = light.beam_angle_degrees.unwrap_or(0.75 * cutoff);
             let beam = files.within(&at("beam_angle_degrees"), beam, 0.0, cutoff)?;
-            let intensity = files.emitted(&at("intensity"), light.intensity)?.into();
+            let intensity = files.intensity(&at("intensity"), light.intensity, space)?;
             Light::Spot(Box::new(SpotLight::new(position, axis, intensity, beam.to_radians(), cutoff.to_radians())))
         }
-        LightDesc::Ies(light) => Light::Ies(Box::new(ies(files, path, light)?)),
+        LightDesc::Ies(light) => Light::Ies(Box::new(ies(files, path, light, space)?)),
         LightDesc::Directional(light) => {
             let direction = files.direction(&at("direction"), light.direction)?;
             let irradiance = files.emitted(&at("irradiance"), light.irradiance)?.into();
@@ -84,20 +84,40 @@ pub fn compile(files: &Files, path: &str, desc: &LightDesc) -> Result<Light> {
     })
 }
 
-fn ies(files: &Files, path: &str, desc: &IesLightDesc) -> Result<IesLight> {
-    let position = files.vector(&format!("{path}.position"), desc.position)?;
+impl Files {
+    /// A point of the world, placed into `space`.
+    fn placed(&self, path: &str, value: [f64; 3], space: &RenderSpace) -> Result<DVec3> {
+        let world = self.position(path, value)?;
+        self.reachable(path, world, space)?;
+        Ok(space.point(world))
+    }
+
+    /// Radiant intensity, which grows with the square of lengths.
+    fn intensity(&self, path: &str, value: [f32; 3], space: &RenderSpace) -> Result<Rgb> {
+        let scale = space.scale() * space.scale();
+        let scaled = self.emitted(path, value)?.map(|channel| (f64::from(channel) * scale) as f32);
+        if scaled.iter().zip(value).any(|(&scaled, given)| !scaled.is_finite() || (given > 0.0 && !scaled.is_normal())) {
+            return Err(self.error(path, format!("{value:?} is out of all proportion to a scene of this size")));
+        }
+        Ok(scaled.into())
+    }
+}
+
+fn ies(files: &Files, path: &str, desc: &IesLightDesc, space: &RenderSpace) -> Result<IesLight> {
+    let at = format!("{path}.position");
+    let (world, position) = (files.position(&at, desc.position)?, files.placed(&at, desc.position, space)?);
     let nadir = match desc.look_at {
         None => -DVec3::Y,
         Some(target) => {
             let place = format!("{path}.look_at");
-            let toward = files.vector(&place, target)? - position;
+            let toward = files.position(&place, target)? - world;
             toward.try_normalize().ok_or_else(|| files.error(&place, "is the light's own position"))?
         }
     };
     if !desc.rotation_degrees.is_finite() {
         return Err(files.error(&format!("{path}.rotation_degrees"), "the angle is not finite"));
     }
-    let intensity = files.emitted(&format!("{path}.intensity"), desc.intensity)?.into();
+    let intensity = files.intensity(&format!("{path}.intensity"), desc.intensity, space)?;
     let place = format!("{path}.file");
     let asset = files.asset(&desc.file);
     let data = read_ies(&asset).map_err(|e| files.asset_error(&place, &asset, e))?;
@@ -121,7 +141,11 @@ fn environment(files: &Files, path: &str, desc: &EnvironmentLightDesc) -> Result
         }
     };
     match (&desc.radiance, &desc.file) {
-        (Some(radiance), None) => Ok(Environment::Constant(Rgb::from(files.emitted(&format!("{path}.radiance"), *radiance)?) * scale)),
+        (Some(radiance), None) => {
+            let place = format!("{path}.radiance");
+            let radiance = Rgb::from(files.emitted(&place, *radiance)?) * scale;
+            Ok(Environment::Constant(files.emitted(&place, radiance.to_array())?.into()))
+        }
         (None, Some(file)) => {
             let place = format!("{path}.file");
             let asset = files.asset(file);
@@ -129,6 +153,8 @@ fn environment(files: &Files, path: &str, desc: &EnvironmentLightDesc) -> Result
                 Some(image) => image.clone(),
                 None => read_rgb_image(&asset).map_err(|e| files.asset_error(&place, &asset, e))?,
             };
+            let brightest = image.pixels.as_flattened().iter().copied().fold(0.0, f32::max);
+            files.emitted(&place, [brightest * scale; 3])?;
             let pixels = image.pixels.into_iter().map(Rgb::from).collect();
             let map = EnvironmentMap::new(image.width, image.height, pixels, rotation, scale);
             let map = map.map_err(|e| files.asset_error(&place, &asset, AssetError::Malformed(e.to_string())))?;

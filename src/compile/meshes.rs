@@ -1,6 +1,6 @@
 //! Meshes: buffers from files or the scene itself to placed, checked [`Mesh`]es.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
@@ -42,6 +42,12 @@ impl MeshStore {
 }
 
 fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
+    for (key, times) in [("deform_files", desc.deform_files.len()), ("deform_positions", desc.deform_positions.len())] {
+        if times >= Mesh::MAX_STEPS {
+            let message = format!("{times} further times: there can be {}", Mesh::MAX_STEPS - 1);
+            return Err(files.error(&format!("{path}.{key}"), message));
+        }
+    }
     match (&desc.file, &desc.positions, &desc.triangles) {
         (Some(file), None, None)
             if desc.normals.is_none() && desc.uvs.is_none() && desc.colors.is_none() && desc.deform_positions.is_empty() =>
@@ -60,14 +66,19 @@ fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
             Ok(meshes)
         }
         (None, Some(positions), Some(triangles)) if desc.deform_files.is_empty() => {
+            let (positions, origin) = MeshData::rounded(positions);
             let data = MeshData {
-                positions: positions.clone(),
+                positions,
                 triangles: triangles.clone(),
                 normals: desc.normals.clone(),
                 uvs: desc.uvs.clone(),
                 colors: desc.colors.clone(),
+                origin,
             };
-            let at = |positions: &Vec<[f32; 3]>| MeshData { positions: positions.clone(), ..data.clone() };
+            let at = |positions: &Vec<[f64; 3]>| {
+                let (positions, origin) = MeshData::rounded(positions);
+                MeshData { positions, origin, ..data.clone() }
+            };
             let later = desc.deform_positions.iter().map(at).collect();
             Ok(vec![LoadedMesh { data, later, material: None }])
         }
@@ -102,6 +113,8 @@ pub struct Placement<'a> {
     pub shading: MeshShadingDesc,
     pub smoothing: Smoothing,
     pub reverse_normal: bool,
+    /// Whether the mesh gives off light.
+    pub emits: bool,
 }
 
 /// The error about a mesh, in its file if it has one.
@@ -128,15 +141,15 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, late
     }
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
-    let place_positions = |mut positions: Vec<[f32; 3]>| {
-        if !is_identity {
+    let place_positions = |mut positions: Vec<[f32; 3]>, origin: [f64; 3]| {
+        if !is_identity || origin != [0.0; 3] {
             for p in &mut positions {
-                *p = transform.point(DVec3::from(p.map(f64::from))).as_vec3().to_array();
+                *p = transform.point(DVec3::from(p.map(f64::from)) + DVec3::from(origin)).as_vec3().to_array();
             }
         }
         positions
     };
-    let positions = place_positions(data.positions);
+    let positions = place_positions(data.positions, data.origin);
     let mut triangles = data.triangles;
     if transform.swaps_handedness() != placement.reverse_normal {
         triangles.iter_mut().for_each(|t| t.swap(1, 2));
@@ -151,13 +164,16 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, late
         }
         tracing::warn!("{}: {path}: {dropped} of {before} triangles have no area and were dropped", files.scene.display());
     }
+    if placement.emits {
+        drop_coincident(files, path, &positions, &mut triangles);
+    }
 
     let mut steps = vec![MeshStep { positions, normals: data.normals }];
     for step in later {
         if step.positions.len() != count {
             return Err(refuse(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices: count }));
         }
-        steps.push(MeshStep { positions: place_positions(step.positions), normals: step.normals });
+        steps.push(MeshStep { positions: place_positions(step.positions, step.origin), normals: step.normals });
     }
     let (mut uvs, mut colors) = (data.uvs, data.colors);
     if let Some(vertices) = find_normals(&mut steps, &mut triangles, placement) {
@@ -206,6 +222,27 @@ fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement
             }
             None
         }
+    }
+}
+
+/// Of triangles of an emitter that are in one place, keeps the first, with a warning: which of them a ray meets, and so which side shines, is
+/// otherwise left to the accelerator.
+fn drop_coincident(files: &Files, path: &str, positions: &[[f32; 3]], triangles: &mut Vec<[u32; 3]>) {
+    let before = triangles.len();
+    let mut places = HashSet::with_capacity(before);
+    triangles.retain(|t| {
+        // Adding zero makes a negative zero positive.
+        let mut corners = t.map(|i| positions[i as usize].map(|x| (x + 0.0).to_bits()));
+        corners.sort_unstable();
+        places.insert(corners)
+    });
+    let dropped = before - triangles.len();
+    if dropped > 0 {
+        let file = files.scene.display();
+        tracing::warn!(
+            "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped (for both sides: \
+             emission.two_sided)"
+        );
     }
 }
 

@@ -23,7 +23,7 @@ mod summary;
 mod textures;
 mod transforms;
 
-pub use settings::check_settings;
+pub use settings::{check_imported_settings, check_settings};
 pub use summary::Summary;
 
 use std::collections::BTreeMap;
@@ -37,6 +37,7 @@ use crate::id::TextureId;
 use crate::import::{AssetError, Assets, Imported};
 use crate::light::LightSet;
 use crate::material::Material;
+use crate::math::RenderSpace;
 use crate::scene::{Features, Scene, Surface};
 use crate::texture::Texture;
 
@@ -59,13 +60,11 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
 /// # Errors
 /// As [`compile`].
 pub fn compile_imported(imported: &Imported, scene_file: &Path) -> Result<Scene> {
-    let (assets, places) = (Arc::clone(&imported.assets), Arc::clone(&imported.places));
-    compile_with(&imported.desc, Files { scene: scene_file.into(), assets, places })
+    compile_with(&imported.desc, Files::of(imported, scene_file))
 }
 
 fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
     settings::check(desc, &files)?;
-    let camera = camera::compile(&files, &desc.camera)?;
     let shutter = camera::shutter(&files, &desc.camera)?;
     let materials = MaterialTable::new(&files, desc)?;
     let mut builder = Builder {
@@ -78,14 +77,17 @@ fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
         opacities: Vec::new(),
         lights: LightTable::default(),
         identities: IdentityTable::new(desc),
+        space: RenderSpace::WORLD,
+        object_spaces: Vec::new(),
     };
     builder.add_world(desc)?;
     for (i, light) in desc.lights.iter().enumerate() {
         let path = format!("lights[{i}]");
         let group = builder.lights.group(&builder.files, &path, light.group())?;
-        let light = lights::compile(&builder.files, &path, light)?;
+        let light = lights::compile(&builder.files, &path, light, &builder.space)?;
         builder.lights.add([light], group);
     }
+    let camera = camera::compile_in(&builder.files, &desc.camera, builder.space)?;
     builder.finish(desc, camera)
 }
 
@@ -106,6 +108,11 @@ impl Files {
     /// A scene whose assets are all files.
     fn new(scene: impl Into<PathBuf>) -> Self {
         Self { scene: scene.into(), assets: Arc::default(), places: Arc::default() }
+    }
+
+    /// The scene of a file of any kind.
+    fn of(imported: &Imported, scene: &Path) -> Self {
+        Self { scene: scene.into(), assets: Arc::clone(&imported.assets), places: Arc::clone(&imported.places) }
     }
 
     /// An error at a place of the scene.
@@ -158,11 +165,19 @@ struct Builder {
     opacities: Vec<Option<TextureId>>,
     lights: LightTable,
     identities: IdentityTable,
+    /// Where everything is placed, once all shapes are known.
+    space: RenderSpace,
+    /// The spaces in which objects are, by object.
+    object_spaces: Vec<RenderSpace>,
 }
 
 impl Builder {
     fn finish(mut self, desc: &SceneDesc, camera: crate::camera::Camera) -> Result<Scene> {
         let files = &self.files;
+        if !self.space.is_world() {
+            self.materials.media.rescale(1.0 / self.space.scale());
+            self.materials.reliefs.iter_mut().for_each(|relief| relief.rescale(self.space.scale()));
+        }
         self.geometry.cutouts = opacity::cutouts(&self.opacities, &self.materials.textures);
         let light_groups = self.lights.groups();
         let lights = LightSet::new(self.lights.lights, &self.geometry);

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::film::PlacementId;
 use crate::geometry::{Instance, Object};
 use crate::id::ObjectId;
-use crate::math::{DAffine3, Motion};
+use crate::math::{Bounds, DAffine3, Motion, RenderSpace};
 
 /// An object in parts: what its instances share, and what each of them has of its own.
 struct PreparedObject {
@@ -22,20 +22,12 @@ struct PreparedObject {
 }
 
 impl Builder {
-    /// Adds the shapes of the world and all instances.
+    /// Adds the shapes of the world and all instances, in the render space that suits them.
     pub(super) fn add_world(&mut self, desc: &SceneDesc) -> Result<()> {
+        let mut world = Vec::with_capacity(desc.shapes.len());
         for (i, shape) in desc.shapes.iter().enumerate() {
-            for prepared in self.prepare(&format!("shapes[{i}]"), i, shape)? {
-                if let Some(motion) = prepared.motion.clone() {
-                    let object = self.group(vec![prepared])?;
-                    self.push_instance(&format!("shapes[{i}].motion"), object, &motion, None)?;
-                } else {
-                    let id = self.place(prepared, &DAffine3::IDENTITY)?;
-                    self.geometry.world.push(id);
-                }
-            }
+            world.extend(self.prepare(&format!("shapes[{i}]"), i, shape)?.into_iter().map(|prepared| (i, prepared)));
         }
-
         let nesting = Nesting::new(&self.files, desc)?;
         let mut objects = BTreeMap::new();
         for (name, object) in &desc.objects {
@@ -44,14 +36,95 @@ impl Builder {
                 shapes.extend(self.prepare(&format!("objects.{name}.shapes[{k}]"), k, shape)?);
             }
             if nesting.is_used(name) {
-                objects.insert(name.as_str(), self.share(shapes)?);
+                objects.insert(name.as_str(), shapes);
             } else {
                 tracing::warn!("{}: objects.{name}: no instance places this object", self.files.scene.display());
             }
         }
         let still = Motion::constant(DAffine3::IDENTITY);
-        let world = Level { desc, nesting: &nesting, objects: &objects, path: "instances", outer: &still, placement: None };
-        self.add_instances(&world, &desc.instances)
+        let level = Level { desc, nesting: &nesting, path: "instances", outer: &still, placement: None };
+        self.space = self.render_space(&level, &world, &objects)?;
+
+        for (i, prepared) in world {
+            if let Some(motion) = prepared.motion.clone() {
+                let object = self.group(vec![prepared])?;
+                self.push_instance(&format!("shapes[{i}].motion"), object, &motion, None)?;
+            } else {
+                let id = self.place(prepared, &DAffine3::IDENTITY, &{ self.space })?;
+                self.geometry.world.push(id);
+            }
+        }
+        let mut shared = BTreeMap::new();
+        for (name, shapes) in objects {
+            shared.insert(name, self.share(shapes)?);
+        }
+        self.add_instances(&level, &shared, &desc.instances)
+    }
+
+    /// The space that suits the world's shapes and the instances of objects.
+    fn render_space(
+        &self,
+        world: &Level,
+        shapes: &[(usize, PreparedShape)],
+        objects: &BTreeMap<&str, Vec<PreparedShape>>,
+    ) -> Result<RenderSpace> {
+        let mut bounds: Vec<Bounds> = Vec::with_capacity(shapes.len() + world.desc.instances.len());
+        for (_, shape) in shapes {
+            bounds.push(self.checked_bounds(shape.path(), shape.bounds())?);
+        }
+        let mut own = BTreeMap::new();
+        for (name, shapes) in objects {
+            own.insert(*name, shapes.iter().fold(Bounds::EMPTY, |all, shape| all.union(&shape.bounds())));
+        }
+        self.instance_bounds(world, &own, &world.desc.instances, &mut bounds)?;
+        let largest = bounds.iter().map(|b| b.min.abs().max(b.max.abs()).max_element()).fold(0.0, f64::max);
+        let least = RenderSpace::EXTENTS[0];
+        if largest > 0.0 && largest < least {
+            let message = format!("the scene reaches only {largest:e} from the origin: at least {least:e} can be rendered");
+            return Err(self.files.error("shapes", message));
+        }
+        Ok(RenderSpace::around(&bounds))
+    }
+
+    /// Bounds of instances and those inside of them.
+    fn instance_bounds(
+        &self,
+        level: &Level,
+        own: &BTreeMap<&str, Bounds>,
+        instances: &[InstanceDesc],
+        bounds: &mut Vec<Bounds>,
+    ) -> Result<()> {
+        for (i, instance) in instances.iter().enumerate() {
+            let name = instance.object.as_str();
+            let (Some(inner), Some(object)) = (level.desc.objects.get(name), own.get(name)) else { continue };
+            if level.nesting.is_empty(name) {
+                continue;
+            }
+            let path = format!("{}[{i}]", level.path);
+            let outer = self.instance_motion(level, &path, instance)?;
+            if !object.is_empty() {
+                let placed = outer.as_constant().map_or_else(|| outer.bounds(object), |map| object.transformed(&map));
+                bounds.push(self.checked_bounds(&format!("{path}.transform"), placed)?);
+            }
+            let path = format!("objects.{name}.instances");
+            self.instance_bounds(&Level { path: &path, outer: &outer, ..*level }, own, &inner.instances, bounds)?;
+        }
+        Ok(())
+    }
+
+    /// Bounds within the range of coordinates; what is not finite is refused where it is placed.
+    fn checked_bounds(&self, path: &str, bounds: Bounds) -> Result<Bounds> {
+        let (reach, most) = (bounds.min.abs().max(bounds.max.abs()).max_element(), RenderSpace::EXTENTS[1]);
+        if reach.is_finite() && reach > most && !bounds.is_empty() {
+            return Err(self.files.error(path, format!("reaches to {reach:e}: coordinates are at most {most:e}")));
+        }
+        Ok(bounds)
+    }
+
+    /// Where an instance stands in the world.
+    fn instance_motion(&self, level: &Level, path: &str, instance: &InstanceDesc) -> Result<Motion> {
+        let map = self.files.transform(&format!("{path}.transform"), &instance.transform, &DAffine3::IDENTITY)?.world_from_object;
+        Ok(level.outer.after(&self.files.motion(&format!("{path}.motion"), &instance.motion, &map, self.shutter)?))
     }
 
     /// The shapes of an object: what neither emits nor moves goes into a group for all instances.
@@ -70,26 +143,34 @@ impl Builder {
 
     /// An object of these shapes.
     fn group(&mut self, shapes: Vec<PreparedShape>) -> Result<ObjectId> {
+        let bounds: Vec<Bounds> = shapes.iter().map(PreparedShape::bounds_at_rest).collect();
+        let space = RenderSpace::around(&bounds);
         let mut object = Object::default();
         for shape in shapes {
-            object.shapes.push(self.place(shape, &DAffine3::IDENTITY)?);
+            object.shapes.push(self.place(shape, &DAffine3::IDENTITY, &space)?);
         }
         self.geometry.objects.push(object);
+        self.object_spaces.push(space);
         Ok(ObjectId::new(self.geometry.objects.len() - 1))
     }
 
     fn push_instance(&mut self, path: &str, object: ObjectId, motion: &Motion, placement: Option<PlacementId>) -> Result<()> {
-        let instance = Instance::moving(object, motion.clone()).ok_or_else(|| self.files.error(path, super::SINGULAR))?;
+        let motion = self.space.place_motion(&self.object_spaces[object.index()].place_within(motion));
+        let instance = Instance::moving(object, motion).ok_or_else(|| self.files.error(path, super::SINGULAR))?;
+        if instance.motion.is_none() && instance.inverse_reach().is_none() {
+            let message = "scales the object so much, up or down, that the inverse is out of the range of 32-bit numbers";
+            return Err(self.files.error(path, message));
+        }
         self.geometry.instances.push(instance);
         self.identities.add_instance(placement);
         Ok(())
     }
 
     /// Adds instances and those inside of them; [`Nesting`] has checked that this ends.
-    fn add_instances(&mut self, level: &Level, instances: &[InstanceDesc]) -> Result<()> {
+    fn add_instances(&mut self, level: &Level, objects: &BTreeMap<&str, PreparedObject>, instances: &[InstanceDesc]) -> Result<()> {
         for (i, instance) in instances.iter().enumerate() {
             let name = instance.object.as_str();
-            let (Some(inner), Some(object)) = (level.desc.objects.get(name), level.objects.get(name)) else {
+            let (Some(inner), Some(object)) = (level.desc.objects.get(name), objects.get(name)) else {
                 continue;
             };
             if level.nesting.is_empty(name) {
@@ -97,8 +178,7 @@ impl Builder {
             }
             let path = format!("{}[{i}]", level.path);
             let place = format!("{path}.transform");
-            let map = self.files.transform(&place, &instance.transform, &DAffine3::IDENTITY)?.world_from_object;
-            let outer = level.outer.after(&self.files.motion(&format!("{path}.motion"), &instance.motion, &map, self.shutter)?);
+            let outer = self.instance_motion(level, &path, instance)?;
             let placement = Some(self.identities.placement(i, instance, level.placement));
             if let Some(object) = object.shared {
                 self.push_instance(&place, object, &outer, placement)?;
@@ -112,11 +192,11 @@ impl Builder {
                 })?;
                 let mut emitter = emitter.clone();
                 emitter.identity.placement = placement;
-                let id = self.place(emitter, &outer)?;
+                let id = self.place(emitter, &outer, &{ self.space })?;
                 self.geometry.world.push(id);
             }
             let path = format!("objects.{name}.instances");
-            self.add_instances(&Level { path: &path, outer: &outer, placement, ..*level }, &inner.instances)?;
+            self.add_instances(&Level { path: &path, outer: &outer, placement, ..*level }, objects, &inner.instances)?;
         }
         Ok(())
     }
@@ -127,7 +207,6 @@ impl Builder {
 struct Level<'a> {
     desc: &'a SceneDesc,
     nesting: &'a Nesting<'a>,
-    objects: &'a BTreeMap<&'a str, PreparedObject>,
     path: &'a str,
     outer: &'a Motion,
     placement: Option<PlacementId>,

@@ -12,7 +12,7 @@ use crate::id::{LightGroupId, ShapeId};
 use crate::import::MeshData;
 use crate::light::{AreaLight, Emission, Light};
 use crate::material::ColorInput;
-use crate::math::{DAffine3, Motion, Transform};
+use crate::math::{Bounds, DAffine3, Motion, RenderSpace, Transform};
 use crate::scene::Surface;
 
 /// A shape that knows everything but its final place.
@@ -33,6 +33,9 @@ pub struct PreparedShape {
     path: String,
 }
 
+/// The least size of a mesh in render space: below, cross products of its edges leave `f32`.
+const SMALLEST_MESH: f64 = 1.0 / (1u64 << 40) as f64;
+
 /// Light given off, and the group it belongs to.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedEmission {
@@ -52,6 +55,30 @@ enum Form {
         /// Where it was read, relative to the scene.
         file: Option<String>,
     },
+}
+
+impl PreparedShape {
+    /// Where the scene has it.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Bounds in the space that it is placed in; at rest if it moves, as [`Builder::place`] leaves it.
+    pub fn bounds_at_rest(&self) -> Bounds {
+        let own = match &self.form {
+            Form::Analytic(surface) => surface.bounds(),
+            Form::Mesh { data, later, .. } => {
+                std::iter::once(data).chain(later).map(MeshData::bounds).fold(Bounds::EMPTY, |all, b| all.union(&b))
+            }
+        };
+        if self.motion.is_some() { own } else { own.transformed(&self.map) }
+    }
+
+    /// Bounds in the space that it is placed in, over the whole shutter interval.
+    pub fn bounds(&self) -> Bounds {
+        let at_rest = self.bounds_at_rest();
+        self.motion.as_ref().map_or(at_rest, |motion| motion.bounds(&at_rest))
+    }
 }
 
 impl Builder {
@@ -175,16 +202,19 @@ impl Builder {
             ColorInput::Constant(color) => (radiance * color, None),
             ColorInput::Texture(id) => (radiance, Some(id)),
         };
+        let brightest = texture.map_or(1.0, |id| self.materials.textures.get(id).range()[1]);
+        self.files.emitted(&format!("{path}.radiance"), (radiance * brightest).to_array())?;
         let emission = Emission { radiance, two_sided: desc.two_sided, texture, opacity: None };
         Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
-    /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
-    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3) -> Result<ShapeId> {
+    /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`. One that emits must end up in the world's.
+    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3, space: &RenderSpace) -> Result<ShapeId> {
         let PreparedShape { form, map, motion, reverse_normal, look, emission, identity, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
-        let transform = Transform::new(*outer * map).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
+        let transform =
+            Transform::new(space.place(&(*outer * map))).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
         let shape = match form {
             Form::Analytic(surface) => {
                 let mut placed = Placed::new(surface, transform);
@@ -192,7 +222,8 @@ impl Builder {
                 Shape::Analytic(placed)
             }
             Form::Mesh { data, shading, smoothing, later, file } => {
-                let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal };
+                let emits = emission.is_some();
+                let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal, emits };
                 let mesh = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)?;
                 Shape::Mesh(if self.materials.has_normal_map(&look) { mesh.with_tangents() } else { mesh })
             }
@@ -200,6 +231,12 @@ impl Builder {
         let bounds = shape.bounds();
         if !bounds.min.is_finite() || !bounds.max.is_finite() {
             return Err(self.files.error(&path, "the shape reaches to infinity: its size or place is too large for 32-bit numbers"));
+        }
+        let size = f64::from(bounds.size().max_element());
+        if matches!(shape, Shape::Mesh(_)) && size > 0.0 && size < SMALLEST_MESH {
+            let [size, least] = [size, SMALLEST_MESH].map(|length| space.world_length(length));
+            let message = format!("the mesh measures {size:e}: beside the rest of the scene, at least {least:e} can be rendered");
+            return Err(self.files.error(&path, message));
         }
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);

@@ -1,10 +1,13 @@
 //! Checks of what says how to render: film, sampler, camera, integrator and outputs.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::{Files, camera};
 use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, OutputDesc, SceneDesc};
 use crate::error::Result;
+use crate::import::Imported;
+use crate::output::find_output_fault;
 
 /// The largest width and height of a picture.
 const MAX_SIZE: u32 = 65_536;
@@ -17,6 +20,14 @@ pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
     check(desc, &Files::new(scene_file))
 }
 
+/// As [`check_settings`], for a scene that was read from a file of any kind; errors name the places in that file.
+///
+/// # Errors
+/// As [`check_settings`].
+pub fn check_imported_settings(imported: &Imported, scene_file: &Path) -> Result<()> {
+    check(&imported.desc, &Files::of(imported, scene_file))
+}
+
 /// As [`check_settings`], for the scene of `files`.
 pub(super) fn check(desc: &SceneDesc, files: &Files) -> Result<()> {
     check_film(files, &desc.film)?;
@@ -25,8 +36,13 @@ pub(super) fn check(desc: &SceneDesc, files: &Files) -> Result<()> {
     }
     camera::compile(files, &desc.camera)?;
     check_integrator(files, &desc.integrator)?;
+    let mut written = HashMap::new();
     for (i, output) in desc.outputs.iter().enumerate() {
-        check_output(files, &format!("outputs[{i}]"), output)?;
+        let path = format!("outputs[{i}]");
+        check_output(files, &path, output)?;
+        if let Some(first) = written.insert(output.file.as_str(), i) {
+            return Err(files.error(&format!("{path}.file"), format!("\"{}\" is the file of outputs[{first}] too", output.file)));
+        }
     }
     Ok(())
 }
@@ -43,6 +59,13 @@ fn check_film(files: &Files, film: &FilmDesc) -> Result<()> {
             let message = format!("[{x}, {y}, {width}, {height}] must have an area and lie within {} x {}", film.width, film.height);
             return Err(files.error("film.crop", message));
         }
+    }
+    let most = film.width.min(film.height);
+    if film.overscan > most {
+        return Err(files.error("film.overscan", format!("must be at most the picture's shorter side, {most}, not {}", film.overscan)));
+    }
+    if film.overscan > 0 && film.crop.is_some() {
+        return Err(files.error("film.overscan", "a crop leaves nothing around the picture: give one of `crop` and `overscan`"));
     }
     let radius = match film.filter {
         FilterDesc::Box { radius } | FilterDesc::Tent { radius } | FilterDesc::BlackmanHarris { radius } => radius,
@@ -91,5 +114,6 @@ fn check_output(files: &Files, path: &str, output: &OutputDesc) -> Result<()> {
     if !output.exposure.is_finite() {
         return Err(files.error(&format!("{path}.exposure"), "is not finite"));
     }
-    Ok(())
+    let fault = if extension.as_deref() == Some("exr") { find_output_fault(output) } else { None };
+    fault.map_or(Ok(()), |fault| Err(files.error(&format!("{path}.{}", fault.key), fault.message)))
 }

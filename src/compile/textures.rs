@@ -16,8 +16,14 @@ use crate::material::ColorInput;
 use crate::math::Vec2;
 use crate::texture::{Bitmap, Channel, Checker, Decoding, Filter, Image, Texture, UvTransform, Wrap};
 
+/// Products of textures are nested at most this deep.
+const MAX_DEPTH: usize = 64;
+
+/// Textures and colours that a product has at most, those of the products in it counted: each is looked up at every point.
+const MAX_LOOKUPS: usize = 256;
+
 /// What a texture is asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
     /// A colour: whole numbers are sRGB unless the texture says otherwise.
     Color,
@@ -42,11 +48,12 @@ struct Entry {
 impl TextureTable {
     pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
         let mut table = Self::default();
-        let mut loader = Loader { files, descs: &desc.textures, images: read_all(files, desc), open: Vec::new() };
+        let mut loader = Loader { files, descs: &desc.textures, images: read_all(files, desc), open: Vec::new(), made: HashMap::new() };
         for name in desc.textures.keys() {
             let place = format!("textures.{name}");
-            let color = table.push(loader.named(&place, name, TextureUse::Color)?);
-            let data = if loader.depends_on_use(name) { table.push(loader.named(&place, name, TextureUse::Data)?) } else { color };
+            let made = loader.named(&place, name, TextureUse::Color)?;
+            let color = table.push(made.texture);
+            let data = if made.depends_on_use { table.push(loader.named(&place, name, TextureUse::Data)?.texture) } else { color };
             table.names.insert(name.clone(), Entry { color, data });
         }
         table.images = loader.images;
@@ -127,59 +134,92 @@ struct Loader<'a> {
     images: HashMap<PathBuf, Arc<Image>>,
     /// The textures on the way to the one being made.
     open: Vec<String>,
+    /// Textures made so far, by name and use.
+    made: HashMap<(String, TextureUse), Made>,
+}
+
+/// A texture with what it is made of.
+#[derive(Clone)]
+struct Made {
+    texture: Texture,
+    /// Levels of products, and textures that are no product, counted as often as they are looked up.
+    depth: usize,
+    lookups: usize,
+    depends_on_use: bool,
 }
 
 impl Loader<'_> {
-    /// Whether a texture (which has been made before, so that it is no part of itself) is another one as a colour than as data.
-    fn depends_on_use(&self, name: &str) -> bool {
-        match self.descs.get(name) {
-            Some(TextureDesc::Image { color_space, .. }) => *color_space == ColorSpaceDesc::Auto,
-            Some(TextureDesc::Product { factors }) => {
-                factors.iter().any(|factor| matches!(factor, ColorDesc::Texture { texture } if self.depends_on_use(texture)))
-            }
-            _ => false,
+    /// The texture that `place` names, made at its first use.
+    fn named(&mut self, place: &str, name: &str, wanted: TextureUse) -> Result<Made> {
+        let key = (name.to_owned(), wanted);
+        if let Some(made) = self.made.get(&key) {
+            return Ok(made.clone());
         }
-    }
-
-    /// The texture that `place` names.
-    fn named(&mut self, place: &str, name: &str, wanted: TextureUse) -> Result<Texture> {
         let descs = self.descs;
         let desc = descs.get(name).ok_or_else(|| self.files.unknown(place, "texture", name, descs.keys().map(String::as_str)))?;
         if let Some(first) = self.open.iter().position(|open| open == name) {
             let cycle = format!("{} > {name}", self.open[first..].join(" > "));
             return Err(self.files.error(place, format!("a texture cannot be a part of itself: {cycle}")));
         }
+        if self.open.len() >= MAX_DEPTH {
+            return Err(self.files.error(place, format!("products of textures are nested more than {MAX_DEPTH} deep")));
+        }
         self.open.push(name.to_owned());
-        let texture = self.texture(&format!("textures.{name}"), desc, wanted);
+        let made = self.texture(&format!("textures.{name}"), desc, wanted);
         self.open.pop();
-        texture
+        let made = made?;
+        self.made.insert(key, made.clone());
+        Ok(made)
     }
 
-    fn texture(&mut self, path: &str, desc: &TextureDesc, wanted: TextureUse) -> Result<Texture> {
+    /// The product of these factors.
+    fn product(&mut self, path: &str, factors: &[ColorDesc], wanted: TextureUse) -> Result<Made> {
+        let files = self.files;
+        let place = format!("{path}.factors");
+        if factors.is_empty() {
+            return Err(files.error(&place, "a product needs at least one factor"));
+        }
+        let mut product = Vec::with_capacity(factors.len());
+        let mut made = Made { texture: Texture::Constant(Rgb::WHITE), depth: 1, lookups: 0, depends_on_use: false };
+        for (i, factor) in factors.iter().enumerate() {
+            let key = format!("{place}[{i}]");
+            let constant = |value: [f32; 3]| files.reflectance(&key, value).map(|v| Texture::Constant(Rgb::from(v)));
+            let texture = match factor {
+                ColorDesc::Grey(v) => constant([*v; 3])?,
+                ColorDesc::Rgb(v) => constant(*v)?,
+                ColorDesc::Texture { texture } => {
+                    let factor = self.named(&key, texture, wanted)?;
+                    made.depth = made.depth.max(factor.depth + 1);
+                    made.lookups += factor.lookups - 1;
+                    made.depends_on_use |= factor.depends_on_use;
+                    factor.texture
+                }
+            };
+            made.lookups += 1;
+            if made.lookups > MAX_LOOKUPS {
+                let message = format!("with the factors of its factors, a product has more than {MAX_LOOKUPS} textures and colours");
+                return Err(files.error(&place, message));
+            }
+            product.push(texture);
+        }
+        if made.depth > MAX_DEPTH {
+            return Err(files.error(&place, format!("products of textures are nested more than {MAX_DEPTH} deep")));
+        }
+        Ok(Made { texture: Texture::Product(product.into()), ..made })
+    }
+
+    fn texture(&mut self, path: &str, desc: &TextureDesc, wanted: TextureUse) -> Result<Made> {
         let files = self.files;
         let color = |key: &str, value: [f32; 3]| files.reflectance(&format!("{path}.{key}"), value).map(Rgb::from);
-        Ok(match desc {
+        let depends_on_use = matches!(desc, TextureDesc::Image { color_space: ColorSpaceDesc::Auto, .. });
+        let texture = match desc {
             TextureDesc::Constant { color: value } => Texture::Constant(color("color", *value)?),
             TextureDesc::Checker { color0, color1, scale } => {
                 let colors = [color("color0", *color0)?, color("color1", *color1)?];
                 Texture::Checker(Checker { colors, scale: files.uv(&format!("{path}.scale"), *scale)? })
             }
             TextureDesc::VertexColor => Texture::VertexColor,
-            TextureDesc::Product { factors } => {
-                if factors.is_empty() {
-                    return Err(files.error(&format!("{path}.factors"), "a product needs at least one factor"));
-                }
-                let mut product = Vec::with_capacity(factors.len());
-                for (i, factor) in factors.iter().enumerate() {
-                    let key = format!("factors[{i}]");
-                    product.push(match factor {
-                        ColorDesc::Grey(v) => Texture::Constant(color(&key, [*v; 3])?),
-                        ColorDesc::Rgb(v) => Texture::Constant(color(&key, *v)?),
-                        ColorDesc::Texture { texture } => self.named(&format!("{path}.{key}"), texture, wanted)?,
-                    });
-                }
-                Texture::Product(product.into())
-            }
+            TextureDesc::Product { factors } => return self.product(path, factors, wanted),
             TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert } => {
                 let scale = files.uv(&format!("{path}.scale"), *scale)?;
                 let offset = files.uv(&format!("{path}.offset"), *offset)?;
@@ -219,7 +259,8 @@ impl Loader<'_> {
                     invert: *invert,
                 })
             }
-        })
+        };
+        Ok(Made { texture, depth: 0, lookups: 1, depends_on_use })
     }
 }
 

@@ -91,8 +91,8 @@ impl Files {
 
     /// The map that takes the origin to `from` and -Z towards `to`, with +Y towards `up`.
     pub(super) fn look_at(&self, path: &str, from: [f64; 3], to: [f64; 3], up: [f64; 3]) -> Result<DAffine3> {
-        let origin = self.vector(path, from)?;
-        let z = origin - self.vector(path, to)?;
+        let origin = self.position(path, from)?;
+        let z = origin - self.position(path, to)?;
         let z = z.try_normalize().ok_or_else(|| self.error(path, "looks at the very point it stands on"))?;
         let up = self.direction(&format!("{path}.up"), up)?;
         let x = up.cross(z);

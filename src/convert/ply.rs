@@ -4,7 +4,7 @@ use std::io::{Result, Write};
 
 use crate::import::MeshData;
 
-/// Writes a mesh as a binary little-endian PLY file: x y z, nx ny nz, u v and linear r g b
+/// Writes a mesh as a binary little-endian PLY file: x y z (as doubles if they are far from the origin), nx ny nz, u v and linear r g b
 /// where the mesh has them, and triangles.
 ///
 /// # Errors
@@ -15,13 +15,20 @@ pub fn write_ply(mesh: &MeshData, out: &mut impl Write) -> Result<()> {
     names.extend(mesh.normals.iter().flat_map(|_| ["nx", "ny", "nz"]));
     names.extend(mesh.uvs.iter().flat_map(|_| ["u", "v"]));
     names.extend(mesh.colors.iter().flat_map(|_| ["r", "g", "b"]));
+    let is_far = mesh.origin != [0.0; 3];
     for name in names {
-        writeln!(out, "property float {name}")?;
+        let kind = if is_far && matches!(name, "x" | "y" | "z") { "double" } else { "float" };
+        writeln!(out, "property {kind} {name}")?;
     }
     writeln!(out, "element face {}\nproperty list uchar int vertex_indices\nend_header", mesh.triangles.len())?;
-    let mut write = |values: &[f32]| values.iter().try_for_each(|value| out.write_all(&value.to_le_bytes()));
     for (i, position) in mesh.positions.iter().enumerate() {
-        write(position)?;
+        if is_far {
+            mesh.position(*position).to_array().iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
+        }
+        let mut write = |values: &[f32]| values.iter().try_for_each(|value| out.write_all(&value.to_le_bytes()));
+        if !is_far {
+            write(position)?;
+        }
         mesh.normals.as_ref().map_or(Ok(()), |normals| write(&normals[i]))?;
         mesh.uvs.as_ref().map_or(Ok(()), |uvs| write(&uvs[i]))?;
         mesh.colors.as_ref().map_or(Ok(()), |colors| write(&colors[i]))?;

@@ -145,7 +145,7 @@ shapes! {
         file: Option<String>,
         /// Inline: positions of the vertices.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        positions: Option<Vec<[f32; 3]>>,
+        positions: Option<Vec<[f64; 3]>>,
         /// Inline: corners of each triangle as indices from 0, counter-clockwise seen from the front.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         triangles: Option<Vec<[u32; 3]>>,
@@ -164,7 +164,7 @@ shapes! {
         deform_files: Vec<String>,
         /// Inline: as `deform_files`, the positions at further times.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        deform_positions: Vec<Vec<[f32; 3]>>,
+        deform_positions: Vec<Vec<[f64; 3]>>,
         /// How normals are found. Default: given ones are interpolated, else the mesh is flat.
         #[serde(default)]
         shading: MeshShadingDesc,

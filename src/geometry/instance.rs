@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::{Detail, Hit, Shape, SurfaceInteraction};
 use crate::id::{ObjectId, ShapeId};
-use crate::math::float::UNIT_ROUNDOFF;
+use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
 use crate::math::{Aabb, Bounds, DMat3, Motion, Ray, Transform, Vec3};
 
 /// A group of shapes in a space of its own.
@@ -12,6 +12,15 @@ use crate::math::{Aabb, Bounds, DMat3, Motion, Ray, Transform, Vec3};
 pub struct Object {
     /// The shapes of the group.
     pub shapes: Vec<ShapeId>,
+}
+
+/// How far the map to an instance's object space can move a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InverseReach {
+    /// Largest sum of magnitudes of a row of the linear part.
+    pub reach: f32,
+    /// Largest magnitude of a component of the translation.
+    pub offset: f32,
 }
 
 /// One placement of an object in the world.
@@ -44,6 +53,26 @@ impl Instance {
         // The product is 9 for a rotation with a scale; the square of the limit is that of a stretch by about 8 along one axis.
         let Transform { world_from_object, object_from_world, .. } = &self.transform;
         squared_norm(&world_from_object.matrix3) * squared_norm(&object_from_world.matrix3) > 9.0 * 16.0
+    }
+
+    /// How far rays are moved by the inverse of the transform, found by cofactors in `f32` as Embree finds it; `None` if that is not finite,
+    /// leaves no room for any ray, or its determinant is denormal.
+    pub fn inverse_reach(&self) -> Option<InverseReach> {
+        let m = &self.transform.world_from_object;
+        let (x, y, z) = (m.matrix3.x_axis.as_vec3(), m.matrix3.y_axis.as_vec3(), m.matrix3.z_axis.as_vec3());
+        let rows = [y.cross(z), z.cross(x), x.cross(y)];
+        let determinant = x.dot(rows[0]);
+        if !determinant.is_normal() {
+            return None;
+        }
+        let rows = rows.map(|row| row / determinant);
+        let translation = m.translation.as_vec3();
+        let offsets = rows.map(|row| row.abs().dot(translation.abs()));
+        let reach = rows.iter().map(|row| row.abs().element_sum()).fold(0.0, f32::max);
+        let offset = offsets.into_iter().fold(0.0, f32::max);
+        // A NaN row would be lost in the maxima, so each is looked at.
+        let finite = rows.iter().all(|row| row.is_finite()) && offsets.iter().all(|o| *o < 0.25 * EMBREE_LARGE);
+        (finite && reach.is_normal()).then_some(InverseReach { reach, offset })
     }
 
     /// Where it stands at a time from 0 to 1.

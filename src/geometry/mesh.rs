@@ -84,6 +84,9 @@ pub struct MeshStep {
 }
 
 impl Mesh {
+    /// The most times at which a mesh can have positions: Embree's `RTC_MAX_TIME_STEP_COUNT`.
+    pub const MAX_STEPS: usize = 129;
+
     /// A mesh from its buffers.
     ///
     /// # Errors

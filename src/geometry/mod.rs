@@ -25,7 +25,7 @@ pub use cutout::{Coverage, Cutouts};
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use hit::Hit;
-pub use instance::{Instance, Object};
+pub use instance::{Instance, InverseReach, Object};
 pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
 pub(crate) use mesh::interpolated_normal;
 pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};

@@ -156,13 +156,16 @@ impl Hash {
     }
 
     fn mesh(&mut self, mesh: &MeshData) {
-        let MeshData { positions, triangles, normals, uvs, colors } = mesh;
+        let MeshData { positions, triangles, normals, uvs, colors, origin } = mesh;
         self.numbers(triangles.as_flattened().iter().copied(), u32::to_le_bytes);
         let triples = [Some(positions), normals.as_ref(), colors.as_ref()].map(|list| list.map(|list| list.as_flattened()));
         let pairs = uvs.as_ref().map(|list| list.as_flattened());
         for list in triples.into_iter().chain([pairs]) {
             self.hasher.update(&[u8::from(list.is_some())]);
             self.numbers(list.unwrap_or_default().iter().copied(), f32::to_le_bytes);
+        }
+        if *origin != [0.0; 3] {
+            self.numbers(origin.iter().copied(), f64::to_le_bytes);
         }
     }
 

@@ -1,11 +1,12 @@
 //! A mesh as a file gives it: buffers that nobody has checked.
 
 use super::AssetError;
+use crate::math::{Bounds, DVec3};
 
 /// Buffers of a triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
-    /// Positions of the vertices.
+    /// Positions of the vertices, from `origin`.
     pub positions: Vec<[f32; 3]>,
     /// Corners of each triangle.
     pub triangles: Vec<[u32; 3]>,
@@ -15,11 +16,50 @@ pub struct MeshData {
     pub uvs: Option<Vec<[f32; 2]>>,
     /// A linear colour for each vertex.
     pub colors: Option<Vec<[f32; 3]>>,
+    /// What all positions are relative to: zero, unless they were given so far away that `f32` would spoil them.
+    pub origin: [f64; 3],
 }
 
+/// Positions that reach this many times as far as they extend are kept relative to an origin.
+const FAR: f64 = 4096.0;
+
 impl MeshData {
+    /// Positions of the vertices as `f32`, and the origin that they are relative to.
+    pub fn rounded(positions: &[[f64; 3]]) -> (Vec<[f32; 3]>, [f64; 3]) {
+        let bounds = positions.iter().fold(Bounds::EMPTY, |b, p| b.extended(DVec3::from(*p)));
+        let origin = Self::origin_for(&bounds, positions.first());
+        let round = |p: &[f64; 3]| [0, 1, 2].map(|i| (p[i] - origin[i]) as f32);
+        (positions.iter().map(round).collect(), origin)
+    }
+
+    /// The origin for vertices with these bounds, of which this is the first.
+    pub(super) fn origin_for(bounds: &Bounds, first: Option<&[f64; 3]>) -> [f64; 3] {
+        let extent = (bounds.max - bounds.min).max_element();
+        let is_far = extent > 0.0 && bounds.min.abs().max(bounds.max.abs()).max_element() > FAR * extent;
+        first.copied().filter(|p| is_far && p.iter().all(|x| x.is_finite())).unwrap_or_default()
+    }
+
+    /// The position of a vertex.
+    #[inline]
+    pub fn position(&self, relative: [f32; 3]) -> DVec3 {
+        DVec3::from(relative.map(f64::from)) + DVec3::from(self.origin)
+    }
+
+    /// The positions as a scene file has them: of the numbers that round to those of the mesh, the shortest.
+    pub fn written_positions(&self) -> Vec<[f64; 3]> {
+        let shortest = |x: f32| x.to_string().parse().unwrap_or(f64::from(x));
+        let written = |p: &[f32; 3]| if self.origin == [0.0; 3] { p.map(shortest) } else { self.position(*p).to_array() };
+        self.positions.iter().map(written).collect()
+    }
+
+    /// Bounds of the vertices, those of NaN left out.
+    pub fn bounds(&self) -> Bounds {
+        self.positions.iter().fold(Bounds::EMPTY, |b, &p| b.extended(self.position(p)))
+    }
+
     /// Adds another mesh with the same attributes.
     pub(super) fn append(&mut self, mut other: Self) -> Result<(), AssetError> {
+        debug_assert_eq!(self.origin, other.origin);
         let first = u32::try_from(self.positions.len()).ok().filter(|&first| (u32::MAX - first) as usize >= other.positions.len());
         let first = first.ok_or_else(|| AssetError::Malformed("the file has more than 4,294,967,295 vertices".into()))?;
         self.positions.append(&mut other.positions);

@@ -56,6 +56,10 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     // The parser loses count of colours that only some vertices have.
     let text = if used.colors > 0 && used.colors < used.vertices { without_colors(&text) } else { text };
 
+    // The parser has 32-bit numbers.
+    let origin = MeshData::origin_for(&used.bounds, used.first.as_ref());
+    let text = if origin == [0.0; 3] { text } else { moved(&text, origin) };
+
     let folder = path.parent().unwrap_or(Path::new(""));
     let trouble: RefCell<Option<AssetError>> = RefCell::new(None);
     let maps: RefCell<HashMap<String, ObjMaps>> = RefCell::default();
@@ -84,7 +88,9 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
         }
     }
     let library: Vec<ObjMaterial> = library.iter().map(|m| from_mtl(m, maps.get(&m.name).cloned().unwrap_or_default())).collect();
-    join_models(&models, &library)
+    let mut meshes = join_models(&models, &library)?;
+    meshes.iter_mut().for_each(|mesh| mesh.mesh.origin = origin);
+    Ok(meshes)
 }
 
 /// One mesh for each material and set of attributes, in the order of their first faces.
@@ -116,6 +122,26 @@ fn without_colors(text: &str) -> String {
         _ => format!("{line}\n"),
     };
     text.lines().map(plain).collect()
+}
+
+/// With all vertices relative to `origin`.
+fn moved(text: &str, origin: [f64; 3]) -> String {
+    let line = |line: &str| {
+        let mut words = line.split_whitespace();
+        if words.next() != Some("v") {
+            return format!("{line}\n");
+        }
+        let mut out = String::from("v");
+        for (axis, word) in words.enumerate() {
+            match (origin.get(axis), word.parse::<f64>()) {
+                (Some(origin), Ok(x)) => out.push_str(&format!(" {}", x - origin)),
+                _ => out.extend([" ", word]),
+            }
+        }
+        out.push('\n');
+        out
+    };
+    text.lines().map(line).collect()
 }
 
 /// The text of an MTL, fit for the parser; its texture maps are added to `maps`.
@@ -159,6 +185,7 @@ fn from_tobj(mesh: &tobj::Mesh) -> MeshData {
         colors: (colors.len() == positions.len()).then_some(colors),
         positions,
         triangles: mesh.indices.as_chunks::<3>().0.to_vec(),
+        origin: [0.0; 3],
     }
 }
 

@@ -3,9 +3,10 @@
 use std::str::SplitWhitespace;
 
 use super::AssetError;
+use crate::math::{Bounds, DVec3};
 
 /// What an OBJ file uses.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct ObjUse {
     /// Lines (from 1) and names of `usemtl`.
     pub materials: Vec<(usize, String)>,
@@ -16,6 +17,9 @@ pub struct ObjUse {
     pub names_a_library: bool,
     /// Whether there are line elements.
     pub has_lines: bool,
+    /// Bounds of the vertices, and the first of them.
+    pub bounds: Bounds,
+    pub first: Option<[f64; 3]>,
 }
 
 /// What the three numbers of a face's corner count.
@@ -23,7 +27,15 @@ const ATTRIBUTES: [&str; 3] = ["vertex", "uv", "normal"];
 
 /// Checks every line's numbers and every index.
 pub fn check_obj(text: &str) -> Result<ObjUse, AssetError> {
-    let mut used = ObjUse::default();
+    let mut used = ObjUse {
+        materials: Vec::new(),
+        vertices: 0,
+        colors: 0,
+        names_a_library: false,
+        has_lines: false,
+        bounds: Bounds::EMPTY,
+        first: None,
+    };
     let mut counts = [0i64; 3];
     // The largest index of each kind and its line: a face may come before what it refers to.
     let mut largest = [(0i64, 0usize); 3];
@@ -34,15 +46,17 @@ pub fn check_obj(text: &str) -> Result<ObjUse, AssetError> {
             Some("v") => {
                 used.vertices += 1;
                 used.colors += usize::from(words.clone().count() > 5);
-                check_numbers(words, 3).ok_or_else(|| at("a vertex needs three numbers"))?;
+                let position = numbers::<3>(words).ok_or_else(|| at("a vertex needs three numbers"))?;
+                used.bounds = used.bounds.extended(DVec3::from(position));
+                used.first = used.first.or(Some(position));
                 counts[0] += 1;
             }
             Some("vt") => {
-                check_numbers(words, 2).ok_or_else(|| at("a uv needs two numbers"))?;
+                numbers::<2>(words).ok_or_else(|| at("a uv needs two numbers"))?;
                 counts[1] += 1;
             }
             Some("vn") => {
-                check_numbers(words, 3).ok_or_else(|| at("a normal needs three numbers"))?;
+                numbers::<3>(words).ok_or_else(|| at("a normal needs three numbers"))?;
                 counts[2] += 1;
             }
             Some("f") => words.try_for_each(|corner| check_corner(corner, &counts, &mut largest, i + 1)).map_err(|e| at(&e))?,
@@ -60,8 +74,12 @@ pub fn check_obj(text: &str) -> Result<ObjUse, AssetError> {
     Ok(used)
 }
 
-fn check_numbers(words: SplitWhitespace, least: usize) -> Option<()> {
-    (words.take(least).filter(|word| word.parse::<f32>().is_ok()).count() == least).then_some(())
+fn numbers<const N: usize>(mut words: SplitWhitespace) -> Option<[f64; N]> {
+    let mut numbers = [0.0; N];
+    for number in &mut numbers {
+        *number = words.next()?.parse().ok()?;
+    }
+    Some(numbers)
 }
 
 /// One corner of a face: `v`, `v/vt`, `v//vn` or `v/vt/vn`.

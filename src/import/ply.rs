@@ -6,7 +6,9 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{
+    DefaultElement, ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
+};
 
 use super::foreign::linear;
 use super::{AssetError, MeshData};
@@ -27,13 +29,25 @@ fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
     let mut reader = Reader::new(source);
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(|e| malformed("", &e))?;
     let mut mesh = MeshData::default();
+    // Those of types that `f32` does not hold.
+    let mut wide: Vec<[f64; 3]> = Vec::new();
     for (name, element) in &header.elements {
+        if element.properties.is_empty() && header.encoding != Encoding::Ascii {
+            // Such rows take no bytes, however many the header claims.
+            continue;
+        }
         match name.as_str() {
             "vertex" => {
                 if let Some(axis) = ["x", "y", "z"].iter().find(|axis| !element.properties.contains_key(**axis)) {
                     return Err(AssetError::Malformed(format!("the vertices have no property {axis}")));
                 }
-                read_elements(&mut reader, element, &header, |_, vertices| take_vertices(&mut mesh, &vertices, element))?;
+                let is_wide = is_wide(element);
+                read_elements(&mut reader, element, &header, |_, vertices: Vec<Vertex>| {
+                    if is_wide {
+                        wide.extend(vertices.iter().map(|v| v.position));
+                    }
+                    take_vertices(&mut mesh, &vertices, element);
+                })?;
             }
             "face" => {
                 let mut negative = None;
@@ -49,6 +63,9 @@ fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
             }
             _ => read_elements(&mut reader, element, &header, |_, _: Vec<DefaultElement>| ())?,
         }
+    }
+    if !wide.is_empty() {
+        (mesh.positions, mesh.origin) = MeshData::rounded(&wide);
     }
     if mesh.positions.is_empty() {
         return Err(AssetError::Malformed("the file has no vertices".into()));
@@ -88,9 +105,16 @@ fn read_elements<E: PropertyAccess>(
     Ok(())
 }
 
+/// Whether coordinates of vertices are doubles or large whole numbers.
+fn is_wide(element: &ElementDef) -> bool {
+    let wide = [ScalarType::Double, ScalarType::Int, ScalarType::UInt];
+    let of_axis = |axis: &str| element.properties.get(axis).map(|property| &property.data_type);
+    ["x", "y", "z"].iter().any(|axis| matches!(of_axis(axis), Some(PropertyType::Scalar(kind)) if wide.contains(kind)))
+}
+
 fn take_vertices(mesh: &mut MeshData, vertices: &[Vertex], element: &ElementDef) {
     let has = |names: &[&str]| names.iter().all(|name| element.properties.contains_key(*name));
-    mesh.positions.extend(vertices.iter().map(|v| v.position));
+    mesh.positions.extend(vertices.iter().map(|v| v.position.map(|x| x as f32)));
     if has(&["nx", "ny", "nz"]) {
         mesh.normals.get_or_insert_default().extend(vertices.iter().map(|v| v.normal));
     }
@@ -104,7 +128,7 @@ fn take_vertices(mesh: &mut MeshData, vertices: &[Vertex], element: &ElementDef)
 
 #[derive(Default)]
 struct Vertex {
-    position: [f32; 3],
+    position: [f64; 3],
     normal: [f32; 3],
     uv: [f32; 2],
     color: [f32; 3],
@@ -116,13 +140,15 @@ impl PropertyAccess for Vertex {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let Some(mut value) = number(&property) else {
+        let Some(exact) = number(&property) else {
             return PropertyAccessResult::Ignored;
         };
+        if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) {
+            self.position[axis] = exact;
+            return PropertyAccessResult::Set;
+        }
+        let mut value = exact as f32;
         let place = match name {
-            "x" => &mut self.position[0],
-            "y" => &mut self.position[1],
-            "z" => &mut self.position[2],
             "nx" => &mut self.normal[0],
             "ny" => &mut self.normal[1],
             "nz" => &mut self.normal[2],
@@ -146,16 +172,16 @@ impl PropertyAccess for Vertex {
 }
 
 /// A single number of any type.
-fn number(property: &Property) -> Option<f32> {
+fn number(property: &Property) -> Option<f64> {
     Some(match *property {
-        Property::Char(x) => f32::from(x),
-        Property::UChar(x) => f32::from(x),
-        Property::Short(x) => f32::from(x),
-        Property::UShort(x) => f32::from(x),
-        Property::Int(x) => x as f32,
-        Property::UInt(x) => x as f32,
-        Property::Float(x) => x,
-        Property::Double(x) => x as f32,
+        Property::Char(x) => f64::from(x),
+        Property::UChar(x) => f64::from(x),
+        Property::Short(x) => f64::from(x),
+        Property::UShort(x) => f64::from(x),
+        Property::Int(x) => f64::from(x),
+        Property::UInt(x) => f64::from(x),
+        Property::Float(x) => f64::from(x),
+        Property::Double(x) => x,
         _ => return None,
     })
 }
@@ -222,9 +248,8 @@ mod tests {
         MeshData {
             positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
-            normals: None,
             uvs: Some(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
-            colors: None,
+            ..MeshData::default()
         }
     }
 
@@ -274,6 +299,26 @@ mod tests {
             let error = parse_ply(text.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
             assert!(!error.contains('\n'), "{error}");
         }
+    }
+
+    #[test]
+    fn elements_without_properties_take_no_time() {
+        let whole = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
+        let text = "element junk 1000000000000000000\nelement vertex";
+        let at = whole.windows(14).position(|window| window == b"element vertex").unwrap();
+        let file = [&whole[..at], text.as_bytes(), &whole[at + 14..]].concat();
+        assert_eq!(parse_ply(file.as_slice()).unwrap(), expected());
+        assert!(parse_ply(ascii().replace("element vertex", text).as_bytes()).is_err());
+    }
+
+    #[test]
+    fn doubles_far_from_the_origin_keep_their_digits() {
+        let far =
+            ascii().replace("property float x", "property double x").replace("\n1 0 0 1 0\n1 1", "\n8388608.25 0 0 1 0\n8388608.25 1");
+        let far = far.replace("\n0 0 0 0 0\n", "\n8388607.5 0 0 0 0\n").replace("\n0 1 0 0 1\n", "\n8388607.5 1 0 0 1\n");
+        let mesh = parse_ply(far.as_bytes()).unwrap();
+        assert_eq!(mesh.position(mesh.positions[1]).x - mesh.position(mesh.positions[0]).x, 0.75);
+        assert_eq!(mesh.bounds().max.to_array(), [8_388_608.25, 1.0, 0.0]);
     }
 
     #[test]

@@ -69,7 +69,7 @@ impl Integrator for DebugView {
 
 /// The fraction of a cosine-weighted hemisphere from which nothing blocks the light.
 pub struct AmbientOcclusion {
-    /// Only what is nearer counts.
+    /// Only what is nearer counts, in world units.
     pub distance: f32,
     /// Where random numbers come from.
     pub sampler: Sampler,
@@ -82,6 +82,7 @@ pub struct AmbientOcclusion {
 impl Integrator for AmbientOcclusion {
     fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts) {
         let mut shadow_rays = 0;
+        let distance = (f64::from(self.distance) * world.scene.camera.render_space().scale()) as f32;
         for_each_first_surface(world, samples, (self.needs, self.parts), out, counts, |sample, ray, at| {
             let u = self.sampler.sample_4d(sample.seed, sample.sample, dimensions::bsdf(0));
             let side = if at.n_g.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
@@ -89,7 +90,7 @@ impl Integrator for AmbientOcclusion {
             // Below the surface is its own inside.
             let above = direction.dot(at.n_g) * side > 0.0;
             shadow_rays += u64::from(above);
-            let free = above && !world.accel.occluded(&Ray { t_max: self.distance, ..at.spawn(direction) });
+            let free = above && !world.accel.occluded(&Ray { t_max: distance, ..at.spawn(direction) });
             Rgb::splat(f32::from(u8::from(free)))
         });
         counts.shadow += shadow_rays;

@@ -4,6 +4,7 @@
 //! shade all hits, trace all shadow rays. Accelerators can then trace rays side by side that belong together, and each stage's code and
 //! data stay in the caches. `docs/wavefront.md` has the figures behind this choice.
 
+mod cancel;
 mod cones;
 mod debug;
 mod guided;
@@ -17,6 +18,7 @@ mod vertex;
 mod whitted;
 mod world;
 
+pub use cancel::Cancel;
 pub use debug::{AmbientOcclusion, DebugView, View};
 pub use path::PathIntegrator;
 pub(crate) use shading::{facing_normal, terminator_factor};

@@ -11,6 +11,7 @@ mod sorting;
 use std::cell::RefCell;
 use std::sync::Arc;
 
+use super::cancel;
 use super::guided::{Steered, Steering, Turns};
 use super::media::MediaState;
 use super::parts::{Way, group_of};
@@ -165,7 +166,7 @@ impl PathIntegrator {
 
         for bounce in 0..self.max_depth {
             let count = scratch.rays.len();
-            if count == 0 {
+            if count == 0 || (bounce % cancel::BOUNCES == 0 && world.gives_up()) {
                 break;
             }
             let coherence = if bounce == 0 { Coherence::Coherent } else { Coherence::Incoherent };

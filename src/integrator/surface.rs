@@ -29,7 +29,7 @@ pub(super) fn place_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInter
         sample.depth = world.scene.camera.depth(at.p, at.time);
         sample.normal = at.n_s;
         sample.geometric_normal = at.n_g;
-        sample.position = at.p.as_vec3();
+        sample.position = world.scene.camera.render_space().world_point(at.p).as_vec3();
         sample.shown = ShapeKey { instance: at.instance.0, shape: at.shape.0 };
     }
     if needs.uv {

@@ -168,7 +168,7 @@ impl Whitted {
             let source = world.scene.surface(at.shape).light(at.prim);
             tally.add(world, view.throughput * radiance, view.course(0, Course::Emission), source);
         }
-        if view.depth >= self.max_depth {
+        if view.depth >= self.max_depth || world.gives_up() {
             return radiance;
         }
         let mut bsdf = None;

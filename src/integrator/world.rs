@@ -1,5 +1,6 @@
 //! A scene with its accelerator: rays in, surface interactions out.
 
+use super::cancel::Cancel;
 use super::cones::Division;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
@@ -29,13 +30,40 @@ pub struct World<'a> {
     pub(super) media_bounds: Aabb,
     /// Width and height of the picture in pixels, if it is part of one.
     pub(super) picture: Option<[u32; 2]>,
+    cancel: Option<&'a Cancel<'a>>,
 }
 
 impl<'a> World<'a> {
     /// A scene with its accelerator.
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator) -> Self {
         let detail = if scene.features.parameters { Detail::Full } else { Detail::Place };
-        Self { scene, accel, bounds: accel.bounds(), detail, division: None, media_bounds: super::media::bounds(scene), picture: None }
+        Self {
+            scene,
+            accel,
+            bounds: accel.bounds(),
+            detail,
+            division: None,
+            media_bounds: super::media::bounds(scene),
+            picture: None,
+            cancel: None,
+        }
+    }
+
+    /// With what says that batches are to be given up.
+    pub fn with_cancel(self, cancel: &'a Cancel<'a>) -> Self {
+        Self { cancel: Some(cancel), ..self }
+    }
+
+    /// Whether the batch under way is to be given up.
+    #[inline]
+    pub(super) fn gives_up(&self) -> bool {
+        self.cancel.is_some_and(Cancel::is_due)
+    }
+
+    /// Whether a batch was given up.
+    #[inline]
+    pub fn has_given_up(&self) -> bool {
+        self.cancel.is_some_and(Cancel::given_up)
     }
 
     /// Whether places are all that is found of surfaces, without parameters.

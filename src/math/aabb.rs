@@ -71,6 +71,11 @@ impl Bounds {
     /// The box that holds nothing.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
+    /// Whether no point lies inside.
+    pub fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+
     /// The smallest box around this one and `p`.
     #[must_use]
     pub fn extended(&self, p: DVec3) -> Self {

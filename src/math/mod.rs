@@ -8,6 +8,7 @@ mod frame;
 mod motion;
 pub mod random;
 mod ray;
+mod render_space;
 mod roots;
 pub mod rows;
 mod transform;
@@ -21,6 +22,7 @@ pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec2, Vec3, Vec4, dvec2, dv
 pub use motion::Motion;
 pub use random::Rng;
 pub use ray::{Ray, RayF64};
+pub use render_space::RenderSpace;
 pub use roots::{Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, quadratic_roots, solve_quadratic};
 pub use transform::Transform;
 pub use trig::{angle_of, sin_cos_eighth, sin_cos_turns};

@@ -9,7 +9,7 @@ mod plane;
 mod read;
 mod write;
 
-pub use plan::check_output;
+pub use plan::{OutputFault, check_output, find_output_fault};
 pub use read::{read_exr, read_settings};
 pub use write::write_exr;
 

@@ -11,7 +11,7 @@ mod png;
 mod role;
 mod view;
 
-pub use self::exr::{check_output, read_exr, read_settings, write_exr};
+pub use self::exr::{OutputFault, check_output, find_output_fault, read_exr, read_settings, write_exr};
 pub use atomic::{check_creatable, check_writable, write_atomically};
 pub use check::{Finding, RULES, Rule, Severity, check_exr};
 pub use compare::{Comparison, RELATIVE_FLOOR, compare};

@@ -251,6 +251,9 @@ pub(super) fn render(run: &mut Run, state: &mut RenderState, target: f64) -> Sta
     tell_of_earlier_runs(run, state, target);
     loop {
         let finished = render_stage(run, state, &mut stats);
+        if state.torn {
+            break;
+        }
         let RenderState { film, blocks: Some(blocks), .. } = state else { return stats };
         let estimate = blocks.estimate(film);
         stats.estimated_error = Some(estimate.error);
@@ -301,6 +304,10 @@ fn render_stage(run: &mut Run, state: &mut RenderState, stats: &mut Stats) -> bo
         }
         let start = Instant::now();
         rays.add(&render_pass(run.job, run.pool, film, blocks, step, run.progress));
+        if run.has_given_up(stats) {
+            state.torn = true;
+            return false;
+        }
         for (done, wanted) in blocks.done.iter_mut().zip(&blocks.wanted) {
             *done = (*done + step).min(*wanted);
         }
@@ -308,6 +315,7 @@ fn render_stage(run: &mut Run, state: &mut RenderState, stats: &mut Stats) -> bo
         let elapsed = start.elapsed();
         if stats.first_pass_seconds == 0.0 {
             stats.first_pass_seconds = run.limits.elapsed().as_secs_f64();
+            run.has_picture();
         }
         let next = next_pass(step, elapsed, run.limits.remaining());
         run.pass_done(state, elapsed.mul_f64(f64::from(next) / f64::from(step)));
@@ -350,6 +358,9 @@ fn render_groups(job: &Job, tile: &mut FilmTile, groups: &[([u32; 2], u32)], bat
         (group * GROUP..(group + 1) * GROUP).flat_map(of_sample)
     };
     job.render_samples(groups.iter().flat_map(of_group), batch, counts);
+    if job.world.has_given_up() {
+        return 0;
+    }
     let active = tile.active();
     let mut count = 0;
     for (g, &(block, group)) in groups.iter().enumerate() {

@@ -16,7 +16,7 @@ use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats};
 use crate::error::Result;
 use crate::film::{Film, FilmTile, LayerKind};
 use crate::guiding::Guide;
-use crate::integrator::{self, RayCounts, Setup};
+use crate::integrator::{self, Cancel, RayCounts, Setup};
 
 /// Samples per pixel of the first pass. One tells how bright the scene is, the other is learned from.
 const FIRST_PASS: u32 = 2;
@@ -199,7 +199,7 @@ pub(super) fn render(
     pool: &rayon::ThreadPool,
     settings: &Settings,
     progress: &dyn Progress,
-    stop: &AtomicBool,
+    (stop, cancel): (&AtomicBool, &Cancel),
 ) -> Result<RenderResult> {
     let mut picture = Picture::new(job.film(Some(LayerKind::Variance))?);
     let mut stats = Stats::default();
@@ -227,11 +227,19 @@ pub(super) fn render(
             rays.add(&render_pass(&job, pool, film.tiles_mut(), stats.spp_done, samples, progress));
             // Drops its part of the guide.
             job.integrator = integrator::build(&settings.integrator, job.setup.clone());
+            if cancel.given_up() {
+                // The film has samples that the guide knows nothing of; what is in the picture stays.
+                limits.end(&mut stats, true);
+                stats.spp_done -= done;
+                done = 0;
+                break;
+            }
             done += samples;
             stats.spp_done += samples;
             lessons.learn(guide, samples, stats.spp_done, || mean(&film));
             if stats.first_pass_seconds == 0.0 {
                 stats.first_pass_seconds = limits.elapsed().as_secs_f64();
+                cancel.has_picture(settings.time_limit);
             }
             step = next_pass(samples, pass_start.elapsed(), limits.remaining());
         }
@@ -254,6 +262,7 @@ pub(super) fn render(
     }
     stats.render_seconds = limits.elapsed().as_secs_f64();
     progress.finish();
+    super::check_time(settings, &stats, stats.spp_done)?;
 
     stats.samples = pixels * u64::from(stats.spp_done);
     stats.nan_samples = picture.film.dropped_count();

@@ -31,7 +31,7 @@ use crate::error::{Error, Result};
 use crate::film::{
     Crop, DroppedSample, Film, FilmTile, Filter, Image, LayerKind, LayerSet, PartNeeds, PixelSample, SampleBatch, SurfaceSample,
 };
-use crate::integrator::{self, CameraSample, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
+use crate::integrator::{self, CameraSample, Cancel, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::light::LightGroups;
 use crate::math::rows::BATCH;
 use crate::math::{Ray, Vec2};
@@ -112,6 +112,11 @@ fn light_groups(scene: &Scene) -> Vec<String> {
 }
 
 impl<'a> Job<'a> {
+    /// For a render that `cancel` can end within a pass.
+    fn cancelled_by(self, cancel: &'a Cancel<'a>) -> Self {
+        Self { world: self.world.with_cancel(cancel), ..self }
+    }
+
     fn new(scene: &'a Scene, accel: &'a dyn Accelerator, settings: &Settings) -> Self {
         let sampler = Sampler::new(settings.sampler, settings.seed);
         let wanted = |kind| settings.layers.contains(kind);
@@ -231,6 +236,9 @@ impl<'a> Job<'a> {
         let active = tile.active();
         for sample in first..first + count {
             self.render_batch(tile.origin(), sample, batch, &mut counts);
+            if self.world.has_given_up() {
+                break;
+            }
             for (i, slot) in slots(self.size, tile.origin()).enumerate() {
                 let [dx, dy] = pixel_of_slot(slot);
                 let (x, y) = (tile.origin()[0] + dx, tile.origin()[1] + dy);
@@ -302,10 +310,11 @@ fn slot_of_pixel([x, y]: [u32; 2]) -> u32 {
 }
 
 /// Renders a scene. When `stop` becomes true, or the time limit passes, the pass under way is finished and what there is becomes the
-/// picture.
+/// picture. A pass that is not done a second later is given up; tiles then differ in their samples, and of a first pass there is no picture
+/// ([`Stats::spp_done`] is 0).
 ///
 /// # Errors
-/// If the threads cannot be started or the film does not fit in memory.
+/// If the threads cannot be started or the film does not fit in memory; [`Error::Usage`] if there is no picture in twice the time limit.
 pub fn render(
     scene: &Scene,
     accel: &dyn Accelerator,
@@ -314,7 +323,9 @@ pub fn render(
     stop: &AtomicBool,
 ) -> Result<RenderResult> {
     if settings.is_guided() {
-        return guided::render(Job::new(scene, accel, settings), &pool(settings)?, settings, progress, stop);
+        let cancel = Cancel::new(stop, settings.time_limit);
+        let job = Job::new(scene, accel, settings).cancelled_by(&cancel);
+        return guided::render(job, &pool(settings)?, settings, progress, (stop, &cancel));
     }
     let state = RenderState::new(scene, settings, Shard::WHOLE)?;
     let (state, stats) = render_from(scene, accel, settings, state, None, progress, stop)?;
@@ -337,19 +348,32 @@ pub fn render_from(
 ) -> Result<(RenderState, Stats)> {
     check_kept(settings, state.shard)?;
     let pool = pool(settings)?;
-    let job = Job::new(scene, accel, settings);
-    let mut run = Run::new(&job, &pool, settings, progress, stop, checkpoints);
+    let cancel = Cancel::new(stop, settings.time_limit);
+    let job = Job::new(scene, accel, settings).cancelled_by(&cancel);
+    let mut run = Run::new(&job, &pool, settings, progress, (stop, &cancel), checkpoints);
     let mut stats = match settings.target_error {
         Some(target) => adaptive::render(&mut run, &mut state, target),
         None => plain::render(&mut run, &mut state),
     };
     run.finish(&mut state);
+    check_time(settings, &stats, state.done)?;
     stats.render_seconds = state.seconds;
     stats.rays = state.rays;
     stats.spp_done = state.done;
     stats.nan_samples = state.film.dropped_count();
     stats.dropped = state.film.dropped();
     Ok((state, stats))
+}
+
+/// Refuses a render of which there is nothing when its time is over.
+fn check_time(settings: &Settings, stats: &Stats, done: u32) -> Result<()> {
+    match settings.time_limit.filter(|_| stats.time_limited && done == 0) {
+        Some(limit) => {
+            let message = "twice that time was not enough for a sample of every pixel: there is no picture";
+            Err(Error::Usage(format!("--time-limit {}: {message}", limit.as_secs_f64())))
+        }
+        None => Ok(()),
+    }
 }
 
 fn pool(settings: &Settings) -> Result<rayon::ThreadPool> {

@@ -34,10 +34,15 @@ pub(super) fn render(run: &mut Run, state: &mut RenderState) -> Stats {
         let start = Instant::now();
         let rendered = &mut state.film.tiles_mut()[tiles.clone()];
         state.rays.add(&render_pass(run.job, run.pool, rendered, missing.start, pass.samples, run.progress));
+        if run.has_given_up(&mut stats) {
+            state.torn = true;
+            break;
+        }
         state.tiles_ahead = tiles.end % all;
         state.done += if tiles.end == all { pass.samples } else { 0 };
         if stats.first_pass_seconds == 0.0 && state.done > 0 {
             stats.first_pass_seconds = run.limits.elapsed().as_secs_f64();
+            run.has_picture();
         }
         let next = Pass { tiles: tiles.len(), ..pass }.next(run, all, start.elapsed());
         if !state.missing(spp).is_empty() {

@@ -4,7 +4,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use super::limits::Limits;
-use super::{Checkpoints, Job, Progress, RenderState, Settings};
+use super::{Checkpoints, Job, Progress, RenderState, Settings, Stats};
+use crate::integrator::Cancel;
 
 /// A pass aims at this time: long enough to cost nothing, short enough that an interrupt is answered soon.
 const PASS_TIME: Duration = Duration::from_millis(500);
@@ -19,6 +20,7 @@ pub(super) struct Run<'a> {
     pub settings: &'a Settings,
     pub progress: &'a dyn Progress,
     pub limits: Limits<'a>,
+    cancel: &'a Cancel<'a>,
     checkpoints: Option<&'a mut Checkpoints>,
 }
 
@@ -29,10 +31,23 @@ impl<'a> Run<'a> {
         pool: &'a rayon::ThreadPool,
         settings: &'a Settings,
         progress: &'a dyn Progress,
-        stop: &'a AtomicBool,
+        (stop, cancel): (&'a AtomicBool, &'a Cancel<'a>),
         checkpoints: Option<&'a mut Checkpoints>,
     ) -> Self {
-        Self { job, pool, settings, progress, limits: Limits::new(settings, stop), checkpoints }
+        Self { job, pool, settings, progress, limits: Limits::new(settings, stop), cancel, checkpoints }
+    }
+
+    /// Notes that every pixel has a sample.
+    pub fn has_picture(&self) {
+        self.cancel.has_picture(self.settings.time_limit);
+    }
+
+    /// Whether the pass under way was given up, and in the statistics why: then tiles differ in their samples.
+    pub fn has_given_up(&self, stats: &mut Stats) -> bool {
+        self.cancel.given_up() && {
+            self.limits.end(stats, true);
+            true
+        }
     }
 
     /// How long a pass may be, as far as checkpoints are due. Parts of a sample keep the processors less busy than all of it.
@@ -54,7 +69,7 @@ impl<'a> Run<'a> {
     /// After the last pass.
     pub fn finish(&mut self, state: &mut RenderState) {
         let elapsed = self.limits.elapsed();
-        if let Some(checkpoints) = &mut self.checkpoints {
+        if let Some(checkpoints) = self.checkpoints.as_mut().filter(|_| !state.torn) {
             let (pool, progress) = (self.pool, self.progress);
             pool.install(|| checkpoints.finish(state, elapsed, progress));
         }

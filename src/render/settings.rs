@@ -1,5 +1,6 @@
 //! Everything a render needs beside the scene: what the scene file says, with the command line's changes.
 
+use std::collections::HashSet;
 use std::num::NonZero;
 use std::time::Duration;
 
@@ -284,10 +285,9 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
     } else {
         by_name(&overrides.default_outputs)
     };
-    for (i, output) in outputs.iter().enumerate() {
-        if outputs[..i].iter().any(|other| other.file == output.file) {
-            return Err(usage(format!("two outputs have the name {}", output.file)));
-        }
+    let mut names = HashSet::new();
+    if let Some(output) = outputs.iter().find(|output| !names.insert(output.file.as_str())) {
+        return Err(usage(format!("two outputs have the name {}", output.file)));
     }
     let has_extension = |output: &OutputDesc, extension: &str| output.file.to_ascii_lowercase().ends_with(extension);
     let needs = |option: &str, asked: bool, extension: &str| {

@@ -2,7 +2,7 @@
 //! becomes invalid in the space of an instance.
 
 use crate::error::{Error, Result};
-use crate::geometry::Instance;
+use crate::geometry::{Instance, InverseReach};
 use crate::math::float::EMBREE_LARGE;
 use crate::math::{Ray, Vec3, Vec4};
 
@@ -44,7 +44,8 @@ impl Gate {
         let mut gate = Self::OPEN;
         // Instances that move look at each ray themselves.
         for (i, instance) in instances.iter().enumerate().filter(|(_, instance)| instance.motion.is_none()) {
-            let Inverse { reach, offset } = invert_as_embree(instance)
+            let InverseReach { reach, offset } = instance
+                .inverse_reach()
                 .ok_or_else(|| Error::Embree(format!("instance {i}: its transform is too small or too large to be inverted in f32")))?;
             gate = Self::new(gate.origin.min((LIMIT - offset) / reach), gate.direction.min(LIMIT / reach));
         }
@@ -92,30 +93,3 @@ impl RayWords {
 
 /// Embree's `min_rcp_input`, rounded up.
 const SMALLEST_RECIPROCAL: f32 = 1.0001e-18;
-
-/// How far a map to object space can move a ray.
-struct Inverse {
-    /// Largest sum of magnitudes of a row of the linear part.
-    reach: f32,
-    /// Largest magnitude of a component of the translation.
-    offset: f32,
-}
-
-/// The inverse by cofactors in `f32`; `None` if it is not finite, leaves no room for any ray, or its determinant is denormal.
-fn invert_as_embree(instance: &Instance) -> Option<Inverse> {
-    let m = &instance.transform.world_from_object;
-    let (x, y, z) = (m.matrix3.x_axis.as_vec3(), m.matrix3.y_axis.as_vec3(), m.matrix3.z_axis.as_vec3());
-    let rows = [y.cross(z), z.cross(x), x.cross(y)];
-    let determinant = x.dot(rows[0]);
-    if !determinant.is_normal() {
-        return None;
-    }
-    let rows = rows.map(|row| row / determinant);
-    let translation = m.translation.as_vec3();
-    let offsets = rows.map(|row| row.abs().dot(translation.abs()));
-    let reach = rows.iter().map(|row| row.abs().element_sum()).fold(0.0, f32::max);
-    let offset = offsets.into_iter().fold(0.0, f32::max);
-    // A NaN row would be lost in the maxima, so each is looked at.
-    let finite = rows.iter().all(|row| row.is_finite()) && offsets.iter().all(|o| *o < 0.25 * EMBREE_LARGE);
-    (finite && reach.is_normal()).then_some(Inverse { reach, offset })
-}

@@ -101,7 +101,13 @@ impl<'a> Kept<'a> {
         let (state, stats) = render::render_from(scene, accel, settings, state, checkpoints.as_mut(), progress, &interrupt.stop)?;
         // What an interrupted shard has is in its checkpoint; a shard that is there is complete.
         let unfinished = stats.interrupted && checkpoints.is_some();
-        if let Some(file) = self.shard_file.as_ref().filter(|_| !unfinished) {
+        if state.torn && self.shard_file.is_some() && !unfinished {
+            let message = "the pass under way took too long and was given up";
+            if !stats.interrupted {
+                return Err(Error::Usage(format!("--time-limit: {message}, so there is no shard")));
+            }
+            reporter.warn(&format!("{message}: no shard is written"));
+        } else if let Some(file) = self.shard_file.as_ref().filter(|_| !unfinished) {
             file.replace(|out| state.write(header, out))?;
         }
         // Of a shard nobody looks at the picture.

@@ -60,6 +60,10 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         session.reporter.say(&format!("interrupted: frame {frame} is not written"));
         return Ok(exit_code);
     }
+    if result.stats.interrupted && result.stats.spp_done == 0 && plan.shard_file.is_none() {
+        session.reporter.say("interrupted before every pixel had a sample: nothing is written");
+        return Ok(exit_code);
+    }
     plan.write(&scene, &*accel, result, &run, (session, &live))?;
     if arguments.live.preview_hold {
         interrupt.wait();
@@ -86,6 +90,7 @@ impl<'a> Plan<'a> {
     /// Checks all that can be checked before the scene is made; `None` if the frame is there already.
     fn new(arguments: &'a RenderArgs, shot: &Shot) -> Result<Option<Self>> {
         let json = arguments.json.as_deref().map(|path| shot.file(path));
+        compile::check_imported_settings(&shot.imported, &shot.scene)?;
         let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
         let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?.map(|name| shot.file_of(&name));
         let mut settings = Settings::new(&shot.imported.desc, &overrides)?;

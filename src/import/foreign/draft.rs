@@ -1,6 +1,6 @@
 //! A scene of our own format while a reader fills it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use super::{ImportReport, Imported, Outcome, ReportEntry};
@@ -17,12 +17,13 @@ pub struct Draft {
     /// What became of the parameters.
     pub report: ImportReport,
     places: BTreeMap<String, String>,
+    numbers: Numbers,
 }
 
 impl Draft {
     /// Adds a texture under `name` or one like it; the result is its name.
     pub fn add_texture(&mut self, name: &str, place: &str, texture: TextureDesc) -> String {
-        let name = unique(name, |name| self.desc.textures.contains_key(name));
+        let name = self.numbers.unique("texture", name, |name| self.desc.textures.contains_key(name));
         self.places.insert(format!("textures.{name}"), place.into());
         self.desc.textures.insert(name.clone(), texture);
         name
@@ -30,7 +31,7 @@ impl Draft {
 
     /// Adds a material under `name` or one like it; the result is its name.
     pub fn add_material(&mut self, name: &str, place: &str, material: MaterialDesc) -> String {
-        let name = unique(name, |name| self.desc.materials.contains_key(name));
+        let name = self.numbers.unique("material", name, |name| self.desc.materials.contains_key(name));
         self.places.insert(format!("materials.{name}"), place.into());
         self.desc.materials.insert(name.clone(), material);
         name
@@ -38,7 +39,7 @@ impl Draft {
 
     /// Adds an object under `name` or one like it, its shapes with their places; the result is its name.
     pub fn add_object(&mut self, name: &str, place: &str, shapes: Vec<(String, ShapeDesc)>, instances: Vec<InstanceDesc>) -> String {
-        let name = unique(name, |name| self.desc.objects.contains_key(name));
+        let name = self.numbers.unique("object", name, |name| self.desc.objects.contains_key(name));
         self.places.insert(format!("objects.{name}"), place.into());
         let mut object = ObjectDesc { shapes: Vec::new(), instances };
         for (i, (place, shape)) in shapes.into_iter().enumerate() {
@@ -75,21 +76,21 @@ impl Draft {
 
     /// Keeps a mesh that has no file; the result is what stands for its file's name.
     pub fn keep_mesh(&mut self, name: &str, mesh: MeshData) -> String {
-        let file = unique_file(name, "ply", &self.assets);
+        let file = self.numbers.unique_file(name, "ply", &self.assets);
         self.assets.meshes.insert(file.clone(), mesh);
         file
     }
 
     /// Keeps an image of a texture that has no file; the result is what stands for its file's name.
     pub fn keep_image(&mut self, name: &str, image: ImageData) -> String {
-        let file = unique_file(name, if image.is_float() { "exr" } else { "png" }, &self.assets);
+        let file = self.numbers.unique_file(name, if image.is_float() { "exr" } else { "png" }, &self.assets);
         self.assets.images.insert(file.clone(), image);
         file
     }
 
     /// Keeps an image of an environment that has no file; the result is what stands for its file's name.
     pub fn keep_environment(&mut self, name: &str, image: RgbImage) -> String {
-        let file = unique_file(name, "exr", &self.assets);
+        let file = self.numbers.unique_file(name, "exr", &self.assets);
         self.assets.environments.insert(file.clone(), image);
         file
     }
@@ -119,20 +120,33 @@ impl Draft {
     }
 }
 
-/// `name`, or the first of `name_2`, `name_3`, ... that is not taken.
-fn unique(name: &str, is_taken: impl Fn(&str) -> bool) -> String {
-    let name = if name.is_empty() { "unnamed" } else { name };
-    if !is_taken(name) {
-        return name.into();
-    }
-    (2u64..).map(|i| format!("{name}_{i}")).find(|name| !is_taken(name)).unwrap_or_default()
-}
+/// The next number of each name that was taken, by what it names: looking for it from the start would take the square of their count.
+#[derive(Clone, Debug, Default)]
+struct Numbers(HashMap<(&'static str, String), u64>);
 
-/// As [`unique`], for a file that any system can write.
-fn unique_file(name: &str, extension: &str, assets: &Assets) -> String {
-    let plain: String = name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).take(60).collect();
-    let stem = unique(&plain, |stem| assets.contains(&format!("{stem}.{extension}")));
-    format!("{stem}.{extension}")
+impl Numbers {
+    /// `name`, or the first of `name_2`, `name_3`, ... that is not taken.
+    fn unique(&mut self, kind: &'static str, name: &str, is_taken: impl Fn(&str) -> bool) -> String {
+        let name = if name.is_empty() { "unnamed" } else { name };
+        if !is_taken(name) {
+            return name.into();
+        }
+        let next = self.0.entry((kind, name.to_owned())).or_insert(2);
+        loop {
+            let numbered = format!("{name}_{next}");
+            *next += 1;
+            if !is_taken(&numbered) {
+                return numbered;
+            }
+        }
+    }
+
+    /// As [`unique`](Self::unique), for a file that any system can write.
+    fn unique_file(&mut self, name: &str, extension: &'static str, assets: &Assets) -> String {
+        let plain: String = name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).take(60).collect();
+        let stem = self.unique(extension, &plain, |stem| assets.contains(&format!("{stem}.{extension}")));
+        format!("{stem}.{extension}")
+    }
 }
 
 #[cfg(test)]
@@ -144,6 +158,14 @@ mod tests {
         let mut draft = Draft::default();
         let names: Vec<String> = (0..3).map(|_| draft.add_texture("a", "x:1", TextureDesc::Constant { color: [0.0; 3] })).collect();
         assert_eq!(names, ["a", "a_2", "a_3"]);
+        // One that has the next number of its own.
+        draft.add_texture("a_4", "x:1", TextureDesc::Constant { color: [0.0; 3] });
+        assert_eq!(draft.add_texture("a", "x:1", TextureDesc::Constant { color: [0.0; 3] }), "a_5");
+        // The square of this number would take minutes.
+        let last = (0..50_000)
+            .map(|_| draft.add_material("", "x:1", MaterialDesc::Mirror { reflectance: crate::desc::ColorDesc::Grey(1.0) }))
+            .last();
+        assert_eq!(last.as_deref(), Some("unnamed_50000"));
         let files: Vec<String> = (0..2).map(|_| draft.keep_mesh("../ä b", MeshData::default())).collect();
         assert_eq!(files, ["___ä_b.ply", "___ä_b_2.ply"]);
     }

@@ -3,12 +3,12 @@
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
-use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::{FlatImage, ReadChannels, ReadLayers, read};
 
 use crate::error::{Error, Result};
+use crate::import::read_exr_headers;
 use crate::output::role::Role;
 
 /// A file's headers, and its pixels if a rule asks for them.
@@ -31,11 +31,11 @@ impl ExrFile {
     pub fn read(path: &Path) -> Result<Self> {
         std::fs::File::open(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
         let malformed = |e: exr::error::Error| Error::Malformed { file: path.into(), message: e.to_string() };
-        let headers = MetaData::read_from_file(path, false).map_err(malformed)?.headers;
+        let headers = read_exr_headers(path).map_err(|message| Error::Malformed { file: path.into(), message })?;
         if headers.is_empty() {
             return Err(Error::Malformed { file: path.into(), message: "there are no parts".into() });
         }
-        let file = Self { path: path.into(), headers: headers.into_vec(), pixels: OnceCell::new() };
+        let file = Self { path: path.into(), headers, pixels: OnceCell::new() };
         // Flat files are read as a whole, so that a truncated one is not called clean.
         if file.headers.iter().all(|header| !header.deep) {
             let image = match read_pixels(path) {

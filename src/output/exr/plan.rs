@@ -37,41 +37,59 @@ impl PartKind {
     }
 }
 
+/// What of an output makes no sense.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutputFault {
+    /// The key of the scene file.
+    pub key: &'static str,
+    /// What is wrong with it.
+    pub message: String,
+}
+
 /// Checks that an EXR output makes sense: no lossy compression of data, no 16 bits where 32 are needed, an even number of ranks.
 ///
 /// # Errors
 /// [`Error::Usage`] naming the output and the layer.
 pub fn check_output(output: &OutputDesc) -> Result<()> {
-    let fault = |message: String| Err(Error::Usage(format!("output {}: {message}", output.file)));
+    let refuse = |fault: OutputFault| Err(Error::Usage(format!("output {}: {}", output.file, fault.message)));
+    find_output_fault(output).map_or(Ok(()), refuse)
+}
+
+/// What of an output makes no sense, if anything does not; see [`check_output`].
+pub fn find_output_fault(output: &OutputDesc) -> Option<OutputFault> {
+    let fault = |key: &'static str, message: String| Some(OutputFault { key, message });
     let data = output.layers.iter().find(|layer| is_data(**layer));
     if let (Some(compression), Some(layer)) = (output.compression.filter(|c| is_lossy(*c)), data)
         && output.profile != ExrProfileDesc::Multipart
     {
         let (compression, layer) = (compression_name(compression), layer_name(*layer));
-        return fault(format!(
+        let message = format!(
             "the compression {compression} would spoil the layer {layer}, which holds data; the profile multipart gives data a part of its own"
-        ));
+        );
+        return fault("compression", message);
     }
     let spoiled = output
         .pixel_types
         .iter()
         .find(|(layer, pixel_type)| **pixel_type == PixelTypeDesc::Half && LayerKind::from(**layer).info().always_float);
     if let Some((layer, _)) = spoiled {
-        return fault(format!("the layer {} needs 32 bits: its pixel type cannot be half", layer_name(*layer)));
+        return fault("pixel_types", format!("the layer {} needs 32 bits: its pixel type cannot be half", layer_name(*layer)));
     }
-    match output.crypto_depth {
-        Some(depth) if depth == 0 || depth % 2 == 1 || depth > MAX_DEPTH => {
-            return fault(format!("{depth} ranks of Cryptomatte: an even number from 2 to {MAX_DEPTH}"));
+    if let Some(depth) = output.crypto_depth.filter(|depth| *depth == 0 || depth % 2 == 1 || *depth > MAX_DEPTH) {
+        return fault("crypto_depth", format!("{depth} ranks of Cryptomatte: an even number from 2 to {MAX_DEPTH}"));
+    }
+    match output.dwa_level {
+        Some(level) if !(0.0..=100_000.0).contains(&level) => {
+            return fault("dwa_level", format!("a DWA level of {level}: a number from 0 to 100000"));
+        }
+        Some(_) if !output.compression.is_some_and(is_lossy) => {
+            return fault("dwa_level", "a DWA level without the compression dwaa or dwab".to_owned());
         }
         _ => {}
     }
-    match output.dwa_level {
-        Some(level) if !(0.0..=100_000.0).contains(&level) => fault(format!("a DWA level of {level}: a number from 0 to 100000")),
-        Some(_) if !output.compression.is_some_and(is_lossy) => fault("a DWA level without the compression dwaa or dwab".to_owned()),
-        _ if output.frames_per_second.is_some_and(|fps| !(fps > 0.0 && fps <= 1e6)) => {
-            fault("frames per second: a number above 0".to_owned())
-        }
-        _ => Ok(()),
+    match output.frames_per_second {
+        Some(fps) if !(fps > 0.0 && fps <= 1e6) => fault("frames_per_second", format!("{fps} frames per second: a number above 0")),
+        _ => None,
     }
 }
 

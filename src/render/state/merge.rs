@@ -44,8 +44,17 @@ pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
     }
     let film = headers[0].film.film()?;
     let rays = RayCounts::default();
-    let mut state =
-        RenderState { film, shard: Shard::WHOLE, done: 0, tiles_ahead: 0, complete: lack.is_none(), blocks: None, rays, seconds: 0.0 };
+    let mut state = RenderState {
+        film,
+        shard: Shard::WHOLE,
+        done: 0,
+        tiles_ahead: 0,
+        torn: false,
+        complete: lack.is_none(),
+        blocks: None,
+        rays,
+        seconds: 0.0,
+    };
     for file in files {
         add(&mut state, file)?;
     }

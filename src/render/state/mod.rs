@@ -42,6 +42,8 @@ pub struct RenderState {
     pub done: u32,
     /// How many tiles, the first of the film, have one sample more.
     pub tiles_ahead: usize,
+    /// Whether a pass was given up: some tiles have samples that others lack, which no file can say. The picture is whole.
+    pub torn: bool,
     /// Whether no sample is missing.
     pub complete: bool,
     /// With a target error, what every block of pixels has and is to get.
@@ -64,7 +66,7 @@ impl RenderState {
             layers.insert(LayerKind::Variance);
         }
         let film = Film::with_light_groups(settings.film_size(), settings.crop, &layers, light_groups(scene), TILE_SIZE)?;
-        Ok(Self { film, shard, done: 0, tiles_ahead: 0, complete: false, blocks, rays: RayCounts::default(), seconds: 0.0 })
+        Ok(Self { film, shard, done: 0, tiles_ahead: 0, torn: false, complete: false, blocks, rays: RayCounts::default(), seconds: 0.0 })
     }
 
     /// Continues from the state in a file.

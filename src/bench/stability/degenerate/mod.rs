@@ -10,7 +10,7 @@ use fuzz::e10_mutated_files;
 use lifetime::{e8_life_of_scenes, e9_memory};
 use meshes::{e3_garbage_meshes, e4_identical_triangles};
 use rays::{e1_invalid_rays, e2_zero_directions, e5_ends_of_intervals, e6_steps_past_hits};
-use scaling::e7_scenes_of_every_size;
+use scaling::{e7_scenes_of_every_size, e11_scenes_in_every_place};
 
 use super::{Effort, Outcome};
 
@@ -38,4 +38,7 @@ checks! {
         "every scene of group F built, traced and released, with each build quality (Embree, verify MemoryMonitorTest)";
     "E10" e10_mutated_files "mutated files end in errors":
         "scene, OBJ, PLY and IES files with bits, bytes, spans and numbers changed at random, read and compiled; a panic or endless loop ends the check";
+    "E11" e11_scenes_in_every_place "pictures do not depend on the scene's place":
+        "the scene of E7 moved by up to 1e11 times the size of its shapes, against the scene at the origin with the same random numbers pixel by \
+         pixel; Embree and the BVH";
 }

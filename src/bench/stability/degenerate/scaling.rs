@@ -1,4 +1,4 @@
-//! One scene in every size.
+//! One scene in every size and every place.
 
 use serde_json::{Value, json};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -14,9 +14,10 @@ use crate::render::Overrides;
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 48;
 
-/// Everything a renderer's tolerances could be about, `s` times as large; lights give the same irradiance.
-fn scene(s: f64) -> Value {
-    let at = |p: [f64; 3]| p.map(|x| x * s);
+/// Everything a renderer's tolerances could be about, `s` times as large and moved by `offset`; lights give the same irradiance.
+fn scene(s: f64, offset: [f64; 3]) -> Value {
+    let along = |p: [f64; 3]| p.map(|x| x * s);
+    let at = |p: [f64; 3]| [0, 1, 2].map(|k| offset[k] + p[k] * s);
     json!({
         "film": { "width": WIDTH, "height": HEIGHT, "filter": { "type": "box" } },
         "camera": {
@@ -30,7 +31,7 @@ fn scene(s: f64) -> Value {
             "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
         },
         "shapes": [
-            { "type": "quad", "material": "grey", "origin": at([-4.0, 0.0, 4.0]), "edge_u": at([8.0, 0.0, 0.0]), "edge_v": at([0.0, 0.0, -8.0]) },
+            { "type": "quad", "material": "grey", "origin": at([-4.0, 0.0, 4.0]), "edge_u": along([8.0, 0.0, 0.0]), "edge_v": along([0.0, 0.0, -8.0]) },
             { "type": "sphere", "material": "glass", "radius": 0.5 * s, "transform": [{ "translate": at([-0.7, 0.5, 0.3]) }] },
             { "type": "cone", "material": "grey", "radius": 0.4 * s, "height": 0.9 * s,
               "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }, { "translate": at([0.2, 0.0, -0.9]) }] },
@@ -50,8 +51,12 @@ fn scene(s: f64) -> Value {
 }
 
 fn picture(s: f64, kind: AccelKind, seed: u64) -> Image {
+    picture_at(s, [0.0; 3], kind, seed)
+}
+
+fn picture_at(s: f64, offset: [f64; 3], kind: AccelKind, seed: u64) -> Image {
     let overrides = Overrides { threads: Some(2), seed: Some(seed), ..Overrides::default() };
-    render_with(&prepare(&scene(s), &overrides), kind).image
+    render_with(&prepare(&scene(s, offset), &overrides), kind).image
 }
 
 /// Root mean square difference of pixels, over the mean.
@@ -84,7 +89,7 @@ fn welch(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 }
 
 pub(super) fn e7_scenes_of_every_size(effort: Effort) -> Outcome {
-    let exponents: Vec<i32> = effort.pick(vec![-9, -3, 9], (-9..=9).filter(|k| *k != 0).collect());
+    let exponents: Vec<i32> = effort.pick(vec![-15, -9, -3, 15], (-16..=16).filter(|k| *k != 0).collect());
     let runs = effort.pick(5, 12);
     let (mut smallest, mut largest, mut inexact) = (1f64, 0f64, 0);
     let mut curves = Vec::new();
@@ -97,7 +102,7 @@ pub(super) fn e7_scenes_of_every_size(effort: Effort) -> Outcome {
         let (mut curve, mut level) = (Vec::new(), Vec::new());
         for &k in &exponents {
             let s = 10f64.powi(k);
-            let found = blocks(s, 100 * (k + 10) as u64);
+            let found = blocks(s, 100 * (k + 20) as u64);
             smallest = smallest.min(welch(&found, &expected));
             tests += expected[0].len();
             let relative = difference(&picture(s, kind, 1), &same_seed);
@@ -105,7 +110,7 @@ pub(super) fn e7_scenes_of_every_size(effort: Effort) -> Outcome {
             curve.push((s, relative));
             level.push((s, noise));
         }
-        for s in [2f64.powi(-30), 2f64.powi(30)] {
+        for s in [-50, -30, 30, 50].map(|k| 2f64.powi(k)) {
             inexact += pixels(&picture(s, kind, 1)).zip(pixels(&same_seed)).filter(|(p, q)| p != q).count();
         }
         curves.push((format!("{name}, the same random numbers"), curve));
@@ -118,10 +123,39 @@ pub(super) fn e7_scenes_of_every_size(effort: Effort) -> Outcome {
         // A hundredth of the noise's power.
         .at_most("difference with the same random numbers, over the noise", largest, 0.1)
         // Scaling by a power of two changes no digit.
-        .none("pixels that differ in a bit at scales 2^-30 and 2^30", inexact)
+        .none("pixels that differ in a bit at scales 2^-50, 2^-30, 2^30 and 2^50", inexact)
         .plot(Plot {
             caption: "Difference of a picture of 8 samples per pixel from that at scale 1".into(),
             x: "scale".into(),
+            y: "RMS difference over the mean".into(),
+            floor: 1e-9,
+            curves,
+        })
+}
+
+pub(super) fn e11_scenes_in_every_place(effort: Effort) -> Outcome {
+    let exponents: Vec<i32> = effort.pick(vec![5, 8, 11], (4..=11).collect());
+    let mut largest = 0f64;
+    let mut curves = Vec::new();
+    for name in ["embree", "bvh"] {
+        let Ok(kind) = name.parse() else { continue };
+        let expected = picture(1.0, kind, 1);
+        let noise = difference(&picture(1.0, kind, 2), &expected);
+        let mut curve = Vec::new();
+        for &k in &exponents {
+            let far = 10f64.powi(k);
+            let relative = difference(&picture_at(1.0, [0.9 * far, 0.0, -0.7 * far], kind, 1), &expected);
+            largest = largest.max(relative / noise);
+            curve.push((far, relative));
+        }
+        curves.push((format!("{name}, the same random numbers"), curve));
+    }
+    Outcome::new()
+        // A hundredth of the noise's power.
+        .at_most("difference with the same random numbers, over the noise", largest, 0.1)
+        .plot(Plot {
+            caption: "Difference of a picture of 8 samples per pixel from that at the origin".into(),
+            x: "distance from the origin, in widths of a shape".into(),
             y: "RMS difference over the mean".into(),
             floor: 1e-9,
             curves,

@@ -83,6 +83,7 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
         normals: normals.map(|normals| used.iter().map(|&i| normals.floats(i as usize)).collect()),
         uvs: None,
         colors: colors.as_ref().map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect()),
+        origin: [0.0; 3],
     };
     morph(source, path, primitive, deformation.weights, count, &used, &mut data)?;
     if let Some(joints) = deformation.joints {

@@ -21,7 +21,7 @@ pub fn cube() -> MeshDesc {
     let triangles = (0..6).flat_map(|face| [[4 * face, 4 * face + 1, 4 * face + 2], [4 * face + 3, 4 * face, 4 * face + 2]]);
     let mut mesh = MeshDesc::from_file("");
     mesh.file = None;
-    mesh.positions = Some(FACES.concat());
+    mesh.positions = Some(FACES.concat().into_iter().map(|p| p.map(f64::from)).collect());
     mesh.triangles = Some(triangles.collect());
     mesh.uvs = Some([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]].repeat(6));
     mesh.shading = MeshShadingDesc::Flat;

@@ -73,14 +73,20 @@ fn decode(stream: &mut impl Read, version: u64) -> Result<MeshData, String> {
         return Err(format!("{vertices} vertices are too many"));
     }
     let is_double = flags & IS_DOUBLE != 0;
-    let positions = tuples::<3>(stream, vertices, is_double)?;
+    let (positions, origin) = if is_double {
+        let mut flat = Vec::new();
+        values::<8>(stream, vertices * 3, |bytes| flat.push(f64::from_le_bytes(bytes)))?;
+        MeshData::rounded(flat.as_chunks::<3>().0)
+    } else {
+        (tuples::<3>(stream, vertices, false)?, [0.0; 3])
+    };
     let normals = (flags & HAS_NORMALS != 0).then(|| tuples::<3>(stream, vertices, is_double)).transpose()?;
     let uvs = (flags & HAS_UVS != 0).then(|| tuples::<2>(stream, vertices, is_double)).transpose()?;
     let colors = (flags & HAS_COLORS != 0).then(|| tuples::<3>(stream, vertices, is_double)).transpose()?;
     let mut corners = Vec::new();
     let count = triangles.checked_mul(3).ok_or("too many triangles")?;
     values::<4>(stream, count, |bytes| corners.push(u32::from_le_bytes(bytes)))?;
-    Ok(MeshData { positions, triangles: corners.as_chunks::<3>().0.to_vec(), normals, uvs, colors })
+    Ok(MeshData { positions, triangles: corners.as_chunks::<3>().0.to_vec(), normals, uvs, colors, origin })
 }
 
 /// `count` tuples of floats or doubles.

@@ -19,6 +19,12 @@ const MAX_DEPTH: usize = 100;
 /// Files that include each other deeper than this are a mistake.
 const MAX_INCLUDES: usize = 16;
 
+/// Files that a scene includes, each as often as it is included, are at most this many.
+const MAX_FILES: usize = 1000;
+
+/// Attributes of an element; the XML parser's time grows with the square of their number.
+const MAX_ATTRIBUTES: usize = 100;
+
 /// Tags of plugins.
 const CLASSES: [&str; 13] =
     ["scene", "integrator", "sensor", "film", "sampler", "rfilter", "bsdf", "emitter", "shape", "texture", "volume", "medium", "phase"];
@@ -55,6 +61,7 @@ pub fn read(path: &Path, defines: &[(String, String)]) -> Result<Document> {
         parameters: BTreeMap::new(),
         used: defines.iter().map(|(name, _)| (name.clone(), false)).collect(),
         files: 0,
+        opened: 0,
     };
     parser.parameters.extend(defines.iter().cloned());
     let mut root = parser.file(path)?;
@@ -77,6 +84,45 @@ struct Parser {
     used: BTreeMap<String, bool>,
     /// Files that are open.
     files: usize,
+    /// Files that have been opened.
+    opened: usize,
+}
+
+/// The line where a tag begins that has more than [`MAX_ATTRIBUTES`] equals signs outside of quotes, if there is one.
+fn crowded_line(text: &str) -> Option<usize> {
+    let mut line = 1;
+    let mut rest = text;
+    while let Some(open) = rest.find('<') {
+        line += rest[..open].bytes().filter(|&b| b == b'\n').count();
+        rest = &rest[open..];
+        // Comments and CDATA sections have no attributes.
+        let skipped = [("<!--", "-->"), ("<![CDATA[", "]]>")].into_iter().find(|(start, _)| rest.starts_with(start));
+        let length = match skipped {
+            Some((_, end)) => rest.find(end).map_or(rest.len(), |at| at + end.len()),
+            None => {
+                let (mut quote, mut attributes, mut length) = (None, 0, rest.len());
+                for (i, b) in rest.bytes().enumerate() {
+                    match (quote, b) {
+                        (Some(open), b) if b == open => quote = None,
+                        (None, b'"' | b'\'') => quote = Some(b),
+                        (None, b'=') => attributes += 1,
+                        (None, b'>') => {
+                            length = i + 1;
+                            break;
+                        }
+                        _ => {}
+                    }
+                }
+                if attributes > MAX_ATTRIBUTES {
+                    return Some(line);
+                }
+                length
+            }
+        };
+        line += rest[..length].bytes().filter(|&b| b == b'\n').count();
+        rest = &rest[length..];
+    }
+    None
 }
 
 /// An XML file with the starts of its lines.
@@ -117,6 +163,10 @@ impl Parser {
         })?;
         // An element of Mitsuba's takes more than ten characters; memory follows the number of elements.
         let nodes_limit = u32::try_from(100 + text.len() / 6).unwrap_or(u32::MAX);
+        if let Some(line) = crowded_line(&text) {
+            let message = format!("an element has more than {MAX_ATTRIBUTES} attributes");
+            return Err(Place { file: Rc::clone(&file), line, column: 1 }.error(message));
+        }
         let options = ParsingOptions { nodes_limit, ..ParsingOptions::default() };
         let xml = Xml::parse_with_options(text.trim_start_matches('\u{feff}'), options).map_err(|e| {
             let at = e.pos();
@@ -134,6 +184,10 @@ impl Parser {
         self.files += 1;
         if self.files > MAX_INCLUDES {
             return Err(source.place(root).error(format!("files include each other more than {MAX_INCLUDES} deep")));
+        }
+        self.opened += 1;
+        if self.opened > MAX_FILES {
+            return Err(source.place(root).error(format!("the scene includes files more than {MAX_FILES} times")));
         }
         let scene = self.plugin(&source, root, "scene".into(), 0)?;
         self.files -= 1;

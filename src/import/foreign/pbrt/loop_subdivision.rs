@@ -118,7 +118,7 @@ impl Surface {
         let on_limit = Self { positions: limits, triangles: Vec::new(), rings: Vec::new() };
         let normals = self.rings.iter().enumerate().map(|(v, ring)| on_limit.normal(v, ring).as_vec3().to_array()).collect();
         let positions = on_limit.positions.iter().map(|p| p.as_vec3().to_array()).collect();
-        MeshData { positions, triangles: self.triangles.clone(), normals: Some(normals), uvs: None, colors: None }
+        MeshData { positions, triangles: self.triangles.clone(), normals: Some(normals), ..MeshData::default() }
     }
 
     /// From the tangents of Loop's scheme along and across the ring.

@@ -179,12 +179,17 @@ impl Params {
 
     /// Numbers in groups of `N`, as floats.
     pub fn groups<const N: usize>(&self, name: &str) -> Result<Option<Vec<[f32; N]>>> {
+        Ok(self.wide_groups(name)?.map(|groups| groups.into_iter().map(|group: [f64; N]| group.map(|x| x as f32)).collect()))
+    }
+
+    /// As [`groups`](Self::groups), as the file has them.
+    pub fn wide_groups<const N: usize>(&self, name: &str) -> Result<Option<Vec<[f64; N]>>> {
         let Some(param) = self.get(name) else { return Ok(None) };
         let (groups, rest) = param.numbers()?.as_chunks::<N>();
         if !rest.is_empty() {
             return Err(param.error(format!("needs groups of {N} numbers, and {} are left over", rest.len())));
         }
-        Ok(Some(groups.iter().map(|group| group.map(|x| x as f32)).collect()))
+        Ok(Some(groups.to_vec()))
     }
 
     /// Indices of vertices in groups of `N`, each below `count`.

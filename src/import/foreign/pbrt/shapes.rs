@@ -120,7 +120,7 @@ impl Shapes<'_> {
         let shading = MeshShadingDesc::default();
         ShapeDesc::Mesh(MeshDesc::new(
             None,
-            Some(mesh.positions),
+            Some(mesh.written_positions()),
             Some(mesh.triangles),
             mesh.normals,
             mesh.uvs,
@@ -243,7 +243,8 @@ fn analytic(kind: &str, params: &Params) -> Result<Form> {
 }
 
 fn triangle_mesh(params: &Params) -> Result<MeshData> {
-    let Some(positions) = params.groups::<3>("P")? else { return Err(params.error("needs positions P")) };
+    let Some(positions) = params.wide_groups("P")? else { return Err(params.error("needs positions P")) };
+    let (positions, origin) = MeshData::rounded(&positions);
     let count = positions.len();
     let triangles = match params.indices("indices", count)? {
         Some(triangles) => triangles,
@@ -266,7 +267,7 @@ fn triangle_mesh(params: &Params) -> Result<MeshData> {
         }
         uvs => uvs,
     };
-    Ok(MeshData { positions, triangles, normals, uvs, colors: None })
+    Ok(MeshData { positions, triangles, normals, uvs, origin, ..MeshData::default() })
 }
 
 /// The triangles, and how many patches they are.

@@ -1,7 +1,7 @@
 //! Meshes of triangles as pbrt understands them.
 
 use crate::import::MeshData;
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{DAffine3, Vec3};
 
 /// Turns triangles so that their fronts are where their normals point, as pbrt has it. Whether any had to be turned.
 pub fn orient(mesh: &mut MeshData) -> bool {
@@ -26,7 +26,7 @@ pub fn give_uvs(mesh: &mut MeshData) {
 
 /// The area of a placed mesh.
 pub fn area(mesh: &MeshData, map: &DAffine3) -> f64 {
-    let corner = |i: u32| mesh.positions.get(i as usize).map(|p| map.transform_point3(DVec3::from(p.map(f64::from))));
+    let corner = |i: u32| mesh.positions.get(i as usize).map(|p| map.transform_point3(mesh.position(*p)));
     let triangle = |t: &[u32; 3]| match t.map(corner) {
         [Some(a), Some(b), Some(c)] => 0.5 * (b - a).cross(c - a).length(),
         _ => 0.0,
@@ -43,8 +43,7 @@ mod tests {
             positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2]],
             normals: Some(vec![normal; 3]),
-            uvs: None,
-            colors: None,
+            ..MeshData::default()
         }
     }
 

@@ -162,3 +162,35 @@ fn nothing_is_dropped_in_silence() {
     assert_eq!(scene(lacking).shapes.len(), 1);
     assert!(try_scene("<shape type=\"sphere\"/>").unwrap().report.is_exact());
 }
+
+/// 13 files of 10 includes each, and so on, would be read 10^12 times.
+#[test]
+fn files_are_included_a_bounded_number_of_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = |body: &str| format!("<scene version=\"3.0.0\">{body}</scene>");
+    for i in 0..12 {
+        let includes = format!("<include filename=\"i{}.xml\"/>", i + 1).repeat(10);
+        std::fs::write(folder.path().join(format!("i{i}.xml")), scene(&includes)).unwrap();
+    }
+    std::fs::write(folder.path().join("i12.xml"), scene("")).unwrap();
+    let error = super::super::xml::read(&folder.path().join("i0.xml"), &[]).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("includes files more than 1000 times"), "{error}");
+}
+
+#[test]
+fn elements_have_a_bounded_number_of_attributes() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |count: usize| {
+        let attributes: String = (0..count).map(|i| format!(" a{i}='x=>y'")).collect();
+        let file = folder.path().join("s.xml");
+        std::fs::write(
+            &file,
+            format!("<!-- {} -->\n<scene version=\"3.0.0\">\n<default name=\"a\" value=\"b\"{attributes}/></scene>", "= ".repeat(500)),
+        )
+        .unwrap();
+        super::super::xml::read(&file, &[]).map(|_| ()).map_err(|e| e.to_string())
+    };
+    assert_eq!(read(90), Ok(()));
+    let error = read(100_000).unwrap_err();
+    assert!(error.contains("s.xml:3:1: ") && error.contains("more than 100 attributes"), "{error}");
+}
