@@ -5,6 +5,7 @@ mod camera;
 mod check;
 mod composites;
 mod identities;
+mod keyframes;
 mod lights;
 mod materials;
 mod media;
