@@ -55,8 +55,9 @@ enum Form {
 }
 
 impl Builder {
-    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may bring several.
-    pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc) -> Result<Vec<PreparedShape>> {
+    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may bring several. Where it is not used,
+    /// its files are not read.
+    pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc, is_used: bool) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
         let identity = self.identities.shape(&self.files, number, desc);
         let mut look = self.materials.find(&self.files, path, common.material)?;
@@ -73,6 +74,14 @@ impl Builder {
             return Err(self.without_colors(path, None, common.material));
         }
         let form = match desc {
+            ShapeDesc::Mesh(mesh) if !is_used && mesh.file.is_some() => {
+                self.smoothing(path, mesh)?;
+                let later = mesh.deform_files.iter().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
+                for (path, file) in mesh.file.iter().map(|file| (format!("{path}.file"), file)).chain(later) {
+                    self.files.warn_of_missing(&path, file);
+                }
+                return Ok(Vec::new());
+            }
             ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), look, emission, identity),
             ShapeDesc::Cube(_) => Form::Mesh {
                 data: meshes::cube(),
@@ -179,8 +188,9 @@ impl Builder {
         Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
-    /// Adds a shape to the scene, placed by its own transform and then by `outer`. One that emits must end up in the world.
-    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3) -> Result<ShapeId> {
+    /// Adds a shape to the scene, placed by its own transform and then by `outer`; `None` if it is a mesh of which nothing has an area. One
+    /// that emits must end up in the world.
+    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3) -> Result<Option<ShapeId>> {
         let PreparedShape { form, map, motion, reverse_normal, look, emission, identity, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
@@ -193,7 +203,9 @@ impl Builder {
             }
             Form::Mesh { data, shading, smoothing, later, file } => {
                 let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal };
-                let mesh = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)?;
+                let Some(mesh) = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)? else {
+                    return Ok(None);
+                };
                 Shape::Mesh(if self.materials.has_normal_map(&look) { mesh.with_tangents() } else { mesh })
             }
         };
@@ -211,15 +223,16 @@ impl Builder {
         if let Some(PreparedEmission { emission, group }) = emission {
             let emission = Emission { opacity: look.opacity, ..emission };
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
-            if !lights.iter().any(|light| light.area() > 0.0) {
-                return Err(self.files.error(&format!("{path}.emission"), "the light has no area"));
+            if lights.iter().any(|light| light.area() > 0.0) {
+                surface.single_light = lights.len() == 1;
+                surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
+            } else {
+                self.files.warn(&format!("{path}.emission"), format_args!("the shape is too small to give off light"));
             }
-            surface.single_light = lights.len() == 1;
-            surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
         }
         self.surfaces.push(surface);
         self.identities.add_shape(identity);
         self.opacities.push(look.opacity);
-        Ok(id)
+        Ok(Some(id))
     }
 }
