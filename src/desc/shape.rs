@@ -296,6 +296,8 @@ pub enum NormalWeightDesc {
     Angle,
     /// By the area of the triangle: large faces stay flatter.
     Area,
+    /// All the same.
+    Uniform,
 }
 
 /// Which triangles computed normals are averaged over.
