@@ -252,10 +252,13 @@ shapes! {
         phi_max_degrees: f64,
     }
     /// A surface of revolution: a profile curve in the xy plane turned about +y. x is the distance from the axis and must not be
-    /// negative. u is the angle over `phi_max`; v is the curve's parameter. A profile that runs towards +y has normals outward.
+    /// negative. u is the angle over `phi_max`; v runs from 0 to 1 along the profile. A profile that runs towards +y has normals outward.
     Revolution(RevolutionDesc) {
         /// The profile.
         profile: ProfileDesc,
+        /// What v grows with. Default: `curve`.
+        #[serde(default, skip_serializing_if = "is_default")]
+        v: ProfileParameterDesc,
         /// Largest angle kept, from +z towards +x, in degrees. Default: 360.
         #[serde(default = "full_turn")]
         phi_max_degrees: f64,
@@ -270,6 +273,23 @@ pub enum ProfileDesc {
     Bezier(Vec<[f64; 2]>),
     /// A uniform cubic B-spline: at least 4 control points. The curve does not reach its end points unless they are tripled.
     BSpline(Vec<[f64; 2]>),
+}
+
+/// What v of a surface of revolution grows with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ProfileParameterDesc {
+    /// The curve's parameter, the same share of v for each of its segments.
+    #[default]
+    Curve,
+    /// The height: v = 0 at the lowest point of the profile, 1 at the highest. Where the profile turns back, values occur again.
+    Height,
+    /// The length of the curve: images are not stretched along it.
+    ArcLength,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// How a mesh's normals are found.
