@@ -80,6 +80,8 @@ mod motion;
 mod opacity;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.
 mod own_accelerators;
+/// Planes without end.
+mod planes;
 /// Normal maps, bump maps and smooth normals, without leaks and black rims.
 mod relief;
 /// Meshes, comments, names and transforms of scene files, read as users write them.

@@ -15,6 +15,7 @@ mod nesting;
 mod normals;
 mod objects;
 mod opacity;
+mod planes;
 mod prepared;
 mod principled;
 mod reliefs;
@@ -39,6 +40,7 @@ use crate::id::TextureId;
 use crate::import::{AssetError, Assets, Imported};
 use crate::light::LightSet;
 use crate::material::Material;
+use crate::math::Bounds;
 use crate::scene::{Features, Scene, Surface};
 use crate::texture::Texture;
 
@@ -75,6 +77,7 @@ fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
         meshes: MeshStore::read(&files, desc, &used),
         files,
         shutter,
+        surroundings: camera.places(),
         materials,
         geometry: Geometry::default(),
         surfaces: Vec::new(),
@@ -174,6 +177,8 @@ struct Builder {
     /// Read, and not placed yet.
     meshes: MeshStore,
     shutter: Shutter,
+    /// Beyond this, planes reach: bounds of the camera's places and, in the end, of all other shapes.
+    surroundings: Bounds,
     materials: MaterialTable,
     geometry: Geometry,
     /// By shape.

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::film::PlacementId;
 use crate::geometry::{Instance, Object};
 use crate::id::ObjectId;
-use crate::math::{DAffine3, Motion};
+use crate::math::{Bounds, DAffine3, Motion};
 
 /// An object in parts: what its instances share, and what each of them has of its own.
 struct PreparedObject {
@@ -24,9 +24,12 @@ struct PreparedObject {
 impl Builder {
     /// Adds the shapes of the world and all instances.
     pub(super) fn add_world(&mut self, desc: &SceneDesc, used: &UsedNames) -> Result<()> {
+        let mut planes = Vec::new();
         for (i, shape) in desc.shapes.iter().enumerate() {
             for prepared in self.prepare(&format!("shapes[{i}]"), i, shape, true)? {
-                if let Some(motion) = prepared.motion.clone() {
+                if prepared.is_plane() {
+                    planes.push(prepared);
+                } else if let Some(motion) = prepared.motion.clone() {
                     if let Some(object) = self.group(vec![prepared])? {
                         self.push_instance(&format!("shapes[{i}].motion"), object, &motion, None)?;
                     }
@@ -53,7 +56,17 @@ impl Builder {
         }
         let still = Motion::constant(DAffine3::IDENTITY);
         let world = Level { desc, nesting: &nesting, objects: &objects, path: "instances", outer: &still, placement: None };
-        self.add_instances(&world, &desc.instances)
+        self.add_instances(&world, &desc.instances)?;
+
+        let bounds = self.geometry.bounds();
+        if !bounds.is_empty() {
+            self.surroundings = self.surroundings.union(&Bounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() });
+        }
+        for plane in planes {
+            let id = self.place(plane, &DAffine3::IDENTITY)?;
+            self.geometry.world.extend(id);
+        }
+        Ok(())
     }
 
     /// The shapes of an object: what neither emits nor moves goes into a group for all instances.

@@ -2,6 +2,7 @@
 
 use super::materials::Look;
 use super::normals::Smoothing;
+use super::planes::{self, Plane};
 use super::{Builder, meshes, shapes};
 use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
@@ -43,6 +44,8 @@ pub struct PreparedEmission {
 #[derive(Clone, Debug)]
 enum Form {
     Analytic(Analytic),
+    /// Placed when everything else has been.
+    Plane(Plane),
     Mesh {
         data: MeshData,
         shading: MeshShadingDesc,
@@ -52,6 +55,16 @@ enum Form {
         /// Where it was read, relative to the scene.
         file: Option<String>,
     },
+}
+
+/// Why a shape cannot be placed.
+const TOO_LARGE: &str = "the shape reaches to infinity: its size or place is too large for 32-bit numbers";
+
+impl PreparedShape {
+    /// Whether its extent depends on that of everything else.
+    pub fn is_plane(&self) -> bool {
+        matches!(self.form, Form::Plane(_))
+    }
 }
 
 impl Builder {
@@ -90,6 +103,7 @@ impl Builder {
                 later: Vec::new(),
                 file: None,
             },
+            ShapeDesc::Plane(plane) => Form::Plane(planes::compile(&self.files, path, plane, &common)?),
             _ => match shapes::compile(&self.files, path, desc)? {
                 Some(surface) => Form::Analytic(surface),
                 None => return Ok(Vec::new()),
@@ -195,11 +209,16 @@ impl Builder {
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform = Transform::new(*outer * map).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
+        let analytic = |surface: Analytic| {
+            let mut placed = Placed::new(surface, transform);
+            placed.reverse_normal = reverse_normal;
+            Shape::Analytic(placed)
+        };
         let shape = match form {
-            Form::Analytic(surface) => {
-                let mut placed = Placed::new(surface, transform);
-                placed.reverse_normal = reverse_normal;
-                Shape::Analytic(placed)
+            Form::Analytic(surface) => analytic(surface),
+            Form::Plane(plane) => {
+                let quad = planes::square(&plane, &transform.world_from_object, &self.surroundings);
+                analytic(Analytic::Quad(quad.ok_or_else(|| self.files.error(&path, TOO_LARGE))?))
             }
             Form::Mesh { data, shading, smoothing, later, file } => {
                 let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal };
@@ -211,7 +230,7 @@ impl Builder {
         };
         let bounds = shape.bounds();
         if !bounds.min.is_finite() || !bounds.max.is_finite() {
-            return Err(self.files.error(&path, "the shape reaches to infinity: its size or place is too large for 32-bit numbers"));
+            return Err(self.files.error(&path, TOO_LARGE));
         }
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);

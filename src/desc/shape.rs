@@ -208,6 +208,17 @@ shapes! {
         #[serde(default = "quad_edge_v")]
         edge_v: [f64; 3],
     }
+    /// A plane through `point`, without end: a square that reaches 10,000 times as far as everything else in the scene and the camera. u and v
+    /// are lengths from `point`: textures repeat. It stands in the world, not in an object, and can neither move nor give off light.
+    Plane(PlaneDesc) {
+        /// A point of the plane, where u and v are 0. Default: the origin.
+        #[serde(default)]
+        point: [f64; 3],
+        /// The normal; any length. u grows along +x cross normal (+y cross normal if the normal is along x by more than a tenth), v along
+        /// normal cross u. Default: +y.
+        #[serde(default = "plane_normal")]
+        normal: [f64; 3],
+    }
     /// The cube `[-1, 1]³` with normals outward. Each face has u and v from 0 to 1.
     Cube(CubeDesc) {}
     /// A disk, ring or sector at z = 0 about the origin, with normal +z. u is the angle over `phi_max`; v runs from the inner to the outer
@@ -358,6 +369,10 @@ fn one() -> f64 {
 
 fn full_turn() -> f64 {
     360.0
+}
+
+fn plane_normal() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
 }
 
 fn quad_origin() -> [f64; 3] {
