@@ -66,6 +66,19 @@ fn colours_of_vertices_and_uv_that_a_file_lacks_are_converted() {
 }
 
 #[test]
+fn files_that_nothing_uses_need_not_be_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.json");
+    let scene = r#"{ "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] }, "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+        "shapes": [{ "type": "sphere" }], "textures": { "t": { "type": "image", "file": "gone.png" } },
+        "objects": { "o": { "shapes": [{ "type": "mesh", "file": "gone.ply" }] } } }"#;
+    std::fs::write(&path, scene).unwrap();
+    let target = folder.path().join("t.json");
+    assert_eq!(convert(&path, &target, Originals::Copy).unwrap(), 0);
+    assert!(picture(&target) == picture(&path));
+}
+
+#[test]
 fn what_cannot_be_written_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.json");

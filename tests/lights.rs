@@ -8,7 +8,7 @@ use steradian::film::LayerKind;
 use steradian::id::{LightGroupId, LightId};
 
 use crate::util::folder::{Folder, good_scene, set};
-use crate::util::render::{assert_irradiance, floor_probe, merge, pixels, probe, render};
+use crate::util::render::{AssertIs, Estimate, assert_irradiance, floor_probe, merge, pixels, probe, render};
 
 /// 10 candela downwards; 8 (in the plane of horizontal angle 0) or 6 (in that of 90) at 45 degrees; nothing at 90.
 const LAMP: &str = "IESNA:LM-63-2002\n[TEST] none\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10 6 0\n";
@@ -93,6 +93,37 @@ fn groups_have_names_and_know_their_lights() {
     let (lamps, fill) = (Some(LightGroupId(0)), Some(LightGroupId(1)));
     // A triangle, two placed lamps, point, spot, directional, environment.
     assert_eq!(groups, [None, lamps, lamps, None, fill, None, lamps]);
+}
+
+#[test]
+fn whitteds_direct_light_of_anything_with_an_extent_is_all_of_it() {
+    let direct = |mut scene: Value, expected: f64, what: &str| {
+        scene["integrator"] = json!({ "type": "whitted" });
+        Estimate::of(&render(&scene), 1).assert_is(expected, what);
+    };
+    // A white ball under a white sky is as bright as the sky on every side.
+    let sky = json!({ "type": "environment", "radiance": [2, 2, 2] });
+    for side in [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.6, -0.8], [0.0, -0.6, 0.8]] {
+        let ball = json!({ "type": "sphere", "material": "white" });
+        let materials = json!({ "white": { "type": "diffuse", "albedo": 1 } });
+        let scene = json!({ "materials": materials, "shapes": [ball], "lights": [sky] });
+        direct(probe(side.map(|x| 4.0 * x), side, scene), 2.0, &format!("{side:?}"));
+    }
+    // The same from an image; from a ball as a lamp, pi (R / d)² cos above a corner of the floor; from a wide sun.
+    let folder = Folder::new();
+    // Two texels of 128 / 256 * 2^(130 - 128).
+    let image =
+        folder.write("sky.hdr", [&b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"[..], &[128, 128, 128, 130].repeat(2)].concat());
+    let mut scene = floor_probe([0.0; 3], json!([]));
+    scene["lights"] = json!([{ "type": "environment", "file": image }]);
+    direct(scene.clone(), 2.0, "image");
+    let sun = json!({ "type": "directional", "direction": [0.6, -0.8, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 30 });
+    scene["lights"] = json!([sun]);
+    direct(scene, 0.8 / PI, "sun");
+    let lamp = json!({
+        "type": "sphere", "material": "black", "radius": 0.5, "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": [1.2, 1.6, 0] }]
+    });
+    direct(floor_probe([0.0; 3], json!([lamp])), 0.8 / 16.0, "ball");
 }
 
 /// A corner with a lamp and a mirror ball.

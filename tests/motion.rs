@@ -1,6 +1,6 @@
 use steradian::accel::{AccelKind, build};
 use steradian::geometry::{Instance, Mesh, Shape};
-use steradian::math::Ray;
+use steradian::math::{DVec3, Ray};
 
 use serde_json::{Value, json};
 
@@ -55,6 +55,55 @@ fn at_each_time_a_moving_scene_is_one_at_rest() {
         }
         assert!(hits > 300 && different <= 2, "{time}: {different} of {hits}");
     }
+}
+
+#[test]
+fn what_turns_about_its_centre_stays_in_place_in_every_accelerator() {
+    // A ball away from the origin, and one on a turning arm; by the angle of one and a half turns.
+    let centre = [3.0, 1.0, -2.0];
+    let turn = json!({ "rotate": { "axis": [1, 2, 2], "degrees": 540 } });
+    let in_place = json!([{ "translate": centre.map(|x: f64| -x) }, turn, { "translate": centre }]);
+    let scene = json!({
+        "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0] },
+        "shapes": [
+            { "type": "sphere", "radius": 0.8, "transform": [{ "translate": centre }], "motion": [{ "time": 0 }, { "time": 1, "transform": in_place }] },
+            {
+                "type": "sphere", "radius": 0.5,
+                "motion": [
+                    { "time": 0, "transform": [{ "translate": [2, 0, 0] }] },
+                    { "time": 1, "transform": [{ "translate": [2, 0, 0] }, { "rotate": { "axis": [0, 0, 1], "degrees": 540 } }] }
+                ]
+            }
+        ],
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
+    });
+    let scene = Folder::new().compile(&scene).unwrap();
+    let accelerators = AccelKind::ALL.iter().map(|&(kind, _)| build(kind, &scene.geometry, 1).unwrap()).collect::<Vec<_>>();
+    let mut rng = Rng::new(7);
+    let mut hits = [0; 2];
+    for i in 0..6_000 {
+        let time = [0.0, 0.25, 0.5, 0.75, 1.0, rng.unit() as f32][i % 6];
+        let angle = (540.0 * f64::from(time)).to_radians();
+        let centres = [DVec3::from(centre), 2.0 * DVec3::new(angle.cos(), angle.sin(), 0.0)];
+        let k = i / 6 % 2;
+        let (middle, radius) = (centres[k], [0.8, 0.5][k]);
+        let ray = Ray { time, ..ray_through(middle + 6.0 * rng.direction(), middle + 0.9 * radius * rng.cube()) };
+        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
+        let distance = |i: usize| (centres[i] - origin).cross(direction).length() - [0.8, 0.5][i];
+        // Not within rounding of an edge, nor with the other ball on the way.
+        if distance(k).abs() < 1e-3 || distance(1 - k) < 1e-3 {
+            continue;
+        }
+        for accelerator in &accelerators {
+            let hit = accelerator.intersect(&ray);
+            assert_eq!(hit.is_some(), distance(k) < 0.0, "{} {time}", accelerator.description());
+            let Some(hit) = hit else { continue };
+            let p = scene.geometry.interaction(&ray, &hit).unwrap().p;
+            assert!(((p - middle).length() - radius).abs() < 1e-5, "{} {time}: {p}", accelerator.description());
+            hits[k] += 1;
+        }
+    }
+    assert!(hits.iter().all(|&hits| hits > 5_000), "{hits:?}");
 }
 
 /// A black card that passes before a white sky, in the middle of the picture for half of the time.

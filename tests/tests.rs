@@ -80,6 +80,8 @@ mod motion;
 mod opacity;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.
 mod own_accelerators;
+/// Planes without end.
+mod planes;
 /// Normal maps, bump maps and smooth normals, without leaks and black rims.
 mod relief;
 /// Scenes far too small, too large or too far away for 32-bit coordinates.

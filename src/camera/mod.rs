@@ -12,7 +12,7 @@ pub use lens::{Blades, Lens, lens_equation};
 
 use std::f64::consts::{PI, TAU};
 
-use crate::math::{DVec3, Motion, Ray, RayCone, RenderSpace, Transform, Vec2, Vec3};
+use crate::math::{Bounds, DVec3, Motion, Ray, RayCone, RenderSpace, Transform, Vec2, Vec3};
 
 /// How points of the picture become directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -174,6 +174,15 @@ impl Camera {
     /// Where the camera stands when the shutter opens.
     pub fn position(&self) -> DVec3 {
         self.world_from_camera.point(DVec3::ZERO)
+    }
+
+    /// Bounds of the places where the camera stands while the shutter is open.
+    pub fn places(&self) -> Bounds {
+        let local = Bounds { min: DVec3::ZERO, max: DVec3::ZERO };
+        match &self.motion {
+            None => local.transformed(&self.world_from_camera.world_from_object),
+            Some(motion) => motion.bounds(&local),
+        }
     }
 
     /// The ray through `film`, in pixels from the upper left corner of a picture of `size` pixels, from the point of the lens that `lens_u`

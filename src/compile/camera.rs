@@ -42,8 +42,7 @@ pub fn compile(files: &Files, desc: &CameraDesc) -> Result<Camera> {
 }
 
 /// The camera in a render space.
-pub fn compile_in(files: &Files, desc: &CameraDesc, space: RenderSpace) -> Result<Camera> {
-    let camera = compile(files, desc)?;
+pub fn place_in(files: &Files, desc: &CameraDesc, camera: Camera, space: RenderSpace) -> Result<Camera> {
     let place = if desc.position.is_some() { "camera.position" } else { "camera.transform" };
     let position = camera.position();
     files.reachable(place, position, &space)?;

@@ -113,6 +113,7 @@ fn kind(desc: &ShapeDesc) -> &'static str {
         ShapeDesc::Mesh(_) => "mesh",
         ShapeDesc::Sphere(_) => "sphere",
         ShapeDesc::Quad(_) => "quad",
+        ShapeDesc::Plane(_) => "plane",
         ShapeDesc::Cube(_) => "cube",
         ShapeDesc::Disk(_) => "disk",
         ShapeDesc::Cylinder(_) => "cylinder",

@@ -7,7 +7,7 @@ use super::Files;
 use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc};
+use crate::desc::{ColorDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc, UsedNames};
 use crate::error::Result;
 use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
@@ -64,8 +64,8 @@ impl MaterialTable {
     /// The id of the material for shapes that name none: diffuse, albedo 1/2.
     pub const DEFAULT: MaterialId = MaterialId(0);
 
-    pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
-        let textures = TextureTable::new(files, desc)?;
+    pub fn new(files: &Files, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
+        let textures = TextureTable::new(files, desc, used)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
         let mut table = Self {
             materials: vec![default],

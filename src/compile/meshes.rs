@@ -6,7 +6,7 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::Files;
 use super::normals::{self, Smoothing};
-use crate::desc::{MeshDesc, MeshShadingDesc, SceneDesc, ShapeDesc};
+use crate::desc::{MeshDesc, MeshShadingDesc, SceneDesc, ShapeDesc, UsedNames};
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, MeshError, MeshStep};
 use crate::import::{self, AssetError, MeshData, ObjMaterial};
@@ -25,9 +25,9 @@ pub struct LoadedMesh {
 pub struct MeshStore(HashMap<String, Result<Vec<LoadedMesh>>>);
 
 impl MeshStore {
-    /// Reads the files of all meshes.
-    pub fn read(files: &Files, desc: &SceneDesc) -> Self {
-        let meshes = desc.all_shapes().filter_map(|(path, shape)| match shape {
+    /// Reads the files of all meshes that are used.
+    pub fn read(files: &Files, desc: &SceneDesc, used: &UsedNames) -> Self {
+        let meshes = desc.used_shapes(used).filter_map(|(path, shape)| match shape {
             ShapeDesc::Mesh(mesh) if mesh.file.is_some() => Some((path, mesh)),
             _ => None,
         });
@@ -126,8 +126,15 @@ pub fn refusal(files: &Files, path: &str, file: Option<&str>, message: String) -
 }
 
 /// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the front. Triangles
-/// without area are dropped with a warning. `file` is where the mesh came from.
-pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, later: Vec<MeshData>, placement: Placement) -> Result<Mesh> {
+/// without area are dropped with a warning. `None`, with a warning too, if no triangles are left. `file` is where the mesh came from.
+pub fn place(
+    files: &Files,
+    path: &str,
+    file: Option<&str>,
+    data: MeshData,
+    later: Vec<MeshData>,
+    placement: Placement,
+) -> Result<Option<Mesh>> {
     let refuse = |error: MeshError| refusal(files, path, file, error.to_string());
     let count = data.positions.len();
     if let Some((triangle, index)) = out_of_range(&data) {
@@ -158,11 +165,13 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, late
     // What deforms may get an area later.
     triangles.retain(|t| !later.is_empty() || has_area(t.map(|i| Vec3::from(positions[i as usize]))));
     let dropped = before - triangles.len();
+    if triangles.is_empty() {
+        let why = if before == 0 { "the mesh has no triangles".into() } else { format!("all {before} triangles of the mesh have no area") };
+        files.warn(path, format_args!("{why}: the shape is skipped"));
+        return Ok(None);
+    }
     if dropped > 0 {
-        if triangles.is_empty() {
-            return Err(refusal(files, path, file, format!("all {before} triangles of the mesh have no area")));
-        }
-        tracing::warn!("{}: {path}: {dropped} of {before} triangles have no area and were dropped", files.scene.display());
+        files.warn(path, format_args!("{dropped} of {before} triangles have no area and were dropped"));
     }
     if placement.emits {
         drop_coincident(files, path, &positions, &mut triangles);
@@ -187,7 +196,8 @@ pub fn place(files: &Files, path: &str, file: Option<&str>, data: MeshData, late
         mesh = mesh.with_colors(colors).map_err(refuse)?;
     }
     let later: Vec<MeshStep> = steps.collect();
-    if later.is_empty() { Ok(mesh) } else { mesh.deforming(later).map_err(refuse) }
+    let mesh = if later.is_empty() { mesh } else { mesh.deforming(later).map_err(refuse)? };
+    Ok(Some(mesh))
 }
 
 /// Gives a placed mesh the normals that its shading asks for, at each of its times; splits vertices where there are creases, and then

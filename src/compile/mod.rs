@@ -5,6 +5,7 @@ mod camera;
 mod check;
 mod composites;
 mod identities;
+mod keyframes;
 mod lights;
 mod materials;
 mod media;
@@ -14,6 +15,7 @@ mod nesting;
 mod normals;
 mod objects;
 mod opacity;
+mod planes;
 mod prepared;
 mod principled;
 mod reliefs;
@@ -27,6 +29,7 @@ pub use settings::{check_imported_settings, check_settings};
 pub use summary::Summary;
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -37,7 +40,7 @@ use crate::id::TextureId;
 use crate::import::{AssetError, Assets, Imported};
 use crate::light::LightSet;
 use crate::material::Material;
-use crate::math::RenderSpace;
+use crate::math::{Bounds, RenderSpace};
 use crate::scene::{Features, Scene, Surface};
 use crate::texture::Texture;
 
@@ -66,11 +69,14 @@ pub fn compile_imported(imported: &Imported, scene_file: &Path) -> Result<Scene>
 fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
     settings::check(desc, &files)?;
     let shutter = camera::shutter(&files, &desc.camera)?;
-    let materials = MaterialTable::new(&files, desc)?;
+    let camera = camera::compile(&files, &desc.camera)?;
+    let used = desc.used_names();
+    let materials = MaterialTable::new(&files, desc, &used)?;
     let mut builder = Builder {
-        meshes: MeshStore::read(&files, desc),
+        meshes: MeshStore::read(&files, desc, &used),
         files,
         shutter,
+        surroundings: camera.places(),
         materials,
         geometry: Geometry::default(),
         surfaces: Vec::new(),
@@ -80,14 +86,14 @@ fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
         space: RenderSpace::WORLD,
         object_spaces: Vec::new(),
     };
-    builder.add_world(desc)?;
+    builder.add_world(desc, &used)?;
     for (i, light) in desc.lights.iter().enumerate() {
         let path = format!("lights[{i}]");
         let group = builder.lights.group(&builder.files, &path, light.group())?;
         let light = lights::compile(&builder.files, &path, light, &builder.space)?;
         builder.lights.add([light], group);
     }
-    let camera = camera::compile_in(&builder.files, &desc.camera, builder.space)?;
+    let camera = camera::place_in(&builder.files, &desc.camera, camera, builder.space)?;
     builder.finish(desc, camera)
 }
 
@@ -118,6 +124,27 @@ impl Files {
     /// An error at a place of the scene.
     fn error(&self, path: &str, message: impl Into<String>) -> Error {
         Error::Scene { file: self.scene.clone(), path: self.place(path), message: message.into() }
+    }
+
+    /// A warning about a place of the scene.
+    fn warn(&self, path: &str, message: fmt::Arguments) {
+        tracing::warn!("{}: {}: {message}", self.scene.display(), self.place(path));
+    }
+
+    /// Warns of a file that is not there and that nothing uses.
+    fn warn_of_missing(&self, path: &str, name: &str) {
+        if !self.assets.contains(name) && !self.asset(name).is_file() {
+            self.warn(path, format_args!("there is no file {name}; nothing uses it"));
+        }
+    }
+
+    /// An error about a scene of this format that is surely a mistake; a warning where the renderer that a scene was written for renders it.
+    fn refuse_own(&self, path: &str, message: &str) -> Result<()> {
+        if self.places.is_empty() {
+            return Err(self.error(path, message));
+        }
+        self.warn(path, format_args!("{message}"));
+        Ok(())
     }
 
     /// A place of the scene, with that of the file it was read from.
@@ -157,6 +184,8 @@ struct Builder {
     /// Read, and not placed yet.
     meshes: MeshStore,
     shutter: Shutter,
+    /// Beyond this, planes reach: bounds of the camera's places and, in the end, of all other shapes.
+    surroundings: Bounds,
     materials: MaterialTable,
     geometry: Geometry,
     /// By shape.
@@ -183,11 +212,11 @@ impl Builder {
         let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();
         if self.geometry.world.is_empty() && self.geometry.instances.is_empty() && !sky {
-            return Err(files.error("shapes", "there is nothing to see: no shapes, no instances and no environment"));
+            files.refuse_own("shapes", "there is nothing to see: no shapes, no instances and no environment")?;
         }
         if !lights.shines() && needs_light(&desc.integrator) {
             let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
-            return Err(files.error("lights", message));
+            files.refuse_own("lights", message)?;
         }
         let part_reliefs = self.materials.part_reliefs();
         let materials = self.materials.materials;

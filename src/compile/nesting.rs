@@ -19,8 +19,6 @@ struct Extent {
     placed: u64,
     /// Levels of objects, this one counted.
     depth: usize,
-    /// Whether the world has an instance of it, through others or not.
-    used: bool,
 }
 
 /// All objects of a scene, checked.
@@ -40,17 +38,10 @@ impl<'a> Nesting<'a> {
         if placed > MAX_PLACED {
             return Err(files.error("instances", format!("with those inside of objects they are more than {MAX_PLACED}")));
         }
-        // So far, only what the world reaches has been visited.
-        nesting.extents.values_mut().for_each(|extent| extent.used = true);
         for name in desc.objects.keys() {
             nesting.visit(files, desc, name, &format!("objects.{name}"), &mut Vec::new())?;
         }
         Ok(nesting)
-    }
-
-    /// Whether the world has an instance of the object.
-    pub fn is_used(&self, name: &str) -> bool {
-        self.extents.get(name).is_some_and(|extent| extent.used)
     }
 
     /// Whether neither the object nor those inside of it have any shape.
@@ -83,7 +74,7 @@ impl<'a> Nesting<'a> {
             return Err(files.error(path, format!("objects contain each other in a cycle: {cycle}")));
         }
         inside.push(name);
-        let mut extent = Extent { placed: 0, depth: 1, used: false };
+        let mut extent = Extent { placed: 0, depth: 1 };
         if let Some(object) = desc.objects.get(name) {
             let emitters = object.shapes.iter().filter(|shape| shape.common().emission.is_some()).count();
             extent.placed = emitters as u64 + u64::from(emitters < object.shapes.len());
@@ -92,7 +83,7 @@ impl<'a> Nesting<'a> {
                 let inner = if inside.len() < MAX_DEPTH {
                     self.visit_instance(files, desc, &path, instance, inside)?
                 } else {
-                    Extent { placed: 0, depth: MAX_DEPTH, used: false }
+                    Extent { placed: 0, depth: MAX_DEPTH }
                 };
                 extent.placed = extent.placed.saturating_add(inner.placed);
                 extent.depth = extent.depth.max(inner.depth + 1);

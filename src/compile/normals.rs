@@ -32,7 +32,8 @@ struct Facet {
 }
 
 impl Facet {
-    /// By the angle at the corner (Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets") or by area.
+    /// By the angle at the corner (Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets"), by area, or all the same (Gouraud,
+    /// "Continuous Shading of Curved Surfaces").
     fn new(corners: [DVec3; 3], weight: NormalWeightDesc) -> Self {
         let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let Some(n) = cross.try_normalize() else {
@@ -40,6 +41,7 @@ impl Facet {
         };
         let weights = match weight {
             NormalWeightDesc::Area => [cross.length(); 3],
+            NormalWeightDesc::Uniform => [1.0; 3],
             NormalWeightDesc::Angle => {
                 [0, 1, 2].map(|k| (corners[(k + 1) % 3] - corners[k]).angle_between(corners[(k + 2) % 3] - corners[k]))
             }
@@ -130,6 +132,23 @@ mod tests {
             for (p, n) in cube.positions.iter().zip(normals) {
                 let cos = Vec3::from(*p).normalize().dot(Vec3::from(n));
                 assert!(cos > if exact { 1.0 - 1e-6 } else { 0.8 }, "{cos}");
+            }
+        }
+    }
+
+    #[test]
+    fn weights_say_how_much_each_triangle_counts() {
+        // About the origin: a right angle in the plane z = 0, of area 2, and half a right angle in the plane x = 0, of area 1/2.
+        let positions = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0]];
+        let triangles = [[0, 1, 2], [0, 3, 4]];
+        for (weight, [of_z, of_x]) in
+            [(NormalWeightDesc::Angle, [2.0, 1.0]), (NormalWeightDesc::Area, [4.0, 1.0]), (NormalWeightDesc::Uniform, [1.0, 1.0])]
+        {
+            let expected = Vec3::new(of_x, 0.0, of_z).normalize();
+            let creased = split(&[&positions], &triangles, weight, SmoothByDesc::Position, -1.0);
+            assert_eq!(creased.vertices[0], 0);
+            for n in [smooth(&positions, &triangles, weight, SmoothByDesc::Position)[0], creased.normals[0][0]] {
+                assert!((Vec3::from(n) - expected).length() < 1e-6, "{weight:?}: {n:?}");
             }
         }
     }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::Builder;
 use super::nesting::Nesting;
 use super::prepared::PreparedShape;
-use crate::desc::{InstanceDesc, SceneDesc};
+use crate::desc::{InstanceDesc, SceneDesc, UsedNames};
 use crate::error::Result;
 use crate::film::PlacementId;
 use crate::geometry::{Instance, Object};
@@ -23,22 +23,26 @@ struct PreparedObject {
 
 impl Builder {
     /// Adds the shapes of the world and all instances, in the render space that suits them.
-    pub(super) fn add_world(&mut self, desc: &SceneDesc) -> Result<()> {
-        let mut world = Vec::with_capacity(desc.shapes.len());
+    pub(super) fn add_world(&mut self, desc: &SceneDesc, used: &UsedNames) -> Result<()> {
+        let (mut world, mut planes) = (Vec::with_capacity(desc.shapes.len()), Vec::new());
         for (i, shape) in desc.shapes.iter().enumerate() {
-            world.extend(self.prepare(&format!("shapes[{i}]"), i, shape)?.into_iter().map(|prepared| (i, prepared)));
+            let prepared = self.prepare(&format!("shapes[{i}]"), i, shape, true)?.into_iter().map(|prepared| (i, prepared));
+            let (endless, others): (Vec<_>, Vec<_>) = prepared.partition(|(_, prepared)| prepared.is_plane());
+            planes.extend(endless);
+            world.extend(others);
         }
         let nesting = Nesting::new(&self.files, desc)?;
         let mut objects = BTreeMap::new();
         for (name, object) in &desc.objects {
+            let is_used = used.objects.contains(name);
             let mut shapes = Vec::new();
             for (k, shape) in object.shapes.iter().enumerate() {
-                shapes.extend(self.prepare(&format!("objects.{name}.shapes[{k}]"), k, shape)?);
+                shapes.extend(self.prepare(&format!("objects.{name}.shapes[{k}]"), k, shape, is_used)?);
             }
-            if nesting.is_used(name) {
+            if is_used {
                 objects.insert(name.as_str(), shapes);
             } else {
-                tracing::warn!("{}: objects.{name}: no instance places this object", self.files.scene.display());
+                self.files.warn(&format!("objects.{name}"), format_args!("no instance places this object"));
             }
         }
         let still = Motion::constant(DAffine3::IDENTITY);
@@ -47,18 +51,30 @@ impl Builder {
 
         for (i, prepared) in world {
             if let Some(motion) = prepared.motion.clone() {
-                let object = self.group(vec![prepared])?;
-                self.push_instance(&format!("shapes[{i}].motion"), object, &motion, None)?;
+                if let Some(object) = self.group(vec![prepared])? {
+                    self.push_instance(&format!("shapes[{i}].motion"), object, &motion, None)?;
+                }
             } else {
                 let id = self.place(prepared, &DAffine3::IDENTITY, &{ self.space })?;
-                self.geometry.world.push(id);
+                self.geometry.world.extend(id);
             }
         }
         let mut shared = BTreeMap::new();
         for (name, shapes) in objects {
             shared.insert(name, self.share(shapes)?);
         }
-        self.add_instances(&level, &shared, &desc.instances)
+        self.add_instances(&level, &shared, &desc.instances)?;
+
+        self.surroundings = self.surroundings.transformed(&self.space.from_world());
+        let bounds = self.geometry.bounds();
+        if !bounds.is_empty() {
+            self.surroundings = self.surroundings.union(&Bounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() });
+        }
+        for (_, plane) in planes {
+            let id = self.place(plane, &DAffine3::IDENTITY, &{ self.space })?;
+            self.geometry.world.extend(id);
+        }
+        Ok(())
     }
 
     /// The space that suits the world's shapes and the instances of objects.
@@ -131,27 +147,32 @@ impl Builder {
     fn share(&mut self, shapes: Vec<PreparedShape>) -> Result<PreparedObject> {
         let (emitters, others): (Vec<_>, Vec<_>) = shapes.into_iter().partition(|shape| shape.emission.is_some());
         let (moving, resting): (Vec<_>, Vec<_>) = others.into_iter().partition(|shape| shape.motion.is_some());
-        let shared = if resting.is_empty() { None } else { Some(self.group(resting)?) };
+        let shared = self.group(resting)?;
         let mut movers = Vec::new();
         for shape in moving {
-            if let Some(motion) = shape.motion.clone() {
-                movers.push((self.group(vec![shape])?, motion));
+            if let Some(motion) = shape.motion.clone()
+                && let Some(object) = self.group(vec![shape])?
+            {
+                movers.push((object, motion));
             }
         }
         Ok(PreparedObject { shared, movers, emitters })
     }
 
-    /// An object of these shapes.
-    fn group(&mut self, shapes: Vec<PreparedShape>) -> Result<ObjectId> {
+    /// An object of these shapes; `None` if nothing is left of them.
+    fn group(&mut self, shapes: Vec<PreparedShape>) -> Result<Option<ObjectId>> {
         let bounds: Vec<Bounds> = shapes.iter().map(PreparedShape::bounds_at_rest).collect();
         let space = RenderSpace::around(&bounds);
         let mut object = Object::default();
         for shape in shapes {
-            object.shapes.push(self.place(shape, &DAffine3::IDENTITY, &space)?);
+            object.shapes.extend(self.place(shape, &DAffine3::IDENTITY, &space)?);
+        }
+        if object.shapes.is_empty() {
+            return Ok(None);
         }
         self.geometry.objects.push(object);
         self.object_spaces.push(space);
-        Ok(ObjectId::new(self.geometry.objects.len() - 1))
+        Ok(Some(ObjectId::new(self.geometry.objects.len() - 1)))
     }
 
     fn push_instance(&mut self, path: &str, object: ObjectId, motion: &Motion, placement: Option<PlacementId>) -> Result<()> {
@@ -193,7 +214,7 @@ impl Builder {
                 let mut emitter = emitter.clone();
                 emitter.identity.placement = placement;
                 let id = self.place(emitter, &outer, &{ self.space })?;
-                self.geometry.world.push(id);
+                self.geometry.world.extend(id);
             }
             let path = format!("objects.{name}.instances");
             self.add_instances(&Level { path: &path, outer: &outer, placement, ..*level }, objects, &inner.instances)?;

@@ -2,6 +2,7 @@
 
 use super::materials::Look;
 use super::normals::Smoothing;
+use super::planes::{self, Plane};
 use super::{Builder, meshes, shapes};
 use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
@@ -46,6 +47,8 @@ pub struct PreparedEmission {
 #[derive(Clone, Debug)]
 enum Form {
     Analytic(Analytic),
+    /// Placed when everything else has been.
+    Plane(Plane),
     Mesh {
         data: MeshData,
         shading: MeshShadingDesc,
@@ -57,7 +60,15 @@ enum Form {
     },
 }
 
+/// Why a shape cannot be placed.
+const TOO_LARGE: &str = "the shape reaches to infinity: its size or place is too large for 32-bit numbers";
+
 impl PreparedShape {
+    /// Whether its extent depends on that of everything else.
+    pub fn is_plane(&self) -> bool {
+        matches!(self.form, Form::Plane(_))
+    }
+
     /// Where the scene has it.
     pub fn path(&self) -> &str {
         &self.path
@@ -67,6 +78,7 @@ impl PreparedShape {
     pub fn bounds_at_rest(&self) -> Bounds {
         let own = match &self.form {
             Form::Analytic(surface) => surface.bounds(),
+            Form::Plane(_) => Bounds::EMPTY,
             Form::Mesh { data, later, .. } => {
                 std::iter::once(data).chain(later).map(MeshData::bounds).fold(Bounds::EMPTY, |all, b| all.union(&b))
             }
@@ -82,8 +94,9 @@ impl PreparedShape {
 }
 
 impl Builder {
-    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may bring several.
-    pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc) -> Result<Vec<PreparedShape>> {
+    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may bring several. Where it is not used,
+    /// its files are not read.
+    pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc, is_used: bool) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
         let identity = self.identities.shape(&self.files, number, desc);
         let mut look = self.materials.find(&self.files, path, common.material)?;
@@ -100,6 +113,14 @@ impl Builder {
             return Err(self.without_colors(path, None, common.material));
         }
         let form = match desc {
+            ShapeDesc::Mesh(mesh) if !is_used && mesh.file.is_some() => {
+                self.smoothing(path, mesh)?;
+                let later = mesh.deform_files.iter().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
+                for (path, file) in mesh.file.iter().map(|file| (format!("{path}.file"), file)).chain(later) {
+                    self.files.warn_of_missing(&path, file);
+                }
+                return Ok(Vec::new());
+            }
             ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), look, emission, identity),
             ShapeDesc::Cube(_) => Form::Mesh {
                 data: meshes::cube(),
@@ -108,6 +129,7 @@ impl Builder {
                 later: Vec::new(),
                 file: None,
             },
+            ShapeDesc::Plane(plane) => Form::Plane(planes::compile(&self.files, path, plane, &common)?),
             _ => match shapes::compile(&self.files, path, desc)? {
                 Some(surface) => Form::Analytic(surface),
                 None => return Ok(Vec::new()),
@@ -208,29 +230,37 @@ impl Builder {
         Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
-    /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`. One that emits must end up in the world's.
-    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3, space: &RenderSpace) -> Result<ShapeId> {
+    /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`; `None` if it is a mesh of which nothing has an area.
+    /// One that emits must end up in the world's.
+    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3, space: &RenderSpace) -> Result<Option<ShapeId>> {
         let PreparedShape { form, map, motion, reverse_normal, look, emission, identity, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform =
             Transform::new(space.place(&(*outer * map))).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
+        let analytic = |surface: Analytic| {
+            let mut placed = Placed::new(surface, transform);
+            placed.reverse_normal = reverse_normal;
+            Shape::Analytic(placed)
+        };
         let shape = match form {
-            Form::Analytic(surface) => {
-                let mut placed = Placed::new(surface, transform);
-                placed.reverse_normal = reverse_normal;
-                Shape::Analytic(placed)
+            Form::Analytic(surface) => analytic(surface),
+            Form::Plane(plane) => {
+                let quad = planes::square(&plane, &transform.world_from_object, &self.surroundings);
+                analytic(Analytic::Quad(quad.ok_or_else(|| self.files.error(&path, TOO_LARGE))?))
             }
             Form::Mesh { data, shading, smoothing, later, file } => {
                 let emits = emission.is_some();
                 let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal, emits };
-                let mesh = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)?;
+                let Some(mesh) = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)? else {
+                    return Ok(None);
+                };
                 Shape::Mesh(if self.materials.has_normal_map(&look) { mesh.with_tangents() } else { mesh })
             }
         };
         let bounds = shape.bounds();
         if !bounds.min.is_finite() || !bounds.max.is_finite() {
-            return Err(self.files.error(&path, "the shape reaches to infinity: its size or place is too large for 32-bit numbers"));
+            return Err(self.files.error(&path, TOO_LARGE));
         }
         let size = f64::from(bounds.size().max_element());
         if matches!(shape, Shape::Mesh(_)) && size > 0.0 && size < SMALLEST_MESH {
@@ -248,15 +278,16 @@ impl Builder {
         if let Some(PreparedEmission { emission, group }) = emission {
             let emission = Emission { opacity: look.opacity, ..emission };
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
-            if !lights.iter().any(|light| light.area() > 0.0) {
-                return Err(self.files.error(&format!("{path}.emission"), "the light has no area"));
+            if lights.iter().any(|light| light.area() > 0.0) {
+                surface.single_light = lights.len() == 1;
+                surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
+            } else {
+                self.files.warn(&format!("{path}.emission"), format_args!("the shape is too small to give off light"));
             }
-            surface.single_light = lights.len() == 1;
-            surface.first_light = Some(self.lights.add(lights.into_iter().map(Light::Area), group));
         }
         self.surfaces.push(surface);
         self.identities.add_shape(identity);
         self.opacities.push(look.opacity);
-        Ok(id)
+        Ok(Some(id))
     }
 }

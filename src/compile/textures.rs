@@ -8,10 +8,10 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::Files;
 use crate::color::Rgb;
-use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
+use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, UsedNames, WrapDesc, WrapModeDesc};
 use crate::error::Result;
 use crate::id::TextureId;
-use crate::import::{AssetError, ImageData, read_image};
+use crate::import::{AssetError, ImageData, Samples, read_image};
 use crate::material::ColorInput;
 use crate::math::Vec2;
 use crate::texture::{Bitmap, Channel, Checker, Decoding, Filter, Image, Texture, UvTransform, Wrap};
@@ -46,11 +46,16 @@ struct Entry {
 }
 
 impl TextureTable {
-    pub fn new(files: &Files, desc: &SceneDesc) -> Result<Self> {
+    /// The textures of a scene; images of those that are not used are not read.
+    pub fn new(files: &Files, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
         let mut table = Self::default();
-        let mut loader = Loader { files, descs: &desc.textures, images: read_all(files, desc), open: Vec::new(), made: HashMap::new() };
+        let images = read_all(files, desc, used);
+        let mut loader = Loader { files, descs: &desc.textures, used: &used.textures, images, open: Vec::new(), made: HashMap::new() };
         for name in desc.textures.keys() {
             let place = format!("textures.{name}");
+            if let Some(TextureDesc::Image { file, .. }) = desc.textures.get(name).filter(|_| !used.textures.contains(name)) {
+                files.warn_of_missing(&format!("{place}.file"), file);
+            }
             let made = loader.named(&place, name, TextureUse::Color)?;
             let color = table.push(made.texture);
             let data = if made.depends_on_use { table.push(loader.named(&place, name, TextureUse::Data)?.texture) } else { color };
@@ -131,6 +136,7 @@ impl TextureTable {
 struct Loader<'a> {
     files: &'a Files,
     descs: &'a BTreeMap<String, TextureDesc>,
+    used: &'a BTreeSet<String>,
     images: HashMap<PathBuf, Arc<Image>>,
     /// The textures on the way to the one being made.
     open: Vec<String>,
@@ -165,7 +171,7 @@ impl Loader<'_> {
             return Err(self.files.error(place, format!("products of textures are nested more than {MAX_DEPTH} deep")));
         }
         self.open.push(name.to_owned());
-        let made = self.texture(&format!("textures.{name}"), desc, wanted);
+        let made = self.texture(name, desc, wanted);
         self.open.pop();
         let made = made?;
         self.made.insert(key, made.clone());
@@ -208,8 +214,8 @@ impl Loader<'_> {
         Ok(Made { texture: Texture::Product(product.into()), ..made })
     }
 
-    fn texture(&mut self, path: &str, desc: &TextureDesc, wanted: TextureUse) -> Result<Made> {
-        let files = self.files;
+    fn texture(&mut self, name: &str, desc: &TextureDesc, wanted: TextureUse) -> Result<Made> {
+        let (files, path) = (self.files, &format!("textures.{name}"));
         let color = |key: &str, value: [f32; 3]| files.reflectance(&format!("{path}.{key}"), value).map(Rgb::from);
         let depends_on_use = matches!(desc, TextureDesc::Image { color_space: ColorSpaceDesc::Auto, .. });
         let texture = match desc {
@@ -228,6 +234,7 @@ impl Loader<'_> {
                 }
                 let place = format!("{path}.file");
                 let image = match files.assets.images.get(file) {
+                    _ if !self.used.contains(name) => kept_image(&mut self.images, files, &place, "", &blank())?,
                     Some(data) => kept_image(&mut self.images, files, &place, file, data)?,
                     None => load_image(&mut self.images, files, &place, &files.asset(file))?,
                 };
@@ -272,13 +279,19 @@ fn wrap_mode(desc: WrapModeDesc) -> Wrap {
     }
 }
 
-/// The images of all files that can be read, in parallel; what is wrong with the others is found when they are asked for.
-fn read_all(files: &Files, desc: &SceneDesc) -> HashMap<PathBuf, Arc<Image>> {
+/// What an unused texture has in place of its image.
+fn blank() -> ImageData {
+    ImageData { width: 1, height: 1, channels: 1, samples: Samples::U8(vec![0]) }
+}
+
+/// The images of all used files that can be read, in parallel; what is wrong with the others is found when they are asked for.
+fn read_all(files: &Files, desc: &SceneDesc, used: &UsedNames) -> HashMap<PathBuf, Arc<Image>> {
     let file = |texture: &TextureDesc| match texture {
         TextureDesc::Image { file, .. } if !files.assets.images.contains_key(file) => files.asset(file).canonicalize().ok(),
         _ => None,
     };
-    let names: BTreeSet<PathBuf> = desc.textures.values().filter_map(file).collect();
+    let names: BTreeSet<PathBuf> =
+        desc.textures.iter().filter(|(name, _)| used.textures.contains(*name)).filter_map(|(_, texture)| file(texture)).collect();
     let read = |asset: PathBuf| {
         let image = Image::new(read_image(&asset).ok()?).ok()?;
         Some((asset, Arc::new(image)))

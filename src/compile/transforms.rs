@@ -1,9 +1,9 @@
 //! Transforms: steps in the order written become one map.
 
 use super::Files;
-use crate::desc::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};
+use crate::desc::{ScaleDesc, TransformDesc, TransformStepDesc};
 use crate::error::Result;
-use crate::math::{DAffine3, DMat3, DVec3, Motion, Transform};
+use crate::math::{DAffine3, DMat3, DVec3, Transform};
 
 /// When the camera's shutter is open, in the time of the scene's keyframes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub(super) struct Shutter {
 
 impl Shutter {
     /// A time of the scene as a share of the interval, or from its opening on if it has no length.
-    fn share(&self, time: f64) -> f64 {
+    pub fn share(&self, time: f64) -> f64 {
         let length = self.close - self.open;
         (time - self.open) / if length > 0.0 { length } else { 1.0 }
     }
@@ -38,29 +38,8 @@ impl Files {
         Transform::new(map).ok_or_else(|| self.error(path, super::SINGULAR))
     }
 
-    /// The motion of keyframes after `map`, its times as shares of the shutter interval; just `map` if there are none.
-    pub(super) fn motion(&self, path: &str, keyframes: &[KeyframeDesc], map: &DAffine3, shutter: Shutter) -> Result<Motion> {
-        let constant = Motion::constant(*map);
-        if keyframes.is_empty() {
-            return Ok(constant);
-        }
-        let mut list = Vec::with_capacity(keyframes.len());
-        for (i, keyframe) in keyframes.iter().enumerate() {
-            let path = format!("{path}[{i}]");
-            let map = self.transform(&format!("{path}.transform"), &keyframe.transform, &DAffine3::IDENTITY)?.world_from_object;
-            let (time, previous) = (shutter.share(keyframe.time), list.last().map_or(f64::NEG_INFINITY, |(time, _)| *time));
-            if !time.is_finite() || time <= previous {
-                return Err(self.error(&format!("{path}.time"), "times must be finite and grow from keyframe to keyframe"));
-            }
-            list.push((time, map));
-        }
-        let motion = Motion::keyframed(&list)
-            .ok_or_else(|| self.error(path, "the motion passes through a singular transform (does one keyframe mirror the shape?)"))?;
-        let motion = if shutter.close > shutter.open { motion } else { Motion::constant(motion.map_at(0.0)) };
-        Ok(motion.after(&constant))
-    }
-
-    fn step(&self, path: &str, step: &TransformStepDesc) -> Result<DAffine3> {
+    /// The map of one step.
+    pub(super) fn step(&self, path: &str, step: &TransformStepDesc) -> Result<DAffine3> {
         Ok(match step {
             TransformStepDesc::Translate(offset) => DAffine3::from_translation(self.vector(&format!("{path}.translate"), *offset)?),
             TransformStepDesc::Rotate { axis, degrees } => {

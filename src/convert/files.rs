@@ -43,6 +43,11 @@ impl<'a> Files<'a> {
         self.count
     }
 
+    /// Whether a file, or what stands for one, is there.
+    pub fn is_there(&self, name: &str) -> bool {
+        self.assets.contains(name) || folder_of(self.source).join(name).is_file()
+    }
+
     /// Brings a file; the result is its name relative to the target. `path` is where the scene names it.
     pub fn bring(&mut self, path: &str, name: &str) -> Result<String> {
         if let Some(done) = self.brought.get(name) {

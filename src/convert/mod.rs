@@ -8,6 +8,7 @@ pub use ply::write_ply;
 
 use std::path::{Path, PathBuf};
 
+use crate::desc::NamedFile;
 use crate::error::{Error, Result};
 use crate::import::Imported;
 use crate::output::{check_creatable, write_atomically};
@@ -25,10 +26,11 @@ pub enum Originals {
 
 /// Writes a scene that was read from `source` as `target`, a file of our format. Meshes and images without files, and with
 /// [`Originals::Copy`] all others, come into the folder `NAME_files` beside it. The scene itself is written last, so that it never names
-/// what is not there. The result is the number of files beside the scene.
+/// what is not there. The result is the number of files beside the scene. Files that are not there and that the world does not use keep
+/// their names, with a warning.
 ///
 /// # Errors
-/// [`Error::Missing`] if a file that the scene names is not there, [`Error::Output`] if one cannot be written.
+/// [`Error::Missing`] if a file that the world uses is not there, [`Error::Output`] if one cannot be written.
 pub fn write_scene(imported: &Imported, source: &Path, target: &Path, originals: Originals) -> Result<usize> {
     if !target.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
         return Err(Error::Usage(format!("{}: scenes of ours end with .json", target.display())));
@@ -36,8 +38,12 @@ pub fn write_scene(imported: &Imported, source: &Path, target: &Path, originals:
     check_creatable(target)?;
     let mut desc = imported.desc.clone();
     let mut files = Files::new(imported, source, target, originals);
-    for (path, file) in desc.files_mut() {
-        *file = files.bring(&path, file)?;
+    for NamedFile { path, name, is_used } in desc.files_mut() {
+        if !is_used && !files.is_there(name) {
+            tracing::warn!("{}: {path}: there is no file {name}; nothing uses it", source.display());
+            continue;
+        }
+        *name = files.bring(&path, name)?;
     }
     let text = json::scene_text(&desc)?;
     write_atomically(target, |out| std::io::Write::write_all(out, text.as_bytes()).map_err(|e| e.to_string()))?;

@@ -2,23 +2,37 @@
 
 use super::{LightDesc, SceneDesc, ShapeDesc, TextureDesc};
 
+/// A file that a scene names.
+#[derive(Debug)]
+pub struct NamedFile<'a> {
+    /// Where, such as `shapes[2].file`.
+    pub path: String,
+    /// Its name.
+    pub name: &'a mut String,
+    /// Whether the world uses it; else the scene can be rendered without.
+    pub is_used: bool,
+}
+
 impl SceneDesc {
-    /// Every name of a file in the scene, with its place, such as `shapes[2].file`. A file may be named more than once.
-    pub fn files_mut(&mut self) -> Vec<(String, &mut String)> {
-        let mut names = Vec::new();
-        let shapes = self.shapes.iter_mut().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape));
+    /// Every name of a file in the scene. A file may be named more than once.
+    pub fn files_mut(&mut self) -> Vec<NamedFile<'_>> {
+        let used = self.used_names();
+        let mut files = Vec::new();
+        let shapes = self.shapes.iter_mut().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape, true));
         let objects = self.objects.iter_mut().flat_map(|(name, object)| {
-            object.shapes.iter_mut().enumerate().map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape))
+            let is_used = used.objects.contains(name);
+            object.shapes.iter_mut().enumerate().map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape, is_used))
         });
-        for (path, shape) in shapes.chain(objects) {
+        for (path, shape, is_used) in shapes.chain(objects) {
             if let ShapeDesc::Mesh(mesh) = shape {
-                names.extend(mesh.file.as_mut().map(|file| (format!("{path}.file"), file)));
-                names.extend(mesh.deform_files.iter_mut().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file)));
+                let file = mesh.file.as_mut().map(|file| (format!("{path}.file"), file));
+                let later = mesh.deform_files.iter_mut().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
+                files.extend(file.into_iter().chain(later).map(|(path, name)| NamedFile { path, name, is_used }));
             }
         }
         for (name, texture) in &mut self.textures {
             if let TextureDesc::Image { file, .. } = texture {
-                names.push((format!("textures.{name}.file"), file));
+                files.push(NamedFile { path: format!("textures.{name}.file"), name: file, is_used: used.textures.contains(name) });
             }
         }
         for (i, light) in self.lights.iter_mut().enumerate() {
@@ -27,8 +41,8 @@ impl SceneDesc {
                 LightDesc::Ies(light) => Some(&mut light.file),
                 LightDesc::Point(_) | LightDesc::Spot(_) | LightDesc::Directional(_) => None,
             };
-            names.extend(file.map(|file| (format!("lights[{i}].file"), file)));
+            files.extend(file.map(|name| NamedFile { path: format!("lights[{i}].file"), name, is_used: true }));
         }
-        names
+        files
     }
 }

@@ -14,8 +14,10 @@ mod settings;
 mod shape;
 mod texture;
 mod transform;
+mod used;
 
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
+pub use files::NamedFile;
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
 pub use material::{
     AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, RangedDesc,
@@ -26,10 +28,12 @@ pub use principled::PrincipledDesc;
 pub use settings::{FilmDesc, FilterDesc, IntegratorDesc, SamplerDesc, SamplerKindDesc, StrategyDesc};
 pub use shape::{
     ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ObjectDesc,
-    OpacityDesc, ProfileDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeCommonMut, ShapeDesc, SmoothByDesc, SphereDesc,
+    OpacityDesc, PlaneDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeCommonMut, ShapeDesc,
+    SmoothByDesc, SphereDesc,
 };
 pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};
+pub use used::UsedNames;
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -84,10 +88,10 @@ pub struct SceneDesc {
 }
 
 impl SceneDesc {
-    /// The shapes of the world and of all objects, each with its place.
-    pub fn all_shapes(&self) -> impl Iterator<Item = (String, &ShapeDesc)> {
+    /// The shapes of the world and of all objects that are used, each with its place.
+    pub fn used_shapes<'a>(&'a self, used: &'a UsedNames) -> impl Iterator<Item = (String, &'a ShapeDesc)> {
         let world = self.shapes.iter().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape));
-        let objects = self.objects.iter().flat_map(|(name, object)| {
+        let objects = self.objects.iter().filter(|(name, _)| used.objects.contains(*name)).flat_map(|(name, object)| {
             object.shapes.iter().enumerate().map(move |(i, shape)| (format!("objects.{name}.shapes[{i}]"), shape))
         });
         world.chain(objects)

@@ -167,7 +167,7 @@ pub enum IntegratorDesc {
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         guiding: bool,
     },
-    /// Whitted's ray tracing: mirror reflection, refraction, hard shadows, and an ambient term.
+    /// Whitted's ray tracing: mirror reflection, refraction, direct illumination by every light, and an ambient term.
     Whitted {
         /// Largest number of segments from the camera. Default: 8.
         #[serde(default = "whitted_depth")]

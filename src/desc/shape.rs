@@ -208,6 +208,17 @@ shapes! {
         #[serde(default = "quad_edge_v")]
         edge_v: [f64; 3],
     }
+    /// A plane through `point`, without end: a square that reaches 10,000 times as far as everything else in the scene and the camera. u and v
+    /// are lengths from `point`: textures repeat. It stands in the world, not in an object, and can neither move nor give off light.
+    Plane(PlaneDesc) {
+        /// A point of the plane, where u and v are 0. Default: the origin.
+        #[serde(default)]
+        point: [f64; 3],
+        /// The normal; any length. u grows along +x cross normal (+y cross normal if the normal is along x by more than a tenth), v along
+        /// normal cross u. Default: +y.
+        #[serde(default = "plane_normal")]
+        normal: [f64; 3],
+    }
     /// The cube `[-1, 1]³` with normals outward. Each face has u and v from 0 to 1.
     Cube(CubeDesc) {}
     /// A disk, ring or sector at z = 0 about the origin, with normal +z. u is the angle over `phi_max`; v runs from the inner to the outer
@@ -252,10 +263,13 @@ shapes! {
         phi_max_degrees: f64,
     }
     /// A surface of revolution: a profile curve in the xy plane turned about +y. x is the distance from the axis and must not be
-    /// negative. u is the angle over `phi_max`; v is the curve's parameter. A profile that runs towards +y has normals outward.
+    /// negative. u is the angle over `phi_max`; v runs from 0 to 1 along the profile. A profile that runs towards +y has normals outward.
     Revolution(RevolutionDesc) {
         /// The profile.
         profile: ProfileDesc,
+        /// What v grows with. Default: `curve`.
+        #[serde(default, skip_serializing_if = "is_default")]
+        v: ProfileParameterDesc,
         /// Largest angle kept, from +z towards +x, in degrees. Default: 360.
         #[serde(default = "full_turn")]
         phi_max_degrees: f64,
@@ -270,6 +284,23 @@ pub enum ProfileDesc {
     Bezier(Vec<[f64; 2]>),
     /// A uniform cubic B-spline: at least 4 control points. The curve does not reach its end points unless they are tripled.
     BSpline(Vec<[f64; 2]>),
+}
+
+/// What v of a surface of revolution grows with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ProfileParameterDesc {
+    /// The curve's parameter, the same share of v for each of its segments.
+    #[default]
+    Curve,
+    /// The height: v = 0 at the lowest point of the profile, 1 at the highest. Where the profile turns back, values occur again.
+    Height,
+    /// The length of the curve: images are not stretched along it.
+    ArcLength,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// How a mesh's normals are found.
@@ -296,6 +327,8 @@ pub enum NormalWeightDesc {
     Angle,
     /// By the area of the triangle: large faces stay flatter.
     Area,
+    /// All the same.
+    Uniform,
 }
 
 /// Which triangles computed normals are averaged over.
@@ -336,6 +369,10 @@ fn one() -> f64 {
 
 fn full_turn() -> f64 {
     360.0
+}
+
+fn plane_normal() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
 }
 
 fn quad_origin() -> [f64; 3] {

@@ -15,8 +15,15 @@ impl TransformDesc {
     }
 }
 
-/// A transform at one time of a motion. Between two keyframes translation, rotation (the short way round, evenly) and stretch are
-/// interpolated each by itself; before the first and after the last the motion rests.
+/// A transform at one time of a motion; before the first and after the last the motion rests.
+///
+/// Where all keyframes have the same kinds of steps in the same order, each step is interpolated by itself: rotations about the same axis
+/// by their angle (0 to 720 degrees are two turns), about different axes the short way round. A `rotate` or `scale` that a keyframe lacks
+/// changes nothing there. So what is moved to the origin, rotated and moved back turns in place, and what is moved and then rotated goes
+/// round the origin.
+///
+/// Other keyframes, such as a `matrix` and a `translate`, are interpolated as matrices: translation, rotation (the short way round, evenly)
+/// and stretch each by itself, about the point which the steps before the first rotation move to the origin.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KeyframeDesc {

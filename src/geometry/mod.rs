@@ -32,7 +32,7 @@ pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
 pub use placed::{Analytic, LocalHit, LocalSurface, Placed, PlacedPoint, ShapeSample};
 pub use profile::Profile;
 pub use quad::Quad;
-pub use revolution::Revolution;
+pub use revolution::{ProfileParameter, Revolution};
 pub use sector::Sector;
 pub use shape_error::ShapeError;
 pub use sphere::Sphere;

@@ -1,6 +1,7 @@
 //! Parallelograms.
 //!
-//! Object space: `origin + u edge_u + v edge_v` with `u` and `v` in `[0, 1]`, which are also the uv. The normal is `edge_u` x `edge_v`.
+//! Object space: `origin + u edge_u + v edge_v` with `u` and `v` in `[0, 1]`, which are also the uv unless others are given. The normal is
+//! `edge_u` x `edge_v`.
 
 use super::{LocalHit, LocalSurface, ShapeError, ShapeSample};
 use crate::math::{Bounds, DVec3, RayF64};
@@ -16,6 +17,9 @@ pub struct Quad {
     dual_u: DVec3,
     dual_v: DVec3,
     area: f64,
+    /// uv at the origin, and their change along the edges.
+    uv_origin: [f64; 2],
+    uv_size: [f64; 2],
 }
 
 impl Quad {
@@ -39,7 +43,13 @@ impl Quad {
         if !(dual_u.is_finite() && dual_v.is_finite()) {
             return Err(ShapeError::NoArea);
         }
-        Ok(Self { origin, edge_u, edge_v, n, dual_u, dual_v, area })
+        Ok(Self { origin, edge_u, edge_v, n, dual_u, dual_v, area, uv_origin: [0.0; 2], uv_size: [1.0; 2] })
+    }
+
+    /// The same parallelogram with uv from `origin` to `origin + size`; no size is zero.
+    #[must_use]
+    pub fn with_uv(self, origin: [f64; 2], size: [f64; 2]) -> Self {
+        Self { uv_origin: origin, uv_size: size, ..self }
     }
 
     /// The corner where u and v are zero.
@@ -79,7 +89,15 @@ impl Quad {
     pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let q = ray.origin - self.origin + ray.direction * hit.t;
         let (u, v) = (q.dot(self.dual_u).clamp(0.0, 1.0), q.dot(self.dual_v).clamp(0.0, 1.0));
-        LocalSurface { p: self.point(u, v), n: self.n, dp_du: self.edge_u, dp_dv: self.edge_v, uv: [u, v], pdf_area: 1.0 / self.area }
+        let ([u0, v0], [width, height]) = (self.uv_origin, self.uv_size);
+        LocalSurface {
+            p: self.point(u, v),
+            n: self.n,
+            dp_du: self.edge_u / width,
+            dp_dv: self.edge_v / height,
+            uv: [u0 + width * u, v0 + height * v],
+            pdf_area: 1.0 / self.area,
+        }
     }
 
     #[inline]

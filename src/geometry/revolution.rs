@@ -3,17 +3,21 @@
 //! Object space: a profile curve in the xy plane, where x is the distance from the axis, turned about +y; `0 <= phi <= phi_max` with phi
 //! from +z towards +x. A profile that runs towards +y has normals outward; the normal is on the right of the profile's direction.
 //!
-//! `uv = (phi / phi_max, (segment + s) / segments)` with `s` the parameter within the profile's segment.
+//! `uv = (phi / phi_max, v)` with `v = (segment + s) / segments` of the parameter `s` within the profile's segment, or by height or arc length.
 //!
 //! Inside this module everything turns about z: `(x, y, z)` stands for the object's `(z, x, y)`, and heights are measured from the middle
 //! of the profile.
 
+mod along;
 mod density;
 mod segment;
 mod solve;
 #[cfg(test)]
 mod tests;
 
+pub use self::along::ProfileParameter;
+
+use self::along::{Along, Parameter};
 use self::density::{Density, ProfileSample, area_per_radian};
 use self::segment::Segment;
 use super::sector::{Sector, direction_from_axis};
@@ -31,6 +35,7 @@ pub struct Revolution {
     size: f64,
     density: Density,
     area: f64,
+    along: Along,
 }
 
 impl Revolution {
@@ -57,7 +62,16 @@ impl Revolution {
         if !(area > 0.0 && area.is_finite()) {
             return Err(ShapeError::ProfileEmpty);
         }
-        Ok(Self { segments, sector, middle, size, density, area })
+        Ok(Self { segments, sector, middle, size, density, area, along: Along::Curve })
+    }
+
+    /// The same surface with another v.
+    ///
+    /// # Errors
+    /// If v is the height of a profile that is level.
+    pub fn with_parameter(self, parameter: ProfileParameter) -> Result<Self, ShapeError> {
+        let along = Along::new(&self.segments, parameter)?;
+        Ok(Self { along, ..self })
     }
 
     /// Whether all angles are kept.
@@ -84,16 +98,15 @@ impl Revolution {
     pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
         let toward = direction_from_axis(raw.z, raw.x);
-        let count = self.segments.len() as f64;
         let at = self.locate(hit.profile);
         let p = self.point(at, toward);
-        let change = self.segments[at.segment].derivative(at.s) * count;
+        let Parameter { v, change } = self.along.at(&self.segments, at);
         LocalSurface {
             p,
             n: self.normal(at, toward),
             dp_du: dvec3(p.z, 0.0, -p.x) * self.sector.phi_max(),
             dp_dv: dvec3(change.x * toward.y, change.y, change.x * toward.x),
-            uv: [self.sector.fraction(raw.z, raw.x), (hit.profile / count).clamp(0.0, 1.0)],
+            uv: [self.sector.fraction(raw.z, raw.x), v],
             pdf_area: self.pdf_area(at),
         }
     }

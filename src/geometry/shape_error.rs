@@ -69,6 +69,9 @@ pub enum ShapeError {
     /// A profile of no length, or one that lies on the axis.
     #[error("the profile has no length or lies on the axis")]
     ProfileEmpty,
+    /// A level profile whose parameter is to be the height.
+    #[error("v cannot be the height: the profile is level")]
+    ProfileLevel,
 }
 
 /// `value` if it is finite and above zero.

@@ -12,7 +12,8 @@ use super::{AssetError, ImageData, Imported, MeshData, RgbImage, Samples};
 use crate::desc::{FilmDesc, IntegratorDesc, SamplerDesc, SceneDesc};
 use crate::error::{Error, Result};
 
-/// Hashes of a scene, each as 64 hexadecimal digits. Two scenes of the same `whole` look the same under the same settings.
+/// Hashes of a scene, each as 64 hexadecimal digits. Two scenes of the same `whole` look the same under the same settings. Files that
+/// the world does not use do not count.
 ///
 /// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count, nor do the folder
 /// of the scene and the format it was read from.
@@ -35,13 +36,14 @@ impl SceneFingerprint {
     }
 }
 
-/// The hashes of a scene that was read from `scene_file`, beside which its files lie. Reads all of them.
+/// The hashes of a scene that was read from `scene_file`, beside which its files lie. Reads all that are used.
 ///
 /// # Errors
 /// [`Error::Missing`] if a file cannot be read.
 pub fn scene_fingerprint(imported: &Imported, scene_file: &Path) -> Result<SceneFingerprint> {
     let mut desc = imported.desc.clone();
-    let names: BTreeMap<String, String> = desc.files_mut().into_iter().map(|(path, name)| (name.clone(), path)).collect();
+    let used = desc.files_mut().into_iter().filter(|file| file.is_used);
+    let names: BTreeMap<String, String> = used.map(|file| (file.name.clone(), file.path)).collect();
     let scene = description_hash(desc)?;
     let folder = scene_file.parent().unwrap_or(Path::new(""));
     let hashed: Vec<Vec<(String, String)>> = names
@@ -220,6 +222,11 @@ mod tests {
         let other = fingerprint(folder.path(), SCENE);
         assert_eq!(first.differences(&other), ["m/a.png"]);
         assert_ne!(first.whole, other.whole);
+
+        // What nothing uses need not be there.
+        let unused = r#""textures": { "t": { "type": "image", "file": "gone.png" } },
+            "objects": { "o": { "shapes": [{ "type": "mesh", "file": "gone.ply" }] } }, "camera""#;
+        assert_eq!(fingerprint(folder.path(), &SCENE.replace("\"camera\"", unused)).assets, other.assets);
 
         std::fs::remove_file(folder.path().join("m/a.obj")).unwrap();
         let imported = read_scene(&folder.path().join("scene.json"), &ImportOptions::default()).unwrap();

@@ -42,10 +42,11 @@ pub struct ObjMesh {
     pub material: Option<ObjMaterial>,
 }
 
-/// Reads an OBJ file; with `materials`, also the MTL files it names. Polygons become fans; points and lines are left out.
+/// Reads an OBJ file; with `materials`, also the MTL files it names. Polygons become fans; points and lines are left out. Of a file with
+/// vertices and no faces the result is one mesh without triangles.
 ///
 /// # Errors
-/// If a file is missing or malformed, a face refers to what does not exist, or there are no faces.
+/// If a file is missing or malformed, a face refers to what does not exist, or there are neither vertices nor faces.
 pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError> {
     // Comments and names in old files may be in any encoding.
     let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
@@ -89,6 +90,12 @@ pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError
     }
     let library: Vec<ObjMaterial> = library.iter().map(|m| from_mtl(m, maps.get(&m.name).cloned().unwrap_or_default())).collect();
     let mut meshes = join_models(&models, &library)?;
+    if meshes.is_empty() {
+        if used.vertices == 0 {
+            return Err(AssetError::Malformed("the file has no vertices and no faces".into()));
+        }
+        meshes.push(ObjMesh { mesh: MeshData::default(), material: None });
+    }
     meshes.iter_mut().for_each(|mesh| mesh.mesh.origin = origin);
     Ok(meshes)
 }
@@ -105,9 +112,6 @@ fn join_models(models: &[tobj::Model], library: &[ObjMaterial]) -> Result<Vec<Ob
             Some(joined) => joined.mesh.append(mesh)?,
             None => meshes.push(ObjMesh { mesh, material: material.map(|id| library[id].clone()) }),
         }
-    }
-    if meshes.is_empty() {
-        return Err(AssetError::Malformed("the file has no faces".into()));
     }
     Ok(meshes)
 }
@@ -279,7 +283,6 @@ mod tests {
             ("v 0 0 0\nf 1 2 3\n".into(), "line 2: a face refers to vertex 3, but there are only 1"),
             ("v 0 0 x\n".into(), "line 1"),
             ("v 0 0\n".into(), "line 1"),
-            (format!("{three}f 1 2\n"), "no faces"),
             (format!("{three}f 0 1 2\n"), "line 4"),
             (format!("{three}f 1 2 -4\n"), "line 4"),
             (format!("{three}f 1 2 x\n"), "line 4"),
@@ -293,5 +296,9 @@ mod tests {
             assert!(matches!(&error, AssetError::Malformed(message) if message.contains(part)), "{text:?}: {error}");
         }
         assert!(matches!(read_obj(&folder.path().join("none.obj"), true), Err(AssetError::Missing { .. })));
+        for text in [three.into(), format!("{three}f 1 2\nl 1 2 3\n")] {
+            let meshes = read_obj(&write(&folder, "points.obj", &text), true).unwrap();
+            assert_eq!(meshes.iter().map(|mesh| mesh.mesh.triangles.len()).collect::<Vec<_>>(), [0], "{text:?}");
+        }
     }
 }

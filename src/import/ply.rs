@@ -13,14 +13,17 @@ use ply_rs_bw::ply::{
 use super::foreign::linear;
 use super::{AssetError, MeshData};
 
-/// Reads a PLY file.
+/// Reads a PLY file. One with no faces, such as a cloud of points, is a mesh without triangles.
 ///
 /// # Errors
-/// If the file is missing, malformed, ends early, or has no vertices or faces.
+/// If the file is missing, malformed, ends early, or has no element `vertex`, or faces without a list `vertex_indices`.
 pub fn read_ply(path: &Path) -> Result<MeshData, AssetError> {
     let file = File::open(path).map_err(|e| AssetError::missing(path, &e))?;
     parse_ply(BufReader::with_capacity(1 << 20, file))
 }
+
+/// Names of the list of a face's vertices.
+const INDICES: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Elements that are read at a time: as the parser has them, they take several times the memory that they end in.
 const AT_ONCE: usize = 1 << 14;
@@ -67,11 +70,12 @@ fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
     if !wide.is_empty() {
         (mesh.positions, mesh.origin) = MeshData::rounded(&wide);
     }
-    if mesh.positions.is_empty() {
+    if !header.elements.contains_key("vertex") {
         return Err(AssetError::Malformed("the file has no vertices".into()));
     }
-    if mesh.triangles.is_empty() {
-        return Err(AssetError::Malformed("the file has no faces with a list `vertex_indices`".into()));
+    let faces = header.elements.get("face").filter(|faces| faces.count > 0);
+    if faces.is_some_and(|faces| !INDICES.iter().any(|name| faces.properties.contains_key(*name))) {
+        return Err(AssetError::Malformed("the faces have no list `vertex_indices`".into()));
     }
     Ok(mesh)
 }
@@ -221,7 +225,7 @@ impl PropertyAccess for Face {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        if !matches!(name, "vertex_indices" | "vertex_index") {
+        if !INDICES.contains(&name) {
             return PropertyAccessResult::Ignored;
         }
         match property {
@@ -287,7 +291,6 @@ mod tests {
         assert!(parse_ply(&text.as_bytes()[..text.len() - 12]).is_err());
         for (from, to) in [
             ("0 1 2 3", "0 1 2 -3"),
-            ("4 0 1 2 3", "2 0 1"),
             ("vertex_indices", "others"),
             ("float z", "float w"),
             ("ply", "pyl"),
@@ -319,6 +322,16 @@ mod tests {
         let mesh = parse_ply(far.as_bytes()).unwrap();
         assert_eq!(mesh.position(mesh.positions[1]).x - mesh.position(mesh.positions[0]).x, 0.75);
         assert_eq!(mesh.bounds().max.to_array(), [8_388_608.25, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn files_without_faces_are_meshes_without_triangles() {
+        let text = ascii();
+        let cloud = |text: &str| (parse_ply(text.as_bytes()).unwrap().positions.len(), parse_ply(text.as_bytes()).unwrap().triangles.len());
+        assert_eq!(cloud(&text.replace("4 0 1 2 3", "2 0 1")), (4, 0));
+        assert_eq!(cloud(&text.replace("face 1", "face 0").replace("4 0 1 2 3\n", "")), (4, 0));
+        let list = "element face 1\nproperty list uchar int vertex_indices\n";
+        assert_eq!(cloud(&text.replace(list, "").replace("4 0 1 2 3\n", "")), (4, 0));
     }
 
     #[test]

@@ -46,12 +46,12 @@ pub mod dimensions {
     /// Choice of a colour (one), where dispersion parts them.
     pub const COLOR: u32 = u32::MAX - 1;
 
-    /// Choice of a light (one, and one for its last digits) and a direction towards it (two), at the vertex with this many bounces before it.
+    /// Of path tracing: choice of a light (one, and one for its last digits) and a direction towards it (two), at the vertex with this many bounces before it.
     pub const fn light(bounce: u32) -> u32 {
         1 + 2 * bounce
     }
 
-    /// Choice of a lobe (one), a direction (two) and roulette (one), at the vertex with this many bounces before it.
+    /// Of path tracing: choice of a lobe (one), a direction (two) and roulette (one), at the vertex with this many bounces before it.
     pub const fn bsdf(bounce: u32) -> u32 {
         2 + 2 * bounce
     }
@@ -132,7 +132,7 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
             guide,
         }),
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
-            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, needs, parts })
+            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, sampler, needs, parts })
         }
         IntegratorDesc::Normal => view(View::Normal),
         IntegratorDesc::ShadingNormal => view(View::ShadingNormal),

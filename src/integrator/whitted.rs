@@ -1,11 +1,11 @@
-//! Whitted's ray tracing: mirror reflection, refraction, hard shadows and an ambient term ("An Improved Illumination Model for Shaded
-//! Display").
+//! Whitted's ray tracing: mirror reflection, refraction, direct light of every light and an ambient term ("An Improved Illumination Model
+//! for Shaded Display").
 
 use super::media::MediaState;
 use super::parts::{Course, Way, add_by_group, add_by_scattering, group_of};
 use super::surface::surface_sample;
 use super::vertex::Vertex;
-use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World};
+use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
 use crate::color::Rgb;
 use crate::film::{PartNeeds, PixelSample, SampleBatch, SurfaceSample};
 use crate::geometry::{Hit, SurfaceInteraction};
@@ -14,10 +14,12 @@ use crate::light::FoundBy;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Ray, RayCone};
 use crate::medium::Interior;
+use crate::sampling::Sampler;
 use crate::texture::Footprint;
 
-/// Whitted's ray tracing. Area lights shine from their middle, so shadows are hard; scattering that is neither mirror-like nor lit by a
-/// light contributes only through the ambient term.
+/// Whitted's ray tracing. At every surface each light is sampled once, with a direction of its own for each camera sample: the mean over
+/// the samples of a pixel is the direct illumination, with hard shadows of point lights and soft ones of area lights and environments.
+/// Scattering that is neither mirror-like nor lit by a light contributes only through the ambient term.
 pub struct Whitted {
     /// Largest number of segments from the camera.
     pub max_depth: u32,
@@ -25,6 +27,8 @@ pub struct Whitted {
     pub ambient: Rgb,
     /// Whether the camera does not see what gives off light.
     pub hide_emitters: bool,
+    /// Where random numbers come from.
+    pub sampler: Sampler,
     /// What the layers need.
     pub needs: SurfaceNeeds,
     /// Which parts of the radiance layers need.
@@ -57,7 +61,7 @@ impl Integrator for Whitted {
                     None => SurfaceSample::default(),
                 };
             }
-            let mut tally = Tally { needs: self.parts, parts: out.parts_mut(i), rays: counts };
+            let mut tally = Tally { needs: self.parts, parts: out.parts_mut(i), rays: counts, sample, light_samples: 0 };
             let view = View { depth: 1, throughput: segment.transmittance, way: None };
             out.pixels[i] = match &segment.end {
                 Some(at) => PixelSample { radiance: self.shade(world, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
@@ -90,11 +94,14 @@ impl View {
     }
 }
 
-/// What is counted of a sample beside its radiance.
+/// A camera sample, and what is counted of it beside its radiance.
 struct Tally<'a> {
     needs: PartNeeds,
     parts: &'a mut [Rgb],
     rays: &'a mut RayCounts,
+    sample: &'a CameraSample,
+    /// How many times a light was sampled.
+    light_samples: u32,
 }
 
 impl Tally<'_> {
@@ -184,7 +191,7 @@ impl Whitted {
                 tally.add(world, view.throughput * ambient, view.course(2, Course::Indirect(Way::DIFFUSE)), None);
             }
             for id in (0..world.scene.lights.lights().len()).map(LightId::new) {
-                radiance += direct_light(world, segment, &vertex, id, view, tally);
+                radiance += self.direct_light(world, segment, &vertex, id, view, tally);
             }
         }
 
@@ -213,32 +220,35 @@ impl Whitted {
         }
         radiance
     }
-}
 
-/// Light that arrives from the middle of one light and is scattered back.
-fn direct_light(world: &World, segment: &Segment, vertex: &Vertex, id: LightId, view: View, tally: &mut Tally) -> Rgb {
-    let (at, light) = (vertex.at, world.scene.lights.get(id));
-    let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [0.5; 2], FoundBy::Lights) else {
-        return Rgb::BLACK;
-    };
-    let mut raised = None;
-    let Some((eval, start)) = vertex.eval_toward(world, sample.wi, &mut raised) else {
-        return Rgb::BLACK;
-    };
-    let scattered = eval.value * sample.radiance / sample.pdf;
-    if scattered.is_black() {
-        return scattered;
+    /// Light that arrives from one light along a sampled direction and is scattered back.
+    fn direct_light(&self, world: &World, segment: &Segment, vertex: &Vertex, id: LightId, view: View, tally: &mut Tally) -> Rgb {
+        let set = dimensions::light(0).wrapping_add(tally.light_samples);
+        tally.light_samples = tally.light_samples.wrapping_add(1);
+        let [u, v, ..] = self.sampler.sample_4d(tally.sample.seed, tally.sample.sample, set);
+        let (at, light) = (vertex.at, world.scene.lights.get(id));
+        let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [u, v], FoundBy::Lights) else {
+            return Rgb::BLACK;
+        };
+        let mut raised = None;
+        let Some((eval, start)) = vertex.eval_toward(world, sample.wi, &mut raised) else {
+            return Rgb::BLACK;
+        };
+        let scattered = eval.value * sample.radiance / sample.pdf;
+        if scattered.is_black() {
+            return scattered;
+        }
+        tally.rays.shadow += 1;
+        let shadow = sample.shadow_ray(start);
+        if world.accel.occluded(&shadow) {
+            return Rgb::BLACK;
+        }
+        let here = world.media_toward(at, segment.ray.direction, shadow.direction, &segment.media.here);
+        let light = scattered * world.transmittance(&here, &shadow);
+        if tally.sorts() {
+            let way = Way::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(sample.wi));
+            tally.add(world, view.throughput * light, view.course(1, Course::Direct(way)), Some(id));
+        }
+        light
     }
-    tally.rays.shadow += 1;
-    let shadow = sample.shadow_ray(start);
-    if world.accel.occluded(&shadow) {
-        return Rgb::BLACK;
-    }
-    let here = world.media_toward(at, segment.ray.direction, shadow.direction, &segment.media.here);
-    let light = scattered * world.transmittance(&here, &shadow);
-    if tally.sorts() {
-        let way = Way::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(sample.wi));
-        tally.add(world, view.throughput * light, view.course(1, Course::Direct(way)), Some(id));
-    }
-    light
 }

@@ -17,6 +17,15 @@ pub struct Motion {
 enum Part {
     Constant(DAffine3),
     Keyframed(Vec<Keyframe>),
+    /// A rotation about a unit axis through the origin, by angles in radians that are interpolated.
+    Turning(DVec3, Vec<Angle>),
+}
+
+/// An angle in radians at one time.
+#[derive(Clone, Copy, Debug)]
+struct Angle {
+    time: f64,
+    angle: f64,
 }
 
 /// A transform at one time: first `stretch`, then `rotation`, then `translation` (Shoemake and Duff, "Matrix Animation and Polar
@@ -58,10 +67,26 @@ impl Motion {
         motion.is_regular().then_some(motion)
     }
 
+    /// Turns about a unit axis through the origin, counter-clockwise when looking against it, by an angle in radians at each time, of any
+    /// number of turns. `None` if there is no angle, a time does not grow, or a number is not finite.
+    pub fn turning(axis: DVec3, angles: &[(f64, f64)]) -> Option<Self> {
+        let grow = angles.windows(2).all(|pair| pair[0].0 < pair[1].0);
+        let finite = axis.is_finite() && angles.iter().all(|(time, angle)| time.is_finite() && angle.is_finite());
+        let list: Vec<_> = angles.iter().map(|&(time, angle)| Angle { time, angle }).collect();
+        (grow && finite && !list.is_empty()).then(|| Self { parts: vec![Part::Turning(axis, list)] })
+    }
+
     /// This motion after `inner`: first `inner`, then `self`.
     #[must_use]
     pub fn after(&self, inner: &Self) -> Self {
-        Self { parts: self.parts.iter().chain(&inner.parts).cloned().collect() }
+        let mut parts = self.parts.clone();
+        for part in &inner.parts {
+            match (parts.last_mut(), part) {
+                (Some(Part::Constant(outer)), Part::Constant(map)) => *outer = *outer * *map,
+                _ => parts.push(part.clone()),
+            }
+        }
+        Self { parts }
     }
 
     /// The map if it does not change.
@@ -69,7 +94,8 @@ impl Motion {
         self.parts.iter().try_fold(DAffine3::IDENTITY, |product, part| match part {
             Part::Constant(map) => Some(product * *map),
             Part::Keyframed(list) if list.len() == 1 => Some(product * list[0].map()),
-            Part::Keyframed(_) => None,
+            Part::Turning(axis, list) if list.len() == 1 => Some(product * turned(*axis, list[0].angle)),
+            Part::Keyframed(_) | Part::Turning(..) => None,
         })
     }
 
@@ -110,27 +136,82 @@ impl Part {
         match self {
             Self::Constant(map) => *map,
             Self::Keyframed(list) => interpolate(list, time),
+            Self::Turning(axis, list) => turned(*axis, interpolated_angle(list, time)),
+        }
+    }
+
+    /// The times of its keyframes.
+    fn times(&self) -> Vec<f64> {
+        match self {
+            Self::Constant(_) => Vec::new(),
+            Self::Keyframed(list) => list.iter().map(|key| key.time).collect(),
+            Self::Turning(_, list) => list.iter().map(|key| key.time).collect(),
+        }
+    }
+
+    /// How far a point within `bounds` can stray from the straight line between its places at two times between which there is no keyframe.
+    fn deviation(&self, bounds: &Bounds, from: f64, to: f64) -> f64 {
+        match self {
+            Self::Constant(_) => 0.0,
+            Self::Keyframed(list) => deviation(list, bounds, from, to),
+            Self::Turning(_, list) => {
+                let angle = interpolated_angle(list, to) - interpolated_angle(list, from);
+                stray(angle * angle * reach(bounds))
+            }
         }
     }
 
     /// Bounds of what is within `bounds`, from one time to another.
     fn bounds(&self, bounds: &Bounds, from: f64, to: f64) -> Bounds {
-        let Self::Keyframed(list) = self else {
-            return bounds.transformed(&self.at(from));
-        };
+        if let Self::Constant(map) = self {
+            return bounds.transformed(map);
+        }
         // Keyframes inside the interval are corners of the path.
-        let inside = list.iter().map(|key| key.time).filter(|&time| from < time && time < to);
+        let inside = self.times().into_iter().filter(|&time| from < time && time < to);
         let times: Vec<f64> = std::iter::once(from).chain(inside).chain(std::iter::once(to)).collect();
         let pieces = times.windows(2).map(|pair| {
             let ends = bounds.transformed(&self.at(pair[0])).union(&bounds.transformed(&self.at(pair[1])));
-            ends.grown(deviation(list, bounds, pair[0], pair[1]))
+            ends.grown(self.deviation(bounds, pair[0], pair[1]))
         });
-        pieces.fold(Bounds::EMPTY, |a, b| a.union(&b))
+        let all = pieces.fold(Bounds::EMPTY, |a, b| a.union(&b));
+        match self {
+            // However often it turns, it stays as far from the origin as it is.
+            Self::Turning(..) => {
+                let reach = DVec3::splat(reach(bounds) * (1.0 + 1e-12));
+                Bounds { min: all.min.max(-reach), max: all.max.min(reach) }
+            }
+            _ => all,
+        }
     }
 }
 
-/// How far a point within `bounds` can stray from the straight line between its places at two times between which there is no keyframe:
-/// an eighth of the square of the time times the largest acceleration.
+/// Distance from the origin of the farthest point within `bounds`.
+fn reach(bounds: &Bounds) -> f64 {
+    bounds.min.abs().max(bounds.max.abs()).length()
+}
+
+/// How far a path can stray from a straight line: an eighth of the largest acceleration times the square of the time; doubled, for rounding.
+fn stray(acceleration_by_squared_time: f64) -> f64 {
+    0.25 * acceleration_by_squared_time
+}
+
+/// The rotation about a unit axis by an angle in radians.
+#[inline]
+fn turned(axis: DVec3, angle: f64) -> DAffine3 {
+    DAffine3::from_axis_angle(axis, angle)
+}
+
+#[inline]
+fn interpolated_angle(list: &[Angle], time: f64) -> f64 {
+    let next = list.partition_point(|key| key.time <= time);
+    if next == 0 {
+        return list[0].angle;
+    }
+    let a = list[next - 1];
+    list.get(next).map_or(a.angle, |b| a.angle + (b.angle - a.angle) * ((time - a.time) / (b.time - a.time)))
+}
+
+/// [`Part::deviation`] of keyframes.
 fn deviation(list: &[Keyframe], bounds: &Bounds, from: f64, to: f64) -> f64 {
     let next = list.partition_point(|key| key.time <= from);
     if next == 0 || next == list.len() {
@@ -139,15 +220,14 @@ fn deviation(list: &[Keyframe], bounds: &Bounds, from: f64, to: f64) -> f64 {
     let (a, b) = (&list[next - 1], &list[next]);
     let duration = b.time - a.time;
     let angular_speed = 2.0 * a.rotation.dot(b.rotation).abs().min(1.0).acos() / duration;
-    let corner = bounds.min.abs().max(bounds.max.abs());
+    let corner = reach(bounds);
     // Frobenius norms bound how far a matrix moves a vector.
     let norm = |m: &DMat3| (m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared()).sqrt();
-    let radius = norm(&a.stretch).max(norm(&b.stretch)) * corner.length();
-    let stretch_speed = norm(&(b.stretch - a.stretch)) * corner.length() / duration;
+    let radius = norm(&a.stretch).max(norm(&b.stretch)) * corner;
+    let stretch_speed = norm(&(b.stretch - a.stretch)) * corner / duration;
     let acceleration = angular_speed * (angular_speed * radius + 2.0 * stretch_speed);
     let step = to - from;
-    // Twice, for the rounding of all this.
-    0.25 * step * step * acceleration
+    stray(step * step * acceleration)
 }
 
 #[inline]
@@ -251,6 +331,20 @@ mod tests {
     }
 
     #[test]
+    fn turns_are_counted_and_held() {
+        let axis = DVec3::new(1.0, -2.0, 2.0) / 3.0;
+        let motion = Motion::turning(axis, &[(0.25, -1.0), (0.5, 19.0), (0.75, 20.0)]).unwrap();
+        for (time, angle) in [(0.0, -1.0), (0.25, -1.0), (0.375, 9.0), (0.5, 19.0), (0.6875, 19.75), (1.0, 20.0)] {
+            assert!(close(motion.map_at(time), DAffine3::from_axis_angle(axis, angle)), "{time}");
+        }
+        assert!(motion.as_constant().is_none());
+        assert!(close(Motion::turning(axis, &[(3.0, 2.0)]).unwrap().as_constant().unwrap(), DAffine3::from_axis_angle(axis, 2.0)));
+        for bad in [&[][..], &[(0.0, 1.0), (0.0, 2.0)], &[(f64::NAN, 1.0)], &[(0.0, f64::INFINITY)]] {
+            assert!(Motion::turning(axis, bad).is_none(), "{bad:?}");
+        }
+    }
+
+    #[test]
     fn what_cannot_be_interpolated_is_refused() {
         let i = DAffine3::IDENTITY;
         assert!(Motion::keyframed(&[]).is_none());
@@ -279,8 +373,14 @@ mod tests {
             let Some(inner) = Motion::keyframed(&[(0.1, map()), (0.37, map()), (0.9, map())]) else { continue };
             let Some(outer) = Motion::keyframed(&[(-0.2, map()), (1.3, map())]) else { continue };
             let cube = Bounds { min: DVec3::new(-1.0, -0.5, 0.2), max: DVec3::new(0.4, 0.7, 1.0) };
-            // In a product the outer motion turns the inner one's boxes, which makes them larger.
-            for (motion, tightness) in [(inner.clone(), 1.05), (outer.after(&inner), 3.0)] {
+            let axis = DVec3::new(next(), next(), next()).normalize();
+            let turning = |turns: f64| Motion::turning(axis, &[(-0.1, 0.0), (0.6, turns * next()), (1.0, turns * next())]).unwrap();
+            let [some, many] = [4.0, 400.0].map(turning);
+            let pivot = DAffine3::from_translation(DVec3::new(2.0, 1.0, -3.0));
+            let about = Motion::constant(pivot).after(&many).after(&Motion::constant(pivot.inverse()));
+            // In a product the outer motion turns the inner one's boxes, which makes them larger; so do many turns in each interval.
+            let motions = [(inner.clone(), 1.05), (outer.after(&inner), 3.0), (some, 1.05), (about, 2.5)];
+            for (motion, tightness) in motions {
                 let bounds = motion.bounds(&cube);
                 let mut reach = Bounds::EMPTY;
                 for i in 0..=2000 {

@@ -88,13 +88,16 @@ fn weight(segment: &Segment, s: f64) -> f64 {
     segment.r.value(s).max(0.0) * segment.derivative(s).length()
 }
 
-/// Area for each radian (Pappus), by Gauss-Legendre quadrature on small parts of the monotone pieces.
+/// Integral of a function over a range, by Gauss-Legendre quadrature.
+pub(super) fn integral(range: Range, function: impl Fn(f64) -> f64) -> f64 {
+    let (middle, half) = (0.5 * (range.min + range.max), 0.5 * (range.max - range.min));
+    GAUSS.iter().map(|[x, w]| half * w * (function(middle - half * x) + function(middle + half * x))).sum()
+}
+
+/// Area for each radian (Pappus), by quadrature on small parts of the monotone pieces.
 pub(super) fn area_per_radian(segments: &[Segment]) -> f64 {
     const PARTS: usize = 16;
-    let piece = |segment: &Segment, range: Range| -> f64 {
-        let (middle, half) = (0.5 * (range.min + range.max), 0.5 * (range.max - range.min));
-        GAUSS.iter().map(|[x, w]| half * w * (weight(segment, middle - half * x) + weight(segment, middle + half * x))).sum()
-    };
+    let piece = |segment: &Segment, range: Range| integral(range, |s| weight(segment, s));
     let mut area = 0.0;
     for segment in segments {
         for pair in segment.knots.windows(2) {

@@ -98,6 +98,36 @@ fn standing_profiles_have_normals() {
 }
 
 #[test]
+fn v_is_the_height_or_the_length_of_the_profile() {
+    let v =
+        |shape: &Revolution, profile: f64| shape.surface(&endless(dvec3(0.0, -9.0, 0.0), DVec3::Y), &LocalHit { t: 1.0, profile }).uv[1];
+    let of = |points: &[[f64; 2]], parameter| turned(points).with_parameter(parameter).unwrap();
+    // Half a circle: heights are cosines, lengths are angles, as far as cubics make one (2.7e-4).
+    let profile = Profile::bezier(CIRCLE).unwrap();
+    let (height, length) = (of(CIRCLE, ProfileParameter::Height), of(CIRCLE, ProfileParameter::ArcLength));
+    for i in 0..=64 {
+        let at = f64::from(i) / 32.0;
+        let y = profile.point(at).y;
+        assert!((v(&height, at) - 0.5 * (y + 1.0)).abs() < 1e-14, "{at}");
+        assert!((v(&length, at) - (-y.clamp(-1.0, 1.0)).acos() / (0.5 * TAU)).abs() < 3e-4, "{at}");
+    }
+    // A line with an uneven parameter, and then one three times as long, downwards.
+    let bent = [[1.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 1.0], [2.0, 0.0], [3.0, -1.0], [4.0, -2.0]];
+    let (height, length) = (of(&bent, ProfileParameter::Height), of(&bent, ProfileParameter::ArcLength));
+    let total = 1.0 + 18f64.sqrt();
+    for i in 0..=16 {
+        let s = f64::from(i) / 16.0;
+        let eased = s * s * (3.0 - 2.0 * s);
+        assert!((v(&height, s) - (2.0 + eased) / 3.0).abs() < 1e-14 && (v(&length, s) - eased / total).abs() < 1e-13, "{s}");
+        let second = (3.0 * (1.0 - s) / 3.0, (1.0 + s * 18f64.sqrt()) / total);
+        assert!((v(&height, 1.0 + s) - second.0).abs() < 1e-14 && (v(&length, 1.0 + s) - second.1).abs() < 1e-13, "{s}");
+    }
+    let level = turned(&line([0.0, 1.0], [1.0, 1.0]));
+    assert_eq!(level.clone().with_parameter(ProfileParameter::Height), Err(ShapeError::ProfileLevel));
+    assert!(level.with_parameter(ProfileParameter::ArcLength).is_ok());
+}
+
+#[test]
 fn a_profile_towards_positive_y_has_outward_normals_and_v_along_it() {
     let points = line([1.0, -2.0], [1.0, 4.0]);
     for (points, sign) in [(points.clone(), 1.0), (points.iter().rev().copied().collect(), -1.0)] {

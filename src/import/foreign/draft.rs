@@ -4,8 +4,12 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use super::{ImportReport, Imported, Outcome, ReportEntry};
-use crate::desc::{CameraDesc, InstanceDesc, LightDesc, MaterialDesc, ObjectDesc, SceneDesc, ShapeDesc, TextureDesc};
+use crate::desc::{
+    CameraDesc, InstanceDesc, KeyframeDesc, LightDesc, MaterialDesc, ObjectDesc, SceneDesc, ShapeDesc, TextureDesc, TransformDesc,
+    TransformStepDesc,
+};
 use crate::import::{Assets, ImageData, MeshData, RgbImage};
+use crate::math::{DAffine3, DMat3, DVec3, Transform};
 
 /// A scene under construction: names are made unique, and the places where things come from are kept for messages.
 #[derive(Debug, Default)]
@@ -42,22 +46,41 @@ impl Draft {
         let name = self.numbers.unique("object", name, |name| self.desc.objects.contains_key(name));
         self.places.insert(format!("objects.{name}"), place.into());
         let mut object = ObjectDesc { shapes: Vec::new(), instances };
-        for (i, (place, shape)) in shapes.into_iter().enumerate() {
-            self.places.insert(format!("objects.{name}.shapes[{i}]"), place);
-            object.shapes.push(shape);
+        for (place, shape) in shapes {
+            let common = shape.common();
+            if self.is_placed(&place, "shape", common.transform, common.motion) {
+                self.places.insert(format!("objects.{name}.shapes[{}]", object.shapes.len()), place);
+                object.shapes.push(shape);
+            }
         }
         self.desc.objects.insert(name.clone(), object);
         name
     }
 
+    /// Whether something stands anywhere; reports it as ignored if a transform leaves nothing of it.
+    fn is_placed(&mut self, place: &str, element: &str, transform: &TransformDesc, motion: &[KeyframeDesc]) -> bool {
+        let flat = std::iter::once(transform).chain(motion.iter().map(|keyframe| &keyframe.transform)).any(flattens);
+        if flat {
+            self.ignored(place, element, "transform", "it is singular: nothing that has a volume or an area is left");
+        }
+        !flat
+    }
+
     /// Adds a shape to the world.
     pub fn add_shape(&mut self, place: &str, shape: ShapeDesc) {
+        let common = shape.common();
+        if !self.is_placed(place, "shape", common.transform, common.motion) {
+            return;
+        }
         self.places.insert(format!("shapes[{}]", self.desc.shapes.len()), place.into());
         self.desc.shapes.push(shape);
     }
 
     /// Places an object in the world.
     pub fn add_instance(&mut self, place: &str, instance: InstanceDesc) {
+        if !self.is_placed(place, "instance", &instance.transform, &instance.motion) {
+            return;
+        }
         self.places.insert(format!("instances[{}]", self.desc.instances.len()), place.into());
         self.desc.instances.push(instance);
     }
@@ -118,6 +141,18 @@ impl Draft {
     pub fn finish(self) -> Imported {
         Imported { desc: self.desc, assets: Arc::new(self.assets), report: self.report, places: Arc::new(self.places) }
     }
+}
+
+/// Whether a transform has a finite matrix that is singular. Importers write matrices only.
+fn flattens(transform: &TransformDesc) -> bool {
+    transform.0.iter().any(|step| match step {
+        TransformStepDesc::Matrix(m) => {
+            let column = |c: usize| DVec3::new(m[0][c], m[1][c], m[2][c]);
+            let map = DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
+            map.is_finite() && Transform::new(map).is_none()
+        }
+        _ => false,
+    })
 }
 
 /// The next number of each name that was taken, by what it names: looking for it from the start would take the square of their count.

@@ -3,6 +3,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::*;
+use crate::geometry::ProfileParameter;
 
 fn vase() -> Profile {
     Profile::bezier(&[[0.0, -1.0], [0.9, -1.0], [1.2, -0.3], [0.5, 0.2], [0.2, 0.4], [0.3, 0.9], [0.6, 1.0]]).unwrap()
@@ -18,7 +19,9 @@ fn shapes() -> Vec<Analytic> {
         shapes.push(Analytic::Frustum(Frustum::cylinder(0.8, 1.7, phi_max).unwrap()));
         shapes.push(Analytic::Frustum(Frustum::new(0.8, 0.0, 1.7, phi_max).unwrap()));
         shapes.push(Analytic::Frustum(Frustum::new(0.3, 1.1, 0.4, phi_max).unwrap()));
-        shapes.push(Analytic::Revolution(Revolution::new(&vase(), phi_max).unwrap()));
+        for parameter in [ProfileParameter::Curve, ProfileParameter::Height, ProfileParameter::ArcLength] {
+            shapes.push(Analytic::Revolution(Revolution::new(&vase(), phi_max).unwrap().with_parameter(parameter).unwrap()));
+        }
     }
     shapes
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::element::Element;
 use super::textures::UvOrigin;
-use super::tree::{PluginId, Value};
+use super::tree::PluginId;
 use super::{Reader, meshes, serialized, values};
 use crate::desc::{
     CylinderDesc, DiskDesc, InstanceDesc, MeshDesc, MeshShadingDesc, OpacityDesc, QuadDesc, ShapeDesc, SmoothByDesc, SphereDesc,
@@ -107,7 +107,11 @@ impl<'a> Reader<'a> {
         let mut element = Element::new(self.document, id);
         let place = element.place().to_string();
         let Some(Form { mut shape, map, uv, reversed }) = self.form(&mut element)? else {
-            self.whole(id, &format!("there is no shape {}", element.kind()));
+            let why = match element.kind() {
+                "sphere" | "cylinder" => "it has no area".into(),
+                kind => format!("there is no shape {kind}"),
+            };
+            self.whole(id, &why);
             return Ok(None);
         };
         let flipped = element.boolean("flip_normals", false)?;
@@ -180,7 +184,7 @@ impl<'a> Reader<'a> {
             || parts.any(|part| self.has_direction(part, seen))
     }
 
-    /// The surface of a shape; none if it is one that does not exist here.
+    /// The surface of a shape; none if it is one that does not exist here, or has no area.
     fn form(&mut self, element: &mut Element<'a>) -> Result<Option<Form>> {
         let kind = element.kind();
         let form = |shape, map, uv| Form { shape, map, uv, reversed: false };
@@ -195,13 +199,13 @@ impl<'a> Reader<'a> {
             "sphere" => {
                 let center = DVec3::from(element.vector("center")?.unwrap_or_default());
                 let radius = element.float("radius")?.unwrap_or(1.0);
-                if radius <= 0.0 {
-                    return Err(element.place_of("radius").error(format!("\"radius\" must be above 0, not {radius}")));
+                if radius == 0.0 {
+                    return Ok(None);
                 }
                 let map = element.transform("to_world")? * DAffine3::from_translation(center);
-                // A mirrored sphere is inside out in Mitsuba.
-                let reversed = map.matrix3.determinant() < 0.0;
-                let sphere = SphereDesc::new(radius, None, None, 360.0);
+                // A mirrored sphere is inside out in Mitsuba, and so is one of negative radius.
+                let reversed = (map.matrix3.determinant() < 0.0) != (radius < 0.0);
+                let sphere = SphereDesc::new(radius.abs(), None, None, 360.0);
                 Form { shape: ShapeDesc::Sphere(sphere), map, uv: UvOrigin::Upward, reversed }
             }
             "cylinder" => {
@@ -209,12 +213,10 @@ impl<'a> Reader<'a> {
                 let p1 = DVec3::from(element.vector("p1")?.unwrap_or([0.0, 0.0, 1.0]));
                 let radius = element.float("radius")?.unwrap_or(1.0);
                 let axis = p1 - p0;
-                let (Some(z), true) = (axis.try_normalize(), radius > 0.0) else {
-                    return Err(element.place().error("a cylinder needs a length and a radius above 0"));
-                };
+                let (Some(z), true) = (axis.try_normalize(), radius != 0.0) else { return Ok(None) };
                 let (x, y) = values::tangents(z);
                 let frame = DAffine3 { matrix3: DMat3::from_cols(x, y, z), translation: p0 };
-                let cylinder = CylinderDesc::new(radius, axis.length(), 360.0);
+                let cylinder = CylinderDesc::new(radius.abs(), axis.length(), 360.0);
                 form(ShapeDesc::Cylinder(cylinder), element.transform("to_world")? * frame, UvOrigin::Mitsuba)
             }
             _ => return Ok(None),
@@ -249,10 +251,6 @@ impl<'a> Reader<'a> {
         desc.shading = if is_flat { MeshShadingDesc::Flat } else { MeshShadingDesc::Smooth };
         // Mitsuba leaves the order of the corners as it is: given normals keep their side, found ones turn with the mirrored faces.
         let reversed = map.matrix3.determinant() < 0.0 && (is_flat || !has_normals);
-        if matches!(element.take("to_world").map(|property| &property.value), Some(Value::Transform(_))) && map.matrix3.determinant() == 0.0
-        {
-            return Err(element.place_of("to_world").error("the transform is singular: it flattens the shape"));
-        }
         Ok(Form { shape: ShapeDesc::Mesh(desc), map, uv, reversed })
     }
 }

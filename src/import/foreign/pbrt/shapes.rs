@@ -137,7 +137,13 @@ impl Shapes<'_> {
     fn form(&self, draft: &mut Draft, kind: &str, params: &Params, needs: Needs) -> Result<Option<Form>> {
         let mut patches = None;
         let mesh = match kind {
-            "sphere" | "disk" | "cylinder" => return Ok(Some(analytic(kind, params)?)),
+            "sphere" | "disk" | "cylinder" => {
+                let form = analytic(kind, params)?;
+                if form.is_none() {
+                    draft.ignored(&params.place, &params.element, "", "it has no area");
+                }
+                return Ok(form);
+            }
             "plymesh" => return self.ply(params, needs).map(Some),
             "trianglemesh" => triangle_mesh(params)?,
             "bilinearmesh" => {
@@ -211,17 +217,15 @@ fn black(draft: &mut Draft, place: &str) -> String {
     draft.add_material("black", place, MaterialDesc::Diffuse { albedo: crate::desc::ColorDesc::Grey(0.0), roughness })
 }
 
-fn analytic(kind: &str, params: &Params) -> Result<Form> {
-    let radius = params.positive_or("radius", 1.0)?;
+/// A sphere, disk or cylinder; `None` if it has no area.
+fn analytic(kind: &str, params: &Params) -> Result<Option<Form>> {
+    let radius = if params.number("radius")? == Some(0.0) { 0.0 } else { params.positive_or("radius", 1.0)? };
     let phi_max = params.number_or("phimax", 360.0)?.clamp(0.0, 360.0);
-    if phi_max == 0.0 {
-        return Err(params.error("nothing is left of it at a phimax of 0"));
-    }
     let raised = |z: f64| DAffine3::from_translation(DVec3::new(0.0, 0.0, z));
     let turn = phi_max.to_radians();
-    Ok(match kind {
+    let form = match kind {
         "disk" => {
-            let inner_radius = params.number_or("innerradius", 0.0)?;
+            let inner_radius = params.number_or("innerradius", 0.0)?.abs();
             let area = 0.5 * turn * (radius * radius - inner_radius * inner_radius);
             let shape = Box::new(ShapeDesc::Disk(DiskDesc::new(radius, inner_radius, phi_max)));
             Form::Analytic { shape, inner: raised(params.number_or("height", 0.0)?), area }
@@ -239,7 +243,8 @@ fn analytic(kind: &str, params: &Params) -> Result<Form> {
             let shape = Box::new(ShapeDesc::Sphere(SphereDesc::new(radius, z_min, z_max, phi_max)));
             Form::Analytic { shape, inner: DAffine3::IDENTITY, area: turn * radius * (high - low) }
         }
-    })
+    };
+    Ok(Some(form).filter(|form| !matches!(form, Form::Analytic { area, .. } if *area <= 0.0)))
 }
 
 fn triangle_mesh(params: &Params) -> Result<MeshData> {

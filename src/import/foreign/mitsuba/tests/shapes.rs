@@ -143,8 +143,18 @@ fn spheres_and_cylinders_have_their_own_places() {
     let ShapeDesc::Cylinder(cylinder) = shape(&desc, 1) else { panic!() };
     assert_eq!((cylinder.radius, cylinder.height), (0.5, 5.0));
     assert_point(moved(&cylinder.transform, [0.0, 0.0, 5.0]), [1.0, 0.0, 5.0]);
-    assert!(message(r#"<shape type="cylinder"><point name="p1" value="0,0,0"/></shape>"#).contains("needs a length"));
-    assert!(message(r#"<shape type="sphere"><float name="radius" value="0"/></shape>"#).contains("above 0"));
+    // A negative radius turns a sphere inside out.
+    let inward = scene(r#"<shape type="sphere"><float name="radius" value="-2"/></shape>"#);
+    let ShapeDesc::Sphere(sphere) = shape(&inward, 0) else { panic!() };
+    assert_eq!((sphere.radius, sphere.reverse_normal), (2.0, true));
+    for nothing in [
+        r#"<shape type="sphere"><float name="radius" value="0"/></shape>"#,
+        r#"<shape type="cylinder"><point name="p1" value="0,0,0"/></shape>"#,
+        r#"<shape type="rectangle"><transform name="to_world"><scale x="1" y="0" z="1"/></transform></shape>"#,
+    ] {
+        assert!(scene(nothing).shapes.is_empty(), "{nothing}");
+        assert!(notes(nothing).iter().any(|(outcome, ..)| *outcome == Outcome::Ignored), "{nothing}");
+    }
 }
 
 #[test]

@@ -157,6 +157,19 @@ fn parts_of_quadrics_are_ours() {
     assert_eq!((&cylinder["height"], z), (&3.0.into(), 1.0));
     let (disk, z) = of("Shape \"disk\" \"float height\" 2 \"float innerradius\" 0.5");
     assert_eq!((&disk["inner_radius"], z), (&0.5.into(), 2.0));
+    for nothing in [
+        "Shape \"sphere\" \"float radius\" 0",
+        "Shape \"sphere\" \"float zmin\" 2 \"float zmax\" 3",
+        "Shape \"disk\" \"float innerradius\" 1",
+        "Shape \"cylinder\" \"float zmin\" 1",
+        "Shape \"sphere\" \"float phimax\" 0",
+        "Scale 0 0 0 Shape \"sphere\"",
+        "ObjectBegin \"o\" Shape \"sphere\" ObjectEnd Scale 1 1 0 ObjectInstance \"o\"",
+    ] {
+        let imported = world(nothing);
+        assert!(imported.desc.shapes.is_empty() && imported.desc.instances.is_empty(), "{nothing}");
+        assert_eq!(imported.report.count(Outcome::Ignored), 1, "{nothing}");
+    }
 }
 
 #[test]
