@@ -14,7 +14,7 @@
 //! | # | modules |
 //! |---|---|
 //! | 0 | `id`, `error` |
-//! | 1 | `math`, `desc` |
+//! | 1 | `math`, `desc`, `exr_headers` |
 //! | 2 | `color`, `sampling`, `import` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
@@ -34,6 +34,7 @@ pub mod convert;
 pub mod denoise;
 pub mod desc;
 pub mod error;
+pub mod exr_headers;
 pub mod farm;
 pub mod film;
 pub mod geometry;

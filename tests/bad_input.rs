@@ -233,7 +233,7 @@ fn shapes_out_of_range() {
         ("shapes[0].z_min", json!(2), "shapes[0]", "z_min 2"),
         ("shapes[0].phi_max_degrees", json!(400), "shapes[0]", "400"),
         ("shapes[0].phi_max_degrees", json!(0), "shapes[0]", "0"),
-        ("shapes[0].radius", json!(1e39), "shapes[0]", "too large"),
+        ("shapes[0].radius", json!(1e39), "shapes[0]", "at most 1e30"),
         ("shapes[2].edge_u", json!([0, 2, 0]), "shapes[2]", "edges"),
         ("shapes[3].inner_radius", json!(1), "shapes[3]", "inner"),
         ("shapes[4].height", json!(0), "shapes[4]", "height"),
@@ -264,7 +264,6 @@ fn inline_meshes_that_make_no_sense() {
     assert_faults(&[
         ("shapes[1].triangles", json!([[0, 1, 3]]), "shapes[1]", "vertex 3"),
         ("shapes[1].positions[1]", json!([1e39, 0, 0]), "shapes[1]", "vertex 1"),
-        ("shapes[1].positions[1]", json!([1e19, 0, 0]), "shapes[1]", "vertex 1"),
         ("shapes[1].triangles", Value::Null, "shapes[1]", "`triangles`"),
         ("shapes[1].positions", Value::Null, "shapes[1]", "`positions`"),
         ("shapes[1].file", json!("a.ply"), "shapes[1]", "either `file`"),

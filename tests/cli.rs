@@ -129,7 +129,7 @@ const MIRRORS: &str = r#"{
 fn signals_and_time_limits_end_a_pass_that_does_not_end() {
     let folder = tempfile::tempdir().unwrap();
     let limited = |options: &str| {
-        let mut command = steradian(folder.path(), &format!("render mirrors.json -o a.exr --threads 1 {options}"));
+        let mut command = steradian(folder.path(), &format!("render mirrors.json -o a.exr --threads 1 -v {options}"));
         std::fs::write(folder.path().join("mirrors.json"), MIRRORS).unwrap();
         command.stderr(Stdio::piped()).spawn().unwrap()
     };
@@ -140,9 +140,10 @@ fn signals_and_time_limits_end_a_pass_that_does_not_end() {
 
     for options in ["", "--guiding on", "--target-error 0.1"] {
         let mut child = limited(options);
-        // With the first line of progress the program listens.
+        // The program listens as soon as the accelerator is built.
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
-        lines.next().unwrap().unwrap();
+        lines.by_ref().map_while(Result::ok).find(|line| line.contains("to build")).unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(300));
         assert!(Command::new("kill").arg("-INT").arg(child.id().to_string()).status().unwrap().success());
         let rest: Vec<String> = lines.map_while(Result::ok).collect();
         assert_eq!(child.wait().unwrap().code(), Some(130), "{options}: {rest:?}");

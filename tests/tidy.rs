@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Modules by layer: a module imports only from lower layers, never sideways; its own folder is free.
 const LAYERS: &[(u32, &[&str])] = &[
     (0, &["id", "error"]),
-    (1, &["math", "desc"]),
+    (1, &["math", "desc", "exr_headers"]),
     (2, &["color", "sampling", "import"]),
     (3, &["geometry", "texture", "bsdf", "camera", "film", "guiding"]),
     (4, &["accel", "material", "medium", "opacity", "relief", "light", "output"]),
@@ -19,8 +19,8 @@ const LAYERS: &[(u32, &[&str])] = &[
 /// Imports narrower than the layer number allows.
 const NARROW: &[(&str, &[&str])] = &[
     ("accel", &["geometry", "math", "error", "id"]),
-    ("denoise", &["film", "error", "math", "color", "output"]),
-    ("output", &["film", "color", "error", "desc", "math"]),
+    ("denoise", &["film", "error", "exr_headers", "math", "color", "output"]),
+    ("output", &["film", "color", "error", "exr_headers", "desc", "math"]),
     ("scene", &["bsdf", "camera", "film", "geometry", "id", "light", "material", "medium", "relief", "texture", "math", "color"]),
 ];
 

@@ -311,4 +311,13 @@ mod tests {
             assert!((b - a).cross(c - a).dot(a + b + c) > 0.0);
         }
     }
+
+    #[test]
+    fn of_coincident_triangles_of_an_emitter_the_first_is_kept() {
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.0, 1.0, -0.0], [1.0, 1.0, 0.0]];
+        // The same, turned, turned over, and with another vertex at the same place; the last shares an edge alone.
+        let mut triangles = vec![[0, 1, 2], [1, 2, 0], [2, 1, 0], [3, 1, 0], [1, 4, 2]];
+        drop_coincident(&Files::new("s.json"), "shapes[0]", &positions, &mut triangles);
+        assert_eq!(triangles, [[0, 1, 2], [1, 4, 2]]);
+    }
 }

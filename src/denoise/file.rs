@@ -10,8 +10,8 @@ use super::oidn::Triple;
 use super::prepared::Prepared;
 use super::{Denoiser, Report};
 use crate::error::{Error, Result};
+use crate::exr_headers::read_headers;
 use crate::film::{LayerKind, Source};
-use crate::import::read_exr_headers;
 use crate::output::write_atomically;
 
 /// Names of layers that hold albedo, in lower case, the best first: ours, then those of Blender, pbrt, Mitsuba.
@@ -47,7 +47,7 @@ pub struct FileOptions {
 pub fn denoise_file(denoiser: &Denoiser, input: &Path, output: &Path, options: &FileOptions) -> Result<Report> {
     std::fs::File::open(input).map_err(|e| Error::Missing { file: input.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: input.to_owned(), message };
-    read_exr_headers(input).map_err(malformed)?;
+    read_headers(input).map_err(malformed)?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     let mut file: FlatImage = reader.from_file(input).map_err(|e| malformed(e.to_string()))?;
     let plan = Plan::new(&file, options).map_err(malformed)?;

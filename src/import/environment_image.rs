@@ -5,7 +5,7 @@ mod pfm;
 use std::path::Path;
 
 use super::AssetError;
-use super::exr_claims::read_exr_headers;
+use crate::exr_headers::read_headers;
 
 /// Pixels row by row from the top, linear RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,7 @@ const MAX_PIXELS: u64 = 1 << 30;
 fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR file: {e}"));
     // The size is believed only after a look: memory is asked for before any pixel is read.
-    for header in &read_exr_headers(path).map_err(|e| malformed(&e))? {
+    for header in &read_headers(path).map_err(|e| malformed(&e))? {
         let size = header.layer_size;
         if size.width() as u64 * size.height() as u64 > MAX_PIXELS {
             return Err(malformed(&format!("{} x {} pixels are too many", size.width(), size.height())));

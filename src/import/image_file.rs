@@ -7,8 +7,8 @@ use half::f16;
 use image::{DynamicImage, ImageFormat, ImageReader};
 
 use super::AssetError;
-use super::exr_claims::check_exr_claims;
 use super::jpeg_check::is_whole_jpeg;
+use crate::exr_headers::check_claims;
 
 /// An image as a file has it, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -148,7 +148,7 @@ fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
     for header in &meta.headers {
         check_size(header.layer_size.width(), header.layer_size.height()).map_err(AssetError::Malformed)?;
     }
-    check_exr_claims(&meta.headers, bytes.len() as u64).map_err(|e| malformed(&e))?;
+    check_claims(&meta.headers, bytes.len() as u64).map_err(|e| malformed(&e))?;
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let layer = reader.from_buffered(Cursor::new(bytes)).map_err(|e| malformed(&e))?.layer_data;
 

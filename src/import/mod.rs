@@ -3,7 +3,6 @@
 mod assets;
 mod comments;
 mod environment_image;
-mod exr_claims;
 mod fault;
 mod fingerprint;
 mod foreign;
@@ -20,7 +19,6 @@ mod spectrum;
 
 pub use assets::Assets;
 pub use environment_image::{RgbImage, read_rgb_image};
-pub use exr_claims::{check_exr_claims, read_exr_headers};
 pub use fingerprint::{SceneFingerprint, scene_fingerprint};
 pub use foreign::{Draft, ImportOptions, ImportReport, Imported, Outcome, ReportEntry, read_scene};
 pub use ies::{IesData, read_ies};

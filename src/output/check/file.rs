@@ -8,7 +8,7 @@ use exr::meta::header::Header;
 use exr::prelude::{FlatImage, ReadChannels, ReadLayers, read};
 
 use crate::error::{Error, Result};
-use crate::import::read_exr_headers;
+use crate::exr_headers::read_headers;
 use crate::output::role::Role;
 
 /// A file's headers, and its pixels if a rule asks for them.
@@ -31,7 +31,7 @@ impl ExrFile {
     pub fn read(path: &Path) -> Result<Self> {
         std::fs::File::open(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
         let malformed = |e: exr::error::Error| Error::Malformed { file: path.into(), message: e.to_string() };
-        let headers = read_exr_headers(path).map_err(|message| Error::Malformed { file: path.into(), message })?;
+        let headers = read_headers(path).map_err(|message| Error::Malformed { file: path.into(), message })?;
         if headers.is_empty() {
             return Err(Error::Malformed { file: path.into(), message: "there are no parts".into() });
         }

@@ -7,8 +7,8 @@ use exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers,
 
 use super::metadata::{SETTINGS, text};
 use crate::error::{Error, Result};
+use crate::exr_headers::read_headers;
 use crate::film::{Crop, Image, Layer, LayerKind};
-use crate::import::read_exr_headers;
 
 /// Reads the colour of any EXR file: bare channels R, G, B (in upper or lower case), else a layer with such channels (the one with the
 /// shortest name, a "Combined" first), else Y as gray. Alpha is that of the same layer, or 1. The picture is the data window; where that
@@ -19,7 +19,7 @@ use crate::import::read_exr_headers;
 pub fn read_exr(path: &Path) -> Result<Image> {
     std::fs::File::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
-    read_exr_headers(path).map_err(malformed)?;
+    read_headers(path).map_err(malformed)?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     let file: FlatImage = reader.from_file(path).map_err(|e| malformed(e.to_string()))?;
     for part in &file.layer_data {
@@ -78,7 +78,7 @@ fn windows(display: &IntegerBounds, position: Vec2<i32>, size: Vec2<usize>) -> (
 pub fn read_settings(path: &Path) -> Result<serde_json::Value> {
     std::fs::File::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
-    let headers = read_exr_headers(path).map_err(malformed)?;
+    let headers = read_headers(path).map_err(malformed)?;
     match headers.first().and_then(|header| header.own_attributes.other.get(&text(SETTINGS))) {
         Some(AttributeValue::Text(settings)) => {
             serde_json::from_slice(settings.as_slice()).map_err(|e| malformed(format!("{SETTINGS}: {e}")))

@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn areas_are_those_in_the_world() {
-        let doubled = DAffine3::from_scale(DVec3::new(2.0, 3.0, 1.0));
+        let doubled = DAffine3::from_scale(crate::math::DVec3::new(2.0, 3.0, 1.0));
         assert!((area(&triangle([0.0; 3]), &doubled) - 3.0).abs() < 1e-12);
     }
 }

@@ -226,7 +226,7 @@ fn mitsubas_cube_looks_outward() {
     let cube = super::super::meshes::cube();
     let positions = cube.positions.unwrap();
     for t in cube.triangles.unwrap() {
-        let [a, b, c] = t.map(|i| crate::math::Vec3::from(positions[i as usize]));
+        let [a, b, c] = t.map(|i| crate::math::DVec3::from(positions[i as usize]));
         assert!((b - a).cross(c - a).dot(a + b + c) > 0.0);
     }
 }

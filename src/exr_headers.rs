@@ -1,4 +1,4 @@
-//! Whether an EXR file can hold what its headers claim: memory is not asked for on a header's word alone.
+//! Headers of EXR files, and whether a file can hold what they claim: memory is not asked for on a header's word alone.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn most_per_byte(compression: Compression) -> u64 {
 ///
 /// # Errors
 /// If the file is too short for the pixels that a header claims.
-pub fn check_exr_claims(headers: &[Header], bytes: u64) -> Result<(), String> {
+pub fn check_claims(headers: &[Header], bytes: u64) -> Result<(), String> {
     let mut blocks = 0u64;
     for header in headers {
         let (width, height) = (header.layer_size.width(), header.layer_size.height());
@@ -48,11 +48,11 @@ pub fn check_exr_claims(headers: &[Header], bytes: u64) -> Result<(), String> {
 /// The headers of an EXR file, whose claims are checked.
 ///
 /// # Errors
-/// As [`check_exr_claims`], and the library's; a file that cannot be opened is one.
-pub fn read_exr_headers(path: &Path) -> Result<Vec<Header>, String> {
+/// As [`check_claims`], and the library's; a file that cannot be opened is one.
+pub fn read_headers(path: &Path) -> Result<Vec<Header>, String> {
     let bytes = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
     let headers = MetaData::read_from_file(path, false).map_err(|e| e.to_string())?.headers;
-    check_exr_claims(&headers, bytes)?;
+    check_claims(&headers, bytes)?;
     Ok(headers.into_vec())
 }
 
@@ -83,7 +83,7 @@ mod tests {
         ] {
             // Black compresses best.
             write(&file, (700, 500), compression);
-            assert!(read_exr_headers(&file).is_ok(), "{compression:?}");
+            assert!(read_headers(&file).is_ok(), "{compression:?}");
             let bytes = std::fs::read(&file).unwrap();
             // The data window's and the display window's far corner, each after its attribute's name, type and size.
             let mut damaged = bytes.clone();
@@ -94,7 +94,7 @@ mod tests {
             }
             assert_ne!(bytes, damaged);
             std::fs::write(&file, damaged).unwrap();
-            assert!(read_exr_headers(&file).unwrap_err().contains("65536 x 65536"), "{compression:?}");
+            assert!(read_headers(&file).unwrap_err().contains("65536 x 65536"), "{compression:?}");
         }
     }
 }
