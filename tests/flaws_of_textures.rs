@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
 use steradian::bsdf::Bsdf;
 use steradian::color::linear_from_srgb;
+use steradian::desc::ViewDesc;
 use steradian::geometry::SurfaceInteraction;
 use steradian::integrator::World;
 use steradian::math::{Ray, Vec3, vec3};
@@ -165,7 +166,7 @@ fn the_codes_of_a_picture_come_back_in_a_png_of_it() {
     scene["integrator"] = json!({ "type": "whitted", "ambient": [1, 1, 1] });
     scene["lights"] = json!([]);
     let path = folder.path("seen.png");
-    output::write_png(&path, &folder.render(&scene), 0.0).unwrap();
+    output::write_png(&path, &folder.render(&scene), 0.0, ViewDesc::Srgb).unwrap();
     let seen = image::open(&path).unwrap().into_rgb8();
     for (i, code) in codes.into_iter().enumerate() {
         let pixel = seen.get_pixel(2 * i as u32, 5).0;

@@ -206,13 +206,4 @@ mod tests {
             assert!(error < 1e-6, "{transform:?}: {u} {v} to {found:?}");
         }
     }
-
-    #[test]
-    fn alpha_is_cut_off_after_its_factor() {
-        let image = ImageData { width: 4, height: 1, channels: 2, samples: Samples::U8(vec![9, 0, 9, 127, 9, 128, 9, 255]) };
-        assert_eq!(cut(&image, 1.0, 0.5).samples, Samples::U8(vec![0, 0, 255, 255]));
-        assert_eq!(cut(&image, 0.9, 0.5).samples, Samples::U8(vec![0, 0, 0, 255]));
-        let opaque = ImageData { width: 1, height: 1, channels: 3, samples: Samples::U8(vec![0; 3]) };
-        assert_eq!(cut(&opaque, 1.0, 0.5).samples, Samples::U8(vec![255]));
-    }
 }

@@ -3,7 +3,6 @@
 use super::*;
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc};
 use crate::desc::{TextureFilterDesc, WrapDesc, WrapModeDesc};
-use crate::import::Samples;
 
 /// A square with this material, named `m`, and one texture of four pixels.
 fn square_of(mut material: Value) -> Asset {
