@@ -2,10 +2,11 @@
 """Samples per second and peak memory beside Mitsuba 3 on the same scene files.
 
     benches/peers.py [--scenes cornell,glass,bunny_x] [--spp 16,64] [--rounds 3] [--variants scalar_rgb,llvm_ad_rgb]
-                     [--threads 2] [--steradian target/release/steradian] [--mitsuba mitsuba]
+                     [--steradian target/release/steradian] [--mitsuba mitsuba]
 
-Renderers take turns. Each renders with both numbers of samples; the rate comes from the difference of the two times, so that starting, reading and
-building are not in it. Prints medians over the rounds in Msamples/s, peak memory in MB, and the median of the rates' ratios within a round.
+Renderers take turns, each with all processors (taskset limits them). Each renders with both numbers of samples; the rate comes from the difference of
+the two times, so that starting, reading and building are not in it. Prints medians over the rounds in Msamples/s, peak memory in MB, and the median of
+the rates' ratios within a round.
 Needs `cargo build --release`, `cargo xtask bench_scenes` and `pip install mitsuba` (DRJIT_LIBLLVM_PATH set for the llvm variants if need be).
 Without Mitsuba only Steradian is measured. Figures of a busy machine mean nothing.
 """
@@ -52,7 +53,6 @@ def main():
     parser.add_argument("--spp", default="16,64", help="two numbers of samples per pixel")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--variants", default="scalar_rgb,llvm_ad_rgb", help="variants of Mitsuba")
-    parser.add_argument("--threads", type=int, default=os.cpu_count())
     parser.add_argument("--steradian", default=str(ROOT / "target/release/steradian"))
     parser.add_argument("--mitsuba", default="mitsuba")
     arguments = parser.parse_args()
@@ -76,9 +76,9 @@ def main():
             if missing:
                 sys.exit(f"peers.py: {scene.parent / missing[0]} is missing: cargo xtask bench_scenes")
             width, height = (int(re.search(rf'"{side}" value="(\d+)"', text)[1]) for side in ("width", "height"))
-            commands = [lambda n: [arguments.steradian, "render", scene, "--spp", n, "--threads", arguments.threads, "-q", "-o", out]]
+            commands = [lambda n: [arguments.steradian, "render", scene, "--spp", n, "-q", "-o", out]]
             for variant in variants:
-                commands.append(lambda n, variant=variant: [arguments.mitsuba, "-m", variant, "-t", arguments.threads, "-D", f"spp={n}", "-o", out, scene])
+                commands.append(lambda n, variant=variant: [arguments.mitsuba, "-m", variant, "-D", f"spp={n}", "-o", out, scene])
             rounds = [[rate(command, width * height, spp) for command in commands] for _ in range(arguments.rounds)]
             cells = []
             for which in range(len(commands)):

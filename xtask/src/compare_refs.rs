@@ -2,7 +2,7 @@
 //!
 //! `cargo xtask compare_refs REFS [--spp N] [SCENE...]`: the folder `REFS` holds `SCENE.exr` for each scene (default: cornell, glass, analytic; a name
 //! in one of the two folders, or the path of a scene file) and, of some, two independent halves `SCENE.half0.exr` and `SCENE.half1.exr`. Mitsuba 3 makes
-//! references of `benches/scenes/*.xml`: `mitsuba -m llvm_ad_rgb -D spp=1024 -s SEED -o REFS/cornell.half0.exr benches/scenes/cornell.xml`.
+//! references of `benches/scenes/*.xml`: `mitsuba -m llvm_ad_rgb -D spp=1024 -D seed=1 -o REFS/cornell.half0.exr benches/scenes/cornell.xml`.
 //!
 //! Two renders of N samples with different seeds give our variance, the halves give the reference's; without halves the differences between the
 //! two pictures, from pixel to pixel of a block, give both together. Over blocks of 16 x 16 pixels, z = (ours - reference) / sqrt(variances).
