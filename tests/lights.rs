@@ -99,6 +99,7 @@ fn groups_have_names_and_know_their_lights() {
 fn whitteds_direct_light_of_anything_with_an_extent_is_all_of_it() {
     let direct = |mut scene: Value, expected: f64, what: &str| {
         scene["integrator"] = json!({ "type": "whitted" });
+        scene["sampler"]["spp"] = json!(128);
         Estimate::of(&render(&scene), 1).assert_is(expected, what);
     };
     // A white ball under a white sky is as bright as the sky on every side.

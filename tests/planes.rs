@@ -57,6 +57,7 @@ fn a_plane_reflects_what_falls_on_it() {
         [1.0, 0.0, -2.0],
         json!({
             "integrator": { "type": "path", "max_depth": 3 },
+            "sampler": { "spp": 128 },
             "materials": { "grey": { "type": "diffuse", "albedo": 0.6 } },
             "shapes": [{ "type": "plane", "material": "grey" }],
             "lights": [

@@ -175,14 +175,32 @@ impl Part {
         });
         let all = pieces.fold(Bounds::EMPTY, |a, b| a.union(&b));
         match self {
-            // However often it turns, it stays as far from the origin as it is.
-            Self::Turning(..) => {
-                let reach = DVec3::splat(reach(bounds) * (1.0 + 1e-12));
-                Bounds { min: all.min.max(-reach), max: all.max.min(reach) }
+            Self::Turning(axis, _) => {
+                let swept = swept(*axis, bounds);
+                Bounds { min: all.min.max(swept.min), max: all.max.min(swept.max) }
             }
             _ => all,
         }
     }
+}
+
+/// Bounds of what is within `bounds` and turns about a unit axis through the origin, however often: it stays at its height along the axis and
+/// as far from it as it is.
+fn swept(axis: DVec3, bounds: &Bounds) -> Bounds {
+    let corner = |i: usize| {
+        let pick = |k: usize| if i >> k & 1 == 0 { bounds.min[k] } else { bounds.max[k] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    };
+    let (mut low, mut high, mut distance) = (f64::INFINITY, f64::NEG_INFINITY, 0f64);
+    for corner in (0..8).map(corner) {
+        let height = axis.dot(corner);
+        (low, high) = (low.min(height), high.max(height));
+        distance = distance.max((corner - axis * height).length());
+    }
+    let across = (DVec3::ONE - axis * axis).max(DVec3::ZERO).map(f64::sqrt);
+    let extent = axis.abs() * (0.5 * (high - low)) + across * distance + reach(bounds) * 1e-12;
+    let middle = axis * (0.5 * (low + high));
+    Bounds { min: middle - extent, max: middle + extent }
 }
 
 /// Distance from the origin of the farthest point within `bounds`.
@@ -379,7 +397,7 @@ mod tests {
             let pivot = DAffine3::from_translation(DVec3::new(2.0, 1.0, -3.0));
             let about = Motion::constant(pivot).after(&many).after(&Motion::constant(pivot.inverse()));
             // In a product the outer motion turns the inner one's boxes, which makes them larger; so do many turns in each interval.
-            let motions = [(inner.clone(), 1.05), (outer.after(&inner), 3.0), (some, 1.05), (about, 2.5)];
+            let motions = [(inner.clone(), 1.05), (outer.after(&inner), 3.0), (some, 1.05), (about, 1.5)];
             for (motion, tightness) in motions {
                 let bounds = motion.bounds(&cube);
                 let mut reach = Bounds::EMPTY;
