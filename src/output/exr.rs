@@ -9,6 +9,7 @@ mod plane;
 mod read;
 mod write;
 
+pub use header_order::finish_headers;
 pub use plan::check_output;
 pub use read::{read_exr, read_settings};
 pub use write::write_exr;

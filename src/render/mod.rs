@@ -354,7 +354,7 @@ pub fn render_from(
 
 fn pool(settings: &Settings) -> Result<rayon::ThreadPool> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(settings.threads).build();
-    pool.map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))
+    pool.map_err(|e| Error::Threads { count: settings.threads, message: e.to_string() })
 }
 
 /// What a replayed sample brings.
