@@ -39,6 +39,14 @@ fn build() -> Result<(), String> {
         .try_compile("steradian_embree_shim")
         .map_err(|error| format!("the C shim does not compile; on Debian: apt install build-essential ({})", one_line(&error)))?;
 
+    cc::Build::new()
+        .cpp(true)
+        .file("ffi/uncaught.cpp")
+        .std("c++17")
+        .opt_level(2)
+        .try_compile("steradian_uncaught")
+        .map_err(|error| format!("the C++ part does not compile; on Debian: apt install build-essential ({})", one_line(&error)))?;
+
     if own.is_some_and(|own| own == prefix) {
         println!("cargo::rustc-link-search=native={}", prefix.join("lib").display());
     }

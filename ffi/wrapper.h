@@ -1,2 +1,3 @@
 /* What bindgen reads. */
 #include "embree_shim.h"
+#include "uncaught.h"

@@ -15,7 +15,7 @@ pub enum ErrorKind {
     Output,
     /// A checkpoint or shard is damaged, or does not belong to what is asked for.
     Checkpoint,
-    /// Memory ran out.
+    /// Memory ran out, or no more threads can be started.
     OutOfMemory,
     /// Anything else: a device fault, a failed comparison.
     Internal,
@@ -99,6 +99,14 @@ pub enum Error {
     /// Memory ran out.
     #[error("out of memory: {0}")]
     OutOfMemory(String),
+    /// Threads cannot be started, for want of memory or by a limit of the system.
+    #[error("{count} threads cannot be started: {message} (ulimit -u limits processes and threads, ulimit -v memory)")]
+    Threads {
+        /// How many were to be started.
+        count: usize,
+        /// The system's reason.
+        message: String,
+    },
     /// Anything else.
     #[error("{0}")]
     Internal(String),
@@ -113,7 +121,7 @@ impl Error {
             Self::Missing { .. } => ErrorKind::AssetMissing,
             Self::Output { .. } => ErrorKind::Output,
             Self::Checkpoint { .. } => ErrorKind::Checkpoint,
-            Self::OutOfMemory(_) => ErrorKind::OutOfMemory,
+            Self::OutOfMemory(_) | Self::Threads { .. } => ErrorKind::OutOfMemory,
             Self::Embree(_) | Self::Internal(_) => ErrorKind::Internal,
         }
     }

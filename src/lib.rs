@@ -13,8 +13,8 @@
 //!
 //! | # | modules |
 //! |---|---|
-//! | 0 | `id`, `error` |
-//! | 1 | `math`, `desc`, `exr_headers` |
+//! | 0 | `id`, `error`, `memory`, `printable` |
+//! | 1 | `math`, `desc`, `file` |
 //! | 2 | `color`, `sampling`, `import` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
@@ -34,8 +34,8 @@ pub mod convert;
 pub mod denoise;
 pub mod desc;
 pub mod error;
-pub mod exr_headers;
 pub mod farm;
+pub mod file;
 pub mod film;
 pub mod geometry;
 pub mod guiding;
@@ -47,8 +47,10 @@ pub mod live;
 pub mod material;
 pub mod math;
 pub mod medium;
+pub mod memory;
 pub mod opacity;
 pub mod output;
+pub mod printable;
 pub mod relief;
 pub mod render;
 pub mod sampling;

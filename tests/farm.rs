@@ -207,23 +207,8 @@ fn an_openjd_template_renders_shards_and_merges_them() {
         (&"Render".into(), &"Render".into())
     );
 
-    let parameters = template["parameterDefinitions"].as_array().unwrap();
-    let value = |name: &str| {
-        let default = &parameters.iter().find(|p| p["name"] == name).unwrap_or_else(|| panic!("{name}"))["default"];
-        default.as_str().map_or_else(|| default.to_string(), str::to_owned)
-    };
-    assert_eq!(value("Frames"), "7-11:2,20");
-    let run = |step: usize| {
-        let mut text = template["steps"][step]["script"]["embeddedFiles"][0]["data"].as_str().unwrap().to_owned();
-        for name in ["Scene", "Work", "Program", "Shards", "Output1", "Output2"] {
-            text = text.replace(&format!("{{{{Param.{name}}}}}"), &value(name));
-        }
-        text = text.replace("{{Task.Param.Shard}}", "1").replace("{{Task.Param.Frame}}", "7");
-        assert!(!text.contains("{{"), "{text}");
-        farm.write("run.sh", &text);
-        assert!(farm.command("bash").arg("run.sh").status().unwrap().success(), "{text}");
-        farm.calls()
-    };
+    assert_eq!(parameter(&template, "Frames"), "7-11:2,20");
+    let run = |step: usize| run_step(&farm, &template, step);
     let folder = farm.path().display();
     let shards = format!("{folder}/room.farm/shards");
     let called = run(0);
@@ -233,4 +218,63 @@ fn an_openjd_template_renders_shards_and_merges_them() {
     let expected =
         format!("merge {shards}/frame7.1-of-2.shard {shards}/frame7.2-of-2.shard -o {folder}/out/a.0007.exr -o {folder}/b.07.png\n");
     assert_eq!(called, expected);
+}
+
+/// The default of a template's parameter; empty if there is none.
+fn parameter(template: &Value, name: &str) -> String {
+    let parameters = template["parameterDefinitions"].as_array().unwrap();
+    let default = parameters.iter().find(|parameter| parameter["name"] == name).map(|parameter| &parameter["default"]);
+    default.map_or(String::new(), |default| default.as_str().map_or_else(|| default.to_string(), str::to_owned))
+}
+
+/// Runs a step of a template for shard 1 and frame 7, as a worker does; the result is what was called.
+fn run_step(farm: &Farm, template: &Value, step: usize) -> String {
+    let script = &template["steps"][step]["script"];
+    let filled = |text: &Value| {
+        let mut text = text.as_str().unwrap().replace("{{Task.File.Run}}", "run.sh");
+        text = text.replace("{{Task.Param.Shard}}", "1").replace("{{Task.Param.Frame}}", "7");
+        for name in ["Scene", "Work", "Program", "Shards", "Output1", "Output2"] {
+            text = text.replace(&format!("{{{{Param.{name}}}}}"), &parameter(template, name));
+        }
+        assert!(!text.contains("{{"), "{text}");
+        text
+    };
+    farm.write("run.sh", &filled(&script["embeddedFiles"][0]["data"]));
+    let arguments = script["actions"]["onRun"]["args"].as_array().unwrap().iter().map(filled);
+    assert!(farm.command("bash").args(arguments).status().unwrap().success(), "{script}");
+    farm.calls()
+}
+
+#[test]
+fn names_are_no_commands() {
+    let farm = Farm::new();
+    let scene = "it's\ntouch owned\n$(touch owned)`touch owned`\"; touch owned; \\ \u{1b}[2J.json";
+    farm.write(scene, r#"{ "camera": {} }"#);
+    let job = |kind: &str| {
+        let mut command = farm.command(env!("CARGO_BIN_EXE_steradian"));
+        command.args(["farm", kind, scene, "--shards", "1", "-o", "a.exr", "--program"]).arg(farm.path().join("render"));
+        let output = command.args(["--", "--define", "a=$(touch owned){{b}}"]).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        output.stdout
+    };
+    job("slurm");
+    let folder = std::fs::read_dir(farm.path()).unwrap().map(|entry| entry.unwrap().path());
+    let folder = folder.into_iter().find(|path| path.extension().is_some_and(|e| e == "farm")).unwrap();
+    assert!(farm.command("bash").arg(folder.join("submit.sh")).status().unwrap().success());
+    let mut task = farm.command("bash");
+    task.arg(folder.join("render.sh")).envs([("SLURM_ARRAY_TASK_ID", "1"), ("SLURM_ARRAY_JOB_ID", "9")]);
+    assert!(task.status().unwrap().success());
+    assert!(farm.command("bash").arg(folder.join("merge.sh")).args(["", "a.exr"]).status().unwrap().success());
+    let called = farm.calls();
+    let rendered = format!("render {}/{scene} --define a=$(touch owned){{{{b}}}} --shard 1/1", farm.path().display());
+    assert!(called.contains(&rendered) && called.contains("merge "), "{called}");
+
+    let template: Value = serde_json::from_slice(&job("openjd")).unwrap();
+    assert!(!template["name"].as_str().unwrap().contains(['\n', '\u{1b}']));
+    assert!(run_step(&farm, &template, 0).contains(&rendered));
+    assert!(run_step(&farm, &template, 1).contains("merge "));
+    assert!(!farm.path().join("owned").exists());
+
+    let output = farm.steradian("farm slurm room.json --shards 1 --partition a\u{7}b");
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -237,3 +237,51 @@ fn the_program_splits_and_merges() {
     let holds = |text: &[u8]| header.windows(text.len()).any(|window| window == text);
     assert!(holds(b"steradian/partial") && holds(b"shards 1,3 of 3"));
 }
+
+/// Writes a file with another header, its checksum made right again.
+fn with_header(file: &Path, to: &Path, change: impl FnOnce(&mut serde_json::Value)) {
+    let bytes = std::fs::read(file).unwrap();
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let mut header = serde_json::from_slice(&bytes[16..16 + length]).unwrap();
+    change(&mut header);
+    let header = header.to_string();
+    let mut out = [&bytes[..12], &(header.len() as u32).to_le_bytes(), header.as_bytes(), &bytes[16 + length..bytes.len() - 32]].concat();
+    out.extend(blake3::hash(&out).as_bytes());
+    std::fs::write(to, out).unwrap();
+}
+
+#[test]
+fn headers_that_make_no_sense_are_refused() {
+    use serde_json::json;
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("scene.json"), scene("box").to_string()).unwrap();
+    assert_code(&run(folder, "render scene.json -q --size 24x16 --spp 2 --shard 1/2 -o a.shard"), 0, "");
+    let huge = 4_000_000_000_u32;
+    let cases: [(&str, serde_json::Value, &str); 9] = [
+        ("/shard/count", json!(0), "there is no shard 1 of 0"),
+        ("/shard/index", json!(0), "there is no shard 0 of 2"),
+        ("/shard/index", json!(3), "there is no shard 3 of 2"),
+        ("/film/layers/0", json!("beauté\u{1b}"), "there is no layer"),
+        ("/film/crop", json!([1, 0, huge, 16]), "not within"),
+        ("/film/crop", json!([0, 0, 0, 0]), "a.shard"),
+        ("/film/size", json!([0, 0]), "not within"),
+        ("/overscan", json!(12), "not within"),
+        ("/done", json!(huge), "samples per pixel are done"),
+    ];
+    for (place, value, part) in cases {
+        with_header(&folder.join("a.shard"), &folder.join("altered_a.shard"), |header| *header.pointer_mut(place).unwrap() = value.clone());
+        let output = run(folder, "merge altered_a.shard --partial -o a.exr");
+        assert_code(&output, 6, part);
+        assert!(!String::from_utf8_lossy(&output.stderr).contains("\u{1b}") && !folder.join("a.exr").exists(), "{place}");
+    }
+    with_header(&folder.join("a.shard"), &folder.join("large.shard"), |header| {
+        header["film"]["size"] = json!([huge, huge]);
+        header["film"]["crop"] = json!([0, 0, huge, huge]);
+    });
+    assert_code(&run(folder, "merge large.shard --partial -o a.exr"), 6, "a part is missing");
+    // A name out of the shard does not leave the folder.
+    with_header(&folder.join("a.shard"), &folder.join("outside.shard"), |header| header["outputs"][0]["file"] = json!("../out.exr"));
+    assert_code(&run(folder, "merge outside.shard --partial"), 2, "-o");
+    assert_code(&run(folder, "merge outside.shard --partial -o a.exr"), 0, "wrote a.exr");
+}

@@ -35,6 +35,8 @@ mod determinism;
 mod exr_files;
 /// Jobs for farms: their scripts with stand-ins for Slurm and the render.
 mod farm;
+/// What is read and written that is no regular file, killed writers, and limits of the process.
+mod files;
 /// Known flaws of renderers in camera and film: each test fails on the flawed formula.
 mod flaws_of_camera;
 /// Known flaws of renderers in glass and in round shapes: each test fails on the flawed formula.
@@ -76,6 +78,8 @@ mod materials;
 mod media;
 /// What moves while the shutter is open: the same for every accelerator, and as if it stood still at each time.
 mod motion;
+/// Names of strangers: in messages, scripts and files, and where they would lead.
+mod names;
 /// Leaves cut out by images, for what the camera sees and for shadows.
 mod opacity;
 /// Our accelerators against the oracle: the same answers bit for bit, on anything, with bounded work.

@@ -9,9 +9,10 @@ there were so many kills. Reported are
 * lost: kills whose checkpoint was older than one interval (and the time of the start, if there was none in this run);
 * wrong: renders whose last state differs in any bit from that of a render that nobody killed (the blocks of the file: every sum, count and
   list of the film), or whose EXR has another pixel;
-* unreadable: checkpoints that were refused after a kill.
+* unreadable: checkpoints that were refused after a kill;
+* left: files on their way to a checkpoint or picture that a killed process left behind.
 
-All three are to be 0. Further OPTIONs go to every render.
+All four are to be 0 (the last where the file system has files without names). Further OPTIONs go to every render.
 """
 
 import argparse
@@ -57,7 +58,7 @@ def main():
         whole_seconds = time.monotonic() - start
         whole = state(f"{folder}/whole.state")
         # How long it takes until samples come: a kill before that loses nothing.
-        kills = lost = wrong = unreadable = renders = 0
+        kills = lost = wrong = unreadable = renders = left = 0
         oldest = 0.0
         while kills < arguments.kills:
             for name in ("a.state", "a.exr"):
@@ -74,6 +75,7 @@ def main():
                     process.send_signal(signal.SIGKILL)
                     process.wait()
                     kills += 1
+                    left += sum(name.startswith(".steradian-") for name in os.listdir(folder))
                     there = os.path.exists(f"{folder}/a.state")
                     safe = max(began, os.stat(f"{folder}/a.state").st_mtime) if there else began
                     oldest = max(oldest, killed - safe)
@@ -93,8 +95,7 @@ def main():
             wrong += blocks != whole[1] or header["done"] != whole[0]["done"] or json.loads(same.stdout)["mse"] != 0.0
             if unreadable:
                 break
-        # Pictures that were being written at the kill leave files of other names.
-        left = sorted(name for name in os.listdir(folder) if name.startswith(".a.state"))
+        left += sum(name.startswith(".") for name in os.listdir(folder))
     print(f"{kills} kills in {renders} renders (of {whole_seconds:.1f} s alone), a checkpoint each {arguments.every} s of {len(whole[1]) / 1e6:.1f} MB")
     print(f"lost beyond one interval: {lost} (oldest checkpoint {oldest:.3f} s); wrong bits: {wrong}; unreadable: {unreadable}; files left: {left}")
     sys.exit(1 if lost or wrong or unreadable or left else 0)

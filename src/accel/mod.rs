@@ -11,7 +11,7 @@ mod tree;
 
 pub use bvh::BvhOptions;
 pub(crate) use embree::Registered;
-pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality, EmbreeReplay};
+pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality, EmbreeReplay, on_uncaught_exception};
 pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};
 pub use linear::LinearAccel;

@@ -11,6 +11,9 @@ use crate::import::{AssetError, read_ies, read_rgb_image};
 use crate::light::{DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, SpotLight};
 use crate::math::{DAffine3, DMat3, DVec3, RenderSpace};
 
+/// The most letters of a group's name: names of channels have at most 255 in OpenEXR, of which `light_` and the channel take some.
+const MOST_LETTERS: usize = 240;
+
 /// All lights so far, with their groups.
 #[derive(Default)]
 pub struct LightTable {
@@ -26,6 +29,10 @@ impl LightTable {
         let Some(name) = name.filter(|name| *name != LightGroups::OF_THE_REST) else { return Ok(None) };
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             let message = format!("\"{name}\" must be made of letters, digits and underscores: it becomes the name of a layer");
+            return Err(files.error(&format!("{path}.group"), message));
+        }
+        if name.len() > MOST_LETTERS {
+            let message = format!("\"{:.20}...\" has {} letters: at most {MOST_LETTERS} make the name of a layer", name, name.len());
             return Err(files.error(&format!("{path}.group"), message));
         }
         let index = self.names.iter().position(|known| known == name).unwrap_or_else(|| {

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Originals, folder_of, write_ply};
 use crate::error::{Error, Result};
+use crate::file::{self, write_atomically};
 use crate::import::{Assets, ImageData, Imported, RgbImage, Samples};
-use crate::output::write_atomically;
 
 /// Brings files to the folder beside a scene.
 pub struct Files<'a> {
@@ -109,7 +109,14 @@ impl<'a> Files<'a> {
         if place.canonicalize().is_ok_and(|place| original.canonicalize().is_ok_and(|original| original == place)) {
             return Ok(());
         }
-        let mut reader = fs::File::open(original).map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
+        let mut reader = file::open(original).map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
+        let mut start = Vec::new();
+        Read::by_ref(&mut reader)
+            .take(START)
+            .read_to_end(&mut start)
+            .map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
+        check_kind(original, &start)?;
+        let mut reader = Cursor::new(start).chain(reader);
         write_atomically(&place, |out| std::io::copy(&mut reader, out).map(drop).map_err(|e| e.to_string()))?;
         self.count += 1;
         Ok(())
@@ -127,6 +134,8 @@ impl<'a> Files<'a> {
         })?;
         let mut images = Vec::new();
         for (mtl, name) in libraries.iter().filter(|(mtl, _)| mtl.is_file()) {
+            let start = file::read(mtl).map_err(|e| Error::Missing { file: mtl.clone(), message: e.to_string() })?;
+            check_kind(&mtl.with_extension("mtl"), &start).map_err(|_| not_a(mtl, "MTL"))?;
             self.copy_text(mtl, &format!("{folder}/{name}"), |key, rest| {
                 let is_map = key.starts_with("map_") || ["norm", "bump", "disp", "decal"].contains(&key);
                 // Options stand before the name of the file.
@@ -146,7 +155,7 @@ impl<'a> Files<'a> {
 
     /// Copies a text; `change` gives what stands behind a line's first word in place of what does, if that changes.
     fn copy_text(&mut self, original: &Path, new: &str, mut change: impl FnMut(&str, &str) -> Option<String>) -> Result<()> {
-        let bytes = fs::read(original).map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
+        let bytes = file::read(original).map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
         let mut copy = Vec::with_capacity(bytes.len());
         for line in bytes.split_inclusive(|&byte| byte == b'\n') {
             let changed = std::str::from_utf8(line).ok().and_then(|line| {
@@ -184,6 +193,37 @@ impl<'a> Files<'a> {
         let up = from.components().skip(common).map(|_| Path::new(".."));
         let path: PathBuf = up.chain(real.components().skip(common).map(|c| Path::new(c.as_os_str()))).collect();
         path.to_string_lossy().into_owned()
+    }
+}
+
+/// As much of a file as tells its kind, in bytes.
+const START: u64 = 1 << 16;
+
+/// Refuses to copy what is not what its name says: a scene of a stranger could name any file, and who gets the copy would have it.
+fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
+    let kind = path.extension().map(|e| e.to_string_lossy().to_uppercase()).unwrap_or_default();
+    let has_line = |word: &str| start.split(|byte| *byte == b'\n').any(|line| line.trim_ascii_start().starts_with(word.as_bytes()));
+    let is_image = || image::guess_format(start).is_ok();
+    let is_so = match kind.as_str() {
+        "OBJ" => ["v ", "v\t", "mtllib ", "o ", "g "].iter().any(|word| has_line(word)),
+        "MTL" => has_line("newmtl"),
+        "PLY" => start.starts_with(b"ply"),
+        "IES" => has_line("TILT=") || has_line("IESNA"),
+        "PFM" => start.starts_with(b"PF") || start.starts_with(b"Pf"),
+        "SERIALIZED" => start.starts_with(&[0x1c, 0x04]),
+        // These have no mark, but a kind of image and a depth from a short list.
+        "TGA" => {
+            is_image() || matches!(start, [_, 0 | 1, 1..=3 | 9..=11, _, _, _, _, _, _, _, _, _, _, _, _, _, 8 | 15 | 16 | 24 | 32, ..])
+        }
+        _ => is_image(),
+    };
+    if is_so { Ok(()) } else { Err(not_a(path, if kind.is_empty() { "image" } else { &kind })) }
+}
+
+fn not_a(path: &Path, kind: &str) -> Error {
+    Error::Malformed {
+        file: path.to_owned(),
+        message: format!("this is no {kind} file, and is not copied (--link names the files where they are)"),
     }
 }
 
@@ -255,7 +295,7 @@ fn write_exr(width: usize, height: usize, planes: Vec<(&str, Vec<f32>)>, out: &m
     let channels = planes.into_iter().map(|(name, samples)| AnyChannel::new(name, FlatSamples::F32(samples))).collect();
     let image = Image::from_channels((width, height), AnyChannels::sort(channels));
     // The writer goes back to fill in tables of offsets, so the file is made in memory first.
-    let mut buffer = std::io::Cursor::new(Vec::new());
+    let mut buffer = Cursor::new(Vec::new());
     image.write().to_buffered(&mut buffer).map_err(|e| e.to_string())?;
     out.write_all(buffer.get_ref()).map_err(|e| e.to_string())
 }

@@ -1,5 +1,6 @@
 //! Denoising of EXR files, anyone's: everything that is not denoised stays as it is.
 
+use std::io::Write;
 use std::path::Path;
 
 use ::exr::meta::attribute::{AttributeValue, Text};
@@ -10,9 +11,10 @@ use super::oidn::Triple;
 use super::prepared::Prepared;
 use super::{Denoiser, Report};
 use crate::error::{Error, Result};
-use crate::exr_headers::read_headers;
+use crate::file::exr_headers::read_headers;
+use crate::file::{self, write_atomically};
 use crate::film::{LayerKind, Source};
-use crate::output::write_atomically;
+use crate::output::finish_headers;
 
 /// Names of layers that hold albedo, in lower case, the best first: ours, then those of Blender, pbrt, Mitsuba.
 const ALBEDO: [&str; 4] = ["feature_albedo", "denoising albedo", "albedo", "diffuse_albedo"];
@@ -45,14 +47,17 @@ pub struct FileOptions {
 /// [`Error::Missing`] if the file cannot be read; [`Error::Malformed`] if it has no colour or not the layers named, is denoised already, or
 /// cannot be kept whole (deep data); [`Error::Output`] if `output` cannot be written; [`Error::OutOfMemory`].
 pub fn denoise_file(denoiser: &Denoiser, input: &Path, output: &Path, options: &FileOptions) -> Result<Report> {
-    std::fs::File::open(input).map_err(|e| Error::Missing { file: input.to_owned(), message: e.to_string() })?;
+    let source = file::open(input).map_err(|e| Error::Missing { file: input.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: input.to_owned(), message };
     read_headers(input).map_err(malformed)?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    let mut file: FlatImage = reader.from_file(input).map_err(|e| malformed(e.to_string()))?;
+    let mut file: FlatImage = reader.from_unbuffered(source).map_err(|e| malformed(e.to_string()))?;
     let plan = Plan::new(&file, options).map_err(malformed)?;
     let report = plan.run(denoiser, &mut file)?;
-    write_atomically(output, |out| file.write().to_buffered(out).map_err(|e| e.to_string()))?;
+    write_atomically(output, |out| {
+        file.write().to_buffered(&mut *out).map_err(|e| e.to_string())?;
+        out.flush().and_then(|()| finish_headers(out.get_mut())).map_err(|e| e.to_string())
+    })?;
     Ok(report)
 }
 

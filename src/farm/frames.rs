@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use crate::error::{Error, Result};
+
 /// The most frames of a sequence.
 const MOST_FRAMES: u64 = 1_000_000;
 
@@ -50,7 +52,7 @@ impl FromStr for FrameList {
     type Err = String;
 
     /// Reads `7`, `1-100`, `1-100x5` (every fifth), `10-1` (backwards) or several of these with commas between them.
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let mut numbers = Vec::new();
         let mut seen = std::collections::HashSet::new();
         for part in text.split(',') {
@@ -88,13 +90,16 @@ struct Pattern {
     digits: usize,
 }
 
-/// The first of `####` (a digit for each), `%d` and `%04d` in `text`.
+/// The first of `####` (a digit for each), `%d` and `%04d` in `text`. In names of folders, a single `#` is a character like any other.
 fn find_pattern(text: &str) -> Option<Pattern> {
     let bytes = text.as_bytes();
     for start in 0..bytes.len() {
         let run = |from: usize, wanted: fn(&u8) -> bool| bytes[from..].iter().take_while(|b| wanted(b)).count();
         if bytes[start] == b'#' {
             let digits = run(start, |b| *b == b'#');
+            if digits == 1 && bytes[start..].contains(&b'/') {
+                continue;
+            }
             return Some(Pattern { start, end: start + digits, digits });
         }
         if bytes[start] == b'%' {
@@ -113,6 +118,22 @@ fn find_pattern(text: &str) -> Option<Pattern> {
 /// Whether a name has a place for a frame's number: `####`, with one digit for each `#`, or `%04d`.
 pub fn has_frame_pattern(name: &str) -> bool {
     find_pattern(name).is_some()
+}
+
+/// Checks the name of a file that is written without frames: one with a place for a frame's number is most likely a slip.
+///
+/// # Errors
+/// [`Error::Usage`] if it has one. A single `#` is a character like any other.
+pub fn check_single_name(name: &str) -> Result<()> {
+    match find_pattern(name).filter(|pattern| !(pattern.digits == 1 && name[pattern.start..].starts_with('#'))) {
+        Some(pattern) => {
+            let place = &name[pattern.start..pattern.end];
+            Err(Error::Usage(format!(
+                "{name}: {place} is the place of a frame's number, but there is no --frames; give that, or another name"
+            )))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The name with a place for the frame's number: its own, or `.####` before the extension.
@@ -196,6 +217,8 @@ mod tests {
             ("a_%d.exr", "a_7.exr"),
             ("####/a.##.exr", "0007/a.07.exr"),
             ("100%.exr", "100%.exr"),
+            ("shot#3/a.####.exr", "shot#3/a.0007.exr"),
+            ("shot#3/a.exr", "shot#3/a.exr"),
             ("%4d", "%4d"),
             ("a.exr", "a.exr"),
         ] {
@@ -207,10 +230,21 @@ mod tests {
     }
 
     #[test]
+    fn places_for_numbers_need_frames() {
+        for name in ["a.####.exr", "a##.exr", "a.%04d.exr", "####/a.exr"] {
+            assert!(matches!(check_single_name(name), Err(Error::Usage(message)) if message.contains("--frames")), "{name}");
+        }
+        for name in ["a.exr", "a#1.exr", "shot#3/a.exr", "100%.exr"] {
+            check_single_name(name).unwrap();
+        }
+    }
+
+    #[test]
     fn names_without_a_pattern_get_one() {
         for (name, with) in [
             ("a.exr", "a.####.exr"),
             ("b.c/a", "b.c/a.####"),
+            ("b#2/a.exr", "b#2/a.####.exr"),
             ("b.c/a.b.png", "b.c/a.b.####.png"),
             ("a.%03d.exr", "a.%03d.exr"),
             (".exr", ".exr.####"),

@@ -19,7 +19,8 @@ pub fn openjd_template(job: &Job) -> Value {
         text("Program", &job.program.to_string_lossy(), "The program steradian"),
         json!({ "name": "Shards", "type": "INT", "default": job.shards, "minValue": 1, "description": "Into how many shards a picture is split" }),
     ];
-    let output = |(i, output): (usize, &PathBuf)| text(&format!("Output{}", i + 1), &output.to_string_lossy(), "A picture to write");
+    let outputs: Vec<String> = (1..=job.outputs.len()).map(|i| format!("Output{i}")).collect();
+    let output = |(i, output): (usize, &PathBuf)| text(&outputs[i], &output.to_string_lossy(), "A picture to write");
     parameters.extend(job.outputs.iter().enumerate().map(output));
     let mut space = vec![json!({ "name": "Shard", "type": "INT", "range": "1-{{Param.Shards}}" })];
     let frames = job.frames.as_ref().map(|frames| {
@@ -31,7 +32,7 @@ pub fn openjd_template(job: &Job) -> Value {
     let mut merge = json!({
         "name": "Merge",
         "dependencies": [{ "dependsOn": "Render" }],
-        "script": script(&merge_script(job)),
+        "script": script(&merge_script(job), &outputs),
     });
     if let Some(space) = merge_space {
         merge["parameterSpace"] = space;
@@ -41,45 +42,56 @@ pub fn openjd_template(job: &Job) -> Value {
         "name": job.name,
         "parameterDefinitions": parameters,
         "steps": [
-            { "name": "Render", "parameterSpace": { "taskParameterDefinitions": space }, "script": script(&render_script(job)) },
+            { "name": "Render", "parameterSpace": { "taskParameterDefinitions": space }, "script": script(&render_script(job), &[]) },
             merge,
         ],
     })
 }
 
-/// An action that runs a text with bash.
-fn script(text: &str) -> Value {
+/// An action that runs a text with bash. Numbers are filled in, but strings come as arguments, so that nothing in them is a command: program,
+/// scene, folder of the work, and `further`.
+fn script(text: &str, further: &[String]) -> Value {
+    let strings = ["Program", "Scene", "Work"].into_iter().chain(further.iter().map(String::as_str));
+    let args: Vec<String> =
+        std::iter::once("{{Task.File.Run}}".to_owned()).chain(strings.map(|name| format!("{{{{Param.{name}}}}}"))).collect();
     json!({
         "embeddedFiles": [{ "name": "Run", "type": "TEXT", "filename": "run.sh", "data": text }],
         "actions": {
             "onRun": {
                 "command": "bash",
-                "args": ["{{Task.File.Run}}"],
+                "args": args,
                 "cancelation": { "mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": 120 },
             },
         },
     })
 }
 
+/// What a script begins with.
+const HEAD: &str = "set -eu\nprogram=$1 scene=$2 work=$3\nshift 3\n";
+
 /// Names of a shard's files, without their extension, and of the option that names the frame.
 fn place(job: &Job, frame: &str) -> String {
     let frame = if job.frames.is_some() { frame } else { "" };
-    format!("\"{{{{Param.Work}}}}/shards/{frame}\"")
+    format!("\"$work/shards/{frame}\"")
 }
 
 const FRAME: &str = "frame{{Task.Param.Frame}}.";
 
+/// An option as the shell reads it back, without two braces next to each other, which would be the template's.
+fn quote_option(option: &String) -> String {
+    quote(option).replace('{', "{''")
+}
+
 fn render_script(job: &Job) -> String {
-    let options: Vec<String> = job.options.iter().map(|option| quote(option)).collect();
+    let options: Vec<String> = job.options.iter().map(quote_option).collect();
     let frames = if job.frames.is_some() { " --frames={{Task.Param.Frame}}" } else { "" };
     let (name, pattern) = (place(job, FRAME), place(job, "frame#."));
     let part = "{{Task.Param.Shard}}-of-{{Param.Shards}}";
     [
-        "set -eu".to_owned(),
-        format!("part={name}{part}"),
-        "mkdir -p \"{{Param.Work}}/shards\"".to_owned(),
+        format!("{HEAD}part={name}{part}"),
+        "mkdir -p \"$work/shards\"".to_owned(),
         "[ ! -e \"$part.shard\" ] || exit 0".to_owned(),
-        format!("exec \"{{{{Param.Program}}}}\" render \"{{{{Param.Scene}}}}\"{frames} {} \\", options.join(" ")),
+        format!("exec \"$program\" render \"$scene\"{frames} {} \\", options.join(" ")),
         format!("    --shard {{{{Task.Param.Shard}}}}/{{{{Param.Shards}}}} -o {pattern}{part}.shard \\"),
         format!("    --checkpoint {pattern}{part}.checkpoint --every {} --resume --progress openjd\n", job.every),
     ]
@@ -87,7 +99,6 @@ fn render_script(job: &Job) -> String {
 }
 
 fn merge_script(job: &Job) -> String {
-    let outputs: Vec<String> = (1..=job.outputs.len()).map(|i| format!("\"{{{{Param.Output{i}}}}}\"")).collect();
     let name = place(job, FRAME);
     let fill = if job.frames.is_some() {
         // `####` and `%04d` become the number.
@@ -97,9 +108,8 @@ fn merge_script(job: &Job) -> String {
         ""
     };
     format!(
-        "set -eu\nparts=()\nfor ((i = 1; i <= {{{{Param.Shards}}}}; i++)); do parts+=({name}$i-of-{{{{Param.Shards}}}}.shard); done\n\
-         outputs=()\nfor output in {}; do\n{fill}    outputs+=(-o \"$output\")\ndone\n\
-         \"{{{{Param.Program}}}}\" merge \"${{parts[@]}}\" \"${{outputs[@]}}\"\nrm -f \"${{parts[@]}}\" {name}*.checkpoint\n",
-        outputs.join(" ")
+        "{HEAD}parts=()\nfor ((i = 1; i <= {{{{Param.Shards}}}}; i++)); do parts+=({name}$i-of-{{{{Param.Shards}}}}.shard); done\n\
+         outputs=()\nfor output in \"$@\"; do\n{fill}    outputs+=(-o \"$output\")\ndone\n\
+         \"$program\" merge \"${{parts[@]}}\" \"${{outputs[@]}}\"\nrm -f \"${{parts[@]}}\" {name}*.checkpoint\n"
     )
 }

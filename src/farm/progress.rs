@@ -2,6 +2,8 @@
 
 use serde_json::{Value, json};
 
+use crate::printable;
+
 /// Where a render stands.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Status {
@@ -63,6 +65,30 @@ impl Format {
     }
 }
 
+/// What farms look for in a program's output, anywhere in a line.
+const MARKERS: [&str; 8] = ["openjd_", "Progress:", "PROGRESS:", "ALF_PROGRESS", "FRAME:", "ACTIVITY:", "[ PARSER", "Error:"];
+
+/// A message on one line in which no farm finds one of its own words, whatever names are in it: the word's first letter is written as JSON
+/// writes odd characters.
+pub fn message_line(text: &str) -> String {
+    without_markers(printable::line(text))
+}
+
+/// A text of several lines in which no farm finds one of its own words.
+pub fn message_lines(text: &str) -> String {
+    without_markers(printable::lines(text))
+}
+
+fn without_markers(mut text: String) -> String {
+    for marker in MARKERS {
+        if text.contains(marker) {
+            let first = marker.as_bytes()[0];
+            text = text.replace(marker, &format!("\\u{first:04x}{}", &marker[1..]));
+        }
+    }
+    text
+}
+
 /// Whole percent, rounded down: 100 only of what is complete.
 fn percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0) as u32
@@ -105,7 +131,7 @@ fn openjd(event: &Event) -> Vec<String> {
         Event::Begin(None) => "openjd_status: rendering".to_owned(),
         Event::Begin(Some(frame)) => format!("openjd_status: rendering frame {frame}"),
         Event::Progress(status) => format!("openjd_progress: {:.1}", tenths(status.fraction)),
-        Event::Failure(message) => format!("openjd_fail: {message}"),
+        Event::Failure(message) => format!("openjd_fail: {}", message_line(message)),
         Event::Warning(_) | Event::Success => return Vec::new(),
     }]
 }
@@ -118,7 +144,7 @@ fn alf(event: &Event) -> Vec<String> {
 fn deadline(event: &Event) -> Vec<String> {
     match event {
         Event::Progress(status) => vec![format!("Progress: {}%", percent(status.fraction))],
-        Event::Failure(message) => vec![format!("Error: {message}")],
+        Event::Failure(message) => vec![format!("Error: {}", message_line(message))],
         _ => Vec::new(),
     }
 }
@@ -131,8 +157,8 @@ fn afanasy(event: &Event) -> Vec<String> {
             vec![format!("FRAME: {frame}"), "PROGRESS: 0%".to_owned(), format!("ACTIVITY: rendering frame {frame}")]
         }
         Event::Progress(status) => vec![format!("PROGRESS: {}%", percent(status.frame_fraction))],
-        Event::Warning(message) => vec![format!("[ PARSER WARNING ] {message}")],
-        Event::Failure(message) => vec![format!("[ PARSER ERROR ] {message}")],
+        Event::Warning(message) => vec![format!("[ PARSER WARNING ] {}", message_line(message))],
+        Event::Failure(message) => vec![format!("[ PARSER ERROR ] {}", message_line(message))],
         Event::Success => vec!["[ PARSER FINISHED SUCCESS ]".to_owned()],
     }
 }
@@ -199,6 +225,25 @@ mod tests {
             assert_eq!(lines(name, &Event::Progress(&status(0.999_999))), [nearly]);
             assert_eq!(lines(name, &Event::Progress(&status(1.0))), [done]);
         }
+    }
+
+    #[test]
+    fn names_in_messages_are_no_words_of_farms() {
+        for marker in MARKERS {
+            let message = format!("a.json: no material \"x\n{marker}env: LD_PRELOAD=/x\" Progress: 100%");
+            for format in &FORMATS {
+                for event in [Event::Warning(&message), Event::Failure(&message)] {
+                    for line in (format.lines)(&event) {
+                        assert!(!line.contains(['\n', '\x1b']), "{line}");
+                        let rest = &line[line.len().min(20)..];
+                        assert!(MARKERS.iter().all(|marker| !rest.contains(marker)), "{}: {line}", format.name);
+                    }
+                }
+            }
+        }
+        assert_eq!(message_line("openjd_env: a\nProgress: 1%"), "\\u006fpenjd_env: a\\n\\u0050rogress: 1%");
+        assert_eq!(message_lines("a\nFRAME: 7"), "a\n\\u0046RAME: 7");
+        assert_eq!(message_line("plain words: Frame 7"), "plain words: Frame 7");
     }
 
     #[test]

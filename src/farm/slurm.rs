@@ -1,6 +1,8 @@
 //! Job scripts for Slurm.
 
 use super::job::{Job, quote, quote_path};
+use crate::error::{Error, Result};
+use crate::printable;
 
 /// What Slurm is asked for.
 #[derive(Clone, Debug, Default)]
@@ -27,8 +29,14 @@ pub type Script = (&'static str, String);
 ///
 /// A task whose node is lost, which is preempted or reaches its time limit is queued again and goes on from its checkpoint; one that fails
 /// by itself is rendered again some times, unless its exit code says that this is of no use.
-pub fn slurm_scripts(job: &Job, options: &SlurmOptions) -> [Script; 3] {
-    let log = |kind: &str| quote_path(&job.folder.join("log").join(kind));
+///
+/// # Errors
+/// [`Error::Usage`] if what stands in a directive for `sbatch`, which is a comment of the shell, has a control character such as a line break.
+pub fn slurm_scripts(job: &Job, options: &SlurmOptions) -> Result<[Script; 3]> {
+    check_directives(job, options)?;
+    // In names of logs, `%` begins a pattern.
+    let folder = job.folder.to_string_lossy().replace('%', "%%");
+    let log = |kind: &str| quote(&format!("{folder}/log/{kind}"));
     let words = |words: &[String]| words.iter().map(|word| quote(word)).collect::<Vec<_>>().join(" ");
     let render = [
         ("SBATCH", sbatch(options, true)),
@@ -40,11 +48,25 @@ pub fn slurm_scripts(job: &Job, options: &SlurmOptions) -> [Script; 3] {
     let merge = [("SBATCH", sbatch(options, false)), ("LOG", log("%x-%j.log"))];
     let overwrite = if job.overwrite { "1" } else { "" };
     let submit = [("SUBMIT", calls(job)), ("SUMMARY", summary(job)), ("OVERWRITE", overwrite.to_owned())];
-    [
+    Ok([
         ("render.sh", fill(include_str!("slurm/render.sh"), job, &render)),
         ("merge.sh", fill(include_str!("slurm/merge.sh"), job, &merge)),
         ("submit.sh", fill(include_str!("slurm/submit.sh"), job, &submit)),
-    ]
+    ])
+}
+
+/// A line break would end the comment, and what follows would be a command.
+fn check_directives(job: &Job, options: &SlurmOptions) -> Result<()> {
+    let folder = job.folder.to_string_lossy();
+    let named = [("the job's name", Some(&*job.name)), ("--dir", Some(&*folder))];
+    let optional = [("--partition", &options.partition), ("--time", &options.time), ("--mem", &options.memory)];
+    let optional = optional.into_iter().map(|(what, text)| (what, text.as_deref()));
+    let further = options.further.iter().map(|text| ("--sbatch", Some(text.as_str())));
+    let odd = |text: &&str| printable::line(text) != **text;
+    match named.into_iter().chain(optional).chain(further).find_map(|(what, text)| Some((what, text.filter(odd)?))) {
+        Some((what, text)) => Err(Error::Usage(format!("{what}: {text:?} has characters that cannot stand in a job script"))),
+        None => Ok(()),
+    }
 }
 
 /// The script with every `@NAME@` replaced, in one pass, so that nothing within a value is taken for a name.
@@ -104,7 +126,7 @@ fn calls(job: &Job) -> String {
 /// What the job is, for the eye.
 fn summary(job: &Job) -> String {
     let frames = job.frames.as_ref().map_or(String::new(), |frames| format!(", frames {}", frames.ranges('x')));
-    format!("{}: {} shards{frames}", job.name.replace('\n', " "), job.shards)
+    format!("{}: {} shards{frames}", printable::line(&job.name), job.shards)
 }
 
 #[cfg(test)]
@@ -136,7 +158,7 @@ mod tests {
             further: vec!["--account=show".to_owned()],
             retries: 2,
         };
-        let [(_, render), (_, merge), (_, submit)] = slurm_scripts(&job(), &options);
+        let [(_, render), (_, merge), (_, submit)] = slurm_scripts(&job(), &options).unwrap();
         for line in [
             "#SBATCH --partition=farm",
             "#SBATCH --time=2:00:00",
@@ -168,9 +190,28 @@ mod tests {
     }
 
     #[test]
+    fn nothing_ends_the_comment_of_a_directive() {
+        let strange = "a\ntouch /tmp/x";
+        let refused = |job: &Job, options: &SlurmOptions| match slurm_scripts(job, options) {
+            Err(Error::Usage(message)) => message,
+            other => panic!("{other:?}"),
+        };
+        let none = SlurmOptions::default();
+        let some = || Some(strange.to_owned());
+        assert!(refused(&Job { name: strange.into(), ..job() }, &none).contains("the job's name"));
+        assert!(refused(&Job { folder: strange.into(), ..job() }, &none).contains("--dir"));
+        assert!(refused(&job(), &SlurmOptions { partition: some(), ..none.clone() }).contains("--partition"));
+        assert!(refused(&job(), &SlurmOptions { time: some(), ..none.clone() }).contains("--time"));
+        assert!(refused(&job(), &SlurmOptions { memory: some(), ..none.clone() }).contains("--mem"));
+        assert!(refused(&job(), &SlurmOptions { further: vec![strange.to_owned()], ..none.clone() }).contains("--sbatch"));
+        let percent = Job { folder: "/a%j".into(), ..job() };
+        assert!(slurm_scripts(&percent, &none).unwrap()[0].1.contains("#SBATCH --output=/a%%j/log/%x-%A_%a.log\n"));
+    }
+
+    #[test]
     fn values_are_not_searched_for_names() {
         let strange = Job { scene: "/a@SHARDS@b.json".into(), frames: None, overwrite: true, ..job() };
-        let [(_, render), _, (_, submit)] = slurm_scripts(&strange, &SlurmOptions::default());
+        let [(_, render), _, (_, submit)] = slurm_scripts(&strange, &SlurmOptions::default()).unwrap();
         assert!(render.contains("scene=/a@SHARDS@b.json"));
         assert!(submit.contains("submit '' '/show/room.####.exr'") && submit.contains("overwrite=1"), "{submit}");
     }

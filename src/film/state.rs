@@ -49,7 +49,7 @@ impl FilmTile {
         self.surfaces = data.floats().filter(|list| list.len() == self.surfaces.len())?;
         self.hits = data.integers().filter(|list| list.len() == self.hits.len())?;
         if let Some(coverage) = &mut self.coverage {
-            *coverage = data.coverage(pixels)?;
+            *coverage = data.coverage(&self.samples)?;
         }
         let spreads = self.spread.len();
         let groups = data.integers().filter(|list| list.len() == spreads)?;
@@ -140,13 +140,17 @@ impl<'a> In<'a> {
         Some(self.list()?.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect())
     }
 
-    fn coverage(&mut self, pixels: usize) -> Option<CoverageCounts> {
+    fn coverage(&mut self, samples: &[u32]) -> Option<CoverageCounts> {
         let values = self.integers()?;
         let mut rest = values.as_slice();
-        let mut counts = CoverageCounts::new(pixels);
-        for pixel in 0..pixels {
+        let mut counts = CoverageCounts::new(samples.len());
+        for (pixel, &samples) in samples.iter().enumerate() {
             let (&length, behind) = rest.split_first()?;
             let (list, behind) = behind.split_at_checked((length as usize).checked_mul(3)?)?;
+            let total: u64 = list.as_chunks().0.iter().map(|&[_, _, count]| u64::from(count)).sum();
+            if total > u64::from(samples) {
+                return None;
+            }
             for &[instance, shape, count] in list.as_chunks().0 {
                 counts.add(pixel, ShapeKey { instance, shape }, count);
             }

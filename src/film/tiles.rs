@@ -218,8 +218,7 @@ pub fn bytes_per_pixel(layers: LayerSet, light_groups: usize) -> usize {
 fn check_memory(crop: &Crop, layers: FilmLayers) -> Result<()> {
     let each = bytes_per_pixel(layers.set, layers.parts.light_groups as usize);
     let bytes = usize::try_from(u128::from(crop.area()) * each as u128).unwrap_or(usize::MAX);
-    Vec::<u8>::new()
-        .try_reserve_exact(bytes)
+    crate::memory::fallible(|| Vec::<u8>::new().try_reserve_exact(bytes))
         .map_err(|_| Error::OutOfMemory(format!("a film of {}x{} pixels needs {} MiB", crop.width, crop.height, bytes >> 20)))
 }
 

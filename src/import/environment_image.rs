@@ -4,8 +4,10 @@ mod pfm;
 
 use std::path::Path;
 
+use exr::prelude::{ReadChannels, ReadLayers, Vec2};
+
 use super::AssetError;
-use crate::exr_headers::read_headers;
+use crate::file::exr_headers::read_headers;
 
 /// Pixels row by row from the top, linear RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +25,6 @@ pub struct RgbImage {
 /// # Errors
 /// If the file is missing, malformed, or of another kind.
 pub fn read_rgb_image(path: &Path) -> Result<RgbImage, AssetError> {
-    std::fs::File::open(path).map_err(|e| AssetError::missing(path, &e))?;
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("exr") => read_exr(path),
@@ -38,6 +39,8 @@ const MAX_PIXELS: u64 = 1 << 30;
 
 fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR file: {e}"));
+    let open = || crate::file::open(path).map_err(|e| AssetError::missing(path, &e));
+    open()?;
     // The size is believed only after a look: memory is asked for before any pixel is read.
     for header in &read_headers(path).map_err(|e| malformed(&e))? {
         let size = header.layer_size;
@@ -45,18 +48,20 @@ fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
             return Err(malformed(&format!("{} x {} pixels are too many", size.width(), size.height())));
         }
     }
-    let image = exr::prelude::read_first_rgba_layer_from_file(
-        path,
-        |size, _| RgbImage { width: size.width(), height: size.height(), pixels: vec![[0.0; 3]; size.area()] },
-        |image: &mut RgbImage, at, (r, g, b, _a): (f32, f32, f32, f32)| image.pixels[at.y() * image.width + at.x()] = [r, g, b],
+    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().rgba_channels(
+        |size: Vec2<usize>, _: &_| RgbImage { width: size.width(), height: size.height(), pixels: vec![[0.0; 3]; size.area()] },
+        |image: &mut RgbImage, at: Vec2<usize>, (r, g, b, _a): (f32, f32, f32, f32)| {
+            image.pixels[at.y() * image.width + at.x()] = [r, g, b]
+        },
     );
+    let image = reader.first_valid_layer().all_attributes().from_unbuffered(open()?);
     image.map(|image| image.layer_data.channel_data.pixels).map_err(|e| malformed(&e))
 }
 
 fn read_hdr(path: &Path) -> Result<RgbImage, AssetError> {
     let malformed = |e: image::ImageError| AssetError::Malformed(format!("not a readable HDR file: {e}"));
-    let reader = image::ImageReader::open(path).map_err(|e| AssetError::missing(path, &e))?;
-    let image = reader.decode().map_err(malformed)?.into_rgb32f();
+    let bytes = crate::file::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    let image = image::load_from_memory_with_format(&bytes, image::ImageFormat::Hdr).map_err(malformed)?.into_rgb32f();
     let (width, height) = (image.width() as usize, image.height() as usize);
     let pixels = image.into_raw().as_chunks::<3>().0.to_vec();
     Ok(RgbImage { width, height, pixels })

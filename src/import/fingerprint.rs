@@ -1,7 +1,6 @@
 //! What a scene is, in a few bytes: BLAKE3 hashes of its description and of every file and asset that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -93,13 +92,13 @@ fn file_hashes(folder: &Path, name: &str) -> Result<Vec<(String, String)>, Asset
 fn file_hash(path: &Path) -> Result<String, AssetError> {
     let missing = |e: std::io::Error| AssetError::missing(path, &e);
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(path).map_err(missing)?).map_err(missing)?;
+    hasher.update_reader(crate::file::open(path).map_err(missing)?).map_err(missing)?;
     Ok(hasher.finalize().to_hex().to_string())
 }
 
 /// The MTL files that an OBJ names and their images, as far as they exist.
 fn files_of_obj(path: &Path) -> Result<BTreeSet<PathBuf>, AssetError> {
-    let read = |path: &Path| std::fs::read(path).map_err(|e| AssetError::missing(path, &e));
+    let read = |path: &Path| crate::file::read(path).map_err(|e| AssetError::missing(path, &e));
     let obj = read(path)?;
     let mut files = BTreeSet::new();
     for line in obj.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii_start().starts_with(b"mtllib")) {

@@ -23,7 +23,7 @@ const MAX_VALUES: usize = 1 << 22;
 /// # Errors
 /// If the file is missing or malformed, with the line; or not of type C.
 pub fn read_ies(path: &Path) -> Result<IesData, AssetError> {
-    let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    let bytes = crate::file::read(path).map_err(|e| AssetError::missing(path, &e))?;
     // Old files name their makers in whatever encoding.
     parse(&String::from_utf8_lossy(&bytes)).map_err(AssetError::Malformed)
 }
@@ -76,6 +76,11 @@ fn parse(text: &str) -> Result<IesData, String> {
     let words = lines.flat_map(|(i, line)| line.split([' ', '\t', ',']).filter(|word| !word.is_empty()).map(move |word| (i, word)));
     let mut numbers = Numbers { words: words.collect::<Vec<_>>().into_iter() };
 
+    if tilt != "INCLUDE" && tilt != "NONE" {
+        return Err(format!(
+            "TILT={tilt}: data of the tilt cannot be read from a file of its own; give TILT=NONE, or TILT=INCLUDE and the data"
+        ));
+    }
     // How the lamp's output depends on the luminaire's tilt; at rest the factor is 1.
     if tilt == "INCLUDE" {
         numbers.next("the lamp's position (TILT)")?;
@@ -148,7 +153,7 @@ mod tests {
     fn tilt_tables_and_old_headers_are_passed_over() {
         let included = SMALL.replace("TILT=NONE", "TILT=INCLUDE\n1\n3\n0 45 90\n1.0 0.95 0.9");
         assert_eq!(parse(&included), parse(SMALL));
-        let old = SMALL.replace("IESNA:LM-63-2002\n", "").replace("TILT=NONE", "tilt=lamp.tlt");
+        let old = SMALL.replace("IESNA:LM-63-2002\n", "").replace("TILT=NONE", "tilt=none");
         assert_eq!(parse(&old), parse(SMALL));
     }
 
@@ -156,6 +161,7 @@ mod tests {
     fn what_is_wrong_is_named_with_its_line() {
         for (from, to, words) in [
             ("TILT=NONE\n", "", "no line with TILT="),
+            ("TILT=NONE\n", "TILT=lamp.tlt\n", "TILT=LAMP.TLT: data of the tilt cannot be read from a file of its own"),
             ("1 1000 2.0", "1 1000 two", "line 5: the candela multiplier should be a number, not \"two\""),
             ("1 1000 2.0", "1 1000 0", "line 5: the candela multiplier must be above 0"),
             ("2.0 3 2 1", "2.0 1 2 1", "line 5: the number of vertical angles"),

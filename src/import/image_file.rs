@@ -8,7 +8,7 @@ use image::{DynamicImage, ImageFormat, ImageReader};
 
 use super::AssetError;
 use super::jpeg_check::is_whole_jpeg;
-use crate::exr_headers::check_claims;
+use crate::file::exr_headers::check_claims;
 
 /// An image as a file has it, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,7 +51,7 @@ pub(super) const MAX_PIXELS: u64 = 1 << 28;
 /// # Errors
 /// If the file is missing, malformed, cut short, of another kind, or has more than 2^28 pixels or none.
 pub fn read_image(path: &Path) -> Result<ImageData, AssetError> {
-    let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    let bytes = crate::file::read(path).map_err(|e| AssetError::missing(path, &e))?;
     read_bytes(&bytes, path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tga")))
 }
 

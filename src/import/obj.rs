@@ -9,6 +9,7 @@ use super::foreign::linear;
 use super::mtl_maps::{ObjMaps, take_maps};
 use super::obj_check::{check_obj, expand_colors};
 use super::{AssetError, MeshData};
+use crate::file;
 
 /// What an MTL says of a material that is used here.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,7 +50,7 @@ pub struct ObjMesh {
 /// If a file is missing or malformed, a face refers to what does not exist, or there are neither vertices nor faces.
 pub fn read_obj(path: &Path, materials: bool) -> Result<Vec<ObjMesh>, AssetError> {
     // Comments and names in old files may be in any encoding.
-    let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    let bytes = file::without_mark(file::read(path).map_err(|e| AssetError::missing(path, &e))?);
     let text = String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned());
     let used = check_obj(&text)?;
     // The parser takes lines of three and more points for faces.
@@ -150,7 +151,7 @@ fn moved(text: &str, origin: [f64; 3]) -> String {
 
 /// The text of an MTL, fit for the parser; its texture maps are added to `maps`.
 fn read_mtl(path: &Path, maps: &RefCell<HashMap<String, ObjMaps>>) -> Result<String, AssetError> {
-    let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    let bytes = file::without_mark(file::read(path).map_err(|e| AssetError::missing(path, &e))?);
     let folder = path.parent().unwrap_or(Path::new(""));
     let (text, found) = take_maps(&String::from_utf8_lossy(&bytes), folder).map_err(|e| mtl_fault(path, &e))?;
     maps.borrow_mut().extend(found);
@@ -221,6 +222,14 @@ mod tests {
         let b = meshes[1].material.as_ref().unwrap();
         assert_eq!((b.emissive, b.diffuse, b.opacity), (Some([1.0, 2.0, 3.0]), Some([0.5; 3]), Some(0.75)));
         assert_eq!(read_obj(&folder.path().join("q.obj"), false).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn a_byte_order_mark_hides_no_line() {
+        let folder = tempfile::tempdir().unwrap();
+        write(&folder, "m.mtl", "\u{feff}newmtl a\nKd 0.1 0.2 0.3\n");
+        let meshes = read_obj(&write(&folder, "q.obj", format!("\u{feff}{QUAD}mtllib m.mtl\nusemtl a\nf 1 2 3 4\n")), true).unwrap();
+        assert_eq!((meshes[0].mesh.positions.len(), meshes[0].material.as_ref().unwrap().diffuse), (4, Some([0.1, 0.2, 0.3])));
     }
 
     #[test]

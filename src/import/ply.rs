@@ -1,7 +1,6 @@
 //! PLY files, ASCII and binary: element `vertex` with x y z, optionally nx ny nz, u v (or s t) and red green blue (or r g b), and element `face`
 //! with a list of vertex indices. Polygons become fans. Colours are linear as floats and sRGB as whole numbers, of which the largest is 1.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -18,7 +17,7 @@ use super::{AssetError, MeshData};
 /// # Errors
 /// If the file is missing, malformed, ends early, or has no element `vertex`, or faces without a list `vertex_indices`.
 pub fn read_ply(path: &Path) -> Result<MeshData, AssetError> {
-    let file = File::open(path).map_err(|e| AssetError::missing(path, &e))?;
+    let file = crate::file::open(path).map_err(|e| AssetError::missing(path, &e))?;
     parse_ply(BufReader::with_capacity(1 << 20, file))
 }
 

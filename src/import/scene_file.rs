@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Missing`] if it cannot be read, [`Error::Parse`] with line, column and path for what it says.
 pub fn load_scene(path: &Path) -> Result<SceneDesc> {
-    let bytes = std::fs::read(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+    let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     match std::str::from_utf8(&bytes) {
         Ok(text) => parse_scene(text, path),
         Err(e) => {
@@ -51,7 +51,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneDesc> {
 
 /// A scene of ours as its file says it, without any default; `None` if it cannot be read or is no JSON.
 pub fn scene_as_written(path: &Path) -> Option<Value> {
-    let text = std::fs::read_to_string(path).ok()?;
+    let text = crate::file::read_to_string(path).ok()?;
     serde_json::from_str(&blank_comments(&text).text).ok()
 }
 

@@ -1,6 +1,5 @@
-//! Picture files. Every file is written aside in its folder and renamed into place, so a reader never sees half of one.
+//! Picture files, and the checks before they are written.
 
-mod atomic;
 mod check;
 mod color_space;
 mod compare;
@@ -11,8 +10,7 @@ mod png;
 mod role;
 mod view;
 
-pub use self::exr::{OutputFault, check_output, find_output_fault, read_exr, read_settings, write_exr};
-pub use atomic::{check_creatable, check_writable, write_atomically};
+pub use self::exr::{OutputFault, check_output, find_output_fault, finish_headers, read_exr, read_settings, write_exr};
 pub use check::{Finding, RULES, Rule, Severity, check_exr};
 pub use compare::{Comparison, RELATIVE_FLOOR, compare};
 pub use png::write_png;
@@ -24,6 +22,8 @@ use serde::{Deserialize, Serialize};
 use crate::desc::OutputDesc;
 use crate::error::{Error, Result};
 use crate::film::{Identities, Image};
+
+pub use crate::file::{check_creatable, write_atomically};
 
 /// The kinds of files that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +50,15 @@ impl Format {
             Error::Usage(format!("output {} has {what}; known are {}", path.display(), known.join(" and ")))
         })
     }
+}
+
+/// Checks that a picture can be written to `path`: a known extension, an existing folder, and the right to create files there.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown extension, [`Error::Output`] otherwise.
+pub fn check_writable(path: &Path) -> Result<()> {
+    Format::from_path(path)?;
+    check_creatable(path)
 }
 
 /// What a file tells of the rendering.
@@ -97,5 +106,20 @@ pub fn write(output: &OutputDesc, image: &Image, info: &RenderInfo) -> Result<()
     match Format::from_path(path)? {
         Format::Exr => write_exr(path, image, output, info),
         Format::Png => write_png(path, image, output.exposure, output.view.unwrap_or_default()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_have_known_extensions() {
+        let folder = tempfile::tempdir().unwrap();
+        check_writable(&folder.path().join("a.PNG")).unwrap();
+        let unknown = check_writable(&folder.path().join("a.jpg")).unwrap_err();
+        assert!(matches!(&unknown, Error::Usage(message) if message.contains(".exr and .png")), "{unknown}");
+        assert!(matches!(check_writable(&folder.path().join("a")), Err(Error::Usage(_))));
+        assert!(matches!(check_writable(&folder.path().join("missing/a.exr")), Err(Error::Output { .. })));
     }
 }

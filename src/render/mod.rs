@@ -378,7 +378,7 @@ fn check_time(settings: &Settings, stats: &Stats, done: u32) -> Result<()> {
 
 fn pool(settings: &Settings) -> Result<rayon::ThreadPool> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(settings.threads).build();
-    pool.map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))
+    pool.map_err(|e| Error::Threads { count: settings.threads, message: e.to_string() })
 }
 
 /// What a replayed sample brings.

@@ -15,6 +15,8 @@ mod sys;
 pub use device::EmbreeInfo;
 pub use replay::EmbreeReplay;
 
+use std::ffi::c_char;
+
 use super::{Accelerator, Coherence};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit, Shape};
@@ -25,6 +27,13 @@ use gate::Gate;
 use packet::{HitPacket, INVALID, ShadowPacket, Tracer, WIDTH};
 use scene::{EnteredInstances, GeometryHandle, Scene, SceneBuilder, UserShapes};
 use sys::StHit;
+
+/// Has `report` called, in place of abort(), for an exception of C++ that nobody catches, such as one of memory in a thread of Embree's. It gets
+/// whether memory or threads ran out, and a description that lives during the call, and must not return.
+pub fn on_uncaught_exception(report: extern "C" fn(bool, *const c_char)) {
+    // SAFETY: the function pointer is valid for ever, and takes what the header says.
+    unsafe { sys::st_on_uncaught(Some(report)) }
+}
 
 /// How much effort Embree's build makes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -7,6 +7,7 @@ use super::markdown::{self, Table};
 use super::plot::{self, Curve, Series};
 use crate::bench::{Mode, RayKind, SceneReport};
 use crate::error::Result;
+use crate::printable;
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --line: #8884; }
@@ -20,9 +21,9 @@ td:not(:first-child) { font-variant-numeric: tabular-nums; }
 figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; border-radius: 6px; } figcaption { opacity: .8; font-size: 13px; }
 code { overflow-wrap: anywhere; }";
 
-/// Text with the characters of markup written out.
+/// Text with the characters of markup, and those that nobody sees, written out.
 pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    printable::lines(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
 }
 
 /// A page down to the line that says where it was measured.
@@ -173,6 +174,21 @@ pub fn add_table(out: &mut String, table: &Table) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn text_is_no_markup() {
+        let strange = "</title><script>alert('x')</script>\" onload=\"&\u{1b}";
+        assert_eq!(escape(strange), "&lt;/title&gt;&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;&quot; onload=&quot;&amp;\\u001b");
+        let mut page = begin(&escape(strange), strange);
+        let table = Table { title: strange.into(), heads: vec![strange.into()], rows: vec![vec![strange.into()]] };
+        add_table(&mut page, &table);
+        figure(
+            &mut page,
+            &plot::curves(&[Curve { name: strange.into(), points: vec![(1.0, 2.0), (2.0, 3.0)] }], strange, strange, &[]).unwrap(),
+            strange,
+        );
+        assert!(!page.contains("<script") && !page.contains("onload=\"") && page.matches("</title>").count() == 1, "{page}");
+    }
 
     #[test]
     fn lines_cross_where_both_have_cost_the_same() {

@@ -151,7 +151,8 @@ fn stability(arguments: &BenchStabilityArgs) -> Result<u8> {
 
 /// The command as it was given, without the folder of the program.
 pub fn command_line() -> String {
-    std::iter::once("steradian".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
+    let words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    std::iter::once("steradian".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 fn options(arguments: &BenchAccelArgs) -> Options {
@@ -195,11 +196,12 @@ pub struct Steps<'a> {
 
 impl Watch for Steps<'_> {
     fn step(&self, what: &str) {
+        let what = steradian::farm::message_line(what);
         if self.lines {
             // Stderr may be gone; that is no reason to stop.
             let _ = writeln!(std::io::stderr(), "{what}");
         }
-        self.bar.set_message(what.to_owned());
+        self.bar.set_message(what);
         self.bar.tick();
     }
 

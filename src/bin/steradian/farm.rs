@@ -9,7 +9,7 @@ use std::process::Command;
 use clap::Parser;
 use steradian::farm::{Job, SlurmOptions, is_scene_per_frame, openjd_template, slurm_scripts, with_frame_pattern};
 use steradian::output::{self, Format};
-use steradian::{Error, Result};
+use steradian::{Error, Result, printable};
 
 use crate::args::{Cli, FarmCommand, JobArgs, SlurmArgs};
 use crate::log::{self, Level};
@@ -36,11 +36,12 @@ fn slurm(arguments: &SlurmArgs) -> Result<()> {
         further: arguments.sbatch.clone(),
         retries: arguments.retries,
     };
+    let scripts = slurm_scripts(&job, &options)?;
     let submit = job.folder.join("submit.sh");
     for folder in ["log", "shards"].map(|name| job.folder.join(name)) {
         fs::create_dir_all(&folder).map_err(|e| Error::Output { file: folder, message: e.to_string() })?;
     }
-    for (name, script) in slurm_scripts(&job, &options) {
+    for (name, script) in scripts {
         let path = job.folder.join(name);
         output::write_atomically(&path, |out| out.write_all(script.as_bytes()).map_err(|e| e.to_string()))?;
         let executable = fs::Permissions::from_mode(0o755);
@@ -68,7 +69,9 @@ fn job(arguments: &JobArgs) -> Result<Job> {
         return Err(Error::Missing { file: arguments.scene.clone(), message: "no such scene".to_owned() });
     }
     let stem = arguments.scene.file_stem().map_or("picture".into(), |stem| stem.to_string_lossy().into_owned());
-    let name = stem.replace(['#', '%'], "").trim_matches('.').to_owned();
+    // A name for queues and folders: no place for a frame's number, no line break, no braces, which are the format's in a template.
+    let plain = |c: char| if printable::line(&c.to_string()) != c.to_string() || "{}".contains(c) { '_' } else { c };
+    let name: String = stem.replace(['#', '%'], "").trim_matches('.').chars().map(plain).collect();
     let default = [PathBuf::from(format!("{name}.exr"))];
     let outputs = if arguments.output.is_empty() { &default[..] } else { &arguments.output };
     let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::Usage(format!("{}: {e}", path.display())));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
 use signal_hook::flag;
 use steradian::{Error, Result};
 
@@ -65,6 +65,11 @@ impl Interrupt {
     pub fn exit_code(&self) -> u8 {
         u8::try_from(self.code.load(Ordering::Relaxed)).ok().filter(|code| *code != 0).unwrap_or(INTERRUPTED)
     }
+}
+
+/// A file that grows beyond the limit of the process (`ulimit -f`) is an error of writing, not the end of the program.
+pub fn outlive_file_limits() -> Result<()> {
+    flag::register(SIGXFSZ, Arc::default()).map(drop).map_err(failed)
 }
 
 fn failed(error: std::io::Error) -> Error {

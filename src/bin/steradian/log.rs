@@ -1,13 +1,14 @@
 //! Messages: to stderr, clear of the bar, and to a file; as text or as JSON.
 
 use std::fmt::Write as _;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, OnceLock};
 
 use indicatif::ProgressBar;
 use serde_json::json;
-use steradian::{Error, Result};
+use steradian::Result;
+use steradian::farm::message_line;
 use tracing::field::{Field, Visit};
 use tracing_subscriber::Layer;
 use tracing_subscriber::filter::LevelFilter;
@@ -77,8 +78,7 @@ pub fn start(arguments: &LogArgs, verbosity: Verbosity, default_format: LogForma
     let file = match &arguments.log_file {
         None => None,
         Some(path) => {
-            let opened = OpenOptions::new().create(true).append(true).open(path);
-            let file = opened.map_err(|e| Error::Output { file: path.clone(), message: e.to_string() })?;
+            let file = steradian::file::append(path)?;
             Some((Mutex::new(file), shown.max(Level::Info)))
         }
     };
@@ -123,6 +123,11 @@ pub fn is_colored() -> bool {
     LOG.get().map_or_else(|| colored(ColorChoice::Auto), |log| log.colored)
 }
 
+/// Whether messages are JSON.
+pub fn is_json() -> bool {
+    LOG.get().is_some_and(|log| log.format == LogFormat::Json)
+}
+
 /// A message.
 pub fn message(level: Level, text: &str) {
     let log = LOG.get();
@@ -158,13 +163,17 @@ pub fn keep_clear_of(bar: Option<ProgressBar>) {
     }
 }
 
+/// Names in the text may be those of strangers: it is one line, steers no terminal and no farm.
 fn rendered(format: LogFormat, level: Level, text: &str, colored: bool, dated: bool) -> String {
+    if format == LogFormat::Json {
+        return message_line(&json!({ "time": now(), "level": level.name(), "message": text }).to_string());
+    }
+    let text = message_line(text);
     match format {
-        LogFormat::Json => json!({ "time": now(), "level": level.name(), "message": text }).to_string(),
-        LogFormat::Text if dated => format!("{} {}: {text}", now(), level.name()),
-        LogFormat::Text if level == Level::Note => text.to_owned(),
-        LogFormat::Text if colored => format!("{}{}:\x1b[0m {text}", level.escape(), level.name()),
-        LogFormat::Text => format!("{}: {text}", level.name()),
+        _ if dated => format!("{} {}: {text}", now(), level.name()),
+        _ if level == Level::Note => text,
+        _ if colored => format!("{}{}:\x1b[0m {text}", level.escape(), level.name()),
+        _ => format!("{}: {text}", level.name()),
     }
 }
 
@@ -226,6 +235,13 @@ mod tests {
         assert_eq!(rendered(LogFormat::Text, Level::Error, "e", true, false), "\x1b[1;31merror:\x1b[0m e");
         let value: serde_json::Value = serde_json::from_str(&rendered(LogFormat::Json, Level::Info, "a \"b\"", true, true)).unwrap();
         assert_eq!((&value["level"], &value["message"]), (&"info".into(), &"a \"b\"".into()));
+        let value: serde_json::Value =
+            serde_json::from_str(&rendered(LogFormat::Json, Level::Info, "\u{9b}\nopenjd_env: a", true, true)).unwrap();
+        assert_eq!(value["message"], "\u{9b}\nopenjd_env: a");
+        assert_eq!(
+            rendered(LogFormat::Text, Level::Note, "a\u{1b}[2J\nProgress: 100%", false, false),
+            "a\\u001b[2J\\n\\u0050rogress: 100%"
+        );
         let dated = rendered(LogFormat::Text, Level::Info, "i", false, true);
         assert!(dated.ends_with("Z info: i") && dated.starts_with("20") && dated.as_bytes()[10] == b'T', "{dated}");
     }

@@ -15,6 +15,7 @@ mod info;
 mod interrupt;
 mod kept;
 mod log;
+mod memory;
 mod merge;
 mod names;
 mod progress;
@@ -38,6 +39,7 @@ const INTERNAL: u8 = 1;
 
 fn main() -> ExitCode {
     report_panics();
+    memory::watch_exceptions();
     match config::parse().and_then(start) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
@@ -61,6 +63,8 @@ fn start(parsed: config::Parsed) -> Result<u8> {
 
 /// Runs a command; the result is the exit code.
 fn run(cli: Cli) -> Result<u8> {
+    interrupt::outlive_file_limits()?;
+    start_threads()?;
     match cli.command {
         Command::Render(arguments) => frames::run(&arguments),
         Command::Info(arguments) => info::run(&arguments).map(|()| 0),
@@ -69,7 +73,7 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Farm(command) => farm::run(&command).map(|()| 0),
         Command::Config(ConfigCommand::Show(arguments)) => config::show(&arguments).map(|()| 0),
         Command::Man { dir } => man(dir.as_deref()).map(|()| 0),
-        Command::Schema => text::print(&import::schema()).map(|()| 0),
+        Command::Schema => text::print_as_it_is(&import::schema()).map(|()| 0),
         Command::Merge(arguments) => merge::run(&arguments).map(|()| 0),
         Command::CheckExr(arguments) => check_exr::run(&arguments),
         Command::Rerender(arguments) => rerender::run(&arguments),
@@ -78,9 +82,16 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "steradian", &mut script);
-            text::print(String::from_utf8_lossy(&script).trim_end()).map(|()| 0)
+            text::print_as_it_is(String::from_utf8_lossy(&script).trim_end()).map(|()| 0)
         }
     }
+}
+
+/// Starts the threads that files are read and written with: they would be started when first needed, and end the program if that fails.
+fn start_threads() -> Result<()> {
+    let count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let started = rayon::ThreadPoolBuilder::new().build_global();
+    started.map_err(|e| Error::Threads { count, message: e.to_string() })
 }
 
 /// Prints the manual page of the program, or writes those of all its commands.
@@ -89,7 +100,7 @@ fn man(folder: Option<&Path>) -> Result<()> {
         let mut page = Vec::new();
         let rendered = clap_mangen::Man::new(Cli::command()).render(&mut page);
         rendered.map_err(|e| Error::Internal(e.to_string()))?;
-        return text::print(String::from_utf8_lossy(&page).trim_end());
+        return text::print_as_it_is(String::from_utf8_lossy(&page).trim_end());
     };
     let written = std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(Cli::command(), folder));
     written.map_err(|e| Error::Output { file: folder.to_owned(), message: e.to_string() })

@@ -1,8 +1,9 @@
 //! `steradian merge`.
 
-use std::path::Path;
+use std::path::{Component, Path};
 
 use steradian::desc::OutputDesc;
+use steradian::farm::check_single_name;
 use steradian::film::Image;
 use steradian::output::{self, Format, RenderInfo, RenderStatistics};
 use steradian::render::{self, Header};
@@ -41,14 +42,27 @@ pub fn run(arguments: &MergeArgs) -> Result<()> {
 /// The files to write: with the names of the command line, but else as the render was to write files of that kind.
 fn outputs(header: &Header, names: &[String]) -> Result<Vec<OutputDesc>> {
     if names.is_empty() {
+        header.outputs.iter().try_for_each(|output| check_plain(&output.file))?;
         return Ok(header.outputs.clone());
     }
+    names.iter().try_for_each(|name| check_single_name(name))?;
     let like = |name: &String| -> Result<OutputDesc> {
         let format = Format::from_path(Path::new(name))?;
         let known = header.outputs.iter().find(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|other| other == format));
         Ok(OutputDesc { file: name.clone(), ..known.cloned().unwrap_or_else(|| OutputDesc::new(name.clone())) })
     };
     names.iter().map(like).collect()
+}
+
+/// Names out of a shard, which may come from anywhere, are those of files in the working folder.
+fn check_plain(name: &str) -> Result<()> {
+    let mut components = Path::new(name).components();
+    match (components.next(), components.next()) {
+        (Some(Component::Normal(only)), None) if only == name => Ok(()),
+        _ => {
+            Err(Error::Usage(format!("the shards name the output {name:?}, which is not in the working folder; say with -o what to write")))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -65,5 +79,10 @@ mod tests {
         assert_eq!((named[1].file.as_str(), named[1].layers.len()), ("c.png", 0));
         assert_eq!(outputs(&header, &[]).unwrap()[0].file, "a.exr");
         assert!(matches!(outputs(&header, &["d.jpg".to_owned()]), Err(Error::Usage(_))));
+        for name in ["/tmp/a.exr", "../a.exr", "b/a.exr", "./a.exr", "..", ""] {
+            let header = Header { outputs: vec![OutputDesc::new(name)], ..Header::default() };
+            assert!(matches!(outputs(&header, &[]), Err(Error::Usage(message)) if message.contains("-o")), "{name}");
+            assert!(outputs(&header, &["/tmp/b.exr".to_owned()]).is_ok());
+        }
     }
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use steradian::accel::{self, Accelerator};
 use steradian::denoise::Denoiser;
+use steradian::farm::check_single_name;
 use steradian::film::LayerSet;
 use steradian::live::{Fan, Live};
 use steradian::output::{self, RenderInfo, RenderStatistics};
@@ -104,6 +105,9 @@ impl<'a> Plan<'a> {
             return Ok(None);
         }
         if arguments.pixel.is_none() {
+            if shot.frame.is_none() && arguments.repeat.is_none() {
+                check_names(arguments, &settings)?;
+            }
             check_outputs(&settings, shard_file.as_deref(), json.as_deref())?;
         }
         let denoiser = denoise::prepare(&arguments.denoise, &mut settings)?;
@@ -211,6 +215,14 @@ impl<'a> Plan<'a> {
 fn default_outputs(scene: &Path) -> Vec<String> {
     let stem = scene.file_stem().map_or("picture".into(), |stem| stem.to_string_lossy().into_owned());
     DEFAULT_EXTENSIONS.iter().map(|extension| format!("{stem}.{extension}")).collect()
+}
+
+/// Names that are given, and not after the scene, have no place for a frame's number.
+fn check_names(arguments: &RenderArgs, settings: &Settings) -> Result<()> {
+    let state = [&arguments.state.checkpoint, &arguments.json].into_iter().flatten().filter_map(|path| path.to_str());
+    let defaults = default_outputs(&arguments.scene);
+    let outputs = settings.outputs.iter().map(|output| output.file.as_str()).filter(|name| !defaults.iter().any(|other| other == name));
+    state.chain(arguments.output.iter().map(String::as_str)).chain(outputs).try_for_each(check_single_name)
 }
 
 /// A slip in a name is found before the render, not after it.

@@ -77,7 +77,7 @@ pub fn prepare(arguments: &RenderArgs, shot: &Shot, settings: &mut Settings) -> 
     }
     let scene = scene_fingerprint(&shot.imported, &shot.scene)?;
     let Some(repeat) = &arguments.repeat else {
-        let words = std::env::args().skip(1).collect();
+        let words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
         return Ok(Some(Recipe { frame: shot.frame, ..Recipe::new(&shot.scene, scene, settings, words) }));
     };
     let changed = repeat.recipe.scene.differences(&scene);

@@ -3,10 +3,16 @@
 use std::io::{ErrorKind, Write};
 
 use serde_json::Value;
-use steradian::{Error, Result};
+use steradian::farm::message_lines;
+use steradian::{Error, Result, printable};
 
-/// Prints a line or several. A reader that has gone (such as `head`) is no error.
+/// Prints a line or several, in which names of strangers steer no terminal and no farm.
 pub fn print(text: &str) -> Result<()> {
+    print_as_it_is(&message_lines(text))
+}
+
+/// Prints text of the program itself. A reader that has gone (such as `head`) is no error.
+pub fn print_as_it_is(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::Output { file: "stdout".into(), message: e.to_string() }),
@@ -34,7 +40,7 @@ fn add_lines(value: &Value, depth: usize, lines: &mut Vec<String>) {
     let width = map.keys().map(|key| key.chars().count()).max().unwrap_or(0);
     let indent = "  ".repeat(depth);
     for (key, value) in map {
-        let label = key.replace('_', " ");
+        let label = printable::line(&key.replace('_', " "));
         if value.as_object().is_some_and(|inner| !inner.is_empty()) {
             lines.push(format!("{indent}{label}"));
             add_lines(value, depth + 1, lines);
@@ -47,7 +53,7 @@ fn add_lines(value: &Value, depth: usize, lines: &mut Vec<String>) {
 fn inline(value: &Value) -> String {
     match value {
         Value::Null => "-".to_owned(),
-        Value::String(text) => text.clone(),
+        Value::String(text) => printable::line(text),
         Value::Array(items) => items.iter().map(inline).collect::<Vec<_>>().join(" "),
         Value::Bool(true) => "yes".to_owned(),
         Value::Bool(false) => "no".to_owned(),
@@ -62,6 +68,7 @@ mod tests {
 
     #[test]
     fn values_are_aligned_and_nested_ones_indented() {
+        assert_eq!(outline(&json!({ "a\n": "b\n\u{1b}" })), "a\\n  b\\n\\u001b");
         let value = json!({ "a": 1, "long_name": [1, 2], "inner": { "b": true, "c": null } });
         assert_eq!(outline(&value), "a          1\ninner\n  b  yes\n  c  -\nlong name  1 2");
     }

@@ -6,7 +6,7 @@ use super::{AssetError, RgbImage};
 
 /// Reads a file.
 pub fn read(path: &Path) -> Result<RgbImage, AssetError> {
-    let bytes = std::fs::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    let bytes = crate::file::read(path).map_err(|e| AssetError::missing(path, &e))?;
     parse(&bytes).ok_or_else(|| AssetError::Malformed("not a readable PFM file".into()))
 }
 

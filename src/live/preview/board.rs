@@ -1,6 +1,6 @@
 //! The newest picture, and who looks at it.
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use super::Snapshot;
@@ -11,6 +11,9 @@ const PAGE_LIFE: Duration = Duration::from_secs(3);
 
 /// Pages beyond so many are not waited for.
 const MAX_PAGES: usize = 64;
+
+/// Answers hold no more pictures than so many at a time.
+const MOST_SENT: usize = 4;
 
 /// A page open somewhere.
 struct Page {
@@ -31,6 +34,8 @@ struct State {
     shown: Option<Instant>,
     finished: bool,
     pages: Vec<Page>,
+    /// Pictures that answers hold while they are sent.
+    sent: Vec<Weak<Snapshot>>,
 }
 
 impl State {
@@ -96,6 +101,23 @@ impl Board {
         Shown { snapshot: state.snapshot.clone(), version: state.version, finished: state.finished }
     }
 
+    /// What there is to see, to be sent, which may take long; `None` if slow readers hold [`MOST_SENT`] older pictures already.
+    pub fn take(&self) -> Option<Shown> {
+        let shown = self.look();
+        let mut state = self.lock();
+        state.sent.retain(|sent| sent.strong_count() > 0);
+        if let Some(snapshot) = shown.snapshot.as_ref().map(Arc::downgrade)
+            && !state.sent.iter().any(|sent| sent.ptr_eq(&snapshot))
+        {
+            if state.sent.len() >= MOST_SENT {
+                return None;
+            }
+            state.sent.push(snapshot);
+        }
+        drop(state);
+        Some(shown)
+    }
+
     /// A page is open, has the picture of this number, and waits for the next one unless it is `idle`.
     pub fn visit(&self, page: u64, version: u64, idle: bool) {
         let mut state = self.lock();
@@ -152,6 +174,26 @@ mod tests {
         board.visit(8, 2, false);
         std::thread::sleep(PICTURE_PERIOD);
         assert!(!board.wants_picture() && board.look().finished && board.look().version == 2);
+    }
+
+    #[test]
+    fn slow_readers_hold_few_pictures() {
+        let board = Board::default();
+        let show = || {
+            let image = Image { size: [1, 1], crop: Crop::full([1, 1]), ..Image::default() };
+            board.show(&Arc::new(Snapshot::new(&image, 1)), false);
+        };
+        assert!(board.take().is_some_and(|shown| shown.snapshot.is_none()));
+        let mut held = Vec::new();
+        for _ in 0..MOST_SENT {
+            show();
+            held.push(board.take().unwrap());
+            held.push(board.take().unwrap());
+        }
+        show();
+        assert!(board.take().is_none() && board.look().version == MOST_SENT as u64 + 1);
+        held.drain(..2);
+        assert!(board.take().is_some());
     }
 
     #[test]

@@ -10,6 +10,12 @@ const MAX_HEAD: usize = 8192;
 /// The most header lines of a request.
 const MAX_HEADERS: usize = 64;
 
+/// The time that any answer may take.
+const GRACE: Duration = Duration::from_secs(10);
+
+/// Bytes a second that a reader of a longer answer has to take.
+const LEAST_RATE: u64 = 1 << 20;
+
 /// How long what is left of a refused request is read.
 const LINGER: Duration = Duration::from_secs(1);
 
@@ -67,13 +73,15 @@ impl Request {
 /// A connection to a browser.
 pub struct Connection {
     stream: TcpStream,
+    /// When the present answer has to be sent.
+    deadline: Option<Instant>,
     /// What has been read and not yet been used.
     buffer: Vec<u8>,
 }
 
 impl Connection {
     pub const fn new(stream: TcpStream) -> Self {
-        Self { stream, buffer: Vec::new() }
+        Self { stream, deadline: None, buffer: Vec::new() }
     }
 
     /// The next request; `None` if there is none. Its head must be there after `patience`, and it must ask for this machine or for `host`.
@@ -124,12 +132,25 @@ impl Connection {
              Content-Security-Policy: {POLICY}\r\nCross-Origin-Resource-Policy: same-origin\r\nX-Content-Type-Options: nosniff\r\n\
              Referrer-Policy: no-referrer\r\n\r\n"
         );
-        self.stream.write_all(head.as_bytes())
+        // The picture is held until then: who takes it byte by byte must not keep it for ever.
+        self.deadline = Some(Instant::now() + GRACE + Duration::from_secs(length / LEAST_RATE));
+        self.write(head.as_bytes())
     }
 
     /// Some of the body.
-    pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.stream.write_all(bytes)
+    pub fn write(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        while !bytes.is_empty() {
+            if self.deadline.is_some_and(|deadline| Instant::now() > deadline) {
+                return Err(ErrorKind::TimedOut.into());
+            }
+            match self.stream.write(bytes) {
+                Ok(0) => return Err(ErrorKind::WriteZero.into()),
+                Ok(count) => bytes = &bytes[count..],
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
     }
 
     /// A whole answer.
@@ -176,11 +197,12 @@ fn check(request: &httparse::Request, host: &str) -> Result<Request, Refusal> {
 /// made to point here (DNS rebinding) is none of these. The port may be another, that of a tunnel.
 fn is_own_host(asked: &str, host: &str) -> bool {
     let asked = asked.to_ascii_lowercase();
-    let name = match asked.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
-        Some((name, _)) => name,
-        None => asked.split(':').next().unwrap_or(""),
+    let (name, port) = match asked.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+        Some(parts) => parts,
+        None => asked.split_at(asked.find(':').unwrap_or(asked.len())),
     };
-    name == "localhost" || name == host || name.parse::<IpAddr>().is_ok()
+    let is_port = port.is_empty() || port.strip_prefix(':').is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()));
+    is_port && (name == "localhost" || name == host || name.parse::<IpAddr>().is_ok())
 }
 
 #[cfg(test)]
@@ -208,6 +230,17 @@ mod tests {
             assert!(is_own_host(host, "node7"), "{host}");
         }
         for host in ["", "example.com", "localhost.example.com:8000", "127.0.0.1.example.com", "node7.example.com", "[example.com]:80"] {
+            assert!(!is_own_host(host, "node7"), "{host}");
+        }
+        for host in [
+            "[127.0.0.1]evil.com",
+            "[::1].evil.com:80",
+            "[::1]:80.evil.com",
+            "127.0.0.1:evil.com",
+            "localhost:80@evil.com",
+            "[::1",
+            "node7:1:2",
+        ] {
             assert!(!is_own_host(host, "node7"), "{host}");
         }
     }

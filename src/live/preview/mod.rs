@@ -85,7 +85,7 @@ impl Preview {
             closing: AtomicBool::new(false),
         });
         let of_thread = Arc::clone(&shared);
-        std::thread::spawn(move || accept(&listener, &of_thread));
+        std::thread::Builder::new().name("preview".to_owned()).spawn(move || accept(&listener, &of_thread)).map_err(|e| unusable(&e))?;
         Ok(Self { shared, address })
     }
 

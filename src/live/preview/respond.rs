@@ -66,9 +66,11 @@ fn state(shared: &Shared) -> Value {
     })
 }
 
-/// The connection holds its picture while it sends, however long that takes.
+/// The connection holds its picture while it sends.
 fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io::Result<()> {
-    let shown = shared.board.look();
+    let Some(shown) = shared.board.take() else {
+        return connection.answer("503 Service Unavailable", "text/plain", b"too many slow readers");
+    };
     let index = request.number("index").and_then(|index| usize::try_from(index).ok());
     let (Some(snapshot), Some(index)) = (shown.snapshot, index) else { return not_found(connection) };
     let Some((layer, names)) = snapshot.layers().nth(index) else { return not_found(connection) };

@@ -51,11 +51,11 @@ pub struct Tev {
 }
 
 impl Tev {
-    /// Starts the thread that sends; in the viewer the picture is called `name`.
+    /// Starts the thread that sends, or sends nothing where no thread can be had; in the viewer the picture is called `name`.
     pub fn new(options: TevOptions, name: &str) -> Self {
         let queue = Arc::new(Queue::new(options.update_period));
         let sender = Sender::new(options, name.replace('\0', "_"), Arc::clone(&queue));
-        std::thread::spawn(move || sender.run());
+        let _ = std::thread::Builder::new().name("tev".to_owned()).spawn(move || sender.run());
         Self { queue }
     }
 

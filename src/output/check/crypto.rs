@@ -24,7 +24,7 @@ impl Matte {
     pub fn manifest(&self, file: &ExrFile) -> Option<String> {
         self.entries.get("manifest").cloned().or_else(|| {
             let beside = file.path.parent()?.join(self.entries.get("manif_file")?);
-            std::fs::read_to_string(beside).ok()
+            crate::file::read_to_string(&beside).ok()
         })
     }
 }

@@ -1,6 +1,7 @@
 //! What a file says of itself.
 
 use std::cell::OnceCell;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
 use exr::meta::attribute::{AttributeValue, SampleType, Text};
@@ -8,7 +9,8 @@ use exr::meta::header::Header;
 use exr::prelude::{FlatImage, ReadChannels, ReadLayers, read};
 
 use crate::error::{Error, Result};
-use crate::exr_headers::read_headers;
+use crate::file;
+use crate::file::exr_headers::read_headers;
 use crate::output::role::Role;
 
 /// A file's headers, and its pixels if a rule asks for them.
@@ -29,8 +31,9 @@ pub struct Channel<'a> {
 
 impl ExrFile {
     pub fn read(path: &Path) -> Result<Self> {
-        std::fs::File::open(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+        let open = || file::open(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() });
         let malformed = |e: exr::error::Error| Error::Malformed { file: path.into(), message: e.to_string() };
+        open()?;
         let headers = read_headers(path).map_err(|message| Error::Malformed { file: path.into(), message })?;
         if headers.is_empty() {
             return Err(Error::Malformed { file: path.into(), message: "there are no parts".into() });
@@ -38,7 +41,7 @@ impl ExrFile {
         let file = Self { path: path.into(), headers, pixels: OnceCell::new() };
         // Flat files are read as a whole, so that a truncated one is not called clean.
         if file.headers.iter().all(|header| !header.deep) {
-            let image = match read_pixels(path) {
+            let image = match read_pixels(open()?) {
                 // Of a compression that the library does not know, the headers can still be checked.
                 Err(exr::error::Error::NotSupported(_)) => None,
                 image => Some(image.map_err(malformed)?),
@@ -84,6 +87,6 @@ pub fn utf8(text: &Text) -> String {
     String::from_utf8_lossy(text.as_slice()).into_owned()
 }
 
-fn read_pixels(path: &Path) -> Result<FlatImage, exr::error::Error> {
-    read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(path)
+fn read_pixels(source: impl Read + Seek) -> Result<FlatImage, exr::error::Error> {
+    read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_unbuffered(source)
 }

@@ -7,7 +7,8 @@ use exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers,
 
 use super::metadata::{SETTINGS, text};
 use crate::error::{Error, Result};
-use crate::exr_headers::read_headers;
+use crate::file;
+use crate::file::exr_headers::read_headers;
 use crate::film::{Crop, Image, Layer, LayerKind};
 
 /// Reads the colour of any EXR file: bare channels R, G, B (in upper or lower case), else a layer with such channels (the one with the
@@ -17,11 +18,11 @@ use crate::film::{Crop, Image, Layer, LayerKind};
 /// # Errors
 /// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no such picture.
 pub fn read_exr(path: &Path) -> Result<Image> {
-    std::fs::File::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
+    let source = file::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
     read_headers(path).map_err(malformed)?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    let file: FlatImage = reader.from_file(path).map_err(|e| malformed(e.to_string()))?;
+    let file: FlatImage = reader.from_unbuffered(source).map_err(|e| malformed(e.to_string()))?;
     for part in &file.layer_data {
         let Some(choice) = choose_channels(&part.channel_data.list) else { continue };
         let pixels = part.size.0 * part.size.1;
@@ -76,7 +77,7 @@ fn windows(display: &IntegerBounds, position: Vec2<i32>, size: Vec2<usize>) -> (
 /// # Errors
 /// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no EXR file or has no settings.
 pub fn read_settings(path: &Path) -> Result<serde_json::Value> {
-    std::fs::File::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
+    file::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
     let headers = read_headers(path).map_err(malformed)?;
     match headers.first().and_then(|header| header.own_attributes.other.get(&text(SETTINGS))) {

@@ -8,7 +8,7 @@ use exr::meta::attribute::IntegerBounds;
 use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, ImageAttributes, LineOrder, Vec2, WritableImage};
 
 use super::coverage::{self, Matte};
-use super::header_order::sort_attributes;
+use super::header_order::finish_headers;
 use super::metadata::{Common, Mattes, part_attributes, text};
 use super::names::{channel_name, plain_word};
 use super::plan::{self, PartKind};
@@ -47,7 +47,7 @@ pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderI
     let file = exr::prelude::Image { attributes, layer_data: parts };
     write_atomically(path, |out| {
         file.write().to_buffered(&mut *out).map_err(|e| e.to_string())?;
-        out.flush().and_then(|()| sort_attributes(out.get_mut())).map_err(|e| e.to_string())
+        out.flush().and_then(|()| finish_headers(out.get_mut())).map_err(|e| e.to_string())
     })
 }
 

@@ -13,11 +13,12 @@
 //! Numbers are little endian. The checksum is looked at before anything else is believed.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Take, Write};
 use std::path::{Path, PathBuf};
 
 use super::Header;
 use crate::error::{Error, Result};
+use crate::file;
 
 const MAGIC: [u8; 8] = *b"STERFILM";
 const END: [u8; 8] = *b"STEREND\n";
@@ -78,7 +79,7 @@ impl<W: Write> Writer<W> {
 /// Reads a file whose checksum is right, block by block.
 pub struct Reader {
     path: PathBuf,
-    file: BufReader<File>,
+    file: BufReader<Take<File>>,
     header: Header,
     /// Whether the marks at the beginning are right.
     is_ours: bool,
@@ -93,8 +94,8 @@ impl Reader {
     /// [`Error::Missing`] if it cannot be read, [`Error::Checkpoint`] if it is of another kind, cut short or altered.
     pub fn open(path: &Path) -> Result<Self> {
         let missing = |e: io::Error| Error::Missing { file: path.to_owned(), message: e.to_string() };
-        let mut file = File::open(path).map_err(missing)?;
-        let length = file.metadata().map_err(missing)?.len();
+        let mut file = file::open(path).map_err(missing)?;
+        let length = file.limit();
         check(path, &mut file, length)?;
         Self::begin(path, file, length)
     }
@@ -105,8 +106,8 @@ impl Reader {
     /// As [`open`](Self::open), as far as the damage shows.
     pub fn peek(path: &Path) -> Result<Header> {
         let missing = |e: io::Error| Error::Missing { file: path.to_owned(), message: e.to_string() };
-        let file = File::open(path).map_err(missing)?;
-        let length = file.metadata().map_err(missing)?.len();
+        let file = file::open(path).map_err(missing)?;
+        let length = file.limit();
         let known = length > START + TRAILER;
         match if known { Self::begin(path, file, length).ok() } else { None } {
             Some(reader) if reader.is_ours => Ok(reader.header),
@@ -116,7 +117,7 @@ impl Reader {
     }
 
     /// Reads the header.
-    fn begin(path: &Path, mut file: File, length: u64) -> Result<Self> {
+    fn begin(path: &Path, mut file: Take<File>, length: u64) -> Result<Self> {
         let missing = |e: io::Error| Error::Missing { file: path.to_owned(), message: e.to_string() };
         file.seek(SeekFrom::Start(0)).map_err(missing)?;
         let file = BufReader::with_capacity(BUFFER, file);
@@ -125,6 +126,9 @@ impl Reader {
         let header_length = u32::from_le_bytes(reader.array()?);
         let header = reader.bytes(u64::from(header_length))?;
         reader.header = serde_json::from_slice(&header).map_err(|e| reader.fault(format!("the header cannot be understood: {e}")))?;
+        if let Some(fault) = reader.header.fault(reader.left) {
+            return Err(reader.fault(fault));
+        }
         Ok(reader)
     }
 
@@ -173,7 +177,7 @@ impl Reader {
 }
 
 /// Checks the marks at both ends and the checksum.
-fn check(path: &Path, file: &mut File, length: u64) -> Result<()> {
+fn check(path: &Path, file: &mut Take<File>, length: u64) -> Result<()> {
     let fault = |message: &str| Error::Checkpoint { file: path.to_owned(), message: message.to_owned() };
     let missing = |e: io::Error| Error::Missing { file: path.to_owned(), message: e.to_string() };
     let mut start = Vec::new();

@@ -61,6 +61,9 @@ impl FromStr for Shard {
     }
 }
 
+/// The least that a file holds of a pixel, in bytes: the sums of colour and alpha.
+const LEAST_BYTES: u64 = 64;
+
 /// What a film holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FilmShape {
@@ -154,6 +157,30 @@ impl Header {
     /// [`Error::Missing`] if it cannot be read, [`Error::Checkpoint`] if it is of another kind or damaged.
     pub fn read(file: &Path) -> Result<Self> {
         Reader::peek(file)
+    }
+
+    /// What of it makes no sense in itself, so that no render can have written it; `None` if all does. `bytes` are those behind the header.
+    pub(super) fn fault(&self, bytes: u64) -> Option<String> {
+        let Shard { index, count } = self.shard;
+        let [x, y, width, height] = self.film.crop.map(u64::from);
+        let [full_width, full_height] = self.film.size.map(u64::from);
+        let layer = self.film.layers.iter().find(|name| !LayerKind::ALL.iter().any(|info| info.name == **name));
+        let around = 2 * u64::from(self.overscan);
+        if !(1..=count).contains(&index) {
+            Some(format!("there is no shard {index} of {count}"))
+        } else if self.done > self.spp {
+            Some(format!("{} of {} samples per pixel are done", self.done, self.spp))
+        } else if let Some(layer) = layer {
+            Some(format!("there is no layer {layer:?}"))
+        } else if x + width > full_width || y + height > full_height || (around > 0 && around >= full_width.min(full_height)) {
+            Some("its film is not within its picture".to_owned())
+        } else if self.info.identities.as_ref().is_some_and(|identities| !identities.is_ordered()) {
+            Some("an instance is placed within itself".to_owned())
+        } else if (width * height).saturating_mul(LEAST_BYTES) > bytes {
+            Some("a part is missing".to_owned())
+        } else {
+            None
+        }
     }
 
     /// In what it belongs to another picture than `other`, in words; empty if it does not. `these` and `those` name the two.

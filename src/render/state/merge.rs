@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::container::Reader;
-use super::{Header, RenderState, Shard};
+use super::{FilmShape, Header, RenderState, Shard};
 use crate::error::{Error, Result};
 use crate::integrator::RayCounts;
 
@@ -42,7 +42,10 @@ pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
         let message = format!("{message}; --partial merges what is there");
         return Err(Error::Checkpoint { file: file.clone(), message });
     }
-    let film = headers[0].film.film()?;
+    let film = headers[0].film.film().map_err(|error| match error {
+        error @ Error::OutOfMemory(_) => error,
+        error => Error::Checkpoint { file: first.clone(), message: error.to_string() },
+    })?;
     let rays = RayCounts::default();
     let mut state = RenderState {
         film,
@@ -103,6 +106,9 @@ fn lack(files: &[PathBuf], headers: &[Header]) -> Option<(PathBuf, String)> {
 /// Adds the samples of a file.
 fn add(state: &mut RenderState, file: &Path) -> Result<()> {
     let mut reader = Reader::open(file)?;
+    if reader.header().film != FilmShape::of(&state.film) {
+        return Err(reader.fault("the film has other layers than that of the first file"));
+    }
     for tile in state.film.tiles_mut() {
         let bytes = reader.block()?;
         let mut other = tile.empty();
@@ -111,7 +117,7 @@ fn add(state: &mut RenderState, file: &Path) -> Result<()> {
     }
     let [camera, indirect, shadow] = reader.header().rays;
     state.rays.add(&RayCounts { camera, indirect, shadow });
-    state.done += reader.header().done;
+    state.done = state.done.saturating_add(reader.header().done);
     state.seconds += reader.header().render_seconds;
     Ok(())
 }

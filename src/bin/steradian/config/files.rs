@@ -25,7 +25,7 @@ pub fn for_scene(scene: &Path) -> Vec<PathBuf> {
 /// # Errors
 /// [`Error::Usage`] with file and line for what is no TOML, no option, or no value of the option.
 pub fn read(options: &Options, file: &Path) -> Result<Vec<Setting>> {
-    let text = std::fs::read_to_string(file).map_err(|e| Error::Usage(format!("{}: {e}", file.display())))?;
+    let text = steradian::file::read_to_string(file).map_err(|e| Error::Usage(format!("{}: {e}", file.display())))?;
     parse(options, file, &text)
 }
 

@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
+use steradian::farm::message_lines;
 use steradian::{Error, Result, import};
 
 use crate::args::Cli;
+use crate::log;
 pub use show::run as show;
 
 /// Options that belong to a single run.
@@ -64,8 +66,9 @@ pub struct Parsed {
 /// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help with 0.
 pub fn parse() -> Result<Parsed> {
     let line: Vec<OsString> = std::env::args_os().collect();
+    check_utf8(&line)?;
     let command = color(Cli::command(), &line);
-    let matches = command.clone().try_get_matches_from(&line).unwrap_or_else(|error| error.exit());
+    let matches = command.clone().try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
     let Some(("render", render)) = matches.subcommand() else {
         return Ok(Parsed { cli: typed(&matches), warnings: Vec::new(), added: Vec::new() });
     };
@@ -78,12 +81,31 @@ pub fn parse() -> Result<Parsed> {
     let added: Vec<Setting> = found.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
     let command =
         added.iter().filter(|setting| !setting.values.is_empty()).fold(command, |command, setting| options.with_default(command, setting));
-    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| error.exit());
+    let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
     Ok(Parsed { cli: typed(&matches), warnings, added })
 }
 
+/// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals nor farms.
+fn exit(error: &clap::Error) -> ! {
+    let text = error.to_string();
+    let harmless = message_lines(&text);
+    if !error.use_stderr() || harmless == text {
+        error.exit();
+    }
+    log::line(harmless.trim_end());
+    std::process::exit(error.exit_code());
+}
+
+/// Names go into files whose text is UTF-8: pictures, statistics, states.
+fn check_utf8(line: &[OsString]) -> Result<()> {
+    match line.iter().skip(1).find(|word| word.to_str().is_none()) {
+        Some(word) => Err(Error::Usage(format!("{word:?} is not UTF-8; give the file a name that is"))),
+        None => Ok(()),
+    }
+}
+
 fn typed(matches: &ArgMatches) -> Cli {
-    Cli::from_arg_matches(matches).unwrap_or_else(|error| error.exit())
+    Cli::from_arg_matches(matches).unwrap_or_else(|error| exit(&error))
 }
 
 /// Help and complaints about the command line follow `--color`, which is not parsed yet.

@@ -1,8 +1,6 @@
 //! Bytes: buffers in files, in data URIs and in the chunk of a GLB, and views of them.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -93,17 +91,10 @@ impl Bytes<'_> {
     }
 }
 
-/// Reads a file, but nothing that never ends.
+/// Reads a file.
 fn read_file(path: &Path, named_by: &str) -> Result<Vec<u8>> {
     let missing = |message: String| Error::Missing { file: path.into(), message: format!("{message} (named by {named_by})") };
-    let file = File::open(path).map_err(|e| missing(e.to_string()))?;
-    let metadata = file.metadata().map_err(|e| missing(e.to_string()))?;
-    if !metadata.is_file() {
-        return Err(missing("is not a file".into()));
-    }
-    let mut bytes = Vec::new();
-    file.take(metadata.len()).read_to_end(&mut bytes).map_err(|e| missing(e.to_string()))?;
-    Ok(bytes)
+    crate::file::read(path).map_err(|e| missing(e.to_string()))
 }
 
 /// Where bytes are.

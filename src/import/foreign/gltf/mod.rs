@@ -49,7 +49,7 @@ impl Source<'_> {
 /// # Errors
 /// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for what it says.
 pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
-    let bytes = std::fs::read(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+    let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     let document = document::parse(path, &bytes)?;
     let buffers = Buffers::load(path, &document.root, document.bin)?;
     let source = Source { file: path, root: &document.root, buffers: &buffers };

@@ -1,6 +1,5 @@
 //! Mitsuba's cube, and what has to be known of mesh files before they are read.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -51,7 +50,7 @@ pub fn has_normals(path: &Path) -> bool {
 
 /// Whether the header of a PLY file has a property whose line ends in one of these, or a line of an OBJ file begins so.
 fn has(path: &Path, endings: &[&str], word: &[u8]) -> bool {
-    let Ok(file) = File::open(path) else { return false };
+    let Ok(file) = crate::file::open(path) else { return false };
     let begins = |line: &[u8], word: &[u8]| line.trim_ascii().starts_with(word);
     let mut lines = BufReader::new(file).split(b'\n').map_while(std::io::Result::ok).peekable();
     if lines.peek().is_some_and(|line| begins(line, b"ply")) {

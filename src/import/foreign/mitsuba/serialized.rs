@@ -25,7 +25,7 @@ const CHUNK: usize = 1 << 16;
 /// # Errors
 /// If the file is missing or malformed or has no such mesh.
 pub fn read(path: &Path, index: u32) -> Result<MeshData, AssetError> {
-    let bytes = std::fs::read(path).map_err(|e| AssetError::Missing { file: path.into(), message: e.to_string() })?;
+    let bytes = crate::file::read(path).map_err(|e| AssetError::Missing { file: path.into(), message: e.to_string() })?;
     parse(&bytes, index).map_err(AssetError::Malformed)
 }
 

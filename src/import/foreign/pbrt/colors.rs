@@ -137,7 +137,7 @@ impl Colors<'_> {
             return Ok(known.rgb().map(f64::from));
         }
         let file = self.folder.join(name);
-        let text = std::fs::read_to_string(&file).map_err(|e| Error::Missing {
+        let text = crate::file::read_to_string(&file).map_err(|e| Error::Missing {
             file: file.clone(),
             message: format!("{e} (\"{} {}\" names neither a known spectrum nor a file)", param.kind, param.name),
         })?;

@@ -91,7 +91,8 @@ impl Reader {
 
     /// Reads all of it.
     pub fn read(mut self) -> Result<Imported> {
-        let bytes = std::fs::read(&self.scene).map_err(|e| Error::Missing { file: self.scene.clone(), message: e.to_string() })?;
+        let bytes =
+            crate::file::read_stream(&self.scene).map_err(|e| Error::Missing { file: self.scene.clone(), message: e.to_string() })?;
         self.lexers.push(Lexer::new(self.scene.clone(), bytes));
         let mut last = None;
         while let Some(mut lexer) = self.lexers.pop() {
@@ -243,7 +244,7 @@ impl Reader {
         if name.ends_with(".gz") {
             return Err(lexer.error(at, format!("\"{name}\": compressed files are not read")));
         }
-        let bytes = std::fs::read(&file)
+        let bytes = crate::file::read(&file)
             .map_err(|e| Error::Missing { file: file.clone(), message: format!("{e} (included by {})", lexer.place(at)) })?;
         Ok(Lexer::new(file, bytes))
     }

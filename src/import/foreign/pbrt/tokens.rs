@@ -54,7 +54,7 @@ impl Lexer {
     /// Begins to read a file's bytes.
     pub fn new(file: PathBuf, bytes: Vec<u8>) -> Self {
         let name = file.file_name().map_or_else(|| file.display().to_string(), |name| name.to_string_lossy().into_owned());
-        Self { file, name, bytes, next: 0, at: Position { line: 1, column: 1 }, waiting: None }
+        Self { file, name, bytes: crate::file::without_mark(bytes), next: 0, at: Position { line: 1, column: 1 }, waiting: None }
     }
 
     /// The text of a token.

@@ -197,3 +197,10 @@ fn lights_stand_in_the_mirrored_world() {
     let LightDesc::Directional(light) = &imported.desc.lights[0] else { panic!() };
     assert_eq!((light.direction, light.irradiance), ([1.0, -1.0, 0.0], [3.0; 3]));
 }
+
+#[test]
+fn byte_order_marks_are_passed_over() {
+    let included = "\u{feff}Shape \"sphere\"\n";
+    let scene = read_with("\u{feff}WorldBegin\nInclude \"a.pbrt\"\nShape \"disk\"\n", &[("a.pbrt", included.as_bytes())]).unwrap();
+    assert_eq!(scene.desc.shapes.len(), 2);
+}

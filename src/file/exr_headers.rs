@@ -50,8 +50,9 @@ pub fn check_claims(headers: &[Header], bytes: u64) -> Result<(), String> {
 /// # Errors
 /// As [`check_claims`], and the library's; a file that cannot be opened is one.
 pub fn read_headers(path: &Path) -> Result<Vec<Header>, String> {
-    let bytes = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
-    let headers = MetaData::read_from_file(path, false).map_err(|e| e.to_string())?.headers;
+    let file = super::open(path).map_err(|e| e.to_string())?;
+    let bytes = file.limit();
+    let headers = MetaData::read_from_unbuffered(file, false).map_err(|e| e.to_string())?.headers;
     check_claims(&headers, bytes)?;
     Ok(headers.into_vec())
 }

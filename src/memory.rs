@@ -1,0 +1,33 @@
+//! Requests for memory that may fail.
+
+use std::cell::Cell;
+
+thread_local! {
+    static FALLIBLE: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs `request`, which copes with memory that cannot be had, as `Vec::try_reserve` reports it. A program whose allocator ends it when memory
+/// runs out lets such requests fail instead, by [`is_fallible`].
+pub fn fallible<T>(request: impl FnOnce() -> T) -> T {
+    let before = FALLIBLE.replace(true);
+    let result = request();
+    FALLIBLE.set(before);
+    result
+}
+
+/// Whether this thread is in [`fallible`].
+pub fn is_fallible() -> bool {
+    FALLIBLE.get()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_request_is_fallible() {
+        assert!(!is_fallible());
+        assert!(fallible(|| fallible(is_fallible) && is_fallible()));
+        assert!(!is_fallible());
+    }
+}

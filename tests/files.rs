@@ -1,0 +1,187 @@
+use std::os::unix::fs::FileTypeExt;
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::util::program::{SCENE, run, steradian, told};
+
+/// Runs a line of shell with the program's path in `$0`.
+fn shell(folder: &Path, line: &str) -> Output {
+    std::fs::write(folder.join("scene.json"), SCENE).unwrap();
+    let mut command = Command::new("bash");
+    command.current_dir(folder).args(["-c", line, env!("CARGO_BIN_EXE_steradian")]);
+    command.env("XDG_CONFIG_HOME", folder.join("config")).stdin(Stdio::null()).output().unwrap()
+}
+
+/// Names in a folder that begin with a dot.
+fn hidden(folder: &Path) -> Vec<String> {
+    let names = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    names.filter(|name| name.starts_with('.')).collect()
+}
+
+fn make_pipe(path: &Path) {
+    assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+#[test]
+fn statistics_go_to_devices_pipes_and_open_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let is_statistics = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).is_ok_and(|value| value["spp"] == 2);
+    for (json, after) in [("/dev/stdout", "| cat"), ("/dev/stdout", ""), ("/dev/fd/3", "3>&1"), ("/proc/self/fd/3", "3>&1 | cat")] {
+        let output = shell(folder.path(), &format!("\"$0\" render scene.json -q -o a.exr --json {json} {after}"));
+        assert!(is_statistics(&output.stdout), "{json} {after}: {}", told(&output));
+    }
+    let output = shell(folder.path(), "\"$0\" render scene.json -q -o a.exr --json /dev/stderr");
+    assert!(is_statistics(&output.stderr), "{}", told(&output));
+    // What is redirected to a file comes between what else goes there.
+    let output = shell(folder.path(), "{ echo before; \"$0\" render scene.json -q -o a.exr --json /dev/stdout; echo after; } >out.txt");
+    assert!(output.status.success(), "{}", told(&output));
+    let text = std::fs::read_to_string(folder.path().join("out.txt")).unwrap();
+    assert!(text.starts_with("before\n{") && text.ends_with("}\nafter\n"), "{text}");
+    let output = shell(
+        folder.path(),
+        "mkfifo p.exr p.json; cat p.exr >b.exr & cat p.json >b.json & \"$0\" render scene.json -q -o p.exr --json p.json && wait",
+    );
+    assert!(output.status.success(), "{}", told(&output));
+    assert!(is_statistics(&std::fs::read(folder.path().join("b.json")).unwrap()));
+    assert_eq!(steradian::output::read_exr(&folder.path().join("b.exr")).unwrap().size, [24, 16]);
+    for device in ["--json /dev/null", "--log-file /dev/null", "--report /dev/null"] {
+        let output = run(folder.path(), &format!("render scene.json -q -o a.exr {device}"));
+        assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    }
+    assert!(std::fs::symlink_metadata("/dev/null").unwrap().file_type().is_char_device());
+    let output = run(folder.path(), "render scene.json -q -o a.exr --json /dev/full");
+    assert_eq!(output.status.code(), Some(5), "{}", told(&output));
+    assert!(hidden(folder.path()).is_empty());
+}
+
+#[test]
+fn what_never_ends_is_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    for extension in ["", ".shard"] {
+        make_pipe(&folder.path().join(format!("pipe{extension}")));
+        std::os::unix::fs::symlink("/dev/zero", folder.path().join(format!("endless{extension}"))).unwrap();
+    }
+    let scenes = [
+        r#""shapes": [{ "type": "mesh", "file": "FILE" }]"#,
+        r#""shapes": [{ "type": "mesh", "file": "named.obj" }]"#,
+        r#""textures": { "t": { "type": "image", "file": "FILE" } },
+           "materials": { "m": { "type": "diffuse", "albedo": { "texture": "t" } } }, "shapes": [{ "type": "sphere", "material": "m" }]"#,
+        r#""lights": [{ "type": "environment", "file": "FILE" }]"#,
+    ];
+    let commands = [
+        ("render scene.json -o a.exr --checkpoint FILE --resume", 5),
+        ("render scene.json --shard 1/2 -o FILE.shard", 5),
+        ("merge FILE.shard -o a.exr", 4),
+        ("compare FILE FILE", 4),
+        ("check-exr FILE", 4),
+        ("rerender FILE", 4),
+    ];
+    for file in ["endless", "pipe"] {
+        let obj = format!("mtllib {file}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+        std::fs::write(folder.path().join("named.obj"), obj).unwrap();
+        for scene in scenes {
+            std::fs::write(folder.path().join("s.json"), format!("{{ \"camera\": {{}}, {} }}", scene.replace("FILE", file))).unwrap();
+            let output = run(folder.path(), "render s.json -o a.exr");
+            assert!(matches!(output.status.code(), Some(3 | 4)), "{scene}: {:?} {}", output.status, told(&output));
+        }
+        for (command, code) in commands {
+            let output = run(folder.path(), &command.replace("FILE", file));
+            assert_eq!(output.status.code(), Some(code), "{command} {file}: {}", told(&output));
+        }
+    }
+    assert_eq!(run(folder.path(), "render /dev/zero -o a.exr").status.code(), Some(4));
+    // But a scene may come through a pipe.
+    let output = shell(folder.path(), "cat scene.json | \"$0\" render /dev/stdin -q -o a.exr && \"$0\" info <(cat scene.json)");
+    assert!(output.status.success() && folder.path().join("a.exr").exists(), "{}", told(&output));
+}
+
+#[test]
+fn killed_writers_leave_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        "render scene.json -q --size 256x192 --spp 400 --layers Z,N,P --checkpoint a.state --every 0 --resume -o a.exr --json a.json";
+    let mut killed = 0;
+    for i in 0..8 {
+        let mut child = steradian(folder.path(), arguments).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(150 + 37 * i));
+        child.kill().unwrap();
+        killed += u32::from(child.wait().unwrap().signal() == Some(9));
+        let left: Vec<_> = hidden(folder.path()).into_iter().filter(|name| name != ".a.state.lock").collect();
+        assert!(left.is_empty(), "{left:?}");
+    }
+    assert!(killed > 4, "{killed}");
+    let output =
+        run(folder.path(), &arguments.replace("--spp 400", "--spp 2 --seed 9").replace("--resume", "").replace("a.state", "b.state"));
+    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+}
+
+#[test]
+fn files_beyond_the_limit_are_errors_of_writing() {
+    let folder = tempfile::tempdir().unwrap();
+    for output in ["-o a.exr --float", "-o a.png", "--shard 1/2"] {
+        let output = shell(folder.path(), &format!("ulimit -f 4; exec \"$0\" render scene.json -q --size 128x128 --spp 2 {output}"));
+        assert_eq!(output.status.code(), Some(5), "{:?} {}", output.status, told(&output));
+        assert_eq!((told(&output).matches("error: cannot write").count(), told(&output).lines().count()), (1, 1), "{}", told(&output));
+    }
+    // A checkpoint that cannot be written is no reason to lose the picture.
+    let output = shell(folder.path(), "ulimit -f 100; exec \"$0\" render scene.json --size 128x128 --spp 2 -o a.png --checkpoint a.state");
+    assert!(output.status.success() && told(&output).contains("warning: cannot write a.state: "), "{}", told(&output));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn memory_that_runs_out_is_one_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let wave = |i: usize, j: usize| 0.1 * (i as f64 * 0.1).sin() * (j as f64 * 0.1).cos();
+    let n = 150;
+    let vertices = (0..n * n).map(|k| format!("v {} {} {}\n", k % n, k / n, wave(k % n, k / n)));
+    let quads = (0..n * (n - 1)).filter(|k| k % n + 1 < n).map(|k| format!("f {} {} {} {}\n", k + 1, k + 2, k + n + 2, k + n + 1));
+    std::fs::write(folder.path().join("m.obj"), vertices.chain(quads).collect::<String>()).unwrap();
+    let scene = SCENE.replace(r#"{ "type": "sphere", "radius": 1 }"#, r#"{ "type": "mesh", "file": "m.obj" }"#);
+    std::fs::write(folder.path().join("m.json"), scene).unwrap();
+    let mut codes = Vec::new();
+    for accel in ["embree", "bvh"] {
+        // Far below, the libraries themselves find no room (127).
+        for megabytes in [70, 90, 100, 110, 170, 230, 290, 330, 345, 360, 400] {
+            let line = format!("ulimit -c 0; ulimit -v {megabytes}000; exec \"$0\" render m.json -q -o a.png --accel {accel} --threads 3");
+            let start = Instant::now();
+            let output = shell(folder.path(), &line);
+            let (code, text) = (output.status.code(), told(&output));
+            assert!(matches!(code, Some(0 | 33 | 127)), "{accel} {megabytes} MB: {:?} {text}", output.status);
+            if code == Some(33) {
+                assert!(text.starts_with("error: ") && text.lines().count() == 1, "{accel} {megabytes} MB: {text}");
+            }
+            assert!(start.elapsed() < Duration::from_secs(60), "{accel} {megabytes} MB");
+            codes.push(code);
+        }
+    }
+    assert!(codes.iter().filter(|code| **code == Some(33)).count() >= 5, "{codes:?}");
+    let output = shell(folder.path(), "ulimit -v 300000; exec \"$0\" render scene.json --size 8000x8000 -o a.png --log-format json");
+    assert_eq!(output.status.code(), Some(33), "{}", told(&output));
+    assert!(serde_json::from_str::<Value>(told(&output).trim()).is_ok_and(|line| line["level"] == "error"), "{}", told(&output));
+}
+
+#[test]
+fn threads_that_cannot_be_started_are_one_error() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o777)).unwrap();
+    // The limit does not hold for root.
+    let user = "[ $(id -u) != 0 ] || user='setpriv --reuid 64321 --regid 64321 --clear-groups'; $user true && $user \"$0\" --version";
+    if !shell(folder.path(), user).status.success() {
+        return;
+    }
+    for (accel, limit) in [("embree", 1), ("embree", 2), ("embree", 3), ("embree", 4), ("bvh", 3), ("bvh", 5)] {
+        let line = format!(
+            "ulimit -c 0; {user} >/dev/null; exec $user bash -c 'ulimit -u {limit}; exec \"$0\" render scene.json -q -o a.png --threads 7 --accel {accel}' \"$0\""
+        );
+        let output = shell(folder.path(), &line);
+        let text = told(&output);
+        assert_eq!(output.status.code(), Some(33), "{accel} {limit}: {:?} {text}", output.status);
+        assert!(text.starts_with("error: ") && text.lines().count() == 1 && !text.contains("bug"), "{accel} {limit}: {text}");
+    }
+}
