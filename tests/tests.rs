@@ -96,6 +96,8 @@ mod texture_filtering;
 mod textures;
 /// Layers, file lengths, unsafe code, printing.
 mod tidy;
+/// What files may do: set what a picture is, but load, overwrite and connect to nothing.
+mod trust;
 /// Shared helpers.
 mod util;
 /// Colours of vertices: in pictures, from every kind of file, and what is refused.

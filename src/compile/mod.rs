@@ -23,7 +23,7 @@ mod summary;
 mod textures;
 mod transforms;
 
-pub use settings::check_settings;
+pub use settings::{check_film_and_integrator, check_settings};
 pub use summary::Summary;
 
 use std::collections::BTreeMap;

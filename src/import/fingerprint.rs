@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 /// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count, nor do the folder
 /// of the scene and the format it was read from.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SceneFingerprint {
     /// Of all below.
     pub whole: String,

@@ -3,6 +3,8 @@
 use std::num::NonZero;
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::ExrOverrides;
 use crate::accel::AccelKind;
 use crate::desc::{FilterDesc, IntegratorDesc, LayerDesc, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc};
@@ -24,7 +26,11 @@ const MOST_SAMPLES: u32 = 1 << 16;
 const MAX_THREADS: usize = 4096;
 
 /// How a scene is rendered.
-#[derive(Clone, Debug)]
+///
+/// Serialized, these are the settings that the picture depends on: EXR files keep them for [`Recipe`](super::Recipe), and a checkpoint or shard
+/// belongs to another picture if any differs. Only what can never change a pixel is skipped.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Settings {
     /// Width and height of the full picture in pixels.
     pub size: [u32; 2],
@@ -47,12 +53,16 @@ pub struct Settings {
     /// What finds hits.
     pub accel: AccelKind,
     /// Whether paths shade diffuse surfaces side by side: faster, with the same picture bit for bit.
+    #[serde(skip)]
     pub side_by_side: bool,
     /// Number of threads, at least 1.
+    #[serde(skip)]
     pub threads: usize,
     /// The render ends after this time even if samples are missing.
+    #[serde(skip)]
     pub time_limit: Option<Duration>,
     /// The files to write.
+    #[serde(skip)]
     pub outputs: Vec<OutputDesc>,
     /// Every layer that an output asks for.
     pub layers: LayerSet,
@@ -115,10 +125,6 @@ impl Settings {
         let overscan = overscan(desc, overrides, size)?;
         let outputs = outputs(desc, overrides)?;
         let layers = outputs.iter().flat_map(|output| &output.layers).collect();
-        let sampler = match overrides.sampler.unwrap_or(desc.sampler.kind) {
-            SamplerKindDesc::Sobol => SamplerKind::Sobol,
-            SamplerKindDesc::Independent => SamplerKind::Independent,
-        };
         if overrides.spp == Some(0) {
             return Err(usage("--spp 0: a picture needs at least one sample per pixel"));
         }
@@ -127,14 +133,14 @@ impl Settings {
             overscan,
             crop: crop(desc, overrides, size, overscan)?,
             filter: desc.film.filter,
-            sampler,
+            sampler: overrides.sampler.unwrap_or(desc.sampler.kind).into(),
             spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() { MOST_SAMPLES } else { desc.sampler.spp }),
             target_error: target_error(overrides)?,
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
             integrator: integrator(desc, overrides)?,
             accel: overrides.accel.unwrap_or_default(),
             side_by_side: true,
-            threads: threads(overrides)?,
+            threads: threads(overrides.threads)?,
             time_limit: time_limit(overrides)?,
             outputs,
             layers,
@@ -238,8 +244,12 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
     Ok(integrator)
 }
 
-fn threads(overrides: &Overrides) -> Result<usize> {
-    match overrides.threads.unwrap_or(0) {
+/// The number of threads that `--threads` means; without it, or with 0, all that the process may use.
+///
+/// # Errors
+/// [`Error::Usage`] if there are too many.
+pub fn threads(wanted: Option<usize>) -> Result<usize> {
+    match wanted.unwrap_or(0) {
         0 => Ok(std::thread::available_parallelism().map_or(1, NonZero::get)),
         threads if threads > MAX_THREADS => Err(usage(format!("--threads {threads}: at most {MAX_THREADS}"))),
         threads => Ok(threads),

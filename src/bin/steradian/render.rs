@@ -85,9 +85,15 @@ impl<'a> Plan<'a> {
         let json = arguments.json.as_deref().map(|path| shot.file(path));
         let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
         let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?.map(|name| shot.file_of(&name));
-        let mut settings = Settings::new(&shot.imported.desc, &overrides)?;
-        shot.adapt(&mut settings);
-        let recipe = rerender::prepare(arguments, shot, &mut settings)?;
+        let mut settings = match &arguments.repeat {
+            Some(repeat) => repeat.recipe.settings(render::threads(arguments.threads)?),
+            None => {
+                let mut settings = Settings::new(&shot.imported.desc, &overrides)?;
+                shot.adapt(&mut settings);
+                settings
+            }
+        };
+        let recipe = rerender::recipe(arguments, shot, &settings)?;
         let is_there = match &shard_file {
             Some(file) => shot.frame.is_some() && !arguments.sequence.overwrite && file.exists(),
             None => shot.is_there(&settings, arguments.sequence.overwrite),

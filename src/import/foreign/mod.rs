@@ -17,12 +17,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::{Assets, load_scene};
 use crate::desc::SceneDesc;
 use crate::error::Result;
 
 /// What the user says beside a scene file.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct ImportOptions {
     /// Mitsuba: values of `$name` that replace the defaults of the file.
     pub defines: Vec<(String, String)>,
