@@ -135,3 +135,29 @@ fn a_recipe_holds_how_the_scene_was_read() {
         assert_eq!(pixels(&dir.join(file)), pixels(&dir.join("third.exr")), "{line}");
     }
 }
+
+/// A project's file loads, writes and connects to nothing; the user's own may.
+#[test]
+fn a_project_cannot_say_what_is_loaded_written_or_connected_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.set_nonblocking(true).unwrap();
+    let address = format!("tev = \"{}\"", listener.local_addr().unwrap());
+    let user = dir.join("config/steradian/config.toml");
+    std::fs::create_dir_all(user.parent().unwrap()).unwrap();
+    for line in ["oidn-library = \"evil.so\"", "log-file = \"log\"", "output = \"o.exr\"", &address, "preview = 0", "overwrite = true"] {
+        let key = line.split(' ').next().unwrap();
+        std::fs::write(dir.join("steradian.toml"), format!("spp = 1\n{line}\n")).unwrap();
+        let variable = format!("STERADIAN_{}", key.to_uppercase().replace('-', "_"));
+        let parts = ["steradian.toml:2: ", key, &format!("--{key}"), &variable, user.to_str().unwrap()];
+        assert_code(dir, "render scene.json -q --denoise", 2, &parts);
+        assert_code(dir, "config show --origin scene.json", 2, &parts);
+    }
+    std::fs::remove_file(dir.join("steradian.toml")).unwrap();
+    assert!(listener.accept().is_err());
+    assert_eq!(names(dir), ["config", "scene.json"].map(str::to_owned).into());
+    std::fs::write(&user, "output = \"mine.exr\"\nlog-file = \"log\"").unwrap();
+    assert_code(dir, "render scene.json -q", 0, &[]);
+    assert!(dir.join("mine.exr").exists() && dir.join("log").exists());
+}
