@@ -464,10 +464,12 @@ fn faults_of_checkpoints_have_their_codes() {
     let line = "render scene.json --size 24x20 -q -o a.exr --checkpoint";
     assert_code(&run(folder, &format!("{line} a.state --spp 2")), 0, "");
     let whole = std::fs::read(folder.join("a.state")).unwrap();
+    std::fs::write(folder.join("other"), "no checkpoint").unwrap();
     let cases = [
         ("a.state --spp 2", 2, "--resume continues from it"),
-        ("scene.json", 2, "there is such a file"),
-        ("scene.json --resume", 6, "this is not a checkpoint"),
+        ("other", 2, "there is such a file"),
+        ("other --resume", 6, "this is not a checkpoint"),
+        ("scene.json --resume", 2, "scene.json (the scene) and scene.json (--checkpoint)"),
         ("missing/a.state", 5, "there is no folder missing"),
         ("/proc/a.state", 5, "no file can be created"),
         ("a.state --resume --spp 2 --seed 4", 6, "seed: 0 in the checkpoint, 4 asked for"),

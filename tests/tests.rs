@@ -35,6 +35,8 @@ mod determinism;
 mod exr_files;
 /// Jobs for farms: their scripts with stand-ins for Slurm and the render.
 mod farm;
+/// Outputs that are inputs, or two of one name: refused by every command before it writes.
+mod file_uses;
 /// Known flaws of renderers in camera and film: each test fails on the flawed formula.
 mod flaws_of_camera;
 /// Known flaws of renderers in glass and in round shapes: each test fails on the flawed formula.

@@ -9,6 +9,7 @@ mod plane;
 mod read;
 mod write;
 
+pub use metadata::sidecar_path;
 pub use plan::check_output;
 pub use read::{read_exr, read_settings};
 pub use write::write_exr;

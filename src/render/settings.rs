@@ -280,11 +280,6 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides) -> Result<Vec<OutputDesc>> {
     } else {
         by_name(&overrides.default_outputs)
     };
-    for (i, output) in outputs.iter().enumerate() {
-        if outputs[..i].iter().any(|other| other.file == output.file) {
-            return Err(usage(format!("two outputs have the name {}", output.file)));
-        }
-    }
     let has_extension = |output: &OutputDesc, extension: &str| output.file.to_ascii_lowercase().ends_with(extension);
     let needs = |option: &str, asked: bool, extension: &str| {
         if asked && !outputs.iter().any(|output| has_extension(output, extension)) {
@@ -435,7 +430,6 @@ mod tests {
             ("--float", Overrides { float: true, outputs: vec!["a.png".to_owned()], ..d() }),
             ("--exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
             ("--exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),
-            ("two outputs", Overrides { outputs: vec!["a.png".to_owned(), "a.png".to_owned()], ..d() }),
         ];
         for (option, overrides) in cases {
             let message = refusal(&desc, &overrides);

@@ -1,10 +1,10 @@
 //! `steradian merge`.
 
-use std::path::Path;
+use std::path::{Component, Path};
 
 use steradian::desc::OutputDesc;
 use steradian::film::Image;
-use steradian::output::{self, Format, RenderInfo, RenderStatistics};
+use steradian::output::{self, FileUses, Format, RenderInfo, RenderStatistics};
 use steradian::render::{self, Header};
 use steradian::{Error, Result};
 
@@ -12,9 +12,11 @@ use crate::args::MergeArgs;
 use crate::log::{self, Level};
 
 /// Merges shards and writes the picture.
-pub fn run(arguments: &MergeArgs) -> Result<()> {
+pub fn run(arguments: &MergeArgs, mut uses: FileUses) -> Result<()> {
     let first = arguments.shards.first().ok_or_else(|| Error::Usage("no shards to merge".into()))?;
     let outputs = outputs(&Header::read(first)?, &arguments.output)?;
+    arguments.shards.iter().try_for_each(|path| uses.read(path, "a shard"))?;
+    outputs.iter().flat_map(output::files_of_output).try_for_each(|path| uses.write(&path, "output"))?;
     for output in &outputs {
         output::check_writable(Path::new(&output.file))?;
     }
@@ -41,7 +43,16 @@ pub fn run(arguments: &MergeArgs) -> Result<()> {
 /// The files to write: with the names of the command line, but else as the render was to write files of that kind.
 fn outputs(header: &Header, names: &[String]) -> Result<Vec<OutputDesc>> {
     if names.is_empty() {
-        return Ok(header.outputs.clone());
+        // A shard may be anybody's: it names files in the working folder alone.
+        let inside = |output: &&OutputDesc| {
+            Path::new(&output.file).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+        };
+        return match header.outputs.iter().find(|output| !inside(output)) {
+            None => Ok(header.outputs.clone()),
+            Some(output) => {
+                Err(Error::Usage(format!("the shards name {}, outside of the working folder: name the file with -o", output.file)))
+            }
+        };
     }
     let like = |name: &String| -> Result<OutputDesc> {
         let format = Format::from_path(Path::new(name))?;
@@ -65,5 +76,10 @@ mod tests {
         assert_eq!((named[1].file.as_str(), named[1].layers.len()), ("c.png", 0));
         assert_eq!(outputs(&header, &[]).unwrap()[0].file, "a.exr");
         assert!(matches!(outputs(&header, &["d.jpg".to_owned()]), Err(Error::Usage(_))));
+        for file in ["/home/a.exr", "../a.exr", "b/../../a.exr"] {
+            let header = Header { outputs: vec![OutputDesc::new(file)], ..Header::default() };
+            assert!(matches!(outputs(&header, &[]), Err(Error::Usage(message)) if message.contains(file) && message.contains("-o")));
+            assert_eq!(outputs(&header, &["b.exr".to_owned()]).unwrap()[0].file, "b.exr");
+        }
     }
 }

@@ -6,7 +6,7 @@ use clap::Parser;
 use steradian::desc::OutputDesc;
 use steradian::farm::is_scene_per_frame;
 use steradian::import::scene_fingerprint;
-use steradian::output::{self, Format};
+use steradian::output::{self, FileUses, Format};
 use steradian::render::{Frame, Recipe, Settings};
 use steradian::{Error, Result};
 
@@ -25,7 +25,7 @@ pub struct Repeat {
 }
 
 /// Renders a picture again; the result is the exit code.
-pub fn run(arguments: &RerenderArgs) -> Result<u8> {
+pub fn run(arguments: &RerenderArgs, mut uses: FileUses) -> Result<u8> {
     let file = &arguments.file;
     let mut recipe = Recipe::from_value(output::read_settings(file)?, file)?;
     let name = arguments.output.clone();
@@ -52,7 +52,8 @@ pub fn run(arguments: &RerenderArgs) -> Result<u8> {
         render.sequence.overwrite = true;
     }
     render.repeat = Some(Box::new(Repeat { recipe, file: file.clone(), allow_changed: arguments.allow_changed }));
-    frames::run(&render)
+    uses.read(file, "the picture to render again")?;
+    frames::run(&render, uses)
 }
 
 /// The arguments of `render` without any option.

@@ -157,6 +157,7 @@ impl TextureSet {
                     None => {
                         let path = source.file.parent().unwrap_or(Path::new("")).join(&plain);
                         let image = read_image(&path).map_err(|e| e.at(source.file, &format!("images[{index}]"), &path))?;
+                        draft.files.insert(path);
                         cut(&image, f32::from_bits(*factor), f32::from_bits(*cutoff))
                     }
                 };
