@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 fn every_file_is_read_or_refused() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus");
     let folder = tempfile::tempdir().unwrap();
-    for kind in ["scene_json", "obj", "ply", "image", "mitsuba_xml", "pbrt", "gltf"] {
+    for kind in ["scene_json", "obj", "ply", "image", "mitsuba_xml", "pbrt", "gltf", "recipe"] {
         let files: Vec<_> = std::fs::read_dir(corpus.join(kind)).unwrap().map(|entry| entry.unwrap().path()).collect();
         assert!(!files.is_empty(), "{kind}");
         for file in files {
