@@ -241,7 +241,8 @@ mod tests {
         ];
         for (place, value, message) in cases {
             let mut changed = recipe();
-            *changed.pointer_mut(place).unwrap() = value;
+            let (object, key) = place.rsplit_once('/').unwrap();
+            changed.pointer_mut(object).unwrap()[key] = value;
             let refused = refusal(changed);
             assert!(refused.contains("a.exr") && refused.contains(message), "{place}: {refused}");
         }
