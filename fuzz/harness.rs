@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use steradian::import::{self, ImportOptions, MeshData};
+use steradian::render::Recipe;
 
 /// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to. Malformed files are errors; anything else is a finding.
 pub fn read(kind: &str, data: &[u8], folder: &Path) {
@@ -46,6 +47,16 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
         "gltf" => {
             let name = if data.starts_with(b"glTF") { "s.glb" } else { "s.gltf" };
             read_scene(&write(name, data));
+        }
+        "recipe" => {
+            let file = Path::new("a.exr");
+            if let Some(recipe) = serde_json::from_slice(data).ok().and_then(|value| Recipe::from_value(value, file).ok()) {
+                let value = recipe.to_value();
+                let again = Recipe::from_value(value.clone(), file).expect("what was taken is taken again");
+                assert_eq!(again.to_value(), value);
+                let settings = recipe.settings(1);
+                assert!(settings.crop.fits(settings.film_size()) && settings.spp > 0 && settings.threads == 1);
+            }
         }
         _ => panic!("no kind {kind}"),
     }

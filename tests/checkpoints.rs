@@ -181,7 +181,7 @@ fn a_state_of_another_render_is_refused_and_named() {
     };
     let cases: [(&str, Overrides); 5] = [
         ("seed: 0 in the checkpoint, 3 asked for", Overrides { seed: Some(3), ..spp(4) }),
-        ("size: 41x37 in the checkpoint, 40x37 asked for", Overrides { size: Some([40, 37]), ..spp(4) }),
+        ("size: 41,37 in the checkpoint, 40,37 asked for", Overrides { size: Some([40, 37]), ..spp(4) }),
         ("crop: 0,0,41,37 in the checkpoint, 1,2,3,4 asked for", Overrides { crop: Some([1, 2, 3, 4]), ..spp(4) }),
         ("integrator.max_depth: 5 in the checkpoint, 6 asked for", Overrides { max_depth: Some(6), ..spp(4) }),
         ("pixels have 4 samples already, 3 asked for", spp(3)),
@@ -201,6 +201,77 @@ fn a_state_of_another_render_is_refused_and_named() {
     assert!(refused.contains(", steradian 99 asked for"), "{refused}");
     let refused = refusal(&scene("box"), &spp(4), |header| header.shard = Shard { index: 1, count: 2 });
     assert!(refused.contains("shard: 1/1 in the checkpoint, 1/2 asked for"), "{refused}");
+}
+
+/// Other values for a serialized field, some of which its type takes.
+fn others(value: &Value) -> Vec<Value> {
+    let names = ["independent", "linear", "mis", "light", "Z"].map(Value::from);
+    match value {
+        Value::Null => vec![json!(0.5)],
+        Value::Bool(on) => vec![json!(!on)],
+        Value::Number(number) if number.as_u64() == Some(0) => vec![json!(1)],
+        Value::Number(number) if number.is_u64() => vec![json!(number.as_u64().unwrap() - 1)],
+        Value::Number(number) => vec![json!(number.as_f64().unwrap() + 1.0)],
+        Value::Array(list) if list.first().is_some_and(Value::is_string) => vec![json!(["Z"])],
+        Value::Array(list) => vec![list.iter().map(|item| others(item).swap_remove(0)).collect()],
+        _ => names.to_vec(),
+    }
+}
+
+/// Every way to change one field of serialized settings, with the field's name: whatever is added to them is found here.
+fn changed_settings(settings: &Value) -> Vec<(String, Value)> {
+    let mut changed = Vec::new();
+    for (name, value) in settings.as_object().unwrap() {
+        let variants: Vec<(String, Value)> = match value {
+            Value::Object(object) => {
+                let other_kind = ["tent", "depth"].map(|kind| ("type".to_owned(), json!({ "type": kind })));
+                let other_fields = object.iter().filter(|(key, _)| *key != "type").flat_map(|(key, field)| {
+                    let with = |other| Value::Object(object.clone().into_iter().chain([(key.clone(), other)]).collect());
+                    others(field).into_iter().map(move |other| (key.clone(), with(other)))
+                });
+                let fields = other_kind.into_iter().chain(other_fields);
+                fields.map(|(key, object)| (format!("{name}.{key}"), object)).collect()
+            }
+            value => others(value).into_iter().map(|other| (name.clone(), other)).collect(),
+        };
+        changed.extend(variants.into_iter().filter(|(_, other)| other != value).map(|(field, other)| {
+            let all = settings.as_object().unwrap().clone();
+            (field, Value::Object(all.into_iter().chain([(name.clone(), other)]).collect()))
+        }));
+    }
+    changed
+}
+
+/// Whatever setting the picture depends on differs: neither is a checkpoint continued nor are shards merged, and the setting is named.
+#[test]
+fn every_setting_that_differs_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let kit = Kit::new(&scene("box"), &spp(4));
+    let shards = [1, 2].map(|index| Shard { index, count: 2 });
+    let state = StateFile::take(&folder.path().join("a.state")).unwrap();
+    let files = [1, 2].map(|index| StateFile::take(&folder.path().join(format!("{index}.shard"))).unwrap());
+    state.replace(|out| kit.render(Shard::WHOLE).write(&kit.header(Shard::WHOLE), out)).unwrap();
+    let shard = kit.render(shards[0]);
+    files[0].replace(|out| shard.write(&kit.header(shards[0]), out)).unwrap();
+    let serialized = serde_json::to_value(&kit.prepared.settings).unwrap();
+    let mut found = std::collections::BTreeSet::new();
+    for (name, value) in changed_settings(&serialized) {
+        let Ok(settings) = serde_json::from_value::<render::Settings>(value) else { continue };
+        let prepared = Prepared { settings: render::Settings { threads: 1, ..settings }, ..prepare(&scene("box"), &spp(4)) };
+        let other = Kit { prepared };
+        let refused = RenderState::read(state.path(), &other.header(Shard::WHOLE), &other.prepared.scene, &other.prepared.settings);
+        let resumed = refused.unwrap_err().to_string();
+        files[1].replace(|out| shard.write(&other.header(shards[1]), out)).unwrap();
+        let merged = render::merge(&files.each_ref().map(|file| file.path().to_owned()), true).unwrap_err().to_string();
+        for refused in [resumed, merged] {
+            assert!(refused.contains("another") && refused.contains(&format!("{name}: ")), "{name}: {refused}");
+        }
+        found.insert(name.split('.').next().unwrap().to_owned());
+    }
+    // Some of the changes make sense for every field.
+    assert_eq!(found.iter().collect::<Vec<_>>(), serialized.as_object().unwrap().keys().collect::<Vec<_>>());
+    let skipped = ["outputs", "side_by_side", "threads", "time_limit"];
+    assert!(skipped.iter().all(|name| !found.contains(*name)));
 }
 
 /// Films of textures that are filtered for a number of samples cannot get more of them.
@@ -390,10 +461,12 @@ fn faults_of_checkpoints_have_their_codes() {
     let line = "render scene.json --size 24x20 -q -o a.exr --checkpoint";
     assert_code(&run(folder, &format!("{line} a.state --spp 2")), 0, "");
     let whole = std::fs::read(folder.join("a.state")).unwrap();
+    std::fs::write(folder.join("other"), "no checkpoint").unwrap();
     let cases = [
         ("a.state --spp 2", 2, "--resume continues from it"),
-        ("scene.json", 2, "there is such a file"),
-        ("scene.json --resume", 6, "this is not a checkpoint"),
+        ("other", 2, "there is such a file"),
+        ("other --resume", 6, "this is not a checkpoint"),
+        ("scene.json --resume", 2, "scene.json (the scene) and scene.json (--checkpoint)"),
         ("missing/a.state", 5, "there is no folder missing"),
         ("/proc/a.state", 5, "no file can be created"),
         ("a.state --resume --spp 2 --seed 4", 6, "seed: 0 in the checkpoint, 4 asked for"),

@@ -131,9 +131,9 @@ fn signals_and_time_limits_end_a_pass_that_does_not_end() {
     let limited = |options: &str| {
         let mut command = steradian(folder.path(), &format!("render mirrors.json -o a.exr --threads 1 -v {options}"));
         std::fs::write(folder.path().join("mirrors.json"), MIRRORS).unwrap();
-        command.stderr(Stdio::piped()).spawn().unwrap()
+        Running::start(command.stderr(Stdio::piped()))
     };
-    let output = limited("--time-limit 0.1").wait_with_output().unwrap();
+    let output = limited("--time-limit 0.1").output();
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("--time-limit 0.1: "), "{message}");
@@ -144,7 +144,7 @@ fn signals_and_time_limits_end_a_pass_that_does_not_end() {
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
         lines.by_ref().map_while(Result::ok).find(|line| line.contains("to build")).unwrap();
         std::thread::sleep(std::time::Duration::from_millis(300));
-        assert!(Command::new("kill").arg("-INT").arg(child.id().to_string()).status().unwrap().success());
+        child.signal(Signal::INT);
         let rest: Vec<String> = lines.map_while(Result::ok).collect();
         assert_eq!(child.wait().unwrap().code(), Some(130), "{options}: {rest:?}");
     }

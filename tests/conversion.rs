@@ -5,6 +5,7 @@ use std::path::Path;
 use steradian::accel::AccelKind;
 use steradian::convert::{Originals, write_scene};
 use steradian::import::{ImportOptions, read_scene};
+use steradian::output::FileUses;
 use steradian::render::{Overrides, Settings};
 use steradian::{ErrorKind, compile};
 
@@ -19,7 +20,7 @@ fn picture(path: &Path) -> Vec<[u32; 3]> {
 }
 
 fn convert(path: &Path, target: &Path, originals: Originals) -> steradian::Result<usize> {
-    write_scene(&read_scene(path, &ImportOptions::default())?, path, target, originals)
+    write_scene(&read_scene(path, &ImportOptions::default())?, path, target, originals, FileUses::default())
 }
 
 #[test]
@@ -33,8 +34,11 @@ fn converted_scenes_give_the_same_picture() {
             std::fs::create_dir_all(target.parent().unwrap()).unwrap();
             convert(&path, &target, originals).unwrap();
             assert!(picture(&target) == expected, "{name}, {kind}");
-            // A second time changes nothing: what is there is written over.
-            convert(&target, &target, originals).unwrap();
+            // A second time changes nothing: what is there stays or is written over. The scene itself is not.
+            assert!(matches!(convert(&target, &target, originals), Err(steradian::Error::Usage(_))));
+            let moved = target.with_extension("moved.json");
+            std::fs::rename(&target, &moved).unwrap();
+            convert(&moved, &target, originals).unwrap();
             assert!(picture(&target) == expected, "{name}, {kind}, twice");
         }
     }

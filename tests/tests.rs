@@ -37,6 +37,8 @@ mod exr_files;
 mod farm;
 /// What is read and written that is no regular file, killed writers, and limits of the process.
 mod files;
+/// Outputs that are inputs, or two of one name: refused by every command before it writes.
+mod file_uses;
 /// Known flaws of renderers in camera and film: each test fails on the flawed formula.
 mod flaws_of_camera;
 /// Known flaws of renderers in glass and in round shapes: each test fails on the flawed formula.
@@ -104,6 +106,8 @@ mod texture_filtering;
 mod textures;
 /// Layers, file lengths, unsafe code, printing.
 mod tidy;
+/// What files may do: set what a picture is, but load, overwrite and connect to nothing.
+mod trust;
 /// Shared helpers.
 mod util;
 /// Colours of vertices: in pictures, from every kind of file, and what is refused.

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use super::bvh::{Bvh, BvhOptions};
 use super::kdtree::{KdTree, KdTreeOptions};
 use super::octree::Octree;
@@ -11,8 +13,9 @@ use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel}
 use crate::error::Result;
 use crate::geometry::Geometry;
 
-/// An accelerator with its options. Its name is `KIND` or `KIND:OPTION+OPTION`; [`AccelKind::CHOICES`] lists both.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// An accelerator with its options. Its name, also when serialized, is `KIND` or `KIND:OPTION+OPTION`; [`AccelKind::CHOICES`] lists both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 pub enum AccelKind {
     /// Embree.
     Embree(EmbreeOptions),
@@ -119,6 +122,20 @@ impl FromStr for AccelKind {
             }
         }
         Ok(accel)
+    }
+}
+
+impl From<AccelKind> for String {
+    fn from(kind: AccelKind) -> Self {
+        kind.to_string()
+    }
+}
+
+impl TryFrom<String> for AccelKind {
+    type Error = UnknownAccel;
+
+    fn try_from(name: String) -> std::result::Result<Self, UnknownAccel> {
+        name.parse()
     }
 }
 

@@ -25,7 +25,7 @@ mod summary;
 mod textures;
 mod transforms;
 
-pub use settings::{check_imported_settings, check_settings};
+pub use settings::{check_film_and_integrator, check_imported_settings, check_settings};
 pub use summary::Summary;
 
 use std::collections::BTreeMap;

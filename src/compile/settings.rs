@@ -28,6 +28,16 @@ pub fn check_imported_settings(imported: &Imported, scene_file: &Path) -> Result
     check(&imported.desc, &Files::of(imported, scene_file))
 }
 
+/// As [`check_settings`], for a film and an integrator alone that `file` holds.
+///
+/// # Errors
+/// As [`check_settings`].
+pub fn check_film_and_integrator(film: &FilmDesc, integrator: &IntegratorDesc, file: &Path) -> Result<()> {
+    let files = Files::new(file);
+    check_film(&files, film)?;
+    check_integrator(&files, integrator)
+}
+
 /// As [`check_settings`], for the scene of `files`.
 pub(super) fn check(desc: &SceneDesc, files: &Files) -> Result<()> {
     check_film(files, &desc.film)?;

@@ -9,6 +9,7 @@ use super::{Originals, folder_of, write_ply};
 use crate::error::{Error, Result};
 use crate::file::{self, write_atomically};
 use crate::import::{Assets, ImageData, Imported, RgbImage, Samples};
+use crate::output::FileUses;
 
 /// Brings files to the folder beside a scene.
 pub struct Files<'a> {
@@ -22,6 +23,8 @@ pub struct Files<'a> {
     brought: BTreeMap<String, String>,
     /// Files in the folder beside the scene.
     count: usize,
+    /// If there are any, files are only compared with these: nothing is written.
+    uses: Option<FileUses>,
 }
 
 impl<'a> Files<'a> {
@@ -35,7 +38,13 @@ impl<'a> Files<'a> {
             originals,
             brought: BTreeMap::new(),
             count: 0,
+            uses: None,
         }
+    }
+
+    /// To find out what would be read and written.
+    pub fn with_uses(self, uses: FileUses) -> Self {
+        Self { uses: Some(uses), ..self }
     }
 
     /// Files written beside the scene.
@@ -55,7 +64,7 @@ impl<'a> Files<'a> {
         }
         let new = if self.assets.contains(name) {
             let new = self.free_name(Path::new(name));
-            self.write_asset(name, &new)?;
+            self.write_asset(path, name, &new)?;
             new
         } else {
             let original = folder_of(self.source).join(name);
@@ -64,14 +73,17 @@ impl<'a> Files<'a> {
                 message: format!("{e} (named by {}: {path})", self.source.display()),
             };
             let real = original.canonicalize().map_err(missing)?;
+            if let Some(uses) = &mut self.uses {
+                uses.read(&original, path)?;
+            }
             match self.originals {
                 Originals::Link => self.relative(&real),
                 Originals::Copy => {
                     let new = self.free_name(&original);
                     if is_obj(&original) {
-                        self.copy_obj(&original, &new)?;
+                        self.copy_obj(path, &original, &new)?;
                     } else {
-                        self.copy(&original, &new)?;
+                        self.copy(path, &original, &new)?;
                     }
                     new
                 }
@@ -96,38 +108,42 @@ impl<'a> Files<'a> {
         (1..).map(name).find(|name| !taken(name)).unwrap_or_default()
     }
 
-    /// Where `new` lies, with its folder made.
-    fn place(&self, new: &str) -> Result<PathBuf> {
+    /// Where `new`, which comes of `original` at `path` in the scene, is to be written, with its folder made; `None` if it is there already, or
+    /// nothing is written.
+    fn place(&mut self, path: &str, original: Option<&Path>, new: &str) -> Result<Option<PathBuf>> {
         let place = self.target_folder.join(new);
+        if let Some(original) = original
+            && place.canonicalize().is_ok_and(|place| original.canonicalize().is_ok_and(|original| original == place))
+        {
+            return Ok(None);
+        }
+        if let Some(uses) = &mut self.uses {
+            original.map_or(Ok(()), |original| uses.read(original, path))?;
+            return uses.write(&place, format!("a copy of {path}")).map(|()| None);
+        }
         let folder = folder_of(&place);
         fs::create_dir_all(&folder).map_err(|e| Error::Output { file: folder, message: e.to_string() })?;
-        Ok(place)
+        self.count += 1;
+        Ok(Some(place))
     }
 
-    fn copy(&mut self, original: &Path, new: &str) -> Result<()> {
-        let place = self.place(new)?;
-        if place.canonicalize().is_ok_and(|place| original.canonicalize().is_ok_and(|original| original == place)) {
-            return Ok(());
-        }
-        let mut reader = file::open(original).map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
+    fn copy(&mut self, path: &str, original: &Path, new: &str) -> Result<()> {
+        let Some(place) = self.place(path, Some(original), new)? else { return Ok(()) };
+        let missing = |e: std::io::Error| Error::Missing { file: original.into(), message: e.to_string() };
+        let mut reader = file::open(original).map_err(missing)?;
         let mut start = Vec::new();
-        Read::by_ref(&mut reader)
-            .take(START)
-            .read_to_end(&mut start)
-            .map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
+        Read::by_ref(&mut reader).take(START).read_to_end(&mut start).map_err(missing)?;
         check_kind(original, &start)?;
         let mut reader = Cursor::new(start).chain(reader);
-        write_atomically(&place, |out| std::io::copy(&mut reader, out).map(drop).map_err(|e| e.to_string()))?;
-        self.count += 1;
-        Ok(())
+        write_atomically(&place, |out| std::io::copy(&mut reader, out).map(drop).map_err(|e| e.to_string()))
     }
 
     /// Copies an OBJ with its MTLs and their images, all into one folder.
-    fn copy_obj(&mut self, original: &Path, new: &str) -> Result<()> {
+    fn copy_obj(&mut self, path: &str, original: &Path, new: &str) -> Result<()> {
         let folder = new.rsplit_once('/').map_or("", |(folder, _)| folder).to_owned();
         let mut names = Names::default();
         let mut libraries = Vec::new();
-        self.copy_text(original, new, |key, rest| {
+        self.copy_text(path, original, new, |key, rest| {
             let name = (key == "mtllib").then(|| names.of(rest))?;
             libraries.push((folder_of(original).join(rest), name.clone()));
             Some(name)
@@ -136,7 +152,7 @@ impl<'a> Files<'a> {
         for (mtl, name) in libraries.iter().filter(|(mtl, _)| mtl.is_file()) {
             let start = file::read(mtl).map_err(|e| Error::Missing { file: mtl.clone(), message: e.to_string() })?;
             check_kind(&mtl.with_extension("mtl"), &start).map_err(|_| not_a(mtl, "MTL"))?;
-            self.copy_text(mtl, &format!("{folder}/{name}"), |key, rest| {
+            self.copy_text(path, mtl, &format!("{folder}/{name}"), |key, rest| {
                 let is_map = key.starts_with("map_") || ["norm", "bump", "disp", "decal"].contains(&key);
                 // Options stand before the name of the file.
                 let (options, file) = rest.rsplit_once(char::is_whitespace).unwrap_or(("", rest));
@@ -148,13 +164,13 @@ impl<'a> Files<'a> {
         images.sort();
         images.dedup();
         for (image, name) in images.iter().filter(|(image, _)| image.is_file()) {
-            self.copy(image, &format!("{folder}/{name}"))?;
+            self.copy(path, image, &format!("{folder}/{name}"))?;
         }
         Ok(())
     }
 
     /// Copies a text; `change` gives what stands behind a line's first word in place of what does, if that changes.
-    fn copy_text(&mut self, original: &Path, new: &str, mut change: impl FnMut(&str, &str) -> Option<String>) -> Result<()> {
+    fn copy_text(&mut self, path: &str, original: &Path, new: &str, mut change: impl FnMut(&str, &str) -> Option<String>) -> Result<()> {
         let bytes = file::read(original).map_err(|e| Error::Missing { file: original.into(), message: e.to_string() })?;
         let mut copy = Vec::with_capacity(bytes.len());
         for line in bytes.split_inclusive(|&byte| byte == b'\n') {
@@ -164,13 +180,12 @@ impl<'a> Files<'a> {
             });
             copy.extend_from_slice(changed.as_ref().map_or(line, |line| line.as_bytes()));
         }
-        write_atomically(&self.place(new)?, |out| out.write_all(&copy).map_err(|e| e.to_string()))?;
-        self.count += 1;
-        Ok(())
+        let Some(place) = self.place(path, Some(original), new)? else { return Ok(()) };
+        write_atomically(&place, |out| out.write_all(&copy).map_err(|e| e.to_string()))
     }
 
-    fn write_asset(&mut self, name: &str, new: &str) -> Result<()> {
-        let place = self.place(new)?;
+    fn write_asset(&mut self, path: &str, name: &str, new: &str) -> Result<()> {
+        let Some(place) = self.place(path, None, new)? else { return Ok(()) };
         let assets = self.assets;
         if let Some(mesh) = assets.meshes.get(name) {
             write_atomically(&place, |out| write_ply(mesh, out).map_err(|e| e.to_string()))?;
@@ -179,7 +194,6 @@ impl<'a> Files<'a> {
         } else if let Some(image) = assets.environments.get(name) {
             write_atomically(&place, |out| write_environment(image, out))?;
         }
-        self.count += 1;
         Ok(())
     }
 

@@ -1,9 +1,12 @@
 //! A finished picture with its layers.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Coverage, LayerKind};
 
-/// A rectangle of pixels; `x` and `y` count from the upper left corner of the full picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// A rectangle of pixels; `x` and `y` count from the upper left corner of the full picture. Serialized as `[x, y, width, height]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "[u32; 4]", from = "[u32; 4]")]
 pub struct Crop {
     /// First column.
     pub x: u32,
@@ -48,6 +51,18 @@ impl Crop {
     /// Whether the rectangle is not empty and lies within a picture of `size` pixels.
     pub fn fits(&self, size: [u32; 2]) -> bool {
         self.area() > 0 && self.intersection(&Self::full(size)) == *self
+    }
+}
+
+impl From<Crop> for [u32; 4] {
+    fn from(Crop { x, y, width, height }: Crop) -> Self {
+        [x, y, width, height]
+    }
+}
+
+impl From<[u32; 4]> for Crop {
+    fn from([x, y, width, height]: [u32; 4]) -> Self {
+        Self { x, y, width, height }
     }
 }
 

@@ -1,5 +1,7 @@
 //! The layers of a picture: one table from kind to name, channels and what fills them.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Part, SurfaceSample};
 use crate::desc::LayerDesc;
 
@@ -308,8 +310,9 @@ impl From<LayerDesc> for LayerKind {
     }
 }
 
-/// A set of layers. The colour is always part of it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// A set of layers. The colour is always part of it. Serialized as the list of their names.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "Vec<&'static str>", try_from = "Vec<String>")]
 pub struct LayerSet {
     bits: u32,
 }
@@ -330,11 +333,13 @@ impl LayerSet {
     /// Only the colour.
     pub const COLOR: Self = Self { bits: 0 };
     /// Every layer that a render fills.
-    pub const FULL: Self = Self { bits: ((1 << LayerKind::ALL.len()) - 1) & !layers_from!(Source::Denoiser) };
+    pub const FULL: Self = Self { bits: ((1 << LayerKind::ALL.len()) - 1) & !layers_from!(Source::Denoiser) & !Self::COLOR_BIT };
+    /// Never set, so that equal sets have equal bits.
+    const COLOR_BIT: u32 = 1 << LayerKind::Color as u32;
 
     /// Adds a layer.
     pub const fn insert(&mut self, kind: LayerKind) {
-        self.bits |= 1 << kind as u32;
+        self.bits |= (1 << kind as u32) & !Self::COLOR_BIT;
     }
 
     /// Whether the layer is part of the set.
@@ -372,6 +377,24 @@ impl LayerSet {
     }
 }
 
+impl From<LayerSet> for Vec<&'static str> {
+    fn from(set: LayerSet) -> Self {
+        set.iter().map(|info| info.name).collect()
+    }
+}
+
+impl TryFrom<Vec<String>> for LayerSet {
+    type Error = String;
+
+    fn try_from(names: Vec<String>) -> Result<Self, String> {
+        let kind = |name: String| {
+            let info = LayerKind::ALL.iter().find(|info| info.name == name);
+            info.map(|info| info.kind).ok_or_else(|| format!("unknown layer `{name}`"))
+        };
+        names.into_iter().map(kind).collect()
+    }
+}
+
 impl FromIterator<LayerKind> for LayerSet {
     fn from_iter<I: IntoIterator<Item = LayerKind>>(kinds: I) -> Self {
         let mut set = Self::default();
@@ -391,6 +414,16 @@ impl<'a> FromIterator<&'a LayerDesc> for LayerSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sets_come_back_from_their_names() {
+        for set in [LayerSet::COLOR, LayerSet::FULL, [LayerKind::Color, LayerKind::Z].into_iter().collect()] {
+            let value = serde_json::to_value(set).unwrap();
+            assert_eq!(serde_json::from_value::<LayerSet>(value).unwrap(), set);
+        }
+        assert_eq!([LayerKind::Color].into_iter().collect::<LayerSet>(), LayerSet::COLOR);
+        assert!(serde_json::from_str::<LayerSet>(r#"["none"]"#).is_err());
+    }
 
     #[test]
     fn the_table_is_in_the_order_of_the_variants() {

@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 /// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count, nor do the folder
 /// of the scene and the format it was read from.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SceneFingerprint {
     /// Of all below.
     pub whole: String,
@@ -62,6 +63,26 @@ pub fn scene_fingerprint(imported: &Imported, scene_file: &Path) -> Result<Scene
     Ok(SceneFingerprint { whole: whole.finish(), scene, assets })
 }
 
+/// The files that a scene is made of beside its own: those that its description names, each with the place, materials and images of OBJ files, and
+/// those that were read to import it. Whether they can be read does not matter.
+pub fn files_of_scene(imported: &Imported, scene_file: &Path) -> Vec<(PathBuf, String)> {
+    let folder = scene_file.parent().unwrap_or(Path::new(""));
+    let mut desc = imported.desc.clone();
+    let named = desc.files_mut().into_iter().filter(|file| !imported.assets.contains(file.name));
+    let named: BTreeMap<PathBuf, String> = named.map(|file| (folder.join(&*file.name), file.path)).collect();
+    let of_obj = |(path, place): (&PathBuf, &String)| {
+        let files = if is_obj(path) { files_of_obj(path).unwrap_or_default() } else { BTreeSet::new() };
+        files.into_iter().map(|file| (file, format!("named by {place}"))).collect::<Vec<_>>()
+    };
+    let further: Vec<(PathBuf, String)> = named.iter().flat_map(of_obj).collect();
+    let imported = imported.files.iter().map(|file| (file.clone(), "a file of the scene".to_owned()));
+    imported.chain(further).chain(named).collect()
+}
+
+fn is_obj(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"))
+}
+
 /// The hash of what the description says beside the settings of a render.
 fn description_hash(mut desc: SceneDesc) -> Result<String> {
     desc.schema = None;
@@ -80,7 +101,7 @@ fn description_hash(mut desc: SceneDesc) -> Result<String> {
 fn file_hashes(folder: &Path, name: &str) -> Result<Vec<(String, String)>, AssetError> {
     let path = folder.join(name);
     let mut hashes = vec![(name.to_owned(), file_hash(&path)?)];
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+    if is_obj(&path) {
         for file in files_of_obj(&path)? {
             let named = file.strip_prefix(folder).unwrap_or(&file).to_string_lossy().into_owned();
             hashes.push((named, file_hash(&file)?));

@@ -19,7 +19,7 @@ mod spectrum;
 
 pub use assets::Assets;
 pub use environment_image::{RgbImage, read_rgb_image};
-pub use fingerprint::{SceneFingerprint, scene_fingerprint};
+pub use fingerprint::{SceneFingerprint, files_of_scene, scene_fingerprint};
 pub use foreign::{Draft, ImportOptions, ImportReport, Imported, Outcome, ReportEntry, read_scene};
 pub use ies::{IesData, read_ies};
 pub use image_file::{ImageData, Samples, read_image, read_image_bytes};

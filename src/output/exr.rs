@@ -10,6 +10,7 @@ mod read;
 mod write;
 
 pub use header_order::finish_headers;
+pub use metadata::sidecar_path;
 pub use plan::{OutputFault, check_output, find_output_fault};
 pub use read::{read_exr, read_settings};
 pub use write::write_exr;

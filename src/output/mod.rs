@@ -8,18 +8,20 @@ mod exr;
 mod matrices;
 mod png;
 mod role;
+mod uses;
 mod view;
 
 pub use self::exr::{OutputFault, check_output, find_output_fault, finish_headers, read_exr, read_settings, write_exr};
 pub use check::{Finding, RULES, Rule, Severity, check_exr};
 pub use compare::{Comparison, RELATIVE_FLOOR, compare};
 pub use png::write_png;
+pub use uses::FileUses;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::desc::OutputDesc;
+use crate::desc::{CryptoManifestDesc, OutputDesc};
 use crate::error::{Error, Result};
 use crate::film::{Identities, Image};
 
@@ -95,6 +97,15 @@ pub struct RenderStatistics {
     pub rays: u64,
     /// Samples that were not finite and therefore left out.
     pub nan_samples: u64,
+}
+
+/// The files that writing an output makes: itself, and the names of Cryptomatte beside it.
+pub fn files_of_output(output: &OutputDesc) -> Vec<PathBuf> {
+    let file = PathBuf::from(&output.file);
+    let beside =
+        output.crypto_manifest == CryptoManifestDesc::Sidecar && Format::from_path(&file).is_ok_and(|format| format == Format::Exr);
+    let sidecars = cryptomatte::TYPES.iter().filter(|_| beside).map(|name| exr::sidecar_path(&file, name));
+    std::iter::once(file.clone()).chain(sidecars).collect()
 }
 
 /// Writes `image` where and how `output` says.

@@ -16,8 +16,8 @@ mod state;
 
 pub use exr_overrides::ExrOverrides;
 pub use progress::{Progress, Silent};
-pub use recipe::{Recipe, RecipeSettings};
-pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings};
+pub use recipe::{Frame, Recipe};
+pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings, threads};
 pub use state::{Checkpoints, FilmShape, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 
 use std::sync::atomic::AtomicBool;

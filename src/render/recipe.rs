@@ -6,18 +6,28 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::Settings;
-use crate::desc::{FilterDesc, IntegratorDesc, OutputDesc, SamplerKindDesc};
+use crate::compile::check_film_and_integrator;
+use crate::desc::{FilmDesc, OutputDesc};
 use crate::error::{Error, Result};
 use crate::film::Crop;
-use crate::import::SceneFingerprint;
-use crate::sampling::SamplerKind;
+use crate::import::{ImportOptions, SceneFingerprint};
+use crate::output::check_output;
+
+/// The version of the format of recipes.
+const VERSION: u64 = 1;
 
 /// How a picture was made. Files keep it, with how they are written, as [`settings`](crate::output::RenderInfo::settings).
+///
+/// It is data: it names the scene and what the picture depends on, never a file to write, a library to load or an address to connect to.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Recipe {
+    /// The version of this format.
+    pub version: u64,
     /// Name and version of the program.
     pub program: String,
-    /// What followed the program's name on its command line.
+    /// What followed the program's name on its command line. Only for people who look at the file.
+    #[serde(default)]
     pub arguments: Vec<String>,
     /// The folder that names of files refer to.
     pub folder: PathBuf,
@@ -25,75 +35,50 @@ pub struct Recipe {
     pub scene_file: PathBuf,
     /// What the scene and its files are.
     pub scene: SceneFingerprint,
-    /// The frame of a sequence.
+    /// How the scene was read.
+    #[serde(default)]
+    pub import: ImportOptions,
+    /// Whether the scene was rendered without the files that were missing.
+    #[serde(default)]
+    pub allow_missing: bool,
+    /// The frame of a sequence that a single scene file holds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frame: Option<i64>,
+    pub frame: Option<Frame>,
     /// What the picture depends on beside the scene.
-    pub settings: RecipeSettings,
+    pub settings: Settings,
+    /// Whether the picture was denoised, with the denoiser's own defaults.
+    #[serde(default)]
+    pub denoise: bool,
     /// How the file is written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<OutputDesc>,
 }
 
-/// The settings that a picture depends on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RecipeSettings {
-    /// Width and height of the picture.
-    pub size: [u32; 2],
-    /// What is rendered, of the picture with its overscan: x, y, width, height.
-    pub crop: [u32; 4],
-    /// Pixels around the picture.
-    pub overscan: u32,
-    /// The pixel filter.
-    pub filter: FilterDesc,
-    /// How samples are chosen.
-    pub sampler: SamplerKindDesc,
-    /// Samples per pixel; with a target error the most.
-    pub spp: u32,
-    /// The relative squared error to stay below.
-    pub target_error: Option<f64>,
-    /// The seed.
-    pub seed: u64,
-    /// The algorithm.
-    pub integrator: IntegratorDesc,
-    /// What finds hits.
-    pub accel: String,
-    /// Whether the camera's lens blurs what is out of focus.
-    #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
-    pub depth_of_field: bool,
-}
-
-fn yes() -> bool {
-    true
+/// A frame of a sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Frame {
+    /// Its number.
+    pub number: i64,
+    /// Frames in a second.
+    pub per_second: f64,
 }
 
 impl Recipe {
     /// That of a render which is about to begin in the working folder.
     pub fn new(scene_file: &Path, scene: SceneFingerprint, settings: &Settings, arguments: Vec<String>) -> Self {
-        let Crop { x, y, width, height } = settings.crop;
         Self {
+            version: VERSION,
             program: concat!("steradian ", env!("CARGO_PKG_VERSION")).to_owned(),
             arguments,
             folder: std::env::current_dir().unwrap_or_default(),
             scene_file: scene_file.to_owned(),
             scene,
+            import: ImportOptions::default(),
+            allow_missing: false,
             frame: None,
-            settings: RecipeSettings {
-                size: settings.size,
-                crop: [x, y, width, height],
-                overscan: settings.overscan,
-                filter: settings.filter,
-                sampler: match settings.sampler {
-                    SamplerKind::Sobol => SamplerKindDesc::Sobol,
-                    SamplerKind::Independent => SamplerKindDesc::Independent,
-                },
-                spp: settings.spp,
-                target_error: settings.target_error,
-                seed: settings.seed,
-                integrator: settings.integrator,
-                accel: settings.accel.to_string(),
-                depth_of_field: settings.depth_of_field,
-            },
+            settings: settings.clone(),
+            denoise: false,
             output: None,
         }
     }
@@ -115,38 +100,151 @@ impl Recipe {
     /// As a file has kept it.
     ///
     /// # Errors
-    /// [`Error::Malformed`] if it is not complete.
+    /// [`Error::Malformed`] if it is of another version, has unknown keys or lacks some; [`Error::Scene`] if a number makes no sense.
     pub fn from_value(value: Value, file: &Path) -> Result<Self> {
-        let malformed = |e: serde_json::Error| Error::Malformed { file: file.to_owned(), message: format!("its settings: {e}") };
-        serde_json::from_value(value).map_err(malformed)
+        let malformed = |message: String| Error::Malformed { file: file.to_owned(), message };
+        match value.get("version").map(Value::as_u64) {
+            Some(Some(VERSION)) => {}
+            Some(version) => {
+                let found = version.map_or_else(|| "no number".to_owned(), |version| version.to_string());
+                return Err(malformed(format!("its recipe has version {found}, supported is {VERSION}: render the scene itself")));
+            }
+            None => {
+                let message =
+                    "its recipe has no version: it was written by an earlier steradian, as a command line; render the scene itself";
+                return Err(malformed(message.to_owned()));
+            }
+        }
+        let recipe: Self = serde_path_to_error::deserialize(value).map_err(|e| malformed(format!("its recipe: {e}")))?;
+        recipe.check(file)?;
+        Ok(recipe)
     }
 
-    /// Makes settings those of this picture, with its file as the only output.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if there is no such accelerator.
-    pub fn apply(&self, settings: &mut Settings) -> Result<()> {
-        let own = &self.settings;
-        let [x, y, width, height] = own.crop;
-        settings.size = own.size;
-        settings.crop = Crop { x, y, width, height };
-        settings.overscan = own.overscan;
-        settings.filter = own.filter;
-        settings.sampler = match own.sampler {
-            SamplerKindDesc::Sobol => SamplerKind::Sobol,
-            SamplerKindDesc::Independent => SamplerKind::Independent,
-        };
-        settings.spp = own.spp;
-        settings.target_error = own.target_error;
-        settings.seed = own.seed;
-        settings.integrator = own.integrator;
-        settings.accel = own.accel.parse().map_err(|e| Error::Usage(format!("accelerator {}: {e}", own.accel)))?;
-        settings.depth_of_field = own.depth_of_field;
-        settings.time_limit = None;
-        if let Some(output) = &self.output {
-            settings.layers = output.layers.iter().collect();
-            settings.outputs = vec![output.clone()];
+    /// Whether numbers are such as scenes and the command line may have.
+    fn check(&self, file: &Path) -> Result<()> {
+        let Settings { size: [width, height], overscan, crop, filter, spp, target_error, ref integrator, .. } = self.settings;
+        let fault = |path: &str, message: &str| Error::Scene { file: file.to_owned(), path: path.to_owned(), message: message.to_owned() };
+        let require = |valid: bool, path: &str, message: &str| if valid { Ok(()) } else { Err(fault(path, message)) };
+        check_film_and_integrator(&FilmDesc { width, height, crop: None, overscan, filter }, integrator, file)?;
+        require(overscan <= width.min(height), "settings.overscan", "must be at most the picture's shorter side")?;
+        let film = self.settings.film_size();
+        require(crop.fits(film), "settings.crop", "must have an area and lie within the picture")?;
+        require(overscan == 0 || crop == Crop::full(film), "settings.crop", "must be all of a picture with overscan")?;
+        require(spp > 0, "settings.spp", "must be at least 1")?;
+        require(target_error.is_none_or(|error| error > 0.0 && error.is_finite()), "settings.target_error", "must be above 0")?;
+        let guided = self.settings.is_guided() && target_error.is_some();
+        require(!guided, "settings.target_error", "must be null with guiding")?;
+        require(self.import.time.is_finite(), "import.time", "must be finite")?;
+        require(self.frame.is_none_or(|frame| i32::try_from(frame.number).is_ok()), "frame.number", "must fit 32 bits")?;
+        require(
+            self.frame.is_none_or(|frame| frame.per_second > 0.0 && frame.per_second.is_finite()),
+            "frame.per_second",
+            "must be above 0",
+        )?;
+        self.output.as_ref().map_or(Ok(()), |output| {
+            require(output.exposure.is_finite(), "output.exposure", "must be finite")?;
+            check_output(output).map_err(|e| fault("output", &e.to_string()))
+        })
+    }
+
+    /// The settings of this picture, to be written as [`output`](Self::output) says, with so many threads.
+    pub fn settings(&self, threads: usize) -> Settings {
+        let layers = self.output.iter().flat_map(|output| &output.layers).collect();
+        let outputs = self.output.iter().cloned().collect();
+        Settings { layers, outputs, threads, side_by_side: true, time_limit: None, ..self.settings.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::Overrides;
+
+    fn recipe() -> Value {
+        let desc = serde_json::from_str(r#"{ "camera": {}, "film": { "width": 40, "height": 30 } }"#).unwrap();
+        let settings = Settings::new(&desc, &Overrides::default()).unwrap();
+        let recipe = Recipe::new(Path::new("s.json"), SceneFingerprint::default(), &settings, Vec::new());
+        Recipe { output: Some(OutputDesc::new("a.exr")), frame: Some(Frame { number: 3, per_second: 24.0 }), ..recipe }.to_value()
+    }
+
+    fn refusal(value: Value) -> String {
+        let error = Recipe::from_value(value, Path::new("a.exr")).unwrap_err();
+        assert_eq!(error.kind(), crate::ErrorKind::Scene, "{error}");
+        error.to_string()
+    }
+
+    #[test]
+    fn a_recipe_comes_back_as_it_was() {
+        let value = recipe();
+        assert_eq!(Recipe::from_value(value.clone(), Path::new("a.exr")).unwrap().to_value(), value);
+        let settings = Recipe::from_value(value.clone(), Path::new("a.exr")).unwrap().settings(3);
+        assert_eq!((serde_json::to_value(&settings).unwrap(), settings.threads), (value["settings"].clone(), 3));
+        assert_eq!(settings.outputs[0].file, "a.exr");
+    }
+
+    #[test]
+    fn recipes_of_other_versions_are_refused() {
+        for (version, message) in [(Value::Null, "version no number"), (2.into(), "version 2"), ("1".into(), "version no number")] {
+            let mut value = recipe();
+            value["version"] = version;
+            assert!(refusal(value).contains(message));
         }
-        Ok(())
+        let mut value = recipe();
+        value.as_object_mut().unwrap().remove("version");
+        assert!(refusal(value).contains("a.exr: its recipe has no version"));
+        assert!(refusal(Value::Null).contains("no version"));
+    }
+
+    /// No object in a recipe takes a key that it does not know, and none that is needed may be missing.
+    #[test]
+    fn unknown_keys_are_refused_at_every_level() {
+        for place in ["", "/scene", "/import", "/frame", "/settings", "/settings/filter", "/settings/integrator", "/output"] {
+            let mut value = recipe();
+            value.pointer_mut(place).unwrap()["oidn_library"] = "evil.so".into();
+            let message = refusal(value);
+            assert!(message.contains("a.exr") && message.contains("unknown field `oidn_library`"), "{place}: {message}");
+        }
+        for key in recipe()["settings"].as_object().unwrap().keys().filter(|key| *key != "target_error") {
+            let mut value = recipe();
+            value["settings"].as_object_mut().unwrap().remove(key);
+            assert!(refusal(value).contains(&format!("missing field `{key}`")), "{key}");
+        }
+    }
+
+    #[test]
+    fn numbers_that_make_no_sense_are_refused() {
+        use serde_json::json;
+        let cases = [
+            ("/settings/size", json!([0, 30]), "film.width"),
+            ("/settings/size", json!([1_000_000, 30]), "film.width"),
+            ("/settings/size", json!([40, -1]), "settings.size[1]"),
+            ("/settings/crop", json!([0, 0, 41, 30]), "settings.crop"),
+            ("/settings/crop", json!([4_294_967_295u32, 0, 2, 2]), "settings.crop"),
+            ("/settings/crop", json!([0, 0, 0, 0]), "settings.crop"),
+            ("/settings/overscan", json!(31), "settings.overscan"),
+            ("/settings/overscan", json!(4_294_967_295u32), "settings.overscan"),
+            ("/settings/overscan", json!(2), "settings.crop"),
+            ("/settings/filter/radius", json!(-1), "filter.radius"),
+            ("/settings/filter/type", json!("none"), "settings.filter"),
+            ("/settings/spp", json!(0), "settings.spp"),
+            ("/settings/seed", json!(1.5), "settings.seed"),
+            ("/settings/target_error", json!(0), "settings.target_error"),
+            ("/settings/integrator/max_depth", json!(0), "integrator.max_depth"),
+            ("/settings/sampler", json!("none"), "settings.sampler"),
+            ("/settings/accel", json!("gpu"), "settings.accel"),
+            ("/settings/layers", json!(["none"]), "settings.layers"),
+            ("/frame/number", json!(1i64 << 40), "frame.number"),
+            ("/frame/per_second", json!(0), "frame.per_second"),
+            ("/output/crypto_depth", json!(5), "Cryptomatte"),
+            ("/output/exposure", json!(1e300), "output.exposure"),
+            ("/denoise", json!("evil.so"), "denoise"),
+        ];
+        for (place, value, message) in cases {
+            let mut changed = recipe();
+            let (object, key) = place.rsplit_once('/').unwrap();
+            changed.pointer_mut(object).unwrap()[key] = value;
+            let refused = refusal(changed);
+            assert!(refused.contains("a.exr") && refused.contains(message), "{place}: {refused}");
+        }
     }
 }

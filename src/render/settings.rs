@@ -1,8 +1,9 @@
 //! Everything a render needs beside the scene: what the scene file says, with the command line's changes.
 
-use std::collections::HashSet;
 use std::num::NonZero;
 use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
 
 use super::ExrOverrides;
 use crate::accel::AccelKind;
@@ -25,7 +26,11 @@ const MOST_SAMPLES: u32 = 1 << 16;
 const MAX_THREADS: usize = 4096;
 
 /// How a scene is rendered.
-#[derive(Clone, Debug)]
+///
+/// Serialized, these are the settings that the picture depends on: EXR files keep them for [`Recipe`](super::Recipe), and a checkpoint or shard
+/// belongs to another picture if any differs. Only what can never change a pixel is skipped.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Settings {
     /// Width and height of the full picture in pixels.
     pub size: [u32; 2],
@@ -51,12 +56,16 @@ pub struct Settings {
     /// render.
     pub depth_of_field: bool,
     /// Whether paths shade diffuse surfaces side by side: faster, with the same picture bit for bit.
+    #[serde(skip)]
     pub side_by_side: bool,
     /// Number of threads, at least 1.
+    #[serde(skip)]
     pub threads: usize,
     /// The render ends after this time even if samples are missing.
+    #[serde(skip)]
     pub time_limit: Option<Duration>,
     /// The files to write.
+    #[serde(skip)]
     pub outputs: Vec<OutputDesc>,
     /// Every layer that an output asks for.
     pub layers: LayerSet,
@@ -124,10 +133,6 @@ impl Settings {
         let integrator = integrator(desc, overrides)?;
         let outputs = outputs(desc, overrides, &integrator)?;
         let layers = outputs.iter().flat_map(|output| &output.layers).collect();
-        let sampler = match overrides.sampler.unwrap_or(desc.sampler.kind) {
-            SamplerKindDesc::Sobol => SamplerKind::Sobol,
-            SamplerKindDesc::Independent => SamplerKind::Independent,
-        };
         if overrides.spp == Some(0) {
             return Err(usage("--spp 0: a picture needs at least one sample per pixel"));
         }
@@ -136,7 +141,7 @@ impl Settings {
             overscan,
             crop: crop(desc, overrides, size, overscan)?,
             filter: desc.film.filter,
-            sampler,
+            sampler: overrides.sampler.unwrap_or(desc.sampler.kind).into(),
             spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() { MOST_SAMPLES } else { desc.sampler.spp }),
             target_error: target_error(overrides)?,
             seed: overrides.seed.unwrap_or(desc.sampler.seed),
@@ -144,7 +149,7 @@ impl Settings {
             accel: overrides.accel.unwrap_or_default(),
             depth_of_field: !overrides.no_depth_of_field,
             side_by_side: true,
-            threads: threads(overrides)?,
+            threads: threads(overrides.threads)?,
             time_limit: time_limit(overrides)?,
             outputs,
             layers,
@@ -253,8 +258,12 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
     Ok(integrator)
 }
 
-fn threads(overrides: &Overrides) -> Result<usize> {
-    match overrides.threads.unwrap_or(0) {
+/// The number of threads that `--threads` means; without it, or with 0, all that the process may use.
+///
+/// # Errors
+/// [`Error::Usage`] if there are too many.
+pub fn threads(wanted: Option<usize>) -> Result<usize> {
+    match wanted.unwrap_or(0) {
         0 => Ok(std::thread::available_parallelism().map_or(1, NonZero::get)),
         threads if threads > MAX_THREADS => Err(usage(format!("--threads {threads}: at most {MAX_THREADS}"))),
         threads => Ok(threads),
@@ -285,10 +294,6 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
     } else {
         by_name(&overrides.default_outputs)
     };
-    let mut names = HashSet::new();
-    if let Some(output) = outputs.iter().find(|output| !names.insert(output.file.as_str())) {
-        return Err(usage(format!("two outputs have the name {}", output.file)));
-    }
     let has_extension = |output: &OutputDesc, extension: &str| output.file.to_ascii_lowercase().ends_with(extension);
     let needs = |option: &str, asked: bool, extension: &str| {
         if asked && !outputs.iter().any(|output| has_extension(output, extension)) {
@@ -459,7 +464,6 @@ mod tests {
             ("--exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
             ("--exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),
             ("--view", Overrides { view: Some(ViewDesc::Agx), outputs: vec!["a.exr".to_owned()], ..d() }),
-            ("two outputs", Overrides { outputs: vec!["a.png".to_owned(), "a.png".to_owned()], ..d() }),
         ];
         for (option, overrides) in cases {
             let message = refusal(&desc, &overrides);

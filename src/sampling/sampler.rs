@@ -7,13 +7,16 @@
 
 mod batch;
 
+use serde::{Deserialize, Serialize};
+
 use crate::desc::SamplerKindDesc;
 use crate::math::random::mix;
 
 pub use batch::{Numbers, Requests};
 
 /// How samples are chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SamplerKind {
     /// Owen-scrambled Sobol points, decorrelated between pixels.
     #[default]

@@ -37,7 +37,7 @@ pub(super) fn make(case: &Case) -> Result<Imported> {
     }
     let mut assets = Assets::default();
     assets.meshes.extend(mesh.map(|mesh| (MESH.to_owned(), mesh)));
-    Ok(Imported { desc, assets: assets.into(), report: Default::default(), places: Default::default() })
+    Ok(Imported { desc, assets: assets.into(), report: Default::default(), files: Default::default(), places: Default::default() })
 }
 
 fn mesh_shape(scale: f64) -> Value {

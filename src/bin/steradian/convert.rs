@@ -2,17 +2,19 @@
 
 use steradian::Result;
 use steradian::convert::{self, Originals};
+use steradian::output::FileUses;
 
 use crate::args::{ConvertArgs, Verbosity};
 use crate::log::{self, Level};
-use crate::scene;
+use crate::{files, scene};
 
 /// Reads a scene of any kind and writes one of ours.
-pub fn run(arguments: &ConvertArgs) -> Result<()> {
+pub fn run(arguments: &ConvertArgs, mut uses: FileUses) -> Result<()> {
     let verbosity = Verbosity { quiet: arguments.quiet, verbose: arguments.verbose };
     let imported = scene::load(&arguments.input, &arguments.import, verbosity)?;
     let originals = if arguments.link { Originals::Link } else { Originals::Copy };
-    let count = convert::write_scene(&imported, &arguments.input, &arguments.output, originals)?;
+    arguments.import.report.iter().filter(|path| !files::is_stdout(path)).try_for_each(|path| uses.write(path, "--report"))?;
+    let count = convert::write_scene(&imported, &arguments.input, &arguments.output, originals, uses)?;
     if !arguments.quiet {
         let files = if count == 1 { "1 file".to_owned() } else { format!("{count} files") };
         log::message(Level::Note, &format!("wrote {} and {files} beside it", arguments.output.display()));

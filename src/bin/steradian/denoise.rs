@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use steradian::denoise::{self, Denoiser, FileOptions, Report, denoise_file};
 use steradian::film::Image;
-use steradian::output::{self, Format};
+use steradian::output::{self, FileUses, Format};
 use steradian::render::{Progress, Settings};
 use steradian::{Error, Result};
 
@@ -49,9 +49,12 @@ pub fn finish(denoiser: Option<&Denoiser>, image: &mut Image, reporter: &Reporte
 }
 
 /// Denoises a file, or every frame of a sequence.
-pub fn run(arguments: &DenoiseArgs) -> Result<()> {
+pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
     let tasks = tasks(arguments)?;
     for task in &tasks {
+        uses.read(&task.input, "a noisy picture")?;
+        uses.write(&task.output, "a denoised picture")?;
+        task.also.iter().try_for_each(|path| uses.write(path, "--png"))?;
         task.check()?;
     }
     let denoiser = Denoiser::open(arguments.oidn.oidn_library.as_deref(), arguments.threads)?;

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use clap::Parser;
 use steradian::farm::{Job, SlurmOptions, is_scene_per_frame, openjd_template, slurm_scripts, with_frame_pattern};
-use steradian::output::{self, Format};
+use steradian::output::{self, FileUses, Format};
 use steradian::{Error, Result, printable};
 
 use crate::args::{Cli, FarmCommand, JobArgs, SlurmArgs};
@@ -19,14 +19,14 @@ use crate::text;
 const OWN: [&str; 8] = ["--shard", "--checkpoint", "--every", "--resume", "--frames", "--output", "-o", "--progress"];
 
 /// Writes a job.
-pub fn run(command: &FarmCommand) -> Result<()> {
+pub fn run(command: &FarmCommand, uses: FileUses) -> Result<()> {
     match command {
-        FarmCommand::Slurm(arguments) => slurm(arguments),
+        FarmCommand::Slurm(arguments) => slurm(arguments, uses),
         FarmCommand::Openjd(arguments) => text::print_json(&openjd_template(&job(&arguments.job)?)),
     }
 }
 
-fn slurm(arguments: &SlurmArgs) -> Result<()> {
+fn slurm(arguments: &SlurmArgs, mut uses: FileUses) -> Result<()> {
     let job = job(&arguments.job)?;
     let options = SlurmOptions {
         partition: arguments.partition.clone(),
@@ -38,6 +38,8 @@ fn slurm(arguments: &SlurmArgs) -> Result<()> {
     };
     let scripts = slurm_scripts(&job, &options)?;
     let submit = job.folder.join("submit.sh");
+    uses.read(&arguments.job.scene, "the scene")?;
+    scripts.iter().try_for_each(|(name, _)| uses.write(&job.folder.join(name), "a script of the job"))?;
     for folder in ["log", "shards"].map(|name| job.folder.join(name)) {
         fs::create_dir_all(&folder).map_err(|e| Error::Output { file: folder, message: e.to_string() })?;
     }

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use steradian::farm::{FrameList, file_of_frame, is_scene_per_frame, scene_of_frame, with_frame_pattern};
 use steradian::import::{ImportReport, Imported};
+use steradian::output::FileUses;
 use steradian::render::Settings;
 use steradian::{Error, Result};
 
@@ -20,14 +21,16 @@ use crate::{chain, exit_code, render, scene};
 pub struct Session {
     /// Tells progress.
     pub reporter: Reporter,
+    /// The files of every command.
+    pub uses: FileUses,
     interrupt: Interrupt,
     listens_to_stop: OnceCell<()>,
 }
 
 impl Session {
-    fn new(arguments: &RenderArgs) -> Result<Self> {
+    fn new(arguments: &RenderArgs, uses: FileUses) -> Result<Self> {
         let reporter = Reporter::new(arguments.sequence.progress, arguments.verbosity.quiet);
-        Ok(Self { reporter, interrupt: Interrupt::listen_to_requests()?, listens_to_stop: OnceCell::new() })
+        Ok(Self { reporter, uses, interrupt: Interrupt::listen_to_requests()?, listens_to_stop: OnceCell::new() })
     }
 
     /// Listens to signals to stop from the first call on; until then they end the program at once.
@@ -53,6 +56,8 @@ pub struct Shot {
     pub imported: Imported,
     /// The frame of a sequence.
     pub frame: Option<i64>,
+    /// The frames, this one among them, whose files are to be compared before it is rendered.
+    pub unchecked: Vec<Option<i64>>,
 }
 
 impl Shot {
@@ -88,8 +93,8 @@ impl Shot {
 }
 
 /// Renders a picture or a sequence; the result is the exit code.
-pub fn run(arguments: &RenderArgs) -> Result<u8> {
-    let session = Session::new(arguments)?;
+pub fn run(arguments: &RenderArgs, uses: FileUses) -> Result<u8> {
+    let session = Session::new(arguments, uses)?;
     let result = match &arguments.sequence.frames {
         None => single(arguments, &session),
         Some(_) if arguments.live.preview_hold => Err(Error::Usage(
@@ -109,7 +114,7 @@ fn single(arguments: &RenderArgs, session: &Session) -> Result<u8> {
     session.reporter.begin(None);
     let start = Instant::now();
     let imported = scene::load(&arguments.scene, &arguments.import, arguments.verbosity)?;
-    render::picture(arguments, Shot { scene: arguments.scene.clone(), imported, frame: None }, session, start)
+    render::picture(arguments, Shot { scene: arguments.scene.clone(), imported, frame: None, unchecked: vec![None] }, session, start)
 }
 
 /// A sequence under way.
@@ -134,10 +139,11 @@ impl<'a> Sequence<'a> {
         }
         reporter.expect(todo.len());
         let mut failures = Vec::new();
+        let mut unchecked: Vec<Option<i64>> = todo.iter().copied().map(Some).collect();
         for frame in todo.iter().copied() {
             reporter.begin(Some(frame));
             let start = Instant::now();
-            let result = self.shot(frame).and_then(|shot| render::picture(self.arguments, shot, self.session, start));
+            let result = self.shot(frame, &mut unchecked).and_then(|shot| render::picture(self.arguments, shot, self.session, start));
             match result {
                 Ok(0) => {}
                 Ok(code) => return Ok(code),
@@ -172,7 +178,8 @@ impl<'a> Sequence<'a> {
         !anew && !outputs.is_empty() && outputs.iter().all(exists)
     }
 
-    fn shot(&self, frame: i64) -> Result<Shot> {
+    /// The picture of a frame; takes the frames whose files are to be compared with those of its scene.
+    fn shot(&self, frame: i64, unchecked: &mut Vec<Option<i64>>) -> Result<Shot> {
         let arguments = self.arguments;
         let scene = scene_of_frame(&arguments.scene, frame);
         let extension = scene.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -190,11 +197,13 @@ impl<'a> Sequence<'a> {
                 let _ = self.whole.set(load(0.0)?);
             }
             let whole = self.whole.get().ok_or_else(|| Error::Internal("no scene".to_owned()))?;
-            let (assets, places) = (Arc::clone(&whole.assets), Arc::clone(&whole.places));
+            let (assets, places, files) = (Arc::clone(&whole.assets), Arc::clone(&whole.places), Arc::clone(&whole.files));
             let mut desc = whole.desc.clone();
             desc.camera.shutter = desc.camera.shutter.map(|time| time + frame as f64);
-            Imported { desc, assets, report: ImportReport::default(), places }
+            Imported { desc, assets, report: ImportReport::default(), files, places }
         };
-        Ok(Shot { scene, imported, frame: Some(frame) })
+        let unchecked =
+            if is_scene_per_frame(&self.arguments.scene) && unchecked.is_empty() { vec![Some(frame)] } else { std::mem::take(unchecked) };
+        Ok(Shot { scene, imported, frame: Some(frame), unchecked })
     }
 }

@@ -56,9 +56,6 @@ impl<'a> Kept<'a> {
         let shard = arguments.shard.unwrap_or_default();
         render::check_kept(settings, shard)?;
         if let Some(path) = checkpoint {
-            if shard_file == Some(path) {
-                return Err(Error::Usage(format!("--checkpoint {}: the shard is to have this name", path.display())));
-            }
             if path.exists() && !arguments.resume {
                 let message = "there is such a file: --resume continues from it; remove it to begin anew";
                 return Err(Error::Usage(format!("--checkpoint {}: {message}", path.display())));

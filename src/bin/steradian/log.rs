@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{IsTerminal, Write};
+use std::io::{IsTerminal, Read, Write};
+use std::path::Path;
 use std::sync::{Mutex, OnceLock};
 
 use indicatif::ProgressBar;
@@ -78,6 +79,11 @@ pub fn start(arguments: &LogArgs, verbosity: Verbosity, default_format: LogForma
     let file = match &arguments.log_file {
         None => None,
         Some(path) => {
+            let fault = |e: std::io::Error| Error::Output { file: path.clone(), message: e.to_string() };
+            if path.is_file() && !is_log(path).map_err(fault)? {
+                let message = "is not a log of steradian, to which messages could be added; choose another name";
+                return Err(Error::Usage(format!("--log-file: {} {message}", path.display())));
+            }
             let file = steradian::file::append(path)?;
             Some((Mutex::new(file), shown.max(Level::Info)))
         }
@@ -94,6 +100,16 @@ pub fn start(arguments: &LogArgs, verbosity: Verbosity, default_format: LogForma
     };
     let _ = tracing_subscriber::registry().with(Events.with_filter(filter)).try_init();
     Ok(())
+}
+
+/// Whether a file is empty or begins as logs do: with a time, or with an object in JSON. Any other may be one that somebody needs.
+fn is_log(path: &Path) -> std::io::Result<bool> {
+    let mut start = Vec::new();
+    steradian::file::open(path)?.take(64).read_to_end(&mut start)?;
+    let separator = |i: usize| [(4, b'-'), (7, b'-'), (10, b'T'), (13, b':'), (16, b':')].into_iter().find(|(place, _)| *place == i);
+    let fits = |(i, byte): (usize, &u8)| separator(i).map_or(byte.is_ascii_digit(), |(_, expected)| *byte == expected);
+    let is_dated = start.len() >= 19 && start.iter().take(19).enumerate().all(fits);
+    Ok(start.is_empty() || is_dated || start.starts_with(br#"{"level":""#))
 }
 
 /// Whether stderr has colours.

@@ -10,6 +10,7 @@ mod config;
 mod convert;
 mod denoise;
 mod farm;
+mod files;
 mod frames;
 mod info;
 mod interrupt;
@@ -29,6 +30,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::CommandFactory;
+use steradian::output::FileUses;
 use steradian::{Error, ErrorKind, Result, import};
 
 use args::{Cli, Command, ConfigCommand};
@@ -49,36 +51,40 @@ fn main() -> ExitCode {
     }
 }
 
-/// Starts to log, says what the configuration brought, and runs the command.
+/// Compares the names of files, starts to log, shows what the configuration brought, and runs the command.
 fn start(parsed: config::Parsed) -> Result<u8> {
     let cli = parsed.cli;
+    let mut uses = FileUses::default();
+    parsed.files.iter().try_for_each(|file| uses.read(file, "configuration"))?;
+    cli.log.log_file.iter().try_for_each(|file| uses.write(file, "--log-file"))?;
+    files::of_command(&cli, uses.clone())?;
     log::start(&cli.log, cli.command.verbosity(), cli.command.log_format())?;
     parsed.warnings.iter().for_each(|warning| log::message(Level::Warning, warning));
     for setting in &parsed.added {
         let value = if setting.values.is_empty() { "false".to_owned() } else { setting.values.join(",") };
         log::message(Level::Info, &format!("{} = {value} ({})", setting.key, setting.origin));
     }
-    run(cli)
+    run(cli, uses)
 }
 
-/// Runs a command; the result is the exit code.
-fn run(cli: Cli) -> Result<u8> {
+/// Runs a command, with the files of every command; the result is the exit code.
+fn run(cli: Cli, uses: FileUses) -> Result<u8> {
     interrupt::outlive_file_limits()?;
     start_threads()?;
     match cli.command {
-        Command::Render(arguments) => frames::run(&arguments),
+        Command::Render(arguments) => frames::run(&arguments, uses),
         Command::Info(arguments) => info::run(&arguments).map(|()| 0),
         Command::Bench(command) => bench::run(&command),
-        Command::Convert(arguments) => convert::run(&arguments).map(|()| 0),
-        Command::Farm(command) => farm::run(&command).map(|()| 0),
+        Command::Convert(arguments) => convert::run(&arguments, uses).map(|()| 0),
+        Command::Farm(command) => farm::run(&command, uses).map(|()| 0),
         Command::Config(ConfigCommand::Show(arguments)) => config::show(&arguments).map(|()| 0),
         Command::Man { dir } => man(dir.as_deref()).map(|()| 0),
         Command::Schema => text::print_as_it_is(&import::schema()).map(|()| 0),
-        Command::Merge(arguments) => merge::run(&arguments).map(|()| 0),
+        Command::Merge(arguments) => merge::run(&arguments, uses).map(|()| 0),
         Command::CheckExr(arguments) => check_exr::run(&arguments),
-        Command::Rerender(arguments) => rerender::run(&arguments),
+        Command::Rerender(arguments) => rerender::run(&arguments, uses),
         Command::Compare(arguments) => compare::run(&arguments).map(|()| 0),
-        Command::Denoise(arguments) => denoise::run(&arguments).map(|()| 0),
+        Command::Denoise(arguments) => denoise::run(&arguments, uses).map(|()| 0),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "steradian", &mut script);

@@ -5,7 +5,7 @@ use std::path::{Component, Path};
 use steradian::desc::OutputDesc;
 use steradian::farm::check_single_name;
 use steradian::film::Image;
-use steradian::output::{self, Format, RenderInfo, RenderStatistics};
+use steradian::output::{self, FileUses, Format, RenderInfo, RenderStatistics};
 use steradian::render::{self, Header};
 use steradian::{Error, Result};
 
@@ -13,9 +13,11 @@ use crate::args::MergeArgs;
 use crate::log::{self, Level};
 
 /// Merges shards and writes the picture.
-pub fn run(arguments: &MergeArgs) -> Result<()> {
+pub fn run(arguments: &MergeArgs, mut uses: FileUses) -> Result<()> {
     let first = arguments.shards.first().ok_or_else(|| Error::Usage("no shards to merge".into()))?;
     let outputs = outputs(&Header::read(first)?, &arguments.output)?;
+    arguments.shards.iter().try_for_each(|path| uses.read(path, "a shard"))?;
+    outputs.iter().flat_map(output::files_of_output).try_for_each(|path| uses.write(&path, "output"))?;
     for output in &outputs {
         output::check_writable(Path::new(&output.file))?;
     }

@@ -8,7 +8,7 @@ use steradian::denoise::Denoiser;
 use steradian::farm::check_single_name;
 use steradian::film::LayerSet;
 use steradian::live::{Fan, Live};
-use steradian::output::{self, RenderInfo, RenderStatistics};
+use steradian::output::{self, FileUses, RenderInfo, RenderStatistics};
 use steradian::render::{self, DEFAULT_EXTENSIONS, Header, Progress, Recipe, RenderResult, Replayed, Settings, Stats};
 use steradian::scene::Scene;
 use steradian::{Result, compile};
@@ -21,11 +21,11 @@ use crate::kept::{self, Kept};
 use crate::progress::Reporter;
 use crate::rerender;
 use crate::stats::{self, Run};
-use crate::text;
+use crate::{files, text};
 
 /// Renders a picture and writes what was asked for; the result is the exit code. `start` is when the scene's reading began.
 pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Instant) -> Result<u8> {
-    let Some(mut plan) = Plan::new(arguments, &shot)? else {
+    let Some(mut plan) = Plan::new(arguments, &shot, &session.uses)? else {
         session.reporter.complete_frame();
         return Ok(0);
     };
@@ -89,14 +89,23 @@ struct Plan<'a> {
 
 impl<'a> Plan<'a> {
     /// Checks all that can be checked before the scene is made; `None` if the frame is there already.
-    fn new(arguments: &'a RenderArgs, shot: &Shot) -> Result<Option<Self>> {
+    fn new(arguments: &'a RenderArgs, shot: &Shot, uses: &FileUses) -> Result<Option<Self>> {
         let json = arguments.json.as_deref().map(|path| shot.file(path));
         compile::check_imported_settings(&shot.imported, &shot.scene)?;
         let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
-        let shard_file = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?.map(|name| shot.file_of(&name));
-        let mut settings = Settings::new(&shot.imported.desc, &overrides)?;
-        shot.adapt(&mut settings);
-        let recipe = rerender::prepare(arguments, shot, &mut settings)?;
+        let shard_name = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?;
+        let shard_file = shard_name.as_deref().map(|name| shot.file_of(name));
+        let mut settings = match &arguments.repeat {
+            Some(repeat) => repeat.recipe.settings(render::threads(arguments.threads)?),
+            None => Settings::new(&shot.imported.desc, &overrides)?,
+        };
+        if arguments.pixel.is_none() {
+            files::of_render(arguments, shot, &settings.outputs, shard_name.as_deref(), uses.clone())?;
+        }
+        if arguments.repeat.is_none() {
+            shot.adapt(&mut settings);
+        }
+        let recipe = rerender::recipe(arguments, shot, &settings)?;
         let is_there = match &shard_file {
             Some(file) => shot.frame.is_some() && !arguments.sequence.overwrite && file.exists(),
             None => shot.is_there(&settings, arguments.sequence.overwrite),

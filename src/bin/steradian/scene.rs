@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use steradian::import::{self, Imported, Outcome, ReportEntry};
-use steradian::{Error, Result, output};
+use steradian::output::{self, FileUses};
+use steradian::{Error, Result};
 
 use crate::args::{ImportArgs, Verbosity};
 use crate::log::{self, Level};
@@ -19,6 +20,9 @@ pub fn load(path: &Path, arguments: &ImportArgs, verbosity: Verbosity) -> Result
         imported.leave_out_missing(path);
     }
     if let Some(file) = &arguments.report {
+        let mut uses = FileUses::default();
+        uses.write(file, "--report")?;
+        import::files_of_scene(&imported, path).into_iter().try_for_each(|(path, place)| uses.read(&path, place))?;
         write_report(file, &imported)?;
     }
     if !verbosity.quiet {

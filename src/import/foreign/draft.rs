@@ -1,6 +1,7 @@
 //! A scene of our own format while a reader fills it.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::{ImportReport, Imported, Outcome, ReportEntry};
@@ -20,11 +21,18 @@ pub struct Draft {
     pub assets: Assets,
     /// What became of the parameters.
     pub report: ImportReport,
+    /// The files that were read beside the scene's own.
+    pub files: BTreeSet<PathBuf>,
     places: BTreeMap<String, String>,
     numbers: Numbers,
 }
 
 impl Draft {
+    /// An empty scene, for which these files were read.
+    pub fn of_files(files: &[PathBuf]) -> Self {
+        Self { files: files.iter().cloned().collect(), ..Self::default() }
+    }
+
     /// Adds a texture under `name` or one like it; the result is its name.
     pub fn add_texture(&mut self, name: &str, place: &str, texture: TextureDesc) -> String {
         let name = self.numbers.unique("texture", name, |name| self.desc.textures.contains_key(name));
@@ -139,7 +147,8 @@ impl Draft {
 
     /// The scene.
     pub fn finish(self) -> Imported {
-        Imported { desc: self.desc, assets: Arc::new(self.assets), report: self.report, places: Arc::new(self.places) }
+        let Self { desc, assets, report, files, places, .. } = self;
+        Imported { desc, assets: Arc::new(assets), report, files: Arc::new(files), places: Arc::new(places) }
     }
 }
 

@@ -13,16 +13,19 @@ pub use draft::Draft;
 pub(super) use recolor::linear;
 pub use report::{ImportReport, Outcome, ReportEntry};
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use super::{Assets, load_scene};
 use crate::desc::SceneDesc;
 use crate::error::Result;
 
 /// What the user says beside a scene file.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct ImportOptions {
     /// Mitsuba: values of `$name` that replace the defaults of the file.
     pub defines: Vec<(String, String)>,
@@ -39,6 +42,8 @@ pub struct Imported {
     pub assets: Arc<Assets>,
     /// What became of the file's parameters; empty for our own format.
     pub report: ImportReport,
+    /// The files beside the scene's own that were read to make it, as far as they are known by then.
+    pub files: Arc<BTreeSet<PathBuf>>,
     /// Where the file says what became `shapes[0]`, `materials.floor` and so on; empty for our own format.
     pub places: Arc<BTreeMap<String, String>>,
 }
@@ -56,7 +61,7 @@ pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
         "gltf" | "glb" => gltf::read(path, options),
         _ => {
             let desc = load_scene(path)?;
-            Ok(Imported { desc, assets: Arc::default(), report: ImportReport::default(), places: Arc::default() })
+            Ok(Imported { desc, assets: Arc::default(), report: ImportReport::default(), files: Arc::default(), places: Arc::default() })
         }
     }
 }

@@ -21,7 +21,12 @@ pub fn recolored(draft: &mut Draft, folder: &Path, name: &str, factor: [f32; 3],
             }
             let data = match draft.assets.images.get(&file) {
                 Some(data) => data.clone(),
-                None => read_image(&folder.join(&file)).ok()?,
+                None => {
+                    let path = folder.join(&file);
+                    let image = read_image(&path).ok()?;
+                    draft.files.insert(path);
+                    image
+                }
             };
             let data = recolored_image(&data, color_space == ColorSpaceDesc::Srgb, &each);
             let file = draft.keep_image(&format!("{name}_{}", draft.assets.images.len()), data);

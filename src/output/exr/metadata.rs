@@ -1,6 +1,6 @@
 //! Attributes of files.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use exr::meta::attribute::{AttributeValue, Text};
 use exr::prelude::{IntegerBounds, LayerAttributes};
@@ -35,11 +35,16 @@ pub struct Mattes<'a> {
     pub manifest: CryptoManifestDesc,
 }
 
+/// The file with the names of a type of mattes, beside the picture's file.
+pub fn sidecar_path(file: &Path, type_name: &str) -> PathBuf {
+    let stem = file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    file.with_file_name(format!("{stem}.{type_name}.json"))
+}
+
 impl Mattes<'_> {
     /// The name of the file with a matte's names, beside the picture.
     pub fn sidecar(&self, matte: &Matte) -> String {
-        let stem = self.file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        format!("{stem}.{}.json", matte.name)
+        sidecar_path(self.file, matte.name).file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }
 
     fn describe(&self, attributes: &mut LayerAttributes) {

@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::container::Reader;
-use crate::desc::{IntegratorDesc, OutputDesc};
-use crate::error::{Error, Result};
-use crate::film::{Crop, Film, LayerKind, LayerSet};
+use crate::desc::OutputDesc;
+use crate::error::Result;
+use crate::film::{Crop, Film, LayerSet};
 use crate::import::SceneFingerprint;
 use crate::output::RenderInfo;
 use crate::render::{FINEST_SPP, Settings, TILE_SIZE};
@@ -69,10 +69,10 @@ const LEAST_BYTES: u64 = 64;
 pub struct FilmShape {
     /// Width and height of the full picture in pixels.
     pub size: [u32; 2],
-    /// The part that is there: first column, first row, columns, rows.
-    pub crop: [u32; 4],
-    /// Names of the layers.
-    pub layers: Vec<String>,
+    /// The part that is there.
+    pub crop: Crop,
+    /// Its layers.
+    pub layers: LayerSet,
     /// Names of the groups of lights.
     pub light_groups: Vec<String>,
 }
@@ -80,23 +80,15 @@ pub struct FilmShape {
 impl FilmShape {
     /// Of this film.
     pub fn of(film: &Film) -> Self {
-        let Crop { x, y, width, height } = film.crop();
-        let layers = film.layers().iter().map(|info| info.name.to_owned()).collect();
-        Self { size: film.size(), crop: [x, y, width, height], layers, light_groups: film.light_groups().to_vec() }
+        Self { size: film.size(), crop: film.crop(), layers: film.layers(), light_groups: film.light_groups().to_vec() }
     }
 
     /// A black film of this shape.
     ///
     /// # Errors
-    /// As [`Film::new`]; [`Error::Internal`] if a layer is not known.
+    /// As [`Film::new`].
     pub fn film(&self) -> Result<Film> {
-        let kind = |name: &String| {
-            let info = LayerKind::ALL.iter().find(|info| info.name == *name);
-            info.map(|info| info.kind).ok_or_else(|| Error::Internal(format!("there is no layer {name}")))
-        };
-        let layers: LayerSet = self.layers.iter().map(kind).collect::<Result<_>>()?;
-        let [x, y, width, height] = self.crop;
-        Film::with_light_groups(self.size, Crop { x, y, width, height }, &layers, self.light_groups.clone(), TILE_SIZE)
+        Film::with_light_groups(self.size, self.crop, &self.layers, self.light_groups.clone(), TILE_SIZE)
     }
 }
 
@@ -142,7 +134,7 @@ impl Header {
             program: concat!("steradian ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene_file: scene_file.to_owned(),
             scene: fingerprint,
-            settings: named(settings, scene),
+            settings: compared(settings, scene),
             spp: settings.spp,
             shard,
             overscan: settings.overscan,
@@ -154,7 +146,8 @@ impl Header {
     /// That of a file, without a look at the rest of it.
     ///
     /// # Errors
-    /// [`Error::Missing`] if it cannot be read, [`Error::Checkpoint`] if it is of another kind or damaged.
+    /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Checkpoint`](crate::Error::Checkpoint) if it is of another kind or
+    /// damaged.
     pub fn read(file: &Path) -> Result<Self> {
         Reader::peek(file)
     }
@@ -162,16 +155,14 @@ impl Header {
     /// What of it makes no sense in itself, so that no render can have written it; `None` if all does. `bytes` are those behind the header.
     pub(super) fn fault(&self, bytes: u64) -> Option<String> {
         let Shard { index, count } = self.shard;
-        let [x, y, width, height] = self.film.crop.map(u64::from);
+        let Crop { x, y, width, height } = self.film.crop;
+        let [x, y, width, height] = [x, y, width, height].map(u64::from);
         let [full_width, full_height] = self.film.size.map(u64::from);
-        let layer = self.film.layers.iter().find(|name| !LayerKind::ALL.iter().any(|info| info.name == **name));
         let around = 2 * u64::from(self.overscan);
         if !(1..=count).contains(&index) {
             Some(format!("there is no shard {index} of {count}"))
         } else if self.done > self.spp {
             Some(format!("{} of {} samples per pixel are done", self.done, self.spp))
-        } else if let Some(layer) = layer {
-            Some(format!("there is no layer {layer:?}"))
         } else if x + width > full_width || y + height > full_height || (around > 0 && around >= full_width.min(full_height)) {
             Some("its film is not within its picture".to_owned())
         } else if self.info.identities.as_ref().is_some_and(|identities| !identities.is_ordered()) {
@@ -206,43 +197,30 @@ impl Header {
     }
 }
 
-/// The settings that the picture depends on, by the names of their options.
-fn named(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
-    let mut named = BTreeMap::new();
-    let mut put = |name: &str, value: String| named.insert(name.to_owned(), value);
-    put("size", format!("{}x{}", settings.size[0], settings.size[1]));
-    let crop = settings.crop;
-    put("crop", format!("{},{},{},{}", crop.x, crop.y, crop.width, crop.height));
-    put("overscan", settings.overscan.to_string());
-    put("seed", settings.seed.to_string());
-    put("sampler", format!("{:?}", settings.sampler).to_lowercase());
-    put("accel", settings.accel.to_string());
-    put("layers", settings.layers.iter().map(|info| info.name).collect::<Vec<_>>().join(","));
-    if !settings.depth_of_field {
-        put("depth-of-field", "off".to_owned());
-    }
-    if let Some(target) = settings.target_error {
-        put("target-error", target.to_string());
-        put("spp", settings.spp.to_string());
+/// The settings that the picture depends on, by their names. More samples can be added, unless the others depend on their number.
+fn compared(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    put(&mut found, "", &serde_json::to_value(settings).unwrap_or_default());
+    if settings.target_error.is_none() {
+        found.remove("spp");
     }
     if scene.features.filtered_textures {
-        put("samples per pixel that textures are filtered for", settings.spp.min(FINEST_SPP).to_string());
+        found.insert("samples per pixel that textures are filtered for".to_owned(), settings.spp.min(FINEST_SPP).to_string());
     }
-    put_value(&mut named, "filter", &serde_json::to_value(settings.filter).unwrap_or_default());
-    put_value(&mut named, "integrator", &serde_json::to_value::<IntegratorDesc>(settings.integrator).unwrap_or_default());
-    named
+    found
 }
 
-/// Each of an object's values under a name of its own.
-fn put_value(named: &mut BTreeMap<String, String>, name: &str, value: &Value) {
+/// A value under a name, or each of an object's values under a name of its own.
+fn put(found: &mut BTreeMap<String, String>, name: &str, value: &Value) {
+    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     match value {
-        Value::Object(values) => values.iter().for_each(|(key, value)| put_value(named, &format!("{name}.{key}"), value)),
-        Value::String(text) => {
-            named.insert(name.to_owned(), text.clone());
+        Value::Null => {}
+        Value::Object(values) => {
+            let dot = if name.is_empty() { "" } else { "." };
+            values.iter().for_each(|(key, value)| put(found, &format!("{name}{dot}{key}"), value));
         }
-        value => {
-            named.insert(name.to_owned(), value.to_string());
-        }
+        Value::Array(values) => drop(found.insert(name.to_owned(), values.iter().map(text).collect::<Vec<_>>().join(","))),
+        value => drop(found.insert(name.to_owned(), text(value))),
     }
 }
 

@@ -6,6 +6,7 @@ use clap::Args;
 use steradian::desc::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc};
 use steradian::render::ExrOverrides;
 
+use super::denoise::OidnArgs;
 use crate::names;
 
 pub const CHECK_EXAMPLES: &str = "\
@@ -96,9 +97,9 @@ pub struct RerenderArgs {
     /// The EXR file to render again
     #[arg(value_name = "FILE.exr")]
     pub file: PathBuf,
-    /// File to write. Without it, FILE.exr is replaced
+    /// File to write, .exr or .png
     #[arg(short, long, value_name = "OUT")]
-    pub output: Option<String>,
+    pub output: String,
     /// The scene, if it does not lie where it did
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
@@ -111,6 +112,8 @@ pub struct RerenderArgs {
     /// Number of threads; 0 stands for all
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
+    #[command(flatten)]
+    pub oidn: OidnArgs,
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,

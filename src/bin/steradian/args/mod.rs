@@ -115,6 +115,7 @@ pub enum Command {
     /// Render the picture of an EXR file again
     ///
     /// The file names its scene with all settings; the picture is the same bit for bit. A scene or file of it that has changed is named and refused.
+    /// Nothing that the file says is loaded, written or connected to.
     #[command(after_help = exr::RERENDER_EXAMPLES)]
     Rerender(RerenderArgs),
     /// Compare a picture with its reference

@@ -2,6 +2,7 @@
 
 mod files;
 mod show;
+mod trust;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -14,9 +15,7 @@ use steradian::{Error, Result, import};
 use crate::args::Cli;
 use crate::log;
 pub use show::run as show;
-
-/// Options that belong to a single run.
-const OF_ONE_RUN: [&str; 10] = ["pixel", "sample", "frames", "checkpoint", "resume", "shard", "json", "report", "help", "version"];
+use trust::{Trust, trust};
 
 /// What environment variables that stand for options begin with.
 const PREFIX: &str = "STERADIAN_";
@@ -61,6 +60,8 @@ pub struct Parsed {
     pub warnings: Vec<String>,
     /// What was added.
     pub added: Vec<Setting>,
+    /// The files that were read for it.
+    pub files: Vec<PathBuf>,
 }
 
 /// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help with 0.
@@ -70,19 +71,19 @@ pub fn parse() -> Result<Parsed> {
     let command = color(Cli::command(), &line);
     let matches = command.clone().try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
     let Some(("render", render)) = matches.subcommand() else {
-        return Ok(Parsed { cli: typed(&matches), warnings: Vec::new(), added: Vec::new() });
+        return Ok(Parsed { cli: typed(&matches), warnings: Vec::new(), added: Vec::new(), files: Vec::new() });
     };
     let scene = render.get_one::<PathBuf>("scene").cloned().unwrap_or_default();
     let options = Options::new(&command);
-    let (found, warnings) = settings(&options, &scene)?;
+    let Found { settings, files, warnings } = settings(&options, &scene)?;
     let given = |key: &str| options.find(key).is_some_and(|arg| is_given(render, &matches, arg));
     // Who asks for more on the command line does not want the quiet of a file.
     let opposed = |key: &str| (key == "quiet" && given("verbose")) || (key == "verbose" && given("quiet"));
-    let added: Vec<Setting> = found.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
+    let added: Vec<Setting> = settings.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
     let command =
         added.iter().filter(|setting| !setting.values.is_empty()).fold(command, |command, setting| options.with_default(command, setting));
     let matches = command.try_get_matches_from(&line).unwrap_or_else(|error| exit(&error));
-    Ok(Parsed { cli: typed(&matches), warnings, added })
+    Ok(Parsed { cli: typed(&matches), warnings, added, files })
 }
 
 /// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals nor farms.
@@ -136,7 +137,7 @@ pub struct Options {
 impl Options {
     /// Those that the command line's definition has.
     pub fn new(command: &Command) -> Self {
-        let known = |arg: &&Arg| arg.get_long().is_some_and(|long| !OF_ONE_RUN.contains(&long));
+        let known = |arg: &&Arg| arg.get_long().is_some_and(|long| trust(long).is_some_and(|trust| trust < Trust::CommandLine));
         let of = |command: &Command| command.get_arguments().filter(known).cloned().collect::<Vec<_>>();
         Self { render: command.find_subcommand("render").map(of).unwrap_or_default(), global: of(command) }
     }
@@ -159,7 +160,7 @@ impl Options {
     /// A hint for a name that is not known.
     fn unknown(&self, key: &str) -> String {
         let hint = import::closest_name(key, self.names()).map_or(String::new(), |name| format!(" (did you mean \"{name}\"?)"));
-        let why = if OF_ONE_RUN.contains(&key) { "belongs to the command line" } else { "is no option of render" };
+        let why = if trust(key) == Some(Trust::CommandLine) { "belongs to the command line" } else { "is no option of render" };
         format!("\"{key}\" {why}{hint}")
     }
 
@@ -228,12 +229,30 @@ impl Words {
     }
 }
 
-/// Everything that is said outside the command line for rendering `scene`, each option once, from the strongest place; and warnings.
-pub fn settings(options: &Options, scene: &Path) -> Result<(Vec<Setting>, Vec<String>)> {
+/// What is set outside the command line.
+pub struct Found {
+    /// Each option once, from the strongest place.
+    pub settings: Vec<Setting>,
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
+    /// What the user should know of it.
+    pub warnings: Vec<String>,
+}
+
+/// Everything that is set outside the command line for rendering `scene`.
+pub fn settings(options: &Options, scene: &Path) -> Result<Found> {
     let mut warnings = Vec::new();
     let mut found = environment(options, std::env::vars_os(), &mut warnings)?;
-    for file in files::for_scene(scene) {
-        found.extend(files::read(options, &file)?);
+    let mut files = Vec::new();
+    let user = rustix::process::geteuid().as_raw();
+    for (file, trust) in files::for_scene(scene) {
+        match files::read(options, &file, trust, user)? {
+            Ok(settings) => {
+                found.extend(settings);
+                files.push(file);
+            }
+            Err(warning) => warnings.push(warning),
+        }
     }
     let limits = |name: &str| std::env::var(name).is_ok_and(|value| value.parse::<usize>().is_ok_and(|threads| threads > 0));
     if let Some(name) = FARM_THREADS.iter().find(|name| limits(name)) {
@@ -246,7 +265,7 @@ pub fn settings(options: &Options, scene: &Path) -> Result<(Vec<Setting>, Vec<St
             kept.push(setting);
         }
     }
-    Ok((kept, warnings))
+    Ok(Found { settings: kept, files, warnings })
 }
 
 /// What variables such as `STERADIAN_SPP` say; an empty one says nothing.

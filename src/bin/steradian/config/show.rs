@@ -9,6 +9,7 @@ use steradian::{Error, Result};
 
 use super::{Options, settings};
 use crate::args::{Cli, ConfigShowArgs};
+use crate::log::{self, Level};
 use crate::text;
 
 /// Options whose values a scene has, with their places in it.
@@ -36,11 +37,12 @@ struct Row {
 pub fn run(arguments: &ConfigShowArgs) -> Result<()> {
     let options = Options::new(&Cli::command());
     let nowhere = Path::new("scene.json").to_owned();
-    let (found, _) = settings(&options, arguments.scene.as_ref().unwrap_or(&nowhere))?;
+    let found = settings(&options, arguments.scene.as_ref().unwrap_or(&nowhere))?;
+    found.warnings.iter().for_each(|warning| log::message(Level::Warning, warning));
     let of_scene = scene_rows(arguments.scene.as_deref())?;
     let mut rows: Vec<Row> = Vec::new();
     for name in options.names() {
-        let setting = found.iter().find(|setting| setting.key == name).map(|setting| {
+        let setting = found.settings.iter().find(|setting| setting.key == name).map(|setting| {
             let value = if setting.values.is_empty() { "false".to_owned() } else { setting.values.join(",") };
             Row { key: name.to_owned(), value, origin: setting.origin.to_string() }
         });

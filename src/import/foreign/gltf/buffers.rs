@@ -12,6 +12,8 @@ use crate::error::{Error, Result};
 #[derive(Debug)]
 pub struct Buffers<'a> {
     list: Vec<Bytes<'a>>,
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
 }
 
 #[derive(Debug)]
@@ -60,7 +62,7 @@ impl<'a> Buffers<'a> {
             }
             list.push(bytes);
         }
-        Ok(Self { list })
+        Ok(Self { list, files: files.into_keys().collect() })
     }
 
     /// How many bytes there are.

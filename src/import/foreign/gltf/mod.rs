@@ -54,7 +54,7 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let buffers = Buffers::load(path, &document.root, document.bin)?;
     let source = Source { file: path, root: &document.root, buffers: &buffers };
 
-    let mut draft = Draft::default();
+    let mut draft = Draft::of_files(&buffers.files);
     document::report_extensions(source.root, &mut draft);
     let tree = Tree::new(source, &mut draft)?;
     let motion = animation::evaluate(source, options.time, &mut draft)?;

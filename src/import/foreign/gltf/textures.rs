@@ -187,6 +187,195 @@ mod tests {
         [f64::from(offset[0]) + cos * u - sin * v, f64::from(offset[1]) + sin * u + cos * v]
     }
 
+xtures, samplers and images, and how an extension moves them.
+
+use std::collections::BTreeMap;
+
+use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
+use gltf::json::validation::Checked;
+use serde_json::{Map, Value};
+
+use super::Source;
+use super::buffers::Uri;
+use super::extensions::{TextureInfo, TextureTransform};
+use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
+use crate::error::Result;
+use crate::import::{Draft, ImageData, read_image_bytes};
+
+/// A texture as a material names it.
+#[derive(Clone, Debug)]
+pub struct TextureRef {
+    /// Where the material names it.
+    pub place: String,
+    index: usize,
+    /// The set of uv that it uses.
+    pub uv_set: u32,
+    transform: TextureTransform,
+}
+
+/// Textures and images that have been added.
+#[derive(Debug, Default)]
+pub struct TextureSet {
+    files: BTreeMap<usize, String>,
+    names: BTreeMap<String, String>,
+    /// That of the vertices' colours.
+    vertex_colors: Option<String>,
+}
+
+impl TextureRef {
+    /// A texture with what extensions say about it.
+    pub fn new(source: Source, place: &str, index: usize, uv_set: u32, extensions: Option<&Map<String, Value>>) -> Result<Self> {
+        let transform: TextureTransform = source.extension(place, extensions, "KHR_texture_transform")?.unwrap_or_default();
+        let numbers = [transform.offset, transform.scale].concat();
+        if !numbers.iter().all(|x| x.is_finite()) || !transform.rotation.is_finite() {
+            return Err(source.fault(&format!("{place}.extensions.KHR_texture_transform"), "is not finite"));
+        }
+        Ok(Self { place: place.into(), index, uv_set: transform.tex_coord.unwrap_or(uv_set), transform })
+    }
+
+    /// A texture that an extension names.
+    pub fn of_extension(source: Source, place: &str, info: Option<&TextureInfo>) -> Result<Option<Self>> {
+        info.map(|info| Self::new(source, place, info.index, info.tex_coord, info.extensions.as_ref())).transpose()
+    }
+}
+
+impl TextureSet {
+    /// Adds a texture: one channel of it, or its colour. `None` if there is no image that can be read, which the report says.
+    pub fn add(
+        &mut self,
+        source: Source,
+        draft: &mut Draft,
+        texture: &TextureRef,
+        color_space: ColorSpaceDesc,
+        channel: Option<ChannelDesc>,
+    ) -> Result<Option<String>> {
+        let json = source.root.textures.get(texture.index);
+        let json = json.ok_or_else(|| source.fault(&texture.place, format!("there is no textures[{}]", texture.index)))?;
+        let path = format!("textures[{}]", texture.index);
+        // An index of all ones stands for none.
+        let Some(image) = source.root.images.get(json.source.value()).map(|_| json.source.value()) else {
+            draft.ignored(&path, "texture", "source", "the image is in a format of an extension that is not read");
+            return Ok(None);
+        };
+        let file = self.image(source, draft, image)?;
+        let sampler = json.sampler.and_then(|index| source.root.samplers.get(index.value()));
+        let (filter, wrap) = sampler.map_or((TextureFilterDesc::Trilinear, WrapDesc::default()), lookup);
+        let (offset, scale, rotation) = flipped(&texture.transform);
+        let desc = TextureDesc::Image {
+            file,
+            color_space,
+            filter,
+            wrap,
+            scale,
+            rotation_degrees: rotation.to_degrees(),
+            offset,
+            channel,
+            invert: false,
+        };
+        let key = format!("{desc:?}");
+        if let Some(name) = self.names.get(&key) {
+            return Ok(Some(name.clone()));
+        }
+        let label = json.name.as_deref().or(source.root.images.get(image).and_then(|image| image.name.as_deref()));
+        let label = label.map_or_else(|| format!("texture {}", texture.index), str::to_owned);
+        let label = match channel {
+            Some(channel) => format!("{label} {channel:?}").to_lowercase(),
+            None => label,
+        };
+        draft.mapped(&path, "texture", "source");
+        if json.sampler.is_some() {
+            draft.mapped(&path, "texture", "sampler");
+        }
+        let name = draft.add_texture(&label, &path, desc);
+        self.names.insert(key, name.clone());
+        Ok(Some(name))
+    }
+
+    /// The texture of the vertices' colours.
+    pub fn vertex_colors(&mut self, draft: &mut Draft, place: &str) -> ColorDesc {
+        let add = || draft.add_texture("vertex_color", place, TextureDesc::VertexColor);
+        ColorDesc::Texture { texture: self.vertex_colors.get_or_insert_with(add).clone() }
+    }
+
+    /// The file of an image.
+    fn image(&mut self, source: Source, draft: &mut Draft, index: usize) -> Result<String> {
+        if let Some(file) = self.files.get(&index) {
+            return Ok(file.clone());
+        }
+        let file = match location(source, index)? {
+            Location::File(file) => file,
+            Location::Bytes(bytes) => draft.keep_image(&format!("image_{index}"), decode(source, index, &bytes)?),
+        };
+        self.files.insert(index, file.clone());
+        Ok(file)
+    }
+}
+
+enum Location {
+    File(String),
+    Bytes(Vec<u8>),
+}
+
+fn location(source: Source, index: usize) -> Result<Location> {
+    let path = format!("images[{index}]");
+    let image = source.root.images.get(index).ok_or_else(|| source.fault(&path, "there is no such image"))?;
+    match (&image.uri, image.buffer_view) {
+        (Some(uri), _) => match Uri::parse(uri).map_err(|message| source.fault(&path, message))? {
+            Uri::File(file) => Ok(Location::File(file)),
+            Uri::Data(bytes) => Ok(Location::Bytes(bytes)),
+        },
+        (None, Some(view)) => {
+            let json = source.root.get(view).ok_or_else(|| source.fault(&path, "there is no such view"))?;
+            let view = source.buffers.view(json).map_err(|message| source.fault(&path, message))?;
+            Ok(Location::Bytes(view.bytes.to_vec()))
+        }
+        (None, None) => Err(source.fault(&path, "has neither `uri` nor `bufferView`")),
+    }
+}
+
+fn decode(source: Source, index: usize, bytes: &[u8]) -> Result<ImageData> {
+    read_image_bytes(bytes).map_err(|e| source.fault(&format!("images[{index}]"), e.to_string()))
+}
+
+/// Filter and wrap modes of a sampler. A viewer that shows pixels enlarged with `NEAREST` shows them as they are.
+fn lookup(sampler: &Sampler) -> (TextureFilterDesc, WrapDesc) {
+    let filter = match (sampler.mag_filter, sampler.min_filter) {
+        (Some(Checked::Valid(MagFilter::Nearest)), _) => TextureFilterDesc::Nearest,
+        (_, Some(Checked::Valid(MinFilter::Nearest | MinFilter::Linear))) => TextureFilterDesc::Bilinear,
+        _ => TextureFilterDesc::Trilinear,
+    };
+    let mode = |mode: Checked<WrappingMode>| match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => WrapModeDesc::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => WrapModeDesc::Mirror,
+        _ => WrapModeDesc::Repeat,
+    };
+    let (u, v) = (mode(sampler.wrap_s), mode(sampler.wrap_t));
+    (filter, if u == v { WrapDesc::Both(u) } else { WrapDesc::Each([u, v]) })
+}
+
+/// A transform of uv whose v runs down, for uv whose v runs up: offset, scale and rotation (radians).
+///
+/// With v down the lookup is `offset + M (scale * uv)`, where M turns counter-clockwise as the image is seen: from u against v. Putting
+/// `1 - v` for v before and after turns that rotation into one from u towards v by the same angle and moves the offset.
+fn flipped(transform: &TextureTransform) -> ([f32; 2], [f32; 2], f64) {
+    let rotation = f64::from(transform.rotation);
+    let (sin, cos) = rotation.sin_cos();
+    let ([offset_u, offset_v], [scale_u, scale_v]) = (transform.offset.map(f64::from), transform.scale.map(f64::from));
+    let offset = [offset_u + sin * scale_v, 1.0 - offset_v - cos * scale_v];
+    (offset.map(|x| x as f32), [scale_u as f32, scale_v as f32], rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What our image lookup does.
+    fn ours([u, v]: [f64; 2], (offset, scale, rotation): ([f32; 2], [f32; 2], f64)) -> [f64; 2] {
+        let (sin, cos) = rotation.sin_cos();
+        let [u, v] = [u * f64::from(scale[0]), v * f64::from(scale[1])];
+        [f64::from(offset[0]) + cos * u - sin * v, f64::from(offset[1]) + sin * u + cos * v]
+    }
+
     #[test]
     fn transforms_mean_the_same_with_v_upward() {
         let quarter = std::f32::consts::FRAC_PI_2;

@@ -160,6 +160,7 @@ impl<'a> Reader<'a> {
     fn converted_environment(&mut self, element: &Element<'a>, name: &str) -> Result<String> {
         let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(name);
         let image = read_image(&path).map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;
+        self.draft.files.insert(path);
         Ok(self.draft.keep_environment(name.rsplit('/').next().unwrap_or(name), as_environment(&image)))
     }
 }

@@ -43,7 +43,7 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let mut reader = Reader {
         document: &document,
         scene: path,
-        draft: Draft::default(),
+        draft: Draft::of_files(&document.files),
         textures: BTreeMap::new(),
         looks: BTreeMap::new(),
         surfaces: BTreeMap::new(),

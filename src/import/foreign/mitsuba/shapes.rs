@@ -233,6 +233,7 @@ impl<'a> Reader<'a> {
         let uv = if flips { UvOrigin::Upward } else { UvOrigin::Mitsuba };
         let map = element.transform("to_world")?;
         let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(&file);
+        self.draft.files.insert(path.clone());
         let (file, has_normals) = if kind == "serialized" {
             let index = element.count("shape_index", 0)?.unwrap_or(0);
             let mesh = serialized::read(&path, index).map_err(|e| e.at(self.scene, &element.place_of("filename").to_string(), &path))?;

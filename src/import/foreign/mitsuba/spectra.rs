@@ -20,6 +20,7 @@ impl<'a> Reader<'a> {
                 let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(self.document.find_file(self.scene, name));
                 let text = crate::file::read_to_string(&path)
                     .map_err(|e| Error::Missing { file: path.clone(), message: format!("{e} (named at {place})") })?;
+                self.draft.files.insert(path.clone());
                 sampled(file_samples(&text).map_err(|message| place.error(format!("{}: {message}", path.display())))?, place)?
             }
         };

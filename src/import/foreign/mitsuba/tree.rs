@@ -117,6 +117,8 @@ pub struct Document {
     pub aliases: BTreeMap<String, String>,
     /// Folders in which files are searched, before that of the scene; relative to it.
     pub folders: Vec<PathBuf>,
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
 }
 
 impl Document {

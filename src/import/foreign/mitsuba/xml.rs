@@ -155,6 +155,7 @@ impl Parser {
     fn file(&mut self, path: &Path) -> Result<Plugin> {
         let read = if self.files == 0 { crate::file::read_stream } else { crate::file::read };
         let bytes = read(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+        self.document.files.push(path.to_owned());
         let file: Rc<Path> = path.into();
         let text = String::from_utf8(bytes).map_err(|e| {
             let valid = &e.as_bytes()[..e.utf8_error().valid_up_to()];

@@ -119,6 +119,13 @@ impl Reader {
         Ok(self.draft.finish())
     }
 
+    /// The parameters of a directive, whose files are noted.
+    fn params(&mut self, lexer: &mut Lexer, at: Position, element: String) -> Result<Params> {
+        let params = Params::read(lexer, at, element)?;
+        self.draft.files.extend(params.strings().map(|name| self.folder.join(name)).filter(|file| file.is_file()));
+        Ok(params)
+    }
+
     /// Carries out a directive; the result is a file to read next.
     fn directive(&mut self, lexer: &mut Lexer, at: Position, directive: &str) -> Result<Option<Lexer>> {
         if let Some(change) = transforms::read(lexer, at, directive)? {
@@ -142,7 +149,7 @@ impl Reader {
             },
             "Attribute" => {
                 let target = quoted(lexer, at, "shape, light, material, medium or texture")?;
-                let params = Params::read(lexer, at, format!("Attribute {target}"))?;
+                let params = self.params(lexer, at, format!("Attribute {target}"))?;
                 let attributes = Rc::make_mut(&mut self.graphics.attributes).entry(target).or_default();
                 for param in params.into_list() {
                     attributes.retain(|old| old.name != param.name);
@@ -178,7 +185,7 @@ impl Reader {
             "WorldBegin" => self.world_begin(lexer, at)?,
             "WorldEnd" => {}
             "Option" => {
-                let params = Params::read(lexer, at, "Option".into())?;
+                let params = self.params(lexer, at, "Option".into())?;
                 self.draft.ignored(&params.place, "Option", "", "options are those of the command line");
             }
             "Film" | "PixelFilter" | "Sampler" | "Integrator" | "Accelerator" | "Camera" => self.option(lexer, at, directive)?,
@@ -192,7 +199,7 @@ impl Reader {
             }
             "MakeNamedMedium" => {
                 let name = quoted(lexer, at, "a name")?;
-                let params = Params::read(lexer, at, format!("{directive} \"{name}\""))?;
+                let params = self.params(lexer, at, format!("{directive} \"{name}\""))?;
                 self.draft.ignored(&params.place, &params.element, "", "there is nothing between surfaces");
             }
             "Material" | "MakeNamedMaterial" | "NamedMaterial" => self.material(lexer, at, directive)?,
@@ -221,7 +228,7 @@ impl Reader {
             return Err(lexer.error(at, format!("{directive} stands before WorldBegin")));
         }
         let kind = quoted(lexer, at, "a type")?;
-        let params = Params::read(lexer, at, format!("{directive} {kind}"))?;
+        let params = self.params(lexer, at, format!("{directive} {kind}"))?;
         let defaults = self.graphics.attributes.get(target).map_or(&[][..], Vec::as_slice);
         Ok((kind, params.with_defaults(defaults)))
     }
@@ -246,6 +253,7 @@ impl Reader {
         }
         let bytes = crate::file::read(&file)
             .map_err(|e| Error::Missing { file: file.clone(), message: format!("{e} (included by {})", lexer.place(at)) })?;
+        self.draft.files.insert(file.clone());
         Ok(Lexer::new(file, bytes))
     }
 
@@ -266,7 +274,7 @@ impl Reader {
             return Err(lexer.error(at, format!("{directive} stands after WorldBegin")));
         }
         let kind = quoted(lexer, at, "a type")?;
-        let params = Params::read(lexer, at, format!("{directive} {kind}"))?;
+        let params = self.params(lexer, at, format!("{directive} {kind}"))?;
         let key = match directive {
             "Film" => "Film",
             "PixelFilter" => "PixelFilter",
@@ -368,7 +376,7 @@ impl Reader {
             })?);
             return Ok(());
         }
-        let params = Params::read(lexer, at, format!("{directive} \"{first}\""))?;
+        let params = self.params(lexer, at, format!("{directive} \"{first}\""))?;
         let params = params.with_defaults(self.graphics.attributes.get("material").map_or(&[][..], Vec::as_slice));
         let (name, kind) = match directive {
             // Numbered, so that finding a free name is quick.
@@ -418,7 +426,7 @@ impl Reader {
     fn texture(&mut self, lexer: &mut Lexer, at: Position) -> Result<()> {
         let (name, of) = (quoted(lexer, at, "a name")?, quoted(lexer, at, "float or spectrum")?);
         let kind = quoted(lexer, at, "a type")?;
-        let params = Params::read(lexer, at, format!("Texture {kind} \"{name}\""))?;
+        let params = self.params(lexer, at, format!("Texture {kind} \"{name}\""))?;
         let params = params.with_defaults(self.graphics.attributes.get("texture").map_or(&[][..], Vec::as_slice));
         let of_numbers = match of.as_str() {
             "float" => true,

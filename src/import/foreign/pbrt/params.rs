@@ -72,6 +72,11 @@ pub struct Params {
 }
 
 impl Params {
+    /// All values that are text, some of which may be names of files.
+    pub fn strings(&self) -> impl Iterator<Item = &String> {
+        self.list.iter().filter_map(|param| if let Values::Strings(texts) = &param.values { Some(texts) } else { None }).flatten()
+    }
+
     /// No parameters, for a directive at a place.
     pub fn none(lexer: &Lexer, at: Position, element: String) -> Self {
         Self { list: Vec::new(), place: lexer.place(at), element, file: lexer.file.clone(), at }

@@ -1,0 +1,130 @@
+//! The files that a command reads and writes, compared before it begins.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use steradian::Result;
+use steradian::desc::OutputDesc;
+use steradian::farm::{file_of_frame, scene_of_frame, with_frame_pattern};
+use steradian::import::files_of_scene;
+use steradian::output::{FileUses, files_of_output};
+
+use crate::args::{BenchCommand, Cli, Command, FarmCommand, ImportArgs, RenderArgs};
+use crate::frames::Shot;
+
+/// Compares the files that the command line itself names; `uses` are those of every command.
+pub fn of_command(cli: &Cli, mut uses: FileUses) -> Result<()> {
+    let mut read: Vec<(&Path, &str)> = Vec::new();
+    let mut written: Vec<(PathBuf, &str)> = Vec::new();
+    let (scene, output) = ("the scene", "--output");
+    let mut outputs = |names: &[String]| written.extend(names.iter().map(|name| (PathBuf::from(name), output)));
+    let reports = |folder: &Option<PathBuf>, stem: &str| -> Vec<(PathBuf, &'static str)> {
+        let kinds = folder.iter().flat_map(|folder| ["html", "md", "csv", "json"].map(|kind| folder.join(format!("{stem}.{kind}"))));
+        kinds.map(|path| (path, "--out")).collect()
+    };
+    let mut import: Option<&ImportArgs> = None;
+    match &cli.command {
+        Command::Render(arguments) => {
+            read.push((&arguments.scene, scene));
+            outputs(&arguments.output);
+            let named = [(&arguments.json, "--json"), (&arguments.state.checkpoint, "--checkpoint")];
+            written.extend(named.into_iter().filter_map(|(path, option)| Some((path.clone()?, option))));
+            import = Some(&arguments.import);
+        }
+        Command::Rerender(arguments) => {
+            read.push((&arguments.file, "the picture to render again"));
+            read.extend(arguments.scene.iter().map(|path| (path.as_path(), scene)));
+            outputs(std::slice::from_ref(&arguments.output));
+        }
+        Command::Info(arguments) => {
+            read.push((&arguments.scene, scene));
+            import = Some(&arguments.import);
+        }
+        Command::Convert(arguments) => {
+            read.push((&arguments.input, scene));
+            written.push((arguments.output.clone(), "the converted scene"));
+            import = Some(&arguments.import);
+        }
+        Command::Merge(arguments) => {
+            read.extend(arguments.shards.iter().map(|path| (path.as_path(), "a shard")));
+            outputs(&arguments.output);
+        }
+        Command::Denoise(arguments) => {
+            read.push((&arguments.input, "the noisy picture"));
+            written.push((arguments.output.clone(), "the denoised picture"));
+            written.extend(arguments.also.iter().map(|path| (path.clone(), "--png")));
+        }
+        Command::CheckExr(arguments) => read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check"))),
+        Command::Compare(arguments) => {
+            read.extend([(arguments.reference.as_path(), "the reference"), (arguments.test.as_path(), "the test")]);
+        }
+        Command::Farm(FarmCommand::Slurm(arguments)) => read.push((&arguments.job.scene, scene)),
+        Command::Farm(FarmCommand::Openjd(arguments)) => read.push((&arguments.job.scene, scene)),
+        Command::Config(crate::args::ConfigCommand::Show(arguments)) => {
+            read.extend(arguments.scene.iter().map(|path| (path.as_path(), scene)));
+        }
+        Command::Bench(BenchCommand::Accel(arguments)) => {
+            read.extend(arguments.scenes.iter().map(|path| (path.as_path(), scene)));
+            written.extend(reports(&arguments.out, "accel"));
+            import = Some(&arguments.import);
+        }
+        Command::Bench(BenchCommand::Error(arguments)) => {
+            read.push((&arguments.scene, scene));
+            read.extend(arguments.reference.iter().map(|path| (path.as_path(), "--reference")));
+            written.extend(reports(&arguments.out, "error"));
+            import = Some(&arguments.import);
+        }
+        Command::Bench(BenchCommand::Scale(arguments)) => written.extend(reports(&arguments.out, "scale")),
+        Command::Bench(BenchCommand::Stability(arguments)) => written.extend(reports(&arguments.out, "stability")),
+        Command::Bench(BenchCommand::Reports(_) | BenchCommand::ScaleCase)
+        | Command::Schema
+        | Command::Man { .. }
+        | Command::Completions { .. } => {}
+    }
+    written.extend(import.and_then(|import| import.report.clone()).map(|path| (path, "--report")));
+    read.into_iter().try_for_each(|(path, purpose)| uses.read(path, purpose))?;
+    written.iter().filter(|(path, _)| !is_stdout(path)).try_for_each(|(path, purpose)| uses.write(path, *purpose))
+}
+
+/// Compares the files of a render, with those that the scene names; `outputs` and `shard` have names for all frames of a sequence.
+pub fn of_render(arguments: &RenderArgs, shot: &Shot, outputs: &[OutputDesc], shard: Option<&Path>, mut uses: FileUses) -> Result<()> {
+    if shot.unchecked.is_empty() {
+        return Ok(());
+    }
+    let mut written: Vec<(PathBuf, &str)> = Vec::new();
+    let mut statistics = BTreeSet::new();
+    for frame in &shot.unchecked {
+        let scene = frame.map_or_else(|| shot.scene.clone(), |frame| scene_of_frame(&arguments.scene, frame));
+        uses.read(&scene, "the scene")?;
+        let numbered = |name: &str| frame.map_or_else(|| name.to_owned(), |frame| file_of_frame(&with_frame_pattern(name), frame));
+        let state = [(shard, "--output"), (arguments.state.checkpoint.as_deref(), "--checkpoint")];
+        let state = state.into_iter().filter_map(|(path, purpose)| Some((numbered(&path?.to_string_lossy()).into(), purpose)));
+        written.extend(state);
+        if shard.is_none() {
+            for output in outputs {
+                let output = OutputDesc {
+                    file: if arguments.repeat.is_some() { output.file.clone() } else { numbered(&output.file) },
+                    ..output.clone()
+                };
+                written.extend(files_of_output(&output).into_iter().map(|path| (path, "output")));
+            }
+        }
+        // Those of frames without a number in the name follow each other in one file.
+        let statistics_of =
+            |path: &PathBuf| frame.map_or_else(|| path.clone(), |frame| file_of_frame(&path.to_string_lossy(), frame).into());
+        statistics.extend(arguments.json.iter().filter(|path| !is_stdout(path)).map(statistics_of));
+    }
+    written.extend(statistics.into_iter().map(|path| (path, "--json")));
+    written.extend(arguments.import.report.iter().filter(|path| !is_stdout(path)).map(|path| (path.clone(), "--report")));
+    written.iter().try_for_each(|(path, purpose)| uses.write(path, *purpose))?;
+    // A file that the scene names is there: it can only be overwritten by one that is.
+    if !written.iter().any(|(path, _)| path.exists()) {
+        return Ok(());
+    }
+    files_of_scene(&shot.imported, &shot.scene).into_iter().try_for_each(|(path, place)| uses.read(&path, place))
+}
+
+/// Whether a name means the standard output.
+pub fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
