@@ -39,7 +39,7 @@ impl Files {
             }
             None => {
                 let pivot = DAffine3::from_translation(self.pivot(path, &lists)?);
-                list.iter_mut().for_each(|(_, map)| *map = *map * pivot);
+                list.iter_mut().for_each(|(_, map)| *map *= pivot);
                 Motion::keyframed(&list).map(|motion| motion.after(&Motion::constant(pivot.inverse())))
             }
         };

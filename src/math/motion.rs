@@ -82,7 +82,7 @@ impl Motion {
         let mut parts = self.parts.clone();
         for part in &inner.parts {
             match (parts.last_mut(), part) {
-                (Some(Part::Constant(outer)), Part::Constant(map)) => *outer = *outer * *map,
+                (Some(Part::Constant(outer)), Part::Constant(map)) => *outer *= *map,
                 _ => parts.push(part.clone()),
             }
         }
