@@ -123,7 +123,7 @@ fn killed_writers_leave_nothing_behind() {
 fn files_beyond_the_limit_are_errors_of_writing() {
     let folder = tempfile::tempdir().unwrap();
     for output in ["-o a.exr --float", "-o a.png", "--shard 1/2"] {
-        let output = shell(folder.path(), &format!("ulimit -f 4; exec \"$0\" render scene.json -q --size 128x128 --spp 2 {output}"));
+        let output = shell(folder.path(), &format!("ulimit -f 1; exec \"$0\" render scene.json -q --size 128x128 --spp 2 {output}"));
         assert_eq!(output.status.code(), Some(5), "{:?} {}", output.status, told(&output));
         assert_eq!((told(&output).matches("error: cannot write").count(), told(&output).lines().count()), (1, 1), "{}", told(&output));
     }
