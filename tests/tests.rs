@@ -35,10 +35,10 @@ mod determinism;
 mod exr_files;
 /// Jobs for farms: their scripts with stand-ins for Slurm and the render.
 mod farm;
-/// What is read and written that is no regular file, killed writers, and limits of the process.
-mod files;
 /// Outputs that are inputs, or two of one name: refused by every command before it writes.
 mod file_uses;
+/// What is read and written that is no regular file, killed writers, and limits of the process.
+mod files;
 /// Known flaws of renderers in camera and film: each test fails on the flawed formula.
 mod flaws_of_camera;
 /// Known flaws of renderers in glass and in round shapes: each test fails on the flawed formula.

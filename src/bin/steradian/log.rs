@@ -8,8 +8,8 @@ use std::sync::{Mutex, OnceLock};
 
 use indicatif::ProgressBar;
 use serde_json::json;
-use steradian::Result;
 use steradian::farm::message_line;
+use steradian::{Error, Result};
 use tracing::field::{Field, Visit};
 use tracing_subscriber::Layer;
 use tracing_subscriber::filter::LevelFilter;

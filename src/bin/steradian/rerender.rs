@@ -31,7 +31,10 @@ pub fn run(arguments: &RerenderArgs, mut uses: FileUses) -> Result<u8> {
     let name = arguments.output.clone();
     let format = Format::from_path(Path::new(&name))?;
     let like = recipe.output.take().filter(|_| format == Format::Exr);
-    recipe.output = Some(OutputDesc { file: name, ..like.unwrap_or_else(|| OutputDesc { view: Some(recipe.settings.integrator.view()), ..OutputDesc::new("") }) });
+    recipe.output = Some(OutputDesc {
+        file: name,
+        ..like.unwrap_or_else(|| OutputDesc { view: Some(recipe.settings.integrator.view()), ..OutputDesc::new("") })
+    });
     recipe.settings.spp = arguments.spp.unwrap_or(recipe.settings.spp);
     if recipe.settings.spp == 0 {
         return Err(Error::Usage("--spp 0: a picture needs at least one sample per pixel".into()));

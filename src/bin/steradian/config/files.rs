@@ -1,6 +1,5 @@
 //! Configuration files: `steradian.toml` of a project and `config.toml` of a user, whose keys are the options of `render`.
 
-use std::fs::File;
 use std::io::Read;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
