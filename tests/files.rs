@@ -78,7 +78,7 @@ fn what_never_ends_is_not_read() {
         ("merge FILE.shard -o a.exr", 4),
         ("compare FILE FILE", 4),
         ("check-exr FILE", 4),
-        ("rerender FILE", 4),
+        ("rerender FILE -o b.exr", 4),
     ];
     for file in ["endless", "pipe"] {
         let obj = format!("mtllib {file}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");

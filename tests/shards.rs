@@ -262,7 +262,7 @@ fn headers_that_make_no_sense_are_refused() {
         ("/shard/count", json!(0), "there is no shard 1 of 0"),
         ("/shard/index", json!(0), "there is no shard 0 of 2"),
         ("/shard/index", json!(3), "there is no shard 3 of 2"),
-        ("/film/layers/0", json!("beauté\u{1b}"), "there is no layer"),
+        ("/film/layers/0", json!("beauté\u{1b}"), "unknown layer"),
         ("/film/crop", json!([1, 0, huge, 16]), "not within"),
         ("/film/crop", json!([0, 0, 0, 0]), "a.shard"),
         ("/film/size", json!([0, 0]), "not within"),

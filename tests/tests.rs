@@ -5,6 +5,8 @@ mod accel_agreement;
 mod adaptive;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
+/// Scenes that ask for more than can be rendered or written.
+mod bad_limits;
 /// The same for materials of several parts or many parameters.
 mod bad_materials;
 /// Accelerators compared from the command line.

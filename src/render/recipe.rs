@@ -126,7 +126,6 @@ impl Recipe {
         let fault = |path: &str, message: &str| Error::Scene { file: file.to_owned(), path: path.to_owned(), message: message.to_owned() };
         let require = |valid: bool, path: &str, message: &str| if valid { Ok(()) } else { Err(fault(path, message)) };
         check_film_and_integrator(&FilmDesc { width, height, crop: None, overscan, filter }, integrator, file)?;
-        require(overscan <= width.min(height), "settings.overscan", "must be at most the picture's shorter side")?;
         let film = self.settings.film_size();
         require(crop.fits(film), "settings.crop", "must have an area and lie within the picture")?;
         require(overscan == 0 || crop == Crop::full(film), "settings.crop", "must be all of a picture with overscan")?;
@@ -221,8 +220,8 @@ mod tests {
             ("/settings/crop", json!([0, 0, 41, 30]), "settings.crop"),
             ("/settings/crop", json!([4_294_967_295u32, 0, 2, 2]), "settings.crop"),
             ("/settings/crop", json!([0, 0, 0, 0]), "settings.crop"),
-            ("/settings/overscan", json!(31), "settings.overscan"),
-            ("/settings/overscan", json!(4_294_967_295u32), "settings.overscan"),
+            ("/settings/overscan", json!(31), "film.overscan"),
+            ("/settings/overscan", json!(4_294_967_295u32), "film.overscan"),
             ("/settings/overscan", json!(2), "settings.crop"),
             ("/settings/filter/radius", json!(-1), "filter.radius"),
             ("/settings/filter/type", json!("none"), "settings.filter"),

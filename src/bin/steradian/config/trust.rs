@@ -43,6 +43,8 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
             "owner",
             "comments",
             "fps",
+            "no-depth-of-field",
+            "view",
             "denoise",
             "define",
             "time",
