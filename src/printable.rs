@@ -8,7 +8,7 @@ pub fn line(text: &str) -> String {
     escape(text, false)
 }
 
-/// As [`line`], but line breaks and tabs stay.
+/// As [`line`](fn@line), but line breaks and tabs stay.
 pub fn lines(text: &str) -> String {
     escape(text, true)
 }

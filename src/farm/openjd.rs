@@ -78,12 +78,12 @@ fn place(job: &Job, frame: &str) -> String {
 const FRAME: &str = "frame{{Task.Param.Frame}}.";
 
 /// An option as the shell reads it back, without two braces next to each other, which would be the template's.
-fn quote_option(option: &String) -> String {
+fn quote_option(option: &str) -> String {
     quote(option).replace('{', "{''")
 }
 
 fn render_script(job: &Job) -> String {
-    let options: Vec<String> = job.options.iter().map(quote_option).collect();
+    let options: Vec<String> = job.options.iter().map(|option| quote_option(option)).collect();
     let frames = if job.frames.is_some() { " --frames={{Task.Param.Frame}}" } else { "" };
     let (name, pattern) = (place(job, FRAME), place(job, "frame#."));
     let part = "{{Task.Param.Shard}}-of-{{Param.Shards}}";

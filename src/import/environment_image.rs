@@ -51,7 +51,7 @@ fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().rgba_channels(
         |size: Vec2<usize>, _: &_| RgbImage { width: size.width(), height: size.height(), pixels: vec![[0.0; 3]; size.area()] },
         |image: &mut RgbImage, at: Vec2<usize>, (r, g, b, _a): (f32, f32, f32, f32)| {
-            image.pixels[at.y() * image.width + at.x()] = [r, g, b]
+            image.pixels[at.y() * image.width + at.x()] = [r, g, b];
         },
     );
     let image = reader.first_valid_layer().all_attributes().from_unbuffered(open()?);

@@ -49,12 +49,12 @@ impl Kind {
                 { "type": "directional", "direction": [-0.4, 0.6, -1], "irradiance": [2, 1.9, 1.7] }
             ]);
             // Of two triangles: accelerators of the reports know no other shapes.
-            scene["shapes"].as_array_mut().map(|shapes| {
+            if let Some(shapes) = scene["shapes"].as_array_mut() {
                 shapes.push(json!({
                     "type": "mesh", "triangles": [[0, 1, 2], [0, 2, 3]],
                     "positions": [[-6, -6, -1.2], [6, -6, -1.2], [6, 6, -1.2], [-6, 6, -1.2]]
-                }))
-            });
+                }));
+            }
         }
         scene
     }

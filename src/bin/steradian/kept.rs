@@ -55,11 +55,12 @@ impl<'a> Kept<'a> {
         }
         let shard = arguments.shard.unwrap_or_default();
         render::check_kept(settings, shard)?;
-        if let Some(path) = checkpoint {
-            if path.exists() && !arguments.resume {
-                let message = "there is such a file: --resume continues from it; remove it to begin anew";
-                return Err(Error::Usage(format!("--checkpoint {}: {message}", path.display())));
-            }
+        if let Some(path) = checkpoint
+            && path.exists()
+            && !arguments.resume
+        {
+            let message = "there is such a file: --resume continues from it; remove it to begin anew";
+            return Err(Error::Usage(format!("--checkpoint {}: {message}", path.display())));
         }
         let take = |path: Option<&Path>| path.map(StateFile::take).transpose();
         Ok(Some(Self { arguments, shard, shard_file: take(shard_file)?, checkpoint: take(checkpoint)? }))
