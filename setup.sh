@@ -54,16 +54,17 @@ fi
 
 case "${1:-render}" in
     render)
-        cargo build --release --locked
-        target/release/steradian render scenes/gallery.json -o gallery.exr -o gallery.png
+        # Without benchmarks and their dependencies, which a render does not need.
+        cargo run --release --locked --no-default-features -- render scenes/gallery.json -o gallery.exr -o gallery.png
         echo "The picture: $PWD/gallery.png (for a screen) and $PWD/gallery.exr (linear, for compositing)" >&2
         ;;
     test) cargo test --locked ;;
-    install) cargo install --locked --path . ;;
+    install) cargo install --locked --profile dist --path . ;;
     package)
         command -v cargo-deb >/dev/null || cargo install --locked cargo-deb
         command -v dpkg-shlibdeps >/dev/null || as_root apt-get install -y -qq --no-install-recommends dpkg-dev >/dev/null
-        cargo build --release --locked
+        cargo build --profile dist --locked
+        install -D target/dist/steradian target/release/steradian
         rm -rf target/man target/completions
         mkdir -p target/completions
         target/release/steradian man --dir target/man

@@ -24,7 +24,11 @@
 //! | 8 | `bench`, `farm`, `live` |
 //! | 9 | `bin/steradian` |
 
+// Checks of numerical stability look at parts that a render does not.
+#![cfg_attr(not(feature = "bench"), allow(dead_code, unused_imports))]
+
 pub mod accel;
+#[cfg(feature = "bench")]
 pub mod bench;
 pub mod bsdf;
 pub mod camera;

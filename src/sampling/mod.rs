@@ -4,6 +4,7 @@ mod discrete;
 mod mis;
 mod piecewise;
 mod sampler;
+#[cfg(feature = "bench")]
 pub mod statistics;
 pub mod warp;
 

@@ -9,7 +9,9 @@ use steradian::farm::{file_of_frame, scene_of_frame, with_frame_pattern};
 use steradian::import::files_of_scene;
 use steradian::output::{FileUses, files_of_output};
 
-use crate::args::{BenchCommand, Cli, Command, FarmCommand, ImportArgs, RenderArgs};
+#[cfg(feature = "bench")]
+use crate::args::BenchCommand;
+use crate::args::{Cli, Command, FarmCommand, ImportArgs, RenderArgs};
 use crate::frames::Shot;
 
 /// Compares the files that the command line itself names; `uses` are those of every command.
@@ -63,23 +65,30 @@ pub fn of_command(cli: &Cli, mut uses: FileUses) -> Result<()> {
         Command::Config(crate::args::ConfigCommand::Show(arguments)) => {
             read.extend(arguments.scene.iter().map(|path| (path.as_path(), scene)));
         }
+        #[cfg(feature = "bench")]
         Command::Bench(BenchCommand::Accel(arguments)) => {
             read.extend(arguments.scenes.iter().map(|path| (path.as_path(), scene)));
             written.extend(reports(&arguments.out, "accel"));
             import = Some(&arguments.import);
         }
+        #[cfg(feature = "bench")]
         Command::Bench(BenchCommand::Error(arguments)) => {
             read.push((&arguments.scene, scene));
             read.extend(arguments.reference.iter().map(|path| (path.as_path(), "--reference")));
             written.extend(reports(&arguments.out, "error"));
             import = Some(&arguments.import);
         }
+        #[cfg(feature = "bench")]
         Command::Bench(BenchCommand::Scale(arguments)) => written.extend(reports(&arguments.out, "scale")),
+        #[cfg(feature = "bench")]
         Command::Bench(BenchCommand::Stability(arguments)) => written.extend(reports(&arguments.out, "stability")),
-        Command::Bench(BenchCommand::Reports(_) | BenchCommand::ScaleCase)
-        | Command::Schema
-        | Command::Man { .. }
-        | Command::Completions { .. } => {}
+        #[cfg(feature = "bench")]
+        Command::Bench(BenchCommand::Reports(arguments)) => written.extend(reports(&arguments.out, "reports")),
+        #[cfg(feature = "bench")]
+        Command::Bench(BenchCommand::ScaleCase) => {}
+        #[cfg(not(feature = "bench"))]
+        Command::Bench { .. } => {}
+        Command::Schema | Command::Man { .. } | Command::Completions { .. } => {}
     }
     written.extend(import.and_then(|import| import.report.clone()).map(|path| (path, "--report")));
     read.into_iter().try_for_each(|(path, purpose)| uses.read(path, purpose))?;

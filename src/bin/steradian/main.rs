@@ -1,8 +1,11 @@
 //! The program `steradian`: results go to stdout, messages to stderr.
 
 mod args;
+#[cfg(feature = "bench")]
 mod bench;
+#[cfg(feature = "bench")]
 mod bench_error;
+#[cfg(feature = "bench")]
 mod bench_scale;
 mod check_exr;
 mod compare;
@@ -74,7 +77,12 @@ fn run(cli: Cli, uses: FileUses) -> Result<u8> {
     match cli.command {
         Command::Render(arguments) => frames::run(&arguments, uses),
         Command::Info(arguments) => info::run(&arguments).map(|()| 0),
+        #[cfg(feature = "bench")]
         Command::Bench(command) => bench::run(&command),
+        #[cfg(not(feature = "bench"))]
+        Command::Bench { .. } => {
+            Err(Error::Usage("this program was built without benchmarks; `cargo build --release` builds it with them".into()))
+        }
         Command::Convert(arguments) => convert::run(&arguments, uses).map(|()| 0),
         Command::Farm(command) => farm::run(&command, uses).map(|()| 0),
         Command::Config(ConfigCommand::Show(arguments)) => config::show(&arguments).map(|()| 0),

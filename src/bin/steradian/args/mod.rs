@@ -1,7 +1,10 @@
 //! The command line.
 
+#[cfg(feature = "bench")]
 mod bench;
+#[cfg(feature = "bench")]
 mod bench_error;
+#[cfg(feature = "bench")]
 mod bench_scale;
 mod config;
 mod denoise;
@@ -23,8 +26,11 @@ use steradian::render::Overrides;
 
 use crate::names;
 use crate::rerender::Repeat;
+#[cfg(feature = "bench")]
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
+#[cfg(feature = "bench")]
 pub use bench_error::BenchErrorArgs;
+#[cfg(feature = "bench")]
 pub use bench_scale::BenchScaleArgs;
 pub use config::{ConfigCommand, ConfigShowArgs};
 pub use denoise::{DenoiseArgs, RenderDenoiseArgs};
@@ -131,8 +137,17 @@ pub enum Command {
     #[command(long_about = denoise::ABOUT, after_help = denoise::EXAMPLES)]
     Denoise(DenoiseArgs),
     /// Measure
+    #[cfg(feature = "bench")]
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// Measure: not in this program, which was built without the feature `bench`
+    #[cfg(not(feature = "bench"))]
+    #[command(hide = true)]
+    Bench {
+        /// Anything
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+        arguments: Vec<String>,
+    },
     /// What the environment and configuration files say
     #[command(subcommand)]
     Config(ConfigCommand),
