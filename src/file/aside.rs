@@ -191,7 +191,7 @@ mod tests {
         assert!(first.exists() && second.exists());
         two.commit().unwrap();
         one.commit().unwrap();
-        // What is no file of ours is left alone, and what it leads to.
+        // Files of other programs, and what links lead to, are left alone.
         std::os::unix::fs::symlink("a", &first).unwrap();
         let three = Aside::named(&a).unwrap();
         assert_eq!(three.name.as_ref(), Some(&second));

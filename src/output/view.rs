@@ -18,7 +18,7 @@ const SHARES: Rgb = Rgb::new(0.211_994_6, 0.392_150_8, 0.395_854_6);
 /// How far AgX moves the chromaticities of the primaries towards white.
 const INSET: f32 = 0.2;
 
-/// The light that the curve's pivot stands for.
+/// Scene-linear light at the curve's pivot.
 const MIDDLE_GREY: f32 = 0.18;
 
 /// Stops below and above middle grey that the curve spans.

@@ -1,4 +1,4 @@
-//! The end of the program when memory runs out, whoever asks for it: one line on stderr and exit code 33.
+//! The end of the program when memory runs out, in its own code or a library's: one line on stderr and exit code 33.
 //!
 //! Rust ends with SIGABRT and a backtrace, C++ by an exception that nobody catches. What is done here takes no memory, and runs no destructors,
 //! which other threads may be in the way of.
