@@ -173,11 +173,12 @@ fn threads_that_cannot_be_started_are_one_error() {
     use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o777)).unwrap();
-    // The limit does not hold for root, and other users may not reach the program where it was built.
-    let program = folder.path().join("steradian");
-    std::fs::copy(env!("CARGO_BIN_EXE_steradian"), &program).unwrap();
+    // The limit does not hold for root, and other users may not reach the program where it was built. The copy is made by another process:
+    // a file that this one had open for writing could be inherited by the child of another test, and would not start ("text file busy").
     let user = "[ $(id -u) != 0 ] || user='setpriv --reuid 64321 --regid 64321 --clear-groups'; $user true";
-    assert!(shell(folder.path(), &format!("{user} && $user ./steradian --version")).status.success());
+    let line = format!("cp '{}' steradian && {user} && $user ./steradian --version", env!("CARGO_BIN_EXE_steradian"));
+    let output = shell(folder.path(), &line);
+    assert!(output.status.success(), "{:?} {}", output.status, told(&output));
     for (accel, limit) in [("embree", 1), ("embree", 2), ("embree", 3), ("embree", 4), ("bvh", 3), ("bvh", 5)] {
         let line = format!(
             "ulimit -c 0; {user} >/dev/null; exec $user bash -c 'ulimit -u {limit}; exec ./steradian render scene.json -q -o a.png --threads 7 --accel {accel}'"
