@@ -176,7 +176,7 @@ fn threads_that_cannot_be_started_are_one_error() {
     // The limit does not hold for root, and other users may not reach the program where it was built. The copy is made by another process:
     // a file that this one had open for writing could be inherited by the child of another test, and would not start ("text file busy").
     let user = "[ $(id -u) != 0 ] || user='setpriv --reuid 64321 --regid 64321 --clear-groups'; $user true";
-    let line = format!("cp '{}' steradian && {user} && $user ./steradian --version", env!("CARGO_BIN_EXE_steradian"));
+    let line = format!("cp \"$0\" steradian && {user} && $user ./steradian --version");
     let output = shell(folder.path(), &line);
     assert!(output.status.success(), "{:?} {}", output.status, told(&output));
     for (accel, limit) in [("embree", 1), ("embree", 2), ("embree", 3), ("embree", 4), ("bvh", 3), ("bvh", 5)] {
