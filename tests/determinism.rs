@@ -48,7 +48,9 @@ fn a_crop_is_a_part_of_the_whole() {
 
 #[test]
 fn a_replayed_sample_is_the_one_in_the_picture() {
-    let one = |spp| prepare(&scene(), &Overrides { spp: Some(spp), ..Overrides::default() });
+    let mut scene = scene();
+    scene["film"]["filter"] = json!({ "type": "tent", "samples": "importance" });
+    let one = |spp| prepare(&scene, &Overrides { spp: Some(spp), ..Overrides::default() });
     let prepared = one(1);
     let image = render_with(&prepared, AccelKind::EMBREE).image;
     let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();

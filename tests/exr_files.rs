@@ -113,7 +113,12 @@ fn other_programs_read_every_profile() {
     let list = info.lines().find_map(|line| line.trim().strip_prefix("channel list: ")).unwrap_or_default();
     assert!(list.starts_with("R (half), G (half), B (half), A (half), Z"), "{list}");
     assert!(list.contains("N.X (half), N.Y (half), N.Z (half)") && list.contains("light_key_light.R"), "{list}");
-    let same = Command::new("idiff").args(["default.exr", "nuke.exr"]).current_dir(dir).output().unwrap();
+    // Each picture, whose layers have the same names but for motion.
+    for file in ["default", "nuke"] {
+        let colour = format!("{file}.exr --ch R,G,B,A,Z,N.X,N.Y,N.Z -o {file}_few.exr");
+        assert!(Command::new("oiiotool").args(colour.split(' ')).current_dir(dir).status().unwrap().success());
+    }
+    let same = Command::new("idiff").args(["default_few.exr", "nuke_few.exr"]).current_dir(dir).output().unwrap();
     assert!(same.status.success(), "{}", text(&same.stdout));
 }
 
@@ -122,7 +127,7 @@ fn other_programs_read_every_profile() {
 fn mattes_cover_what_they_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
-    run_ok(folder.path(), "render scene.json -q -o a.exr --float --layers crypto_object,crypto_material,object_id");
+    run_ok(folder.path(), "render scene.json -q -o a.exr --float --layers crypto_object,crypto_material,object_id --transparent");
     let alpha = values(&path, "A");
     let planes: Vec<Vec<f32>> = (0..12).map(|i| values(&path, &cryptomatte::channel_name("CryptoObject", i / 4, i % 4))).collect();
     let matte = |name: &str, pixel: usize| -> f32 {
@@ -135,7 +140,8 @@ fn mattes_cover_what_they_name() {
         partial += usize::from(sphere > 0.0 && sphere < 1.0);
     }
     let centre = 15 * 40 + 20;
-    assert_eq!((matte("равнина", centre), matte("wall", 2 * 40 + 20)), (1.0, 1.0));
+    assert_eq!(matte("равнина", centre), 1.0);
+    assert!(matte("wall", 2 * 40 + 20) > 0.99);
     assert!(partial > 20, "{partial}");
     assert_eq!(values(&path, "CryptoMaterial00.r")[centre], cryptomatte::id("red clay"));
     let [object, wall, nothing] = [centre, 2 * 40 + 20, 0].map(|pixel| values(&path, "object_id.id")[pixel]);

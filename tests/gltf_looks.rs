@@ -55,7 +55,7 @@ fn render(gltf: &Value, map: [[u8; 4]; 4]) -> Image {
     let path = folder.write("scene.gltf", gltf.to_string());
     let mut imported = read_scene(&path, &ImportOptions::default()).unwrap();
     let film = &mut imported.desc.film;
-    (film.width, film.height, film.filter) = (4, 4, FilterDesc::Box { radius: 0.5 });
+    (film.width, film.height, film.filter) = (4, 4, FilterDesc::Box { radius: 0.5, samples: None });
     imported.desc.sampler.spp = 16;
     let settings = Settings::new(&imported.desc, &Overrides { threads: Some(2), ..Overrides::default() }).unwrap();
     let scene = compile::compile_imported(&imported, &path).unwrap();

@@ -256,7 +256,7 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
         for turned in [false, true] {
             let picture = |hide: bool, near: f64| {
                 render(&json!({
-                    "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
+                    "film": { "width": 24, "height": 24, "filter": { "type": "box" }, "transparent": near > 0.0 },
                     "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "near": near },
                     "sampler": { "spp": 16 },
                     "integrator": { "type": kind, "hide_emitters": hide },
@@ -279,7 +279,11 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
             let (shown, hidden, beyond) = (picture(false, 0.0), picture(true, 0.0), picture(false, 4.8));
             let of = |image: &steradian::film::Image, x: u32, y: u32| image.pixel(LayerKind::Color, x, y).unwrap().to_vec();
             assert_eq!((of(&shown, 12, 12)[0] >= 5.0, of(&shown, 12, 12)[3]), (!turned, 1.0), "{kind}");
-            assert_eq!((of(&shown, 0, 0), of(&hidden, 0, 0)), (vec![0.3, 0.3, 0.3, 0.0], vec![0.0; 4]), "{kind}");
+            assert_eq!(
+                [of(&shown, 0, 0), of(&hidden, 0, 0), of(&beyond, 0, 0)],
+                [vec![0.3, 0.3, 0.3, 1.0], vec![0.0; 4], vec![0.0; 4]],
+                "{kind}"
+            );
             let (mut sums, mut covered) = ([0.0; 2], 0);
             for (x, y) in (0..24).flat_map(|y| (0..24).map(move |x| (x, y))) {
                 let (a, b) = (of(&hidden, x, y), of(&beyond, x, y));

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::{Files, camera};
-use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, OutputDesc, SceneDesc};
+use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, MAX_FILTER_RADIUS, OutputDesc, SceneDesc};
 use crate::error::Result;
 use crate::import::Imported;
 use crate::output::find_output_fault;
@@ -77,20 +77,20 @@ fn check_film(files: &Files, film: &FilmDesc) -> Result<()> {
     if film.overscan > 0 && film.crop.is_some() {
         return Err(files.error("film.overscan", "a crop leaves nothing around the picture: give one of `crop` and `overscan`"));
     }
-    let radius = match film.filter {
-        FilterDesc::Box { radius } | FilterDesc::Tent { radius } | FilterDesc::BlackmanHarris { radius } => radius,
-        FilterDesc::Gaussian { radius, sigma } => {
+    match film.filter {
+        FilterDesc::Gaussian { sigma, .. } => {
             files.positive("film.filter.sigma", f64::from(sigma))?;
-            radius
         }
-        FilterDesc::Mitchell { radius, b, c } => {
+        FilterDesc::Mitchell { b, c, .. } => {
             files.within("film.filter.b", f64::from(b), 0.0, 1.0)?;
             files.within("film.filter.c", f64::from(c), 0.0, 1.0)?;
-            radius
         }
-    };
-    if !(radius > 0.0 && radius <= 64.0) {
-        return Err(files.error("film.filter.radius", format!("must be above 0 and at most 64 pixels, not {radius}")));
+        _ => {}
+    }
+    let radius = film.filter.radius();
+    if !(radius > 0.0 && radius <= MAX_FILTER_RADIUS) {
+        let message = format!("must be above 0 and at most {MAX_FILTER_RADIUS} pixels, not {radius}");
+        return Err(files.error("film.filter.radius", message));
     }
     Ok(())
 }

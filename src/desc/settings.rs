@@ -21,6 +21,10 @@ pub struct FilmDesc {
     pub overscan: u32,
     /// The pixel filter.
     pub filter: FilterDesc,
+    /// Do not show light from infinity to the camera: the picture is black with an alpha of 0 there. Otherwise its alpha is 1 wherever the camera
+    /// sees a surface or a background. Default: false.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub transparent: bool,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)]
@@ -30,7 +34,7 @@ fn is_zero(x: &u32) -> bool {
 
 impl Default for FilmDesc {
     fn default() -> Self {
-        Self { width: 640, height: 360, crop: None, overscan: 0, filter: FilterDesc::default() }
+        Self { width: 640, height: 360, crop: None, overscan: 0, filter: FilterDesc::default(), transparent: false }
     }
 }
 
@@ -43,12 +47,18 @@ pub enum FilterDesc {
         /// Half the width. Default: 0.5.
         #[serde(default = "box_radius")]
         radius: f32,
+        /// `shared` (the default, save for pictures to be denoised) or `importance`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        samples: Option<FilterSamplesDesc>,
     },
     /// Weight falls linearly to zero.
     Tent {
         /// Default: 1.
         #[serde(default = "tent_radius")]
         radius: f32,
+        /// `shared` (the default, save for pictures to be denoised) or `importance`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        samples: Option<FilterSamplesDesc>,
     },
     /// A truncated Gaussian that reaches zero at the radius.
     Gaussian {
@@ -58,12 +68,18 @@ pub enum FilterDesc {
         /// Standard deviation. Default: 0.5.
         #[serde(default = "gaussian_sigma")]
         sigma: f32,
+        /// `shared` (the default, save for pictures to be denoised) or `importance`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        samples: Option<FilterSamplesDesc>,
     },
     /// The Blackman-Harris window.
     BlackmanHarris {
         /// Default: 1.5.
         #[serde(default = "gaussian_radius")]
         radius: f32,
+        /// `shared` (the default, save for pictures to be denoised) or `importance`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        samples: Option<FilterSamplesDesc>,
     },
     /// Mitchell and Netravali's cubic; it has negative lobes.
     Mitchell {
@@ -76,12 +92,53 @@ pub enum FilterDesc {
         /// Default: 1/3.
         #[serde(default = "third")]
         c: f32,
+        /// `shared` (the default, save for pictures to be denoised) or `importance`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        samples: Option<FilterSamplesDesc>,
     },
+}
+
+/// The largest radius of a pixel filter.
+pub const MAX_FILTER_RADIUS: f32 = 64.0;
+
+/// How a pixel filter is applied to samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FilterSamplesDesc {
+    /// Each sample counts for all pixels whose filter reaches it: the weighted mean of the samples around a pixel. Filters with a radius of at most
+    /// half a pixel or above 4 pixels are importance sampled instead.
+    Shared,
+    /// The filter is importance sampled: each sample counts for one pixel. Noise is higher, but independent between pixels.
+    Importance,
+}
+
+impl FilterDesc {
+    /// Half the width of the support in pixels.
+    pub fn radius(&self) -> f32 {
+        match *self {
+            Self::Box { radius, .. }
+            | Self::Tent { radius, .. }
+            | Self::Gaussian { radius, .. }
+            | Self::BlackmanHarris { radius, .. }
+            | Self::Mitchell { radius, .. } => radius,
+        }
+    }
+
+    /// How the filter is applied, if that is set.
+    pub fn samples_mut(&mut self) -> &mut Option<FilterSamplesDesc> {
+        match self {
+            Self::Box { samples, .. }
+            | Self::Tent { samples, .. }
+            | Self::Gaussian { samples, .. }
+            | Self::BlackmanHarris { samples, .. }
+            | Self::Mitchell { samples, .. } => samples,
+        }
+    }
 }
 
 impl Default for FilterDesc {
     fn default() -> Self {
-        Self::BlackmanHarris { radius: gaussian_radius() }
+        Self::BlackmanHarris { radius: gaussian_radius(), samples: None }
     }
 }
 

@@ -2,11 +2,11 @@
 
 use super::ShapeKey;
 
-/// Samples of each pixel by the shape that they show.
+/// Samples of each pixel by the shape that they show, [`ShapeKey::NONE`] included, in units of coverage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CoverageCounts {
     /// By pixel, in the order in which shapes were met.
-    pixels: Vec<Vec<(ShapeKey, u32)>>,
+    pixels: Vec<Vec<(ShapeKey, u64)>>,
 }
 
 impl CoverageCounts {
@@ -17,11 +17,11 @@ impl CoverageCounts {
 
     /// Adds samples.
     #[inline]
-    pub fn add(&mut self, pixel: usize, shown: ShapeKey, samples: u32) {
+    pub fn add(&mut self, pixel: usize, shown: ShapeKey, units: u64) {
         let list = &mut self.pixels[pixel];
         match list.iter_mut().find(|(key, _)| *key == shown) {
-            Some((_, count)) => *count += samples,
-            None => list.push((shown, samples)),
+            Some((_, count)) => *count = count.saturating_add(units),
+            None => list.push((shown, units)),
         }
     }
 
@@ -35,7 +35,7 @@ impl CoverageCounts {
     }
 
     /// What a pixel shows, in no particular order.
-    pub fn of(&self, pixel: usize) -> &[(ShapeKey, u32)] {
+    pub fn of(&self, pixel: usize) -> &[(ShapeKey, u64)] {
         &self.pixels[pixel]
     }
 }
@@ -49,15 +49,22 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// From the counts of each pixel, row by row, with its number of samples.
-    pub fn new<'a>(pixels: impl Iterator<Item = (&'a [(ShapeKey, u32)], u32)>) -> Self {
+    /// From the weight of each shape in each pixel, row by row, that of [`ShapeKey::NONE`] included. A shape may occur several times.
+    pub fn new(pixels: impl Iterator<Item = Vec<(ShapeKey, f64)>>) -> Self {
         let (mut starts, mut entries) = (vec![0], Vec::new());
-        let mut sorted = Vec::new();
-        for (counts, samples) in pixels {
-            sorted.clear();
-            sorted.extend_from_slice(counts);
-            sorted.sort_unstable_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
-            entries.extend(sorted.iter().map(|&(key, count)| (key, (f64::from(count) / f64::from(samples)) as f32)));
+        for mut weights in pixels {
+            let whole: f64 = weights.iter().map(|(_, weight)| weight).sum();
+            weights.sort_by_key(|(key, _)| *key);
+            weights.dedup_by(|(key, weight), (kept, sum)| {
+                let same = key == kept;
+                if same {
+                    *sum += *weight;
+                }
+                same
+            });
+            weights.retain(|(key, weight)| *key != ShapeKey::NONE && *weight > 0.0);
+            weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+            entries.extend(weights.iter().map(|&(key, weight)| (key, (weight / whole) as f32)));
             starts.push(entries.len());
         }
         Self { starts, entries }
@@ -89,7 +96,9 @@ mod tests {
         other.add(0, key(2), 1);
         other.add(1, key(9), 2);
         counts.merge(&other);
-        let coverage = Coverage::new([(counts.of(0), 10), (counts.of(1), 2)].into_iter());
+        counts.add(0, ShapeKey::NONE, 5);
+        let weights = |pixel| counts.of(pixel).iter().map(|&(key, units)| (key, units as f64)).collect();
+        let coverage = Coverage::new([0, 1].map(weights).into_iter());
         assert_eq!(coverage.of(0), [(key(1), 0.2), (key(2), 0.2), (key(3), 0.1)]);
         assert_eq!(coverage.of(1), [(key(9), 1.0)]);
         assert_eq!(coverage.pixels(), 2);

@@ -1,8 +1,8 @@
 use super::*;
 
 use crate::color::Rgb;
-use crate::desc::FilterDesc;
-use crate::film::{FilmTile, Filter, LayerKind, PixelSample, Sample, SurfaceSample};
+use crate::desc::{FilterDesc, FilterSamplesDesc};
+use crate::film::{FilmTile, Filter, LayerKind, PixelSample, Sample, Splats, SurfaceSample};
 use crate::math::Vec3;
 
 fn gray(v: f32) -> PixelSample {
@@ -10,7 +10,7 @@ fn gray(v: f32) -> PixelSample {
 }
 
 fn one_pixel(layers: LayerSet) -> Film {
-    Film::new([1, 1], Crop::full([1, 1]), &layers, 16).unwrap()
+    Film::new(FilmShape::new([1, 1], Crop::full([1, 1]), layers), 16).unwrap()
 }
 
 fn color(film: &Film) -> [f32; 4] {
@@ -20,9 +20,9 @@ fn color(film: &Film) -> [f32; 4] {
 /// A step edge through the filter's negative lobe: the mean over many pixels is the filter's integral over the bright side.
 #[test]
 fn negative_lobes_overshoot_at_an_edge_without_bias() {
-    let desc = FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0 };
+    let desc = FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0, samples: Some(FilterSamplesDesc::Importance) };
     let filter = Filter::new(&desc);
-    let mut film = one_pixel(LayerSet::COLOR);
+    let mut film = Film::new(FilmShape { filter: desc, ..FilmShape::new([1, 1], Crop::full([1, 1]), LayerSet::COLOR) }, 16).unwrap();
     let edge = -1.0;
     let n = 1024;
     for i in 0..n {
@@ -41,7 +41,7 @@ fn negative_lobes_overshoot_at_an_edge_without_bias() {
 #[test]
 fn samples_that_are_not_finite_are_dropped_and_counted() {
     let layers = LayerSet::FULL;
-    let mut film = Film::new([4, 4], Crop::full([4, 4]), &layers, 4).unwrap();
+    let mut film = Film::new(FilmShape::new([4, 4], Crop::full([4, 4]), layers), 4).unwrap();
     let tile = &mut film.tiles_mut()[0];
     let pixel = tile.index(2, 1);
     assert!(tile.add(pixel, 0, &gray(0.25), 1.0));
@@ -67,26 +67,30 @@ fn samples_that_are_not_finite_are_dropped_and_counted() {
 }
 
 #[test]
-fn layers_average_what_was_hit() {
+fn data_is_that_of_the_nearest_sample_and_albedo_is_a_mean() {
     let surface = |depth, x: f32, n: Vec3, albedo| SurfaceSample {
         depth,
         position: Vec3::new(x, 0.0, 1.0),
         normal: n,
         albedo: Rgb::splat(albedo),
+        shown: crate::film::ShapeKey { instance: 0, shape: 0 },
         ..Default::default()
     };
-    let mut film = Film::new([2, 1], Crop::full([2, 1]), &LayerSet::FULL, 8).unwrap();
+    let mut film = Film::new(FilmShape::new([2, 1], Crop::full([2, 1]), LayerSet::FULL), 8).unwrap();
     let tile = &mut film.tiles_mut()[0];
     let (near, far) = (surface(2.0, 1.0, Vec3::X, 0.5), surface(4.0, 3.0, Vec3::Y, 0.7));
-    tile.add(0, 0, Sample { pixel: &gray(1.0), surface: Some(&near), parts: &[] }, 1.0);
-    tile.add(0, 1, Sample { pixel: &gray(1.0), surface: Some(&far), parts: &[] }, 1.0);
-    tile.add(0, 2, &PixelSample::default(), 1.0);
-    tile.add(1, 0, &PixelSample::default(), 1.0);
+    let miss = (PixelSample::default(), SurfaceSample { motion: [5.0, 6.0], ..SurfaceSample::default() });
+    for (pixel, samples) in [(0, [(gray(1.0), far), miss, (gray(1.0), near)].as_slice()), (1, &[miss])] {
+        for (i, (value, surface)) in (0..).zip(samples) {
+            assert!(tile.add(pixel, i, Sample { pixel: value, surface: Some(surface), parts: &[] }, 1.0));
+        }
+    }
     let image = film.resolve();
     let at = |kind, x| image.pixel(kind, x, 0).unwrap().to_vec();
-    assert_eq!(at(LayerKind::Z, 0), [3.0]);
-    assert_eq!(at(LayerKind::P, 0), [2.0, 0.0, 1.0]);
-    assert!((at(LayerKind::N, 0)[1] - 0.5f32.sqrt()).abs() < 1e-7);
+    assert_eq!(at(LayerKind::Z, 0), [2.0]);
+    assert_eq!(at(LayerKind::P, 0), [1.0, 0.0, 1.0]);
+    assert_eq!(at(LayerKind::N, 0), [1.0, 0.0, 0.0]);
+    assert_eq!((at(LayerKind::Motion, 0), at(LayerKind::Motion, 1)), (vec![0.0; 2], vec![5.0, 6.0]));
     assert!((at(LayerKind::Albedo, 0)[0] - 0.4).abs() < 1e-7);
     assert!((at(LayerKind::Color, 0)[3] - 2.0 / 3.0).abs() < 1e-7);
     assert_eq!((at(LayerKind::Z, 1), at(LayerKind::N, 1), at(LayerKind::P, 1)), (vec![1e10], vec![0.0; 3], vec![0.0; 3]));
@@ -95,20 +99,20 @@ fn layers_average_what_was_hit() {
 #[test]
 fn tiles_lie_on_the_full_pictures_grid() {
     let crop = Crop { x: 15, y: 17, width: 10, height: 20 };
-    let film = Film::new([40, 40], crop, &LayerSet::COLOR, 16).unwrap();
+    let film = Film::new(FilmShape::new([40, 40], crop, LayerSet::COLOR), 16).unwrap();
     let origins: Vec<_> = film.tiles().iter().map(FilmTile::origin).collect();
     assert_eq!(origins, [[0, 16], [16, 16], [0, 32], [16, 32]]);
     assert_eq!(film.tiles()[3].size(), [16, 8]);
     assert_eq!(film.tiles().iter().map(|tile| tile.active().area()).sum::<u64>(), crop.area());
-    assert!(film.tiles().iter().all(|tile| tile.surfaces.is_empty() && tile.hits.is_empty() && tile.corrections.is_empty()));
+    assert!(film.tiles().iter().all(|tile| tile.nearest.values.is_empty() && tile.filtered.channels.is_empty() && tile.weights.is_empty()));
 }
 
 #[test]
 fn impossible_films_are_refused() {
     let wide = Crop { x: 8, y: 0, width: 3, height: 1 };
-    assert!(matches!(Film::new([10, 10], wide, &LayerSet::COLOR, 16), Err(Error::Usage(_))));
+    assert!(matches!(Film::new(FilmShape::new([10, 10], wide, LayerSet::COLOR), 16), Err(Error::Usage(_))));
     let huge = [2_000_000_000, 2_000_000_000];
-    assert!(matches!(Film::new(huge, Crop::full(huge), &LayerSet::COLOR, 16), Err(Error::OutOfMemory(_))));
+    assert!(matches!(Film::new(FilmShape::new(huge, Crop::full(huge), LayerSet::COLOR), 16), Err(Error::OutOfMemory(_))));
 }
 
 /// Films whose samples count differently: the mean is the weighted one, the variance that of a weighted mean, all else is as of one film.
@@ -120,7 +124,7 @@ fn merged_films_weigh_their_samples() {
         for (i, &v) in (0..).zip(values) {
             let tile = &mut film.tiles_mut()[0];
             assert!(tile.add(0, i, &gray(v), 1.0));
-            tile.add_group(0, [f64::from(v); 3], 1.0);
+            tile.add_group(0, [f64::from(v); 3]);
         }
         film
     };
@@ -137,4 +141,79 @@ fn merged_films_weigh_their_samples() {
     let image = merged.resolve();
     assert!((f64::from(image.pixel(LayerKind::Variance, 0, 0).unwrap()[0]) - expected).abs() < 1e-6);
     assert_eq!(image.pixel(LayerKind::Samples, 0, 0).unwrap(), [6.0]);
+}
+
+/// A film of 70 x 40 pixels, tiles of 32, filled with noise by a shared filter.
+fn shared(desc: FilterDesc, crop: Crop, block_size: Option<u32>, samples: impl Fn(u32, u32) -> u32) -> Film {
+    let size = [70, 40];
+    let shape = FilmShape { filter: desc, block_size, ..FilmShape::new(size, crop, LayerSet::FULL) };
+    let mut film = Film::new(shape, 32).unwrap();
+    let (filter, mut splats) = (Filter::new(&desc), Splats::default());
+    for tile in film.tiles_mut() {
+        let active = tile.active();
+        for (x, y) in active.pixels() {
+            let mut rng = crate::math::Rng::new(u64::from(x * 1000 + y));
+            let pixel = tile.index(x, y);
+            for sample in 0..samples(x, y) {
+                let place = filter.sample([rng.unit_f32(), rng.unit_f32()]);
+                let value = gray(x as f32 + 100.0 * y as f32 + 10.0 * rng.unit_f32());
+                assert!(tile.splat((pixel, sample), &value, &filter, place, &mut splats));
+                tile.flush(pixel, &mut splats);
+            }
+        }
+    }
+    film
+}
+
+/// Against a direct sum over all samples and pixels: shared samples give the weighted mean, whatever tiles and blocks there are.
+#[test]
+fn shared_samples_give_the_weighted_mean_across_tiles_and_blocks() {
+    for desc in Filter::examples(FilterSamplesDesc::Shared) {
+        let filter = Filter::new(&desc);
+        if !filter.is_shared() || filter.is_signed() {
+            continue;
+        }
+        for block_size in [None, Some(4)] {
+            let count = |x: u32, y: u32| if block_size.is_some() { 1 + (x / 4 + y / 4) % 3 } else { 2 };
+            let film = shared(desc, Crop::full([70, 40]), block_size, count);
+            let image = film.resolve();
+            for (px, py) in [(0, 0), (31, 17), (32, 31), (33, 32), (69, 39), (12, 5)] {
+                let (mut sum, mut whole) = (0.0, 0.0);
+                for (x, y) in film.sampled().pixels() {
+                    let mut rng = crate::math::Rng::new(u64::from(x * 1000 + y));
+                    for _ in 0..count(x, y) {
+                        let offset = filter.sample([rng.unit_f32(), rng.unit_f32()]).offset;
+                        let value = f64::from(x as f32 + 100.0 * y as f32 + 10.0 * rng.unit_f32());
+                        let at = [(x as f32, px), (y as f32, py)].map(|(x, p)| x - (p + film.grid().offset) as f32);
+                        let weight = filter.evaluate(crate::math::Vec2::new(at[0], at[1]) + offset) / f64::from(count(x, y));
+                        sum += weight * value;
+                        whole += weight;
+                    }
+                }
+                let found = f64::from(image.rgb(px, py).unwrap()[1]);
+                assert!((found - sum / whole).abs() < 2e-6 * 4000.0, "{desc:?} {px},{py}: {found} {}", sum / whole);
+            }
+        }
+    }
+}
+
+/// A crop is a part of the whole, films of parts of the samples sum to the film of all, and states come back: all bit for bit.
+#[test]
+fn crops_merges_and_states_of_shared_samples_have_the_same_bits() {
+    for desc in Filter::examples(FilterSamplesDesc::Shared).into_iter().filter(|desc| Filter::new(desc).is_shared()) {
+        let whole = shared(desc, Crop::full([70, 40]), None, |_, _| 3);
+        let image = whole.resolve();
+        let crop = Crop { x: 30, y: 33, width: 36, height: 7 };
+        let part = shared(desc, crop, None, |_, _| 3).resolve();
+        for kind in [LayerKind::Color, LayerKind::Samples] {
+            assert!(crop.pixels().all(|(x, y)| part.pixel(kind, x, y) == image.pixel(kind, x, y)), "{desc:?}");
+        }
+        let mut loaded = Film::new(whole.shape().clone(), 32).unwrap();
+        for (to, from) in loaded.tiles_mut().iter_mut().zip(whole.tiles()) {
+            let mut tile = from.empty();
+            tile.load(&from.save()).unwrap();
+            to.merge(&tile);
+        }
+        assert_eq!(loaded.resolve(), image, "{desc:?}");
+    }
 }

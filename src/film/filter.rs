@@ -1,10 +1,12 @@
-//! Pixel filters, importance sampled as in "Filter Importance Sampling" (Ernst, Stamminger and Greiner, 2006).
+//! Pixel filters: shared samples, or importance sampled as in "Filter Importance Sampling" (Ernst, Stamminger and Greiner, 2006).
 //!
-//! All filters are separable and even, so one axis is described on `[0, radius]` and a random number picks a side and a distance.
+//! All filters are separable and even, so one axis is described on `[0, radius]`. With shared samples, points are uniform within each pixel and a
+//! sample is weighted for every pixel whose filter reaches it. For importance sampling, a random number picks a side and a distance.
 
 use std::f64::consts::TAU;
 
-use crate::desc::FilterDesc;
+use super::Crop;
+use crate::desc::{FilterDesc, FilterSamplesDesc};
 use crate::math::Vec2;
 
 /// Cells of a table. With them the sampled distribution differs from the filter's by less than `1e-6` (a test measures it).
@@ -13,11 +15,19 @@ const CELLS: usize = 1024;
 /// Steps of the integration that makes a table.
 const STEPS: usize = 1 << 15;
 
-/// A pixel filter, importance sampled: a sample touches one pixel.
+/// Most pixels along an axis that a shared sample reaches.
+const MAX_TAPS: usize = 8;
+
+/// Steps per pixel of the integrals of [`VarianceKernel`].
+const KERNEL_STEPS: u32 = 1000;
+
+/// A pixel filter.
 #[derive(Clone, Debug)]
 pub struct Filter {
     desc: FilterDesc,
     kernel: Kernel,
+    /// With shared samples: one axis of the filter over its integral, at distances of `i * radius / CELLS`.
+    shared: Option<Box<[f32; CELLS + 2]>>,
 }
 
 /// An offset from the pixel's centre and the weight of a sample there.
@@ -25,8 +35,33 @@ pub struct Filter {
 pub struct FilterSample {
     /// Offset in pixels.
     pub offset: Vec2,
-    /// 1 for filters without negative lobes; else the filter over the density, of mean 1.
+    /// 1 for shared samples and for filters without negative lobes; else the filter over the density, of mean 1.
     pub weight: f32,
+}
+
+/// The weights of a shared sample for the pixels along one axis. Over all offsets within a pixel, the weights of a sample have a mean sum of 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Taps {
+    /// The first pixel, counted from the sample's own.
+    pub first: i32,
+    /// How many pixels; the weights beyond are 0.
+    pub count: usize,
+    /// By pixel.
+    pub weights: [f32; MAX_TAPS],
+}
+
+/// How the noise of pixels' own samples becomes that of the filtered picture. Along one axis, for the pixels `-border ..= border` around a pixel.
+///
+/// Of independent samples at positions that do not correlate with their values, with the variance `v` of the mean of a pixel's own samples, the
+/// filtered picture has the variance `sum(squares * v) / sum(means)^2`.
+#[derive(Clone, Debug)]
+pub struct VarianceKernel {
+    /// Integral of the filter over each pixel.
+    pub means: Vec<f64>,
+    /// Integral of the filter's square over each pixel.
+    pub squares: Vec<f64>,
+    /// Sum over a pixel and all others of the squares of the correlation of their noise, in two dimensions.
+    pub correlation: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -38,32 +73,45 @@ enum Kernel {
 
 impl Filter {
     /// Every kind of filter, with usual parameters and others, to be checked.
-    pub(crate) const EXAMPLES: [FilterDesc; 10] = [
-        FilterDesc::Box { radius: 0.5 },
-        FilterDesc::Box { radius: 0.8 },
-        FilterDesc::Tent { radius: 1.0 },
-        FilterDesc::Gaussian { radius: 1.5, sigma: 0.5 },
-        FilterDesc::Gaussian { radius: 2.0, sigma: 3.0 },
-        FilterDesc::BlackmanHarris { radius: 1.5 },
-        FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0 },
-        FilterDesc::Mitchell { radius: 2.0, b: 1.0, c: 0.0 },
-        FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5 },
-        FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 1.0 },
-    ];
+    pub(crate) const EXAMPLES: [FilterDesc; 10] = Self::examples(FilterSamplesDesc::Importance);
+
+    /// [`EXAMPLES`](Self::EXAMPLES), applied in this way.
+    pub(crate) const fn examples(samples: FilterSamplesDesc) -> [FilterDesc; 10] {
+        let samples = Some(samples);
+        [
+            FilterDesc::Box { radius: 0.5, samples },
+            FilterDesc::Box { radius: 0.8, samples },
+            FilterDesc::Tent { radius: 1.0, samples },
+            FilterDesc::Gaussian { radius: 1.5, sigma: 0.5, samples },
+            FilterDesc::Gaussian { radius: 2.0, sigma: 3.0, samples },
+            FilterDesc::BlackmanHarris { radius: 1.5, samples },
+            FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0, samples },
+            FilterDesc::Mitchell { radius: 2.0, b: 1.0, c: 0.0, samples },
+            FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5, samples },
+            FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 1.0, samples },
+        ]
+    }
 
     /// From its description; radii and the Gaussian's deviation are above 0.
     pub fn new(desc: &FilterDesc) -> Self {
         let kernel = match *desc {
-            FilterDesc::Box { radius } => Kernel::Box { radius },
-            FilterDesc::Tent { radius } => Kernel::Tent { radius },
+            FilterDesc::Box { radius, .. } => Kernel::Box { radius },
+            FilterDesc::Tent { radius, .. } => Kernel::Tent { radius },
             _ => Kernel::Table(Box::new(Table::new(desc))),
         };
-        Self { desc: *desc, kernel }
+        let mut desc = *desc;
+        // Samples within a pixel reach another from a radius of 0.5 on.
+        let can_share = desc.radius() > 0.5 && desc.radius() <= MAX_TAPS as f32 / 2.0;
+        let shared = can_share && *desc.samples_mut() != Some(FilterSamplesDesc::Importance);
+        Self { desc, kernel, shared: shared.then(|| Box::new(tabulate(&desc))) }
     }
 
-    /// An offset chosen in proportion to the filter's absolute value.
+    /// Where a sample lies: uniform within the pixel if samples are shared, else in proportion to the filter's absolute value.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> FilterSample {
+        if self.is_shared() {
+            return FilterSample { offset: Vec2::new(u[0] - 0.5, u[1] - 0.5), weight: 1.0 };
+        }
         match &self.kernel {
             Kernel::Box { radius } => {
                 FilterSample { offset: Vec2::new((2.0 * u[0] - 1.0) * radius, (2.0 * u[1] - 1.0) * radius), weight: 1.0 }
@@ -85,8 +133,102 @@ impl Filter {
 
     /// Half the width of its support in pixels.
     pub fn radius(&self) -> f32 {
-        radius(&self.desc)
+        self.desc.radius()
     }
+
+    /// Its description.
+    pub fn desc(&self) -> &FilterDesc {
+        &self.desc
+    }
+
+    /// Whether a sample counts for all pixels that it reaches.
+    #[inline]
+    pub fn is_shared(&self) -> bool {
+        self.shared.is_some()
+    }
+
+    /// How many pixels beyond its own a sample reaches in each direction.
+    pub fn border(&self) -> u32 {
+        if self.is_shared() { (self.radius() - 0.5).ceil() as u32 } else { 0 }
+    }
+
+    /// The weights along one axis of a shared sample at this offset from its pixel's centre, from -0.5 to 0.5.
+    #[inline]
+    pub fn taps(&self, offset: f32) -> Taps {
+        let mut weights = [0.0; MAX_TAPS];
+        let Some(table) = &self.shared else { return Taps { first: 0, count: 1, weights: [1.0; MAX_TAPS] } };
+        let radius = self.radius();
+        let border = self.border() as i32;
+        let first = ((offset - radius).floor() as i32 + 1).max(-border);
+        let last = ((offset + radius).ceil() as i32 - 1).min(border);
+        let count = ((last - first + 1).max(0) as usize).min(MAX_TAPS);
+        let scale = CELLS as f32 / radius;
+        for (k, weight) in weights[..count].iter_mut().enumerate() {
+            let at = ((first + k as i32) as f32 - offset).abs() * scale;
+            let cell = (at as usize).min(CELLS);
+            *weight = table[cell] + (at - cell as f32) * (table[cell + 1] - table[cell]);
+        }
+        Taps { first, count, weights }
+    }
+
+    /// How noise of pixels becomes that of the filtered picture.
+    pub fn variance_kernel(&self) -> VarianceKernel {
+        let radius = f64::from(self.radius());
+        let integral = |from: f64, to: f64, f: &dyn Fn(f64) -> f64| -> f64 {
+            let steps = f64::from(KERNEL_STEPS) * (to - from);
+            let h = (to - from) / steps.ceil();
+            (0..steps.ceil() as u32).map(|i| f(evaluate(&self.desc, from + (f64::from(i) + 0.5) * h)) * h).sum()
+        };
+        let whole = integral(-radius, radius, &|f| f);
+        if !self.is_shared() {
+            // Weights are `± integral(|f|) / integral(f)`.
+            let square = (integral(-radius, radius, &f64::abs) / whole).powi(2);
+            return VarianceKernel { means: vec![1.0], squares: vec![square], correlation: 1.0 };
+        }
+        let border = f64::from(self.border());
+        let pixels = || (0..=2 * self.border()).map(|i| f64::from(i) - border);
+        let over_pixel = |x: f64, f: &dyn Fn(f64) -> f64| integral((x - 0.5).max(-radius), (x + 0.5).min(radius), f);
+        VarianceKernel {
+            means: pixels().map(|x| over_pixel(x, &|f| f) / whole).collect(),
+            squares: pixels().map(|x| over_pixel(x, &|f| f * f) / (whole * whole)).collect(),
+            correlation: self.correlation().powi(2),
+        }
+    }
+
+    /// Along one axis: sum over a pixel and all others of the squares of the correlation of their noise.
+    fn correlation(&self) -> f64 {
+        let radius = f64::from(self.radius());
+        let h = 2.0 * radius / STEPS as f64;
+        let covariance = |distance: f64| -> f64 {
+            let term = |x: f64| evaluate(&self.desc, x) * evaluate(&self.desc, x - distance);
+            (0..STEPS).map(|i| term(-radius + (i as f64 + 0.5) * h) * h).sum()
+        };
+        let own = covariance(0.0);
+        1.0 + 2.0 * (1..=(2.0 * radius) as u32).map(|distance| (covariance(f64::from(distance)) / own).powi(2)).sum::<f64>()
+    }
+}
+
+impl VarianceKernel {
+    /// Calls `f` with every pixel around one within a rectangle, and the kernel there.
+    pub fn for_each(&self, area: Crop, [x, y]: [u32; 2], mut f: impl FnMut([u32; 2], f64, f64)) {
+        let border = (self.means.len() / 2) as u32;
+        let around = |at: u32, start: u32, length: u32| at.saturating_sub(border).max(start)..(at + border + 1).min(start + length);
+        for row in around(y, area.y, area.height) {
+            for column in around(x, area.x, area.width) {
+                let [i, j] = [column + border - x, row + border - y].map(|i| i as usize);
+                f([column, row], self.means[i] * self.means[j], self.squares[i] * self.squares[j]);
+            }
+        }
+    }
+}
+
+/// One axis over its integral at `i * radius / CELLS`, and once more the last value.
+fn tabulate(desc: &FilterDesc) -> [f32; CELLS + 2] {
+    let radius = f64::from(desc.radius());
+    let at = |i: usize| evaluate(desc, (i as f64 / CELLS as f64).min(1.0) * radius);
+    let h = radius / STEPS as f64;
+    let half: f64 = (0..STEPS).map(|i| evaluate(desc, (i as f64 + 0.5) * h) * h).sum();
+    std::array::from_fn(|i| (at(i) / (2.0 * half)) as f32)
 }
 
 /// Inverts the distribution of a tent on `[-1, 1]`.
@@ -96,19 +238,9 @@ fn tent(u: f32) -> f32 {
     (1.0 - (1.0 - v.abs()).sqrt()).copysign(v)
 }
 
-fn radius(desc: &FilterDesc) -> f32 {
-    match *desc {
-        FilterDesc::Box { radius }
-        | FilterDesc::Tent { radius }
-        | FilterDesc::Gaussian { radius, .. }
-        | FilterDesc::BlackmanHarris { radius }
-        | FilterDesc::Mitchell { radius, .. } => radius,
-    }
-}
-
 /// One axis of a filter.
 fn evaluate(desc: &FilterDesc, x: f64) -> f64 {
-    let radius = f64::from(radius(desc));
+    let radius = f64::from(desc.radius());
     let x = x.abs();
     if x > radius {
         return 0.0;
@@ -154,7 +286,7 @@ struct Table {
 
 impl Table {
     fn new(desc: &FilterDesc) -> Self {
-        let radius = f64::from(radius(desc));
+        let radius = f64::from(desc.radius());
         let step = radius / STEPS as f64;
         let at = |i: usize| radius - i as f64 * step;
 

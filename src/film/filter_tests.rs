@@ -11,7 +11,7 @@ fn integral(desc: &FilterDesc, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
 #[test]
 fn the_sampled_distribution_is_the_filters() {
     for desc in Filter::EXAMPLES {
-        let r = f64::from(radius(&desc));
+        let r = f64::from(desc.radius());
         let filter = Filter::new(&desc);
         let n = 1 << 19;
         let total = integral(&desc, 0.0, r, |f| f);

@@ -48,6 +48,19 @@ impl Crop {
         Self { x, y, width, height }
     }
 
+    /// The rectangle with `border` pixels more on each side, as far as they lie within another.
+    #[must_use]
+    pub fn grown(&self, border: u32, within: Self) -> Self {
+        let (x, y) = (self.x.saturating_sub(border), self.y.saturating_sub(border));
+        let grow = |start: u32, length: u32, first: u32| (start + length).saturating_add(border) - first;
+        Self { x, y, width: grow(self.x, self.width, x), height: grow(self.y, self.height, y) }.intersection(&within)
+    }
+
+    /// The pixels, row by row.
+    pub fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
+        (self.y..self.y + self.height).flat_map(move |y| (self.x..self.x + self.width).map(move |x| (x, y)))
+    }
+
     /// Whether the rectangle is not empty and lies within a picture of `size` pixels.
     pub fn fits(&self, size: [u32; 2]) -> bool {
         self.area() > 0 && self.intersection(&Self::full(size)) == *self

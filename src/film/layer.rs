@@ -71,8 +71,8 @@ pub enum LayerKind {
 pub enum Source {
     /// The picture itself.
     Color,
-    /// First surfaces: how a sample's values are read, one for each channel, and how they are averaged.
-    Surface(fn(&SurfaceSample, &mut [f32]), Average),
+    /// First surfaces: how a sample's values are read, one for each channel, and how those of samples are put together.
+    Surface(fn(&SurfaceSample, &mut [f32]), Filtering),
     /// A part of the radiance.
     Part(Part),
     /// The parts by groups of lights.
@@ -85,15 +85,27 @@ pub enum Source {
     Denoiser,
 }
 
-/// How a pixel's value comes from those of its samples.
+/// How a pixel's value comes from those of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Average {
-    /// The mean over samples that hit something.
-    Hits,
-    /// The mean over all samples.
-    Samples,
-    /// The direction of the mean.
-    Direction,
+pub enum Filtering {
+    /// The value of the nearest surface that the pixel's own samples hit: data that has no meaningful mean.
+    Nearest,
+    /// The mean that the pixel filter gives, as of the picture.
+    Mean,
+}
+
+/// Channels of all layers of surfaces that are filtered so.
+pub(super) const fn channels_of(filtering: Filtering) -> usize {
+    let (mut total, mut i) = (0, 0);
+    while i < LayerKind::ALL.len() {
+        if let Source::Surface(_, other) = LayerKind::ALL[i].source
+            && other as u8 == filtering as u8
+        {
+            total += LayerKind::ALL[i].channels.len();
+        }
+        i += 1;
+    }
+    total
 }
 
 /// What the table says of a layer.
@@ -145,46 +157,46 @@ impl LayerKind {
             Self::Z,
             "Z",
             &["Z"],
-            Source::Surface(|s, out| out[0] = s.depth, Average::Hits),
-            "Z: depth along the view axis; 1e10 where nothing was hit",
+            Source::Surface(|s, out| out[0] = s.depth, Filtering::Nearest),
+            "Z: depth along the view axis of the nearest sample; 1e10 where nothing was hit",
         )
         .float(),
         LayerInfo::new(
             Self::N,
             "N",
             &["N.X", "N.Y", "N.Z"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.normal.to_array()), Average::Direction),
-            "N: shading normal, world; 0 where nothing was hit",
+            Source::Surface(|s, out| out.copy_from_slice(&s.normal.to_array()), Filtering::Nearest),
+            "N: shading normal of the nearest sample, world; 0 where nothing was hit",
         ),
         LayerInfo::new(
             Self::Ng,
             "Ng",
             &["Ng.X", "Ng.Y", "Ng.Z"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.geometric_normal.to_array()), Average::Direction),
-            "Ng: geometric normal, world; 0 where nothing was hit",
+            Source::Surface(|s, out| out.copy_from_slice(&s.geometric_normal.to_array()), Filtering::Nearest),
+            "Ng: geometric normal of the nearest sample, world; 0 where nothing was hit",
         ),
         LayerInfo::new(
             Self::P,
             "P",
             &["P.X", "P.Y", "P.Z"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.position.to_array()), Average::Hits),
-            "P: position, world; 0 where nothing was hit",
+            Source::Surface(|s, out| out.copy_from_slice(&s.position.to_array()), Filtering::Nearest),
+            "P: position of the nearest sample, world; 0 where nothing was hit",
         )
         .float(),
         LayerInfo::new(
             Self::Uv,
             "uv",
             &["uv.U", "uv.V"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.uv), Average::Hits),
-            "uv: surface parameters; 0 where nothing was hit",
+            Source::Surface(|s, out| out.copy_from_slice(&s.uv), Filtering::Nearest),
+            "uv: surface parameters of the nearest sample; 0 where nothing was hit",
         )
         .float(),
         LayerInfo::new(
             Self::Motion,
             "motion",
             &["motion.X", "motion.Y"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.motion), Average::Samples),
-            "motion: from where the surface is when the shutter opens to where it is when it closes, in pixels to the right and down; without a \
+            Source::Surface(|s, out| out.copy_from_slice(&s.motion), Filtering::Nearest),
+            "motion: of the nearest sample, from where the surface is when the shutter opens to where it is when it closes, in pixels to the right and down; without a \
              surface, that of a point infinitely far away",
         )
         .float(),
@@ -192,7 +204,7 @@ impl LayerKind {
             Self::Albedo,
             "albedo",
             &["albedo.R", "albedo.G", "albedo.B"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.albedo.to_array()), Average::Samples),
+            Source::Surface(|s, out| out.copy_from_slice(&s.albedo.to_array()), Filtering::Mean),
             "albedo: fraction of light scattered by the first surface",
         ),
         part!(DiffuseDirect, "diffuse_direct", "light scattered once, by diffuse reflection"),
@@ -215,7 +227,7 @@ impl LayerKind {
             "variance",
             &["variance.R", "variance.G", "variance.B"],
             Source::Film,
-            "variance: of the picture's R, G and B, their expected squared error",
+            "variance: of the filtered picture's R, G and B, their expected squared error",
         )
         .float(),
         LayerInfo::new(Self::Samples, "samples", &["stats.samples"], Source::Film, "stats.samples: samples of the pixel").float(),
@@ -223,14 +235,14 @@ impl LayerKind {
             Self::FeatureAlbedo,
             "feature_albedo",
             &["feature_albedo.R", "feature_albedo.G", "feature_albedo.B"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.feature_albedo.to_array()), Average::Samples),
+            Source::Surface(|s, out| out.copy_from_slice(&s.feature_albedo.to_array()), Filtering::Mean),
             "feature_albedo: fraction of light scattered by the first surface that is no mirror and no clear glass",
         ),
         LayerInfo::new(
             Self::FeatureNormal,
             "feature_normal",
             &["feature_normal.X", "feature_normal.Y", "feature_normal.Z"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.feature_normal.to_array()), Average::Samples),
+            Source::Surface(|s, out| out.copy_from_slice(&s.feature_normal.to_array()), Filtering::Mean),
             "feature_normal: mean shading normal of that surface, world, not of unit length",
         ),
         LayerInfo::new(
@@ -366,9 +378,9 @@ impl LayerSet {
         self.bits & layers_from!(Source::Part(_)) != 0
     }
 
-    /// The layers of first surfaces, in the table's order.
-    pub fn of_surfaces(self) -> impl Iterator<Item = &'static LayerInfo> {
-        self.iter().filter(|info| matches!(info.source, Source::Surface(..)))
+    /// The layers of first surfaces that are filtered so, in the table's order.
+    pub fn surfaces(self, filtering: Filtering) -> impl Iterator<Item = &'static LayerInfo> {
+        self.iter().filter(move |info| matches!(info.source, Source::Surface(_, other) if other == filtering))
     }
 
     /// All layers, in the table's order.
@@ -439,7 +451,7 @@ mod tests {
         assert_eq!(set.iter().map(|info| info.kind).collect::<Vec<_>>(), [LayerKind::Color, LayerKind::Z, LayerKind::P]);
         assert!(set.needs_surface() && !LayerSet::COLOR.needs_surface());
         assert!(LayerSet::COLOR.contains(LayerKind::Color));
-        assert_eq!([LayerDesc::Albedo, LayerDesc::Samples].iter().collect::<LayerSet>().of_surfaces().count(), 1);
+        assert_eq!([LayerDesc::Albedo, LayerDesc::Samples].iter().collect::<LayerSet>().surfaces(Filtering::Mean).count(), 1);
         assert!(!LayerSet::from_iter(&[LayerDesc::Variance, LayerDesc::Samples]).needs_surface());
         assert_eq!(LayerSet::FULL.iter().count(), LayerKind::ALL.len() - 1);
         assert!(LayerSet::from_iter(&[LayerDesc::CryptoObject]).needs_coverage() && !set.needs_coverage());

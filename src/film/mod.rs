@@ -1,27 +1,32 @@
 //! The film: samples go in, weighted by a pixel filter, and a picture with its layers comes out.
 //!
-//! Filters are importance sampled, so a sample touches one pixel and tiles share nothing. Sums do not depend on the order of their terms. So any
-//! number of threads gives the same picture, and so does any split of the samples.
+//! A sample counts for all pixels that the filter reaches from it; tiles have borders for what reaches other tiles, so they share nothing. Sums do
+//! not depend on the order of their terms. So any number of threads gives the same picture, and so does any split of the samples.
 
+mod cells;
 mod coverage;
 mod filter;
 mod identities;
 mod image;
 mod layer;
+mod nearest;
+mod resolve;
 mod sample;
+mod splats;
 mod state;
 mod sum;
 mod tile;
 mod tiles;
 
 pub use coverage::{Coverage, CoverageCounts};
-pub use filter::{Filter, FilterSample};
+pub use filter::{Filter, FilterSample, Taps, VarianceKernel};
 pub use identities::{Identities, Label, NameId, PlacementId, ShapeIdentity};
 pub use image::{Crop, Image, Layer};
-pub use layer::{Average, LayerInfo, LayerKind, LayerSet, Source};
+pub use layer::{Filtering, LayerInfo, LayerKind, LayerSet, Source};
 pub use sample::{Part, PartNeeds, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};
+pub use splats::Splats;
 pub use sum::Sums;
 pub use tile::{DroppedSample, FilmTile};
-pub use tiles::{Film, bytes_per_pixel};
+pub use tiles::{Film, FilmGrid, FilmShape, bytes_per_pixel};
 
-use tiles::FilmLayers;
+use tiles::Layout;

@@ -8,7 +8,7 @@ use crate::math::Vec3;
 pub struct PixelSample {
     /// Radiance, without the filter's weight.
     pub radiance: Rgb,
-    /// 1 where something was hit, 0 where not.
+    /// 1 where the camera sees a surface or a background, 0 where not.
     pub alpha: f32,
 }
 
@@ -56,7 +56,7 @@ pub struct SurfaceSample {
     pub feature_albedo: Rgb,
     /// Shading normal of that surface, world.
     pub feature_normal: Vec3,
-    /// The shape.
+    /// The shape; [`ShapeKey::NONE`] where there is none.
     pub shown: ShapeKey,
 }
 

@@ -11,20 +11,21 @@ impl FilmTile {
     pub fn save(&self) -> Vec<u8> {
         debug_assert!(self.weighed.is_empty(), "samples that count differently are not kept");
         let mut out = Out::default();
-        out.sums(&self.color);
-        out.integers(&self.samples);
-        out.sums(&self.corrections);
-        for list in [&self.parts, &self.part_corrections, &self.surfaces] {
-            out.floats(list.len(), list.iter().copied());
+        for sums in [&self.filtered, &self.own] {
+            out.sums(&sums.color);
+            out.floats(sums.channels.len(), sums.channels.iter().copied());
         }
-        out.integers(&self.hits);
+        out.sums(&self.weights);
+        out.integers(&self.samples);
+        out.integers(&self.nearest.depths.iter().map(|depth| depth.to_bits()).collect::<Vec<_>>());
+        out.integers(&self.nearest.samples);
+        out.integers(&self.nearest.values.iter().map(|value| value.to_bits()).collect::<Vec<_>>());
         if let Some(coverage) = &self.coverage {
-            out.coverage(coverage, self.samples.len());
+            out.coverage(coverage, self.cells.entries());
         }
         out.integers(&self.spread.iter().map(|spread| spread.groups).collect::<Vec<_>>());
         out.sums(&self.spread.iter().map(|spread| spread.sums).collect::<Vec<_>>());
         out.sums(&self.spread.iter().map(|spread| spread.squares).collect::<Vec<_>>());
-        out.sums(&self.spread_corrections);
         out.bytes.extend(self.dropped_count.to_le_bytes());
         out.integers(self.dropped.iter().map(|d| [d.x, d.y, d.sample]).collect::<Vec<_>>().as_flattened());
         out.bytes
@@ -39,17 +40,18 @@ impl FilmTile {
     }
 
     fn read(&mut self, data: &mut In) -> Option<()> {
-        let pixels = self.samples.len();
-        let optional = |length: usize, count: usize| length == 0 || length == count;
-        self.color = data.sums().filter(|list| list.len() == pixels)?;
-        self.samples = data.integers().filter(|list| list.len() == pixels)?;
-        self.corrections = data.sums().filter(|list| optional(list.len(), pixels))?;
-        self.parts = data.floats().filter(|list| list.len() == self.parts.len())?;
-        self.part_corrections = data.floats().filter(|list| optional(list.len(), self.parts.len()))?;
-        self.surfaces = data.floats().filter(|list| list.len() == self.surfaces.len())?;
-        self.hits = data.integers().filter(|list| list.len() == self.hits.len())?;
+        for sums in [&mut self.filtered, &mut self.own] {
+            sums.color = data.sums().filter(|list| list.len() == sums.color.len())?;
+            sums.channels = data.floats().filter(|list| list.len() == sums.channels.len())?;
+        }
+        self.weights = data.sums().filter(|list| list.len() == self.weights.len())?;
+        self.samples = data.integers().filter(|list| list.len() == self.samples.len())?;
+        let floats = |list: Vec<u32>| list.into_iter().map(f32::from_bits).collect::<Vec<_>>();
+        self.nearest.depths = data.integers().map(floats).filter(|list| list.len() == self.nearest.depths.len())?;
+        self.nearest.samples = data.integers().filter(|list| list.len() == self.nearest.samples.len())?;
+        self.nearest.values = data.integers().map(floats).filter(|list| list.len() == self.nearest.values.len())?;
         if let Some(coverage) = &mut self.coverage {
-            *coverage = data.coverage(&self.samples)?;
+            *coverage = data.coverage(self.cells.entries())?;
         }
         let spreads = self.spread.len();
         let groups = data.integers().filter(|list| list.len() == spreads)?;
@@ -60,7 +62,6 @@ impl FilmTile {
             .zip(sums.into_iter().zip(squares))
             .map(|(groups, (sums, squares))| Spread { groups, sums, squares })
             .collect();
-        self.spread_corrections = data.sums().filter(|list| optional(list.len(), spreads))?;
         self.dropped_count = u64::from_le_bytes(data.array()?);
         let dropped = data.integers().filter(|list| list.len() <= 3 * DROPPED_KEPT)?;
         self.dropped = dropped.as_chunks().0.iter().map(|&[x, y, sample]| DroppedSample { x, y, sample }).collect();
@@ -95,11 +96,11 @@ impl Out {
         self.bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     }
 
-    fn coverage(&mut self, coverage: &CoverageCounts, pixels: usize) {
+    fn coverage(&mut self, coverage: &CoverageCounts, entries: usize) {
         let mut values = Vec::new();
-        for list in (0..pixels).map(|pixel| coverage.of(pixel)) {
+        for list in (0..entries).map(|entry| coverage.of(entry)) {
             values.push(list.len() as u32);
-            values.extend(list.iter().flat_map(|(key, count)| [key.instance, key.shape, *count]));
+            values.extend(list.iter().flat_map(|&(key, units)| [key.instance, key.shape, units as u32, (units >> 32) as u32]));
         }
         self.integers(&values);
     }
@@ -140,19 +141,17 @@ impl<'a> In<'a> {
         Some(self.list()?.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect())
     }
 
-    fn coverage(&mut self, samples: &[u32]) -> Option<CoverageCounts> {
+    fn coverage(&mut self, entries: usize) -> Option<CoverageCounts> {
         let values = self.integers()?;
         let mut rest = values.as_slice();
-        let mut counts = CoverageCounts::new(samples.len());
-        for (pixel, &samples) in samples.iter().enumerate() {
+        let mut counts = CoverageCounts::new(entries);
+        for entry in 0..entries {
             let (&length, behind) = rest.split_first()?;
-            let (list, behind) = behind.split_at_checked((length as usize).checked_mul(3)?)?;
-            let total: u64 = list.as_chunks().0.iter().map(|&[_, _, count]| u64::from(count)).sum();
-            if total > u64::from(samples) {
-                return None;
-            }
-            for &[instance, shape, count] in list.as_chunks().0 {
-                counts.add(pixel, ShapeKey { instance, shape }, count);
+            let (list, behind) = behind.split_at_checked((length as usize).checked_mul(4)?)?;
+            for &[instance, shape, low, high] in list.as_chunks().0 {
+                // More than any render has would overflow.
+                let units = u64::from(low) | u64::from(high) << 32;
+                counts.add(entry, ShapeKey { instance, shape }, Some(units).filter(|units| *units < 1 << 60)?);
             }
             rest = behind;
         }

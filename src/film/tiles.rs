@@ -1,112 +1,200 @@
 //! The film as independent tiles.
 
+use serde::{Deserialize, Serialize};
+
 use super::sum::Sums;
 use super::tile::{DROPPED_KEPT, DroppedSample, FilmTile, Spread};
-use super::{Coverage, Crop, Image, Layer, LayerKind, LayerSet, PartNeeds, Source};
+use super::{Crop, Filter, Filtering, LayerKind, LayerSet, PartNeeds, VarianceKernel};
+use crate::desc::FilterDesc;
 use crate::error::{Error, Result};
+
+/// What a film holds, and how samples reach it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FilmShape {
+    /// Width and height of the full picture in pixels.
+    pub size: [u32; 2],
+    /// Pixels of it on each side around what the camera shows.
+    pub overscan: u32,
+    /// The part that is there.
+    pub crop: Crop,
+    /// Its layers.
+    pub layers: LayerSet,
+    /// Names of the groups of lights, for the layers of groups if there are any.
+    pub light_groups: Vec<String>,
+    /// The pixel filter.
+    pub filter: FilterDesc,
+    /// Width and height in pixels of the squares whose pixels have equally many samples, if not all have: a divisor of the tiles' size.
+    pub block_size: Option<u32>,
+}
+
+impl Default for FilmShape {
+    fn default() -> Self {
+        Self::new([0, 0], Crop::default(), LayerSet::COLOR)
+    }
+}
+
+impl FilmShape {
+    /// With a box filter, and as many samples for every pixel.
+    pub fn new(size: [u32; 2], crop: Crop, layers: LayerSet) -> Self {
+        Self {
+            size,
+            overscan: 0,
+            crop,
+            layers,
+            light_groups: Vec::new(),
+            filter: FilterDesc::Box { radius: 0.5, samples: None },
+            block_size: None,
+        }
+    }
+}
+
+/// Where the pixels of a film are on the grid of its tiles. The grid's corner is a multiple of the tiles' size above and left of the pixel that the camera
+/// sees in its upper left corner, so a pixel has the same place within a tile, whatever the overscan and the margin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FilmGrid {
+    /// Place of the full picture's first pixel, along both axes.
+    pub offset: u32,
+    /// The full picture and around it the margin, whose samples reach the picture.
+    pub area: Crop,
+    /// The part that is rendered.
+    pub crop: Crop,
+}
+
+impl FilmGrid {
+    /// Of a film with tiles of this size.
+    pub fn new(shape: &FilmShape, filter: &Filter, tile_size: u32) -> Self {
+        let around = shape.overscan + filter.border();
+        let corner = around.div_ceil(tile_size) * tile_size;
+        // Blocks lie on the grid, too.
+        let start = corner - around.next_multiple_of(shape.block_size.unwrap_or(1)).min(corner);
+        let offset = corner - shape.overscan;
+        let end = shape.size.map(|side| side.saturating_add(offset + filter.border()));
+        let Crop { x, y, width, height } = shape.crop;
+        Self {
+            offset,
+            area: Crop { x: start, y: start, width: end[0] - start, height: end[1] - start },
+            crop: Crop { x: x + offset, y: y + offset, width, height },
+        }
+    }
+}
 
 /// What a film holds for each pixel.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FilmLayers {
+pub(super) struct Layout {
     pub set: LayerSet,
     /// The parts of the radiance.
     pub parts: PartNeeds,
-    /// Channels of the layers of surfaces.
-    pub surface_channels: usize,
+    /// Channels of the layers of surfaces that are averaged.
+    pub mean_channels: usize,
+    /// Channels of the layers of surfaces that are data.
+    pub data_channels: usize,
+    /// Width and height of cells, whose pixels have equally many samples.
+    pub cell_size: u32,
+    /// How many pixels beyond its own a sample reaches.
+    pub border: u32,
+    /// Whether the filter has negative lobes.
+    pub signed: bool,
 }
 
-impl FilmLayers {
-    fn new(set: LayerSet, light_groups: usize) -> Self {
+impl Layout {
+    fn new(set: LayerSet, light_groups: usize, filter: &Filter, cell_size: u32) -> Self {
         let light_groups = if set.contains(LayerKind::LightGroups) { light_groups as u32 } else { 0 };
         let parts = PartNeeds { by_scattering: set.needs_parts(), light_groups };
-        Self { set, parts, surface_channels: set.of_surfaces().map(|info| info.channels.len()).sum() }
+        let channels = |filtering| set.surfaces(filtering).map(|info| info.channels.len()).sum();
+        let (mean_channels, data_channels) = (channels(Filtering::Mean), channels(Filtering::Nearest));
+        Self { set, parts, mean_channels, data_channels, cell_size, border: filter.border(), signed: filter.is_signed() }
     }
 
-    /// Numbers that a pixel's parts take.
+    /// Numbers that the averaged channels beside the colour take.
     #[inline]
-    pub fn part_stride(&self) -> usize {
-        2 * 3 * self.parts.count()
-    }
-
-    /// Numbers that a pixel's layers of surfaces take.
-    #[inline]
-    pub fn surface_stride(&self) -> usize {
-        2 * self.surface_channels
+    pub fn channel_stride(&self) -> usize {
+        2 * (3 * self.parts.count() + self.mean_channels)
     }
 
     /// Whether samples bring more than colour.
     #[inline]
     pub fn beside_color(&self) -> bool {
-        self.set.needs_surface() || self.part_stride() > 0
+        self.set.needs_surface() || self.parts.count() > 0
+    }
+
+    /// Whether weights differ from 1.
+    #[inline]
+    pub fn is_weighted(&self) -> bool {
+        self.border > 0 || self.signed
     }
 }
 
-/// The film: the tiles that a picture's crop touches.
+/// The film: the tiles that a picture's crop touches, and that its samples come from.
 #[derive(Clone, Debug)]
 pub struct Film {
-    size: [u32; 2],
-    crop: Crop,
-    layers: FilmLayers,
-    light_groups: Vec<String>,
+    shape: FilmShape,
+    grid: FilmGrid,
+    pub(super) filter: Filter,
+    pub(super) layout: Layout,
+    tile_size: u32,
+    /// Column and row of the first tile on the full picture's grid.
+    first: [u32; 2],
+    /// Tiles in a row.
+    columns: u32,
     tiles: Vec<FilmTile>,
 }
 
 impl Film {
-    /// A black film for the part `crop` of a picture of `size` pixels. Tiles of `tile_size` pixels (at least 1) lie on the full picture's
-    /// grid, so a pixel's tile does not depend on the crop.
+    /// A black film. Tiles of `tile_size` pixels (at least 1) lie on the full picture's grid, so a pixel's tile does not depend on the crop.
     ///
     /// # Errors
     /// [`Error::Usage`] if the crop is empty or reaches beyond the picture; [`Error::OutOfMemory`] if the film cannot be held.
-    pub fn new(size: [u32; 2], crop: Crop, layers: &LayerSet, tile_size: u32) -> Result<Self> {
-        Self::with_light_groups(size, crop, layers, Vec::new(), tile_size)
-    }
-
-    /// As [`new`](Self::new), with layers for these groups of lights if `layers` has them.
-    ///
-    /// # Errors
-    /// As of [`new`](Self::new).
-    pub fn with_light_groups(size: [u32; 2], crop: Crop, layers: &LayerSet, light_groups: Vec<String>, tile_size: u32) -> Result<Self> {
+    pub fn new(shape: FilmShape, tile_size: u32) -> Result<Self> {
+        let (size, crop) = (shape.size, shape.crop);
         if !crop.fits(size) {
             let Crop { x, y, width, height } = crop;
             return Err(Error::Usage(format!("crop {x},{y},{width},{height} does not fit a picture of {}x{} pixels", size[0], size[1])));
         }
-        let layers = FilmLayers::new(*layers, light_groups.len());
+        let filter = Filter::new(&shape.filter);
         let tile_size = tile_size.max(1);
-        check_memory(&crop, layers)?;
+        // Samples that stay in their pixel are normalised by their own number.
+        let cell_size = shape.block_size.filter(|_| filter.border() > 0).unwrap_or(tile_size);
+        let layout = Layout::new(shape.layers, shape.light_groups.len(), &filter, cell_size);
+        let grid = FilmGrid::new(&shape, &filter, tile_size);
+        let sampled = grid.crop.grown(filter.border(), grid.area);
+        check_memory(&shape, &sampled, layout)?;
+        let range = |start: u32, length: u32| start / tile_size..=(start + length - 1) / tile_size;
+        let (columns, rows) = (range(sampled.x, sampled.width), range(sampled.y, sampled.height));
+        let first = [*columns.start(), *rows.start()];
         let mut tiles = Vec::new();
-        for row in crop.y / tile_size..=(crop.y + crop.height - 1) / tile_size {
-            for column in crop.x / tile_size..=(crop.x + crop.width - 1) / tile_size {
+        for row in rows {
+            for column in columns.clone() {
                 let cell = Crop { x: column * tile_size, y: row * tile_size, width: tile_size, height: tile_size };
-                let area = cell.intersection(&Crop::full(size));
-                tiles.push(FilmTile::new(area, area.intersection(&crop), layers));
+                let area = cell.intersection(&grid.area);
+                tiles.push(FilmTile::new(area, area.intersection(&sampled), layout));
             }
         }
-        Ok(Self { size, crop, layers, light_groups, tiles })
+        Ok(Self { shape, grid, filter, layout, tile_size, first, columns: columns.count() as u32, tiles })
     }
 
-    /// Width and height of the full picture.
-    pub fn size(&self) -> [u32; 2] {
-        self.size
+    /// What it holds.
+    pub fn shape(&self) -> &FilmShape {
+        &self.shape
     }
 
-    /// The part that is rendered.
-    pub fn crop(&self) -> Crop {
-        self.crop
+    /// Where its pixels are.
+    pub fn grid(&self) -> &FilmGrid {
+        &self.grid
     }
 
-    /// What is stored.
-    pub fn layers(&self) -> LayerSet {
-        self.layers.set
+    /// The pixels whose samples reach the crop, on the grid.
+    pub fn sampled(&self) -> Crop {
+        self.grid.crop.grown(self.filter.border(), self.grid.area)
     }
 
     /// Which parts of the radiance are stored.
     pub fn parts(&self) -> PartNeeds {
-        self.layers.parts
+        self.layout.parts
     }
 
-    /// Names of the groups of lights.
-    pub fn light_groups(&self) -> &[String] {
-        &self.light_groups
+    /// How the noise of pixels' own samples becomes that of the picture.
+    pub fn variance_kernel(&self) -> VarianceKernel {
+        self.filter.variance_kernel()
     }
 
     /// The tiles, row by row.
@@ -119,14 +207,24 @@ impl Film {
         &mut self.tiles
     }
 
+    /// Samples of the picture's pixels.
+    pub fn samples(&self) -> u64 {
+        let places = self.grid.crop.pixels().filter_map(|(x, y)| self.tile_of(x, y));
+        places.map(|(tile, pixel)| u64::from(tile.samples[pixel])).sum()
+    }
+
     /// How many samples were not finite and therefore dropped.
     pub fn dropped_count(&self) -> u64 {
         self.tiles.iter().map(|tile| tile.dropped_count).sum()
     }
 
-    /// The first dropped samples, in the order of the tiles.
+    /// The first dropped samples of pixels of the full picture, in the order of the tiles.
     pub fn dropped(&self) -> Vec<DroppedSample> {
-        self.tiles.iter().flat_map(|tile| &tile.dropped).take(DROPPED_KEPT).copied().collect()
+        let within = |sample: &DroppedSample| {
+            let [x, y] = [sample.x.checked_sub(self.grid.offset)?, sample.y.checked_sub(self.grid.offset)?];
+            (x < self.shape.size[0] && y < self.shape.size[1]).then_some(DroppedSample { x, y, ..*sample })
+        };
+        self.tiles.iter().flat_map(|tile| &tile.dropped).filter_map(within).take(DROPPED_KEPT).collect()
     }
 
     /// Adds all samples of another film of the same picture, crop and layers.
@@ -136,90 +234,45 @@ impl Film {
         }
     }
 
-    /// The picture of the samples so far; a pixel without samples is black and without a surface.
-    ///
-    /// Colour and its parts are means over all samples and albedo is too (a miss counts as black); depth and position are means over the
-    /// samples that hit something; normals are averaged over those and normalised. Layers of surfaces have the filter's absolute
-    /// value as weight.
-    pub fn resolve(&self) -> Image {
-        let pixels = self.crop.area() as usize;
-        let (mut layers, mut firsts, mut channel) = (Vec::new(), Vec::new(), 0);
-        for (kind, group) in self.stored() {
-            let info = kind.info();
-            layers.push(Layer {
-                kind,
-                group: group.map(|group| self.light_groups[group].clone()),
-                data: vec![0.0; pixels * info.channels.len()],
-            });
-            firsts.push(match info.source {
-                Source::Part(part) => part as usize,
-                Source::LightGroups => self.layers.parts.first_group() + group.unwrap_or_default(),
-                _ => channel,
-            });
-            if matches!(info.source, Source::Surface(..)) {
-                channel += info.channels.len();
-            }
-        }
-        for (tile, from, to) in self.places() {
-            for (layer, &first) in layers.iter_mut().zip(&firsts) {
-                let info = layer.kind.info();
-                let out = &mut layer.data[to * info.channels.len()..(to + 1) * info.channels.len()];
-                tile.layer_at(from, info, first, out);
-            }
-        }
-        Image { size: self.size, crop: self.crop, overscan: 0, layers, coverage: self.coverage() }
+    /// The tile of a pixel in the film's coordinates and the pixel's index there, if the film has them.
+    #[inline]
+    pub(super) fn tile_of(&self, x: u32, y: u32) -> Option<(&FilmTile, usize)> {
+        let column = (x / self.tile_size).checked_sub(self.first[0]).filter(|column| *column < self.columns)?;
+        let row = (y / self.tile_size).checked_sub(self.first[1])?;
+        let tile = self.tiles.get((row * self.columns + column) as usize)?;
+        tile.area.contains(x, y).then(|| (tile, tile.index(x, y)))
     }
 
-    /// Every pixel of the picture: its tile, its index there and in the picture.
-    fn places(&self) -> impl Iterator<Item = (&FilmTile, usize, usize)> {
-        self.tiles.iter().flat_map(move |tile| {
-            let active = tile.active;
-            let all = (active.y..active.y + active.height).flat_map(move |y| (active.x..active.x + active.width).map(move |x| (x, y)));
-            all.map(move |(x, y)| {
-                let to = (y - self.crop.y) as usize * self.crop.width as usize + (x - self.crop.x) as usize;
-                (tile, tile.index(x, y), to)
-            })
-        })
-    }
-
-    /// The picture's layers, and of those of groups of lights, which.
-    fn stored(&self) -> impl Iterator<Item = (LayerKind, Option<usize>)> + '_ {
-        let all = self.layers.set.iter().filter(|info| !matches!(info.source, Source::Coverage | Source::Denoiser));
-        all.flat_map(|info| {
-            let groups = if matches!(info.source, Source::LightGroups) { self.layers.parts.light_groups as usize } else { 1 };
-            let is_group = matches!(info.source, Source::LightGroups);
-            (0..groups).map(move |group| (info.kind, is_group.then_some(group)))
-        })
-    }
-
-    fn coverage(&self) -> Option<Coverage> {
-        if !self.layers.set.needs_coverage() {
-            return None;
-        }
-        let mut counts = vec![None; self.crop.area() as usize];
-        for (tile, from, to) in self.places() {
-            counts[to] = tile.coverage.as_ref().map(|coverage| (coverage.of(from), tile.samples[from]));
-        }
-        Some(Coverage::new(counts.into_iter().map(Option::unwrap_or_default)))
+    /// Width and height of the cells, which lie on the full picture's grid.
+    pub(super) fn cell_size(&self) -> u32 {
+        self.layout.cell_size
     }
 }
 
-/// Bytes that a film with these layers holds for each pixel, with so many groups of lights; more with a filter that has negative lobes, and
-/// without the lists of shapes that layers of objects need.
-pub fn bytes_per_pixel(layers: LayerSet, light_groups: usize) -> usize {
-    let layers = FilmLayers::new(layers, light_groups);
-    let spread = if layers.set.contains(LayerKind::Variance) { size_of::<Spread>() } else { 0 };
-    let lists = if layers.set.needs_coverage() { size_of::<Vec<()>>() } else { 0 };
-    let counts = size_of::<u32>() * (1 + usize::from(layers.surface_channels > 0));
-    spread + lists + counts + size_of::<Sums<4>>() + size_of::<f64>() * (layers.surface_stride() + layers.part_stride())
+/// Bytes that a film holds for each pixel, without the borders of cells and the lists of shapes that layers of objects need.
+pub fn bytes_per_pixel(shape: &FilmShape) -> usize {
+    pixel_bytes(Layout::new(shape.layers, shape.light_groups.len(), &Filter::new(&shape.filter), 1))
+}
+
+fn pixel_bytes(layout: Layout) -> usize {
+    let filtered = size_of::<Sums<4>>() + size_of::<f64>() * layout.channel_stride();
+    let weights = if layout.is_weighted() { size_of::<Sums<1>>() } else { 0 };
+    let own = if layout.signed { filtered } else { 0 };
+    let spread = if layout.set.contains(LayerKind::Variance) { size_of::<Spread>() } else { 0 };
+    let lists = if layout.set.needs_coverage() { size_of::<Vec<()>>() } else { 0 };
+    let data = if layout.data_channels > 0 { size_of::<f32>() * (2 + layout.data_channels) } else { 0 };
+    filtered + weights + own + spread + lists + data + size_of::<u32>()
 }
 
 /// Asks for the film's memory in one piece first: many small requests would be granted long past what the machine has.
-fn check_memory(crop: &Crop, layers: FilmLayers) -> Result<()> {
-    let each = bytes_per_pixel(layers.set, layers.parts.light_groups as usize);
-    let bytes = usize::try_from(u128::from(crop.area()) * each as u128).unwrap_or(usize::MAX);
+fn check_memory(shape: &FilmShape, sampled: &Crop, layout: Layout) -> Result<()> {
+    let side = u128::from(layout.cell_size);
+    let entries = (side + 2 * u128::from(layout.border)).pow(2);
+    let bytes = u128::from(sampled.area()) * pixel_bytes(layout) as u128 * entries / (side * side);
+    let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
+    let Crop { width, height, .. } = shape.crop;
     crate::memory::fallible(|| Vec::<u8>::new().try_reserve_exact(bytes))
-        .map_err(|_| Error::OutOfMemory(format!("a film of {}x{} pixels needs {} MiB", crop.width, crop.height, bytes >> 20)))
+        .map_err(|_| Error::OutOfMemory(format!("a film of {width}x{height} pixels needs {} MiB", bytes >> 20)))
 }
 
 #[cfg(test)]

@@ -300,7 +300,9 @@ impl PathIntegrator {
         let found = world.resolve(ray, hits[i]);
         let Some(at) = &found else {
             let known = escapes.of(i - first, hits[i]);
-            if bounce > 0 || !self.hide_emitters {
+            let visible = bounce > 0 || (!self.hide_emitters && world.shows_background);
+            if visible {
+                sample.alpha = if bounce == 0 { world.background_alpha() } else { sample.alpha };
                 let light = self.clamped(path.throughput * self.escaped(world, path, ray.direction, known), bounce);
                 sample.radiance += light;
                 if LAYERS && self.sorts() {

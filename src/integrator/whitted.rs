@@ -65,8 +65,11 @@ impl Integrator for Whitted {
             let view = View { depth: 1, throughput: segment.transmittance, way: None };
             out.pixels[i] = match &segment.end {
                 Some(at) => PixelSample { radiance: self.shade(world, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
-                None if self.hide_emitters => PixelSample::default(),
-                None => PixelSample { radiance: segment.escaped(world, View { throughput: Rgb::WHITE, ..view }, &mut tally), alpha: 0.0 },
+                None if self.hide_emitters || !world.shows_background => PixelSample::default(),
+                None => PixelSample {
+                    radiance: segment.escaped(world, View { throughput: Rgb::WHITE, ..view }, &mut tally),
+                    alpha: world.background_alpha(),
+                },
             };
         }
     }

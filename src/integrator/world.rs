@@ -30,6 +30,8 @@ pub struct World<'a> {
     pub(super) media_bounds: Aabb,
     /// Width and height of the picture in pixels, if it is part of one.
     pub(super) picture: Option<[u32; 2]>,
+    /// Whether the camera sees light from infinity.
+    pub(super) shows_background: bool,
     cancel: Option<&'a Cancel<'a>>,
 }
 
@@ -45,8 +47,20 @@ impl<'a> World<'a> {
             division: None,
             media_bounds: super::media::bounds(scene),
             picture: None,
+            shows_background: true,
             cancel: None,
         }
+    }
+
+    /// Where the camera does not see light from infinity: the picture is transparent there.
+    pub fn without_background(self) -> Self {
+        Self { shows_background: false, ..self }
+    }
+
+    /// The picture's alpha where the camera sees no surface.
+    #[inline]
+    pub(super) fn background_alpha(&self) -> f32 {
+        if self.shows_background && !self.scene.lights.at_infinity().is_empty() { 1.0 } else { 0.0 }
     }
 
     /// With what says that batches are to be given up.

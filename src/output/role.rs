@@ -36,6 +36,7 @@ const PRECISE: &[&str] = &[
     "motionvector",
     "motionvectors",
     "vector",
+    "forward",
     "velocity",
     "samples",
     "stats",
@@ -93,7 +94,10 @@ mod tests {
             (Role::Color, "R G B Y albedo.R diffuse_direct.G View.Combined.B light_key.R beauty.red Ci.g RY"),
             (Role::Alpha, "A View.Combined.A albedo.a"),
             (Role::Direction, "N.X Ng.Z feature_normal.Y ViewLayer.Normal.X Ns.Y Tangent.X"),
-            (Role::Precise, "Z P.X uv.U uv.V UV.A motion.X ViewLayer.Depth.Z Vector.W stats.samples variance.R Variance.G u v depth.Z"),
+            (
+                Role::Precise,
+                "Z P.X uv.U uv.V UV.A motion.X forward.u ViewLayer.Depth.Z Vector.W stats.samples variance.R Variance.G u v depth.Z",
+            ),
             (Role::Id, "object_id.id material_id.id ViewLayer.Object Index.X IndexOB.X instance_id.id"),
             (Role::Crypto, "CryptoObject00.r ViewLayer.CryptoMaterial02.a cryptoAsset01.R CryptoObject.r uCryptoMine00.g"),
         ] {

@@ -14,7 +14,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::run::{Run, next_pass};
-use super::{BLOCK_SIZE, Batch, Job, Progress, RenderState, Stats, TILE_SIZE, weighted};
+use super::{BLOCK_SIZE, Batch, Job, Progress, RenderState, Stats, TILE_SIZE, radiance};
 use crate::film::{Crop, Film, FilmTile};
 use crate::integrator::RayCounts;
 
@@ -48,7 +48,7 @@ const BLOCK_PIXELS: u32 = BLOCK_SIZE * BLOCK_SIZE;
 /// Pairs of a block and a group in a batch.
 const BATCH_GROUPS: usize = (TILE_SIZE * TILE_SIZE / (BLOCK_PIXELS * GROUP)) as usize;
 
-/// The blocks of a picture's crop on the full picture's grid.
+/// The blocks of the pixels whose samples reach the picture, on the full picture's grid.
 #[derive(Clone, Debug)]
 pub(super) struct Blocks {
     /// First column and row.
@@ -137,23 +137,33 @@ impl Blocks {
     }
 
     fn estimate(&self, film: &Film) -> Estimate {
-        let mut variances = vec![0.0; self.done.len()];
-        let (mut squares, mut pixels) = (0.0, 0.0);
-        for tile in film.tiles() {
-            for index in self.of_tile(tile) {
-                let block = BlockVariance::new(tile, self.place(index));
-                let n = f64::from(self.done[index]);
-                variances[index] = block.mean * n;
-                squares += block.squares;
-                pixels += f64::from(block.pixels);
-            }
+        let statistics = PixelStatistics::new(self, film);
+        let kernel = film.variance_kernel();
+        let pixels = film.grid().crop.area() as f64;
+        // By the block whose samples cause it: the sum of the pixels' relative squared errors.
+        let mut errors = vec![0.0; self.done.len()];
+        let mut squares = 0.0;
+        for (x, y) in film.grid().crop.pixels() {
+            let target = statistics.of([x, y]);
+            let mut whole = 0.0;
+            kernel.for_each(film.sampled(), [x, y], |_, mean, _| whole += mean);
+            let mut error = 0.0;
+            kernel.for_each(film.sampled(), [x, y], |source, _, square| {
+                let variance = statistics.of(source).variance;
+                let relative: f64 = (0..3).map(|k| variance[k] * target.weight[k]).sum();
+                let part = relative / 3.0 * square / (whole * whole);
+                errors[self.index(source.map(|at| at / BLOCK_SIZE))] += part;
+                error += part;
+            });
+            squares += error * error;
         }
-        let count = variances.len() as f64;
-        let errors = variances.iter().zip(&self.done).map(|(v, n)| v / f64::from(*n));
-        let error = errors.clone().sum::<f64>() / count;
-        let spread = errors.map(|e| (e - error).powi(2)).sum::<f64>() / (count * (count - 1.0).max(1.0));
-        // The square of a normal deviate has a variance of 2.
-        let actual = 2.0 * squares / (pixels * pixels);
+        let count = errors.len() as f64;
+        let error = errors.iter().sum::<f64>() / pixels;
+        let of_blocks = errors.iter().map(|e| e * count / pixels);
+        let spread = of_blocks.clone().map(|e| (e - error).powi(2)).sum::<f64>() / (count * (count - 1.0).max(1.0));
+        // The square of a normal deviate has a variance of 2, and neighbours' deviates are correlated.
+        let actual = 2.0 * squares * kernel.correlation / (pixels * pixels);
+        let variances = of_blocks.zip(&self.done).map(|(e, n)| e * f64::from(*n)).collect();
         Estimate { variances, error, deviation: (spread + actual).sqrt() }
     }
 
@@ -190,7 +200,7 @@ impl Blocks {
         }
     }
 
-    /// Samples of the pixels within the crop, done and wanted.
+    /// Samples done and wanted.
     fn samples(&self, film: &Film) -> [u64; 2] {
         let mut sums = [0; 2];
         for tile in film.tiles() {
@@ -209,43 +219,59 @@ fn block_area(tile: &FilmTile, [x, y]: [u32; 2]) -> Crop {
     Crop { x: x * BLOCK_SIZE, y: y * BLOCK_SIZE, width: BLOCK_SIZE, height: BLOCK_SIZE }.intersection(&tile.active())
 }
 
-/// Relative variance of the pixels of a block.
-struct BlockVariance {
-    /// Mean over pixels and channels.
-    mean: f64,
-    /// Sum over pixels of the square of the mean over channels.
-    squares: f64,
-    pixels: u32,
+/// What a pixel's own samples say of it.
+#[derive(Clone, Copy, Debug, Default)]
+struct PixelStatistic {
+    /// Variance of their mean, by channel.
+    variance: [f64; 3],
+    /// What relates a squared error of the pixel to its colour, by channel.
+    weight: [f64; 3],
 }
 
-impl BlockVariance {
-    fn new(tile: &FilmTile, place: [u32; 2]) -> Self {
-        let area = block_area(tile, place);
-        let pixels = (area.y..area.y + area.height).flat_map(|y| (area.x..area.x + area.width).map(move |x| tile.index(x, y)));
-        let statistics: Vec<_> = pixels.map(|pixel| tile.group_statistics(pixel).unwrap_or_default()).collect();
-        let count = statistics.len() as f64;
-        let totals = [0, 1, 2].map(|k| statistics.iter().map(|(mean, _)| mean[k]).sum::<f64>());
-        let (mut sum, mut squares) = (0.0, 0.0);
-        for (mean, variance) in &statistics {
-            let relative: f64 = (0..3)
-                .map(|k| {
-                    // What makes a pixel uncertain may make it bright: the others of its block know better.
-                    let others = (totals[k] - mean[k]) / (count - 1.0).max(1.0);
-                    let color = if count > 1.0 { mean[k].abs().min(others.abs()) } else { mean[k] };
-                    variance[k] / (color * color + FLOOR)
-                })
-                .sum();
-            sum += relative / 3.0;
-            squares += (relative / 3.0).powi(2);
+/// By pixel whose samples reach the picture.
+struct PixelStatistics {
+    area: Crop,
+    pixels: Vec<PixelStatistic>,
+}
+
+impl PixelStatistics {
+    fn new(blocks: &Blocks, film: &Film) -> Self {
+        let area = film.sampled();
+        let mut all = Self { area, pixels: vec![PixelStatistic::default(); area.area() as usize] };
+        for tile in film.tiles() {
+            for index in blocks.of_tile(tile) {
+                let block = block_area(tile, blocks.place(index));
+                let statistics = || block.pixels().map(|(x, y)| tile.group_statistics(tile.index(x, y)).unwrap_or_default());
+                let totals = statistics().fold([0.0; 3], |sum, (mean, _)| [0, 1, 2].map(|k| sum[k] + mean[k]));
+                let count = block.area() as f64;
+                for ((x, y), (mean, variance)) in block.pixels().zip(statistics()) {
+                    let weight = [0, 1, 2].map(|k| {
+                        // What makes a pixel uncertain may make it bright: the others of its block know better.
+                        let others = (totals[k] - mean[k]) / (count - 1.0).max(1.0);
+                        let color = if count > 1.0 { mean[k].abs().min(others.abs()) } else { mean[k] };
+                        1.0 / (color * color + FLOOR)
+                    });
+                    let at = all.index([x, y]);
+                    all.pixels[at] = PixelStatistic { variance, weight };
+                }
+            }
         }
-        Self { mean: sum / count, squares, pixels: statistics.len() as u32 }
+        all
+    }
+
+    fn index(&self, [x, y]: [u32; 2]) -> usize {
+        (y - self.area.y) as usize * self.area.width as usize + (x - self.area.x) as usize
+    }
+
+    fn of(&self, pixel: [u32; 2]) -> &PixelStatistic {
+        &self.pixels[self.index(pixel)]
     }
 }
 
 /// Renders until the relative squared error is below `target`, or a pixel would get more samples than the settings allow.
 pub(super) fn render(run: &mut Run, state: &mut RenderState, target: f64) -> Stats {
     let mut stats = Stats::default();
-    let pixels = state.film.crop().area();
+    let pixels = state.film.sampled().area();
     let most = run.settings.spp.div_ceil(GROUP).max(PILOT);
     run.progress.start(PILOT * GROUP, pixels);
     tell_of_earlier_runs(run, state, target);
@@ -274,7 +300,7 @@ pub(super) fn render(run: &mut Run, state: &mut RenderState, target: f64) -> Sta
         debug_assert!(wanted >= done, "samples are never taken back");
         run.progress.plan(wanted, estimate.error, target);
     }
-    stats.samples = state.blocks.as_ref().map_or(0, |blocks| blocks.samples(&state.film)[0]);
+    stats.samples = state.film.samples();
     stats
 }
 
@@ -290,7 +316,7 @@ fn tell_of_earlier_runs(run: &Run, state: &RenderState, target: f64) {
 
 /// Renders what is wanted, in passes that end soon when asked to; says whether all of it is there.
 fn render_stage(run: &mut Run, state: &mut RenderState, stats: &mut Stats) -> bool {
-    let pixels = state.film.crop().area();
+    let pixels = state.film.sampled().area();
     let mut step = 1;
     loop {
         let RenderState { film, blocks: Some(blocks), rays, .. } = state else { return true };
@@ -370,22 +396,22 @@ fn render_groups(job: &Job, tile: &mut FilmTile, groups: &[([u32; 2], u32)], bat
                 continue;
             }
             let index = tile.index(x, y);
-            let (mut sum, mut weights, mut kept) = ([0.0; 3], 0.0, 0.0);
+            let (mut sum, mut kept) = ([0.0; 3], 0.0);
             for i in 0..GROUP {
                 let slot = g * (BLOCK_PIXELS * GROUP) as usize + (i * BLOCK_PIXELS + within) as usize;
-                let (sample, weight) = (batch.out.sample(slot), batch.weights[slot]);
-                if tile.add(index, group * GROUP + i, sample, weight) {
-                    let value = weighted(sample.pixel, weight);
+                if job.add(tile, (index, group * GROUP + i), slot, batch) {
+                    let value = radiance(&batch.out.pixels[slot]);
                     sum = [0, 1, 2].map(|k| sum[k] + value[k]);
-                    weights += f64::from(weight);
                     kept += 1.0;
                 }
             }
             if kept > 0.0 {
-                tile.add_group(index, sum.map(|s| s / kept), weights / kept);
+                tile.add_group(index, sum.map(|s| s / kept));
             }
             count += u64::from(GROUP);
         }
+        let corner = block_area(tile, block);
+        tile.flush(tile.index(corner.x, corner.y), &mut batch.splats);
     }
     count
 }

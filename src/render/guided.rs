@@ -12,7 +12,7 @@ use std::time::Instant;
 use super::limits::Limits;
 use super::plain::render_pass;
 use super::run::next_pass;
-use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats};
+use super::{BLOCK_SIZE, Job, Progress, RenderResult, Settings, Stats, TILE_SIZE};
 use crate::error::Result;
 use crate::film::{Film, FilmTile, LayerKind};
 use crate::guiding::Guide;
@@ -88,7 +88,7 @@ fn block_means(tile: &FilmTile) -> Vec<[f64; 3]> {
     let of_block = |pixels: Vec<usize>| {
         let mut sum = [0.0; 3];
         for mean in pixels.iter().map(|&pixel| tile.mean(pixel)) {
-            sum = [0, 1, 2].map(|k| sum[k] + f64::from(mean[k]) / pixels.len() as f64);
+            sum = [0, 1, 2].map(|k| sum[k] + mean[k] / pixels.len() as f64);
         }
         sum
     };
@@ -120,7 +120,7 @@ impl Picture {
     /// Adds a pass of so many samples per pixel; says by how much it is better than the first, variance times rays.
     fn add(&mut self, film: &Film, samples: u32, rays: &RayCounts) -> f64 {
         let variances: Vec<_> = film.tiles().iter().map(|tile| block_variances(tile, samples)).collect();
-        let pixels = film.crop().area() as f64;
+        let pixels = film.sampled().area() as f64;
         let pass = Pass { variances, rays: rays.total() as f64 / (pixels * f64::from(samples)) };
         let mut gain = 1.0;
         if let (Some(first), Some(last), true) = (&self.first, &self.last, samples >= 2) {
@@ -201,17 +201,20 @@ pub(super) fn render(
     progress: &dyn Progress,
     (stop, cancel): (&AtomicBool, &Cancel),
 ) -> Result<RenderResult> {
-    let mut picture = Picture::new(job.film(Some(LayerKind::Variance))?);
+    let mut shape = job.shape.clone();
+    shape.layers.insert(LayerKind::Variance);
+    let film = || Film::new(shape.clone(), TILE_SIZE);
+    let mut picture = Picture::new(film()?);
     let mut stats = Stats::default();
     let pixels = settings.crop.area();
-    progress.start(settings.spp, pixels);
+    progress.start(settings.spp, picture.film.sampled().area());
     let mut lessons = Lessons { guide: Some(Guide::new(job.world.accel.bounds(), 0.0)), since: 0 };
 
     let limits = Limits::new(settings, stop);
     let mut step = 1;
     while stats.spp_done < settings.spp && !stats.interrupted && !stats.time_limited {
         let count = stats.spp_done.max(FIRST_PASS).min(settings.spp - stats.spp_done);
-        let mut film = job.film(Some(LayerKind::Variance))?;
+        let mut film = film()?;
         let (mut done, mut rays) = (0, RayCounts::default());
         while done < count {
             let has_picture = stats.spp_done > 0;

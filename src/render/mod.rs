@@ -18,7 +18,7 @@ pub use exr_overrides::ExrOverrides;
 pub use progress::{Progress, Silent};
 pub use recipe::{Frame, Recipe};
 pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings, threads};
-pub use state::{Checkpoints, FilmShape, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
+pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 
 use std::sync::atomic::AtomicBool;
 
@@ -29,7 +29,8 @@ use crate::camera::FilmRows;
 use crate::desc::IntegratorDesc;
 use crate::error::{Error, Result};
 use crate::film::{
-    Crop, DroppedSample, Film, FilmTile, Filter, Image, LayerKind, LayerSet, PartNeeds, PixelSample, SampleBatch, SurfaceSample,
+    Crop, DroppedSample, Film, FilmGrid, FilmShape, FilmTile, Filter, FilterSample, Filtering, Image, LayerKind, LayerSet, PartNeeds,
+    PixelSample, SampleBatch, Splats, SurfaceSample,
 };
 use crate::integrator::{self, CameraSample, Cancel, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::light::LightGroups;
@@ -87,16 +88,34 @@ struct Job<'a> {
     integrator: Box<dyn Integrator>,
     setup: Setup,
     filter: Filter,
-    /// Names of the groups of lights, the last for lights in no group.
-    light_groups: Vec<String>,
-    layers: LayerSet,
-    crop: Crop,
-    /// Pixels on each side of what the camera shows.
+    /// The film for the picture.
+    shape: FilmShape,
+    /// Pixels on each side of the picture.
     overscan: u32,
     /// Width and height of what the camera shows.
     view: [u32; 2],
-    /// Width and height of the film.
-    size: [u32; 2],
+    /// Where the film's pixels are.
+    grid: FilmGrid,
+}
+
+/// The film for the picture of a scene.
+fn film_shape(scene: &Scene, settings: &Settings) -> FilmShape {
+    let mut shape = FilmShape {
+        light_groups: light_groups(scene),
+        filter: settings.filter,
+        overscan: settings.overscan,
+        ..FilmShape::new(settings.film_size(), settings.crop, settings.layers)
+    };
+    if settings.target_error.is_some() {
+        shape.layers.insert(LayerKind::Variance);
+        shape.block_size = Some(BLOCK_SIZE);
+    }
+    shape
+}
+
+/// Bytes that the film of a picture holds for each pixel, as [`film::bytes_per_pixel`](crate::film::bytes_per_pixel).
+pub fn film_bytes_per_pixel(scene: &Scene, settings: &Settings) -> usize {
+    crate::film::bytes_per_pixel(&film_shape(scene, settings))
 }
 
 /// The picture of a film, in these layers.
@@ -121,48 +140,41 @@ impl<'a> Job<'a> {
         let sampler = Sampler::new(settings.sampler, settings.seed);
         let wanted = |kind| settings.layers.contains(kind);
         let needs = SurfaceNeeds {
-            geometry: [LayerKind::Z, LayerKind::N, LayerKind::Ng, LayerKind::P].into_iter().any(wanted) || settings.layers.needs_coverage(),
+            // The distance decides which sample's data counts.
+            geometry: settings.layers.surfaces(Filtering::Nearest).next().is_some() || settings.layers.needs_coverage(),
             uv: wanted(LayerKind::Uv),
             motion: wanted(LayerKind::Motion),
             albedo: wanted(LayerKind::Albedo),
             features: wanted(LayerKind::FeatureAlbedo) || wanted(LayerKind::FeatureNormal),
         };
-        let light_groups = light_groups(scene);
+        let (shape, filter) = (film_shape(scene, settings), Filter::new(&settings.filter));
         let parts = PartNeeds {
             by_scattering: settings.layers.needs_parts(),
-            light_groups: if wanted(LayerKind::LightGroups) { light_groups.len() as u32 } else { 0 },
+            light_groups: if wanted(LayerKind::LightGroups) { shape.light_groups.len() as u32 } else { 0 },
         };
         let setup = Setup { sampler, needs, parts, side_by_side: settings.side_by_side, guide: None };
         let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
+        let world = if settings.transparent { world.without_background() } else { world };
         Self {
             world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
             integrator: integrator::build(&settings.integrator, setup.clone()),
             setup,
-            filter: Filter::new(&settings.filter),
-            light_groups,
-            layers: settings.layers,
-            crop: settings.crop,
+            grid: FilmGrid::new(&shape, &filter, TILE_SIZE),
+            shape,
             overscan: settings.overscan,
+            filter,
             view: settings.size,
-            size: settings.film_size(),
         }
-    }
-
-    /// A film for the picture, of the settings' layers and another.
-    fn film(&self, besides: Option<LayerKind>) -> Result<Film> {
-        let mut layers = self.layers;
-        besides.into_iter().for_each(|kind| layers.insert(kind));
-        Film::with_light_groups(self.size, self.crop, &layers, self.light_groups.clone(), TILE_SIZE)
     }
 
     /// The picture of a film, in the settings' layers.
     fn picture(&self, film: &Film) -> Image {
-        picture(film, self.layers, self.overscan)
+        picture(film, self.shape.layers, self.overscan)
     }
 
     /// Renders one sample of every pixel of the tile with this origin; `out` is in the order of [`slots`].
     fn render_batch(&self, origin: [u32; 2], sample: u32, batch: &mut Batch, counts: &mut RayCounts) {
-        let pixels = slots(self.size, origin).map(pixel_of_slot);
+        let pixels = slots(self.grid.area, origin).map(pixel_of_slot);
         self.render_samples(pixels.map(|[dx, dy]| ([origin[0] + dx, origin[1] + dy], sample)), batch, counts);
     }
 
@@ -181,7 +193,7 @@ impl<'a> Job<'a> {
             for i in 0..count {
                 let u = batch.numbers.of(i);
                 let filter = self.filter.sample([u[0], u[1]]);
-                batch.weights[start + i] = filter.weight;
+                batch.places[start + i] = filter;
                 for (k, offset) in filter.offset.to_array().into_iter().enumerate() {
                     batch.film.film[k][i] = batch.pixels[i][k] as i32 as f32 + 0.5 + offset;
                 }
@@ -197,7 +209,7 @@ impl<'a> Job<'a> {
         let mut count = 0;
         for ([x, y], sample) in samples.take(BATCH) {
             // Of what the camera shows; beyond its left and upper edge coordinates wrap.
-            let [x, y] = [x, y].map(|x| x.wrapping_sub(self.overscan));
+            let [x, y] = [x, y].map(|x| x.wrapping_sub(self.grid.offset + self.overscan));
             batch.pixels[count] = [x, y];
             batch.requests.pixels[count] = self.setup.sampler.pixel(x, y);
             batch.requests.samples[count] = sample;
@@ -234,36 +246,52 @@ impl<'a> Job<'a> {
     fn render_tile(&self, tile: &mut FilmTile, first: u32, count: u32, batch: &mut Batch) -> RayCounts {
         let mut counts = RayCounts::default();
         let active = tile.active();
+        let origin = tile.origin().map(|x| x / TILE_SIZE * TILE_SIZE);
         for sample in first..first + count {
-            self.render_batch(tile.origin(), sample, batch, &mut counts);
+            self.render_batch(origin, sample, batch, &mut counts);
             if self.world.has_given_up() {
                 break;
             }
-            for (i, slot) in slots(self.size, tile.origin()).enumerate() {
+            for (i, slot) in slots(self.grid.area, origin).enumerate() {
                 let [dx, dy] = pixel_of_slot(slot);
-                let (x, y) = (tile.origin()[0] + dx, tile.origin()[1] + dy);
+                let (x, y) = (origin[0] + dx, origin[1] + dy);
                 if active.contains(x, y) {
-                    let (pixel, out, weight) = (tile.index(x, y), batch.out.sample(i), batch.weights[i]);
-                    if tile.add(pixel, sample, out, weight) && tile.wants_groups() {
-                        tile.add_group(pixel, weighted(out.pixel, weight), f64::from(weight));
+                    let pixel = tile.index(x, y);
+                    if self.add(tile, (pixel, sample), i, batch) && tile.wants_groups() {
+                        tile.add_group(pixel, radiance(&batch.out.pixels[i]));
                     }
                 }
             }
+            let first = tile.index(active.x, active.y);
+            tile.flush(first, &mut batch.splats);
         }
         counts
     }
+
+    /// Adds a sample of a batch to the film; `false` if it was dropped. What is shared stays in the batch's splats.
+    #[inline]
+    fn add(&self, tile: &mut FilmTile, (pixel, sample): (usize, u32), slot: usize, batch: &mut Batch) -> bool {
+        let (value, place) = (batch.out.sample(slot), batch.places[slot]);
+        if self.filter.is_shared() {
+            tile.splat((pixel, sample), value, &self.filter, place, &mut batch.splats)
+        } else {
+            tile.add(pixel, sample, value, place.weight)
+        }
+    }
 }
 
-/// A sample's radiance with the filter's weight.
-fn weighted(sample: &PixelSample, weight: f32) -> [f64; 3] {
-    sample.radiance.to_array().map(|v| f64::from(v) * f64::from(weight))
+/// A sample's radiance.
+fn radiance(sample: &PixelSample) -> [f64; 3] {
+    sample.radiance.to_array().map(f64::from)
 }
 
 /// Buffers of one batch.
 struct Batch {
     samples: Vec<CameraSample>,
-    weights: Vec<f32>,
+    /// Of each sample, its place in the pixel and its weight.
+    places: Vec<FilterSample>,
     out: SampleBatch,
+    splats: Splats,
     pixels: [[u32; 2]; BATCH],
     film: FilmRows,
     requests: Requests,
@@ -275,8 +303,9 @@ impl Batch {
         let count = (TILE_SIZE * TILE_SIZE) as usize;
         Self {
             samples: Vec::with_capacity(count),
-            weights: vec![1.0; count],
+            places: vec![FilterSample { offset: Vec2::ZERO, weight: 1.0 }; count],
             out: SampleBatch::default(),
+            splats: Splats::default(),
             pixels: [[0; 2]; BATCH],
             film: FilmRows::default(),
             requests: Requests::default(),
@@ -293,12 +322,15 @@ fn pixel_of_slot(slot: u32) -> [u32; 2] {
     [block % blocks * BLOCK_SIZE + within % BLOCK_SIZE, block / blocks * BLOCK_SIZE + within / BLOCK_SIZE]
 }
 
-/// The slots of a batch: all of a tile, but at the edges of the full picture only blocks that reach into it.
-fn slots(size: [u32; 2], origin: [u32; 2]) -> impl Iterator<Item = u32> {
-    let blocks = [0, 1].map(|k| (size[k] - origin[k]).div_ceil(BLOCK_SIZE));
+/// The slots of a batch for the tile with this corner: of blocks that reach into the film's area.
+fn slots(area: Crop, origin: [u32; 2]) -> impl Iterator<Item = u32> {
+    let reaches = move |k: usize, start: u32, length: u32, at: u32| {
+        let block = origin[k] + at / BLOCK_SIZE * BLOCK_SIZE;
+        block + BLOCK_SIZE > start && block < start + length
+    };
     (0..TILE_SIZE * TILE_SIZE).filter(move |slot| {
         let [dx, dy] = pixel_of_slot(*slot);
-        dx / BLOCK_SIZE < blocks[0] && dy / BLOCK_SIZE < blocks[1]
+        reaches(0, area.x, area.width, dx) && reaches(1, area.y, area.height, dy)
     })
 }
 
@@ -403,11 +435,12 @@ pub fn replay(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, pixel
         return Err(Error::Usage("--pixel: with guiding, a sample depends on all that were before; replay it with --guiding off".into()));
     }
     let job = Job::new(scene, accel, settings);
+    let pixel = pixel.map(|x| x + job.grid.offset);
     let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
     let mut batch = Batch::new();
     job.render_batch(origin, sample, &mut batch, &mut RayCounts::default());
     let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
-    let place = slots(job.size, origin).position(|other| other == slot);
+    let place = slots(job.grid.area, origin).position(|other| other == slot);
     let replayed =
         |place: usize| Replayed { pixel: batch.out.pixels[place], surface: batch.out.surfaces.get(place).copied().unwrap_or_default() };
     place.map(replayed).ok_or_else(|| Error::Internal(format!("pixel {pixel:?} has no slot")))
@@ -428,13 +461,14 @@ mod tests {
 
     #[test]
     fn batches_have_every_pixel_of_the_picture_and_hardly_more() {
-        let count = |size, origin| slots(size, origin).count();
+        let count = |size, origin| slots(Crop::full(size), origin).count();
         assert_eq!([count([64, 64], [32, 32]), count([50, 37], [0, 0]), count([50, 37], [32, 32])], [1024, 1024, 5 * 2 * 16]);
+        assert_eq!(slots(Crop { x: 31, y: 30, width: 40, height: 40 }, [0, 0]).count(), 16);
         for size in [[1, 1], [50, 37], [33, 64]] {
             for pixel in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y])) {
                 let origin = pixel.map(|x| x / TILE_SIZE * TILE_SIZE);
                 let slot = slot_of_pixel([pixel[0] - origin[0], pixel[1] - origin[1]]);
-                assert!(slots(size, origin).any(|other| other == slot), "{size:?} {pixel:?}");
+                assert!(slots(Crop::full(size), origin).any(|other| other == slot), "{size:?} {pixel:?}");
             }
         }
     }

@@ -16,9 +16,10 @@ const FIRST_TILES: usize = 64;
 pub(super) fn render(run: &mut Run, state: &mut RenderState) -> Stats {
     let mut stats = Stats::default();
     let spp = run.settings.spp;
-    let pixels = state.film.crop().area();
-    run.progress.start(state.shard.samples(spp).len() as u32, pixels);
-    run.progress.resumed(pixels * u64::from(state.done));
+    let pixels = state.film.grid().crop.area();
+    let sampled = state.film.sampled().area();
+    run.progress.start(state.shard.samples(spp).len() as u32, sampled);
+    run.progress.resumed(sampled * u64::from(state.done));
     let all = state.film.tiles().len();
     let mut pass = Pass { samples: 1, tiles: if run.longest_pass().is_some() { FIRST_TILES.min(all) } else { all } };
     loop {

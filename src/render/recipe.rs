@@ -125,7 +125,7 @@ impl Recipe {
         let Settings { size: [width, height], overscan, crop, filter, spp, target_error, ref integrator, .. } = self.settings;
         let fault = |path: &str, message: &str| Error::Scene { file: file.to_owned(), path: path.to_owned(), message: message.to_owned() };
         let require = |valid: bool, path: &str, message: &str| if valid { Ok(()) } else { Err(fault(path, message)) };
-        check_film_and_integrator(&FilmDesc { width, height, crop: None, overscan, filter }, integrator, file)?;
+        check_film_and_integrator(&FilmDesc { width, height, overscan, filter, ..FilmDesc::default() }, integrator, file)?;
         let film = self.settings.film_size();
         require(crop.fits(film), "settings.crop", "must have an area and lie within the picture")?;
         require(overscan == 0 || crop == Crop::full(film), "settings.crop", "must be all of a picture with overscan")?;

@@ -40,6 +40,8 @@ pub struct Settings {
     pub crop: Crop,
     /// The pixel filter.
     pub filter: FilterDesc,
+    /// Whether the camera does not see light from infinity, and the picture is transparent there.
+    pub transparent: bool,
     /// How samples are chosen.
     pub sampler: SamplerKind,
     /// Samples per pixel; with a target error the most that a pixel gets.
@@ -94,6 +96,8 @@ pub struct Overrides {
     pub accel: Option<AccelKind>,
     /// `--no-depth-of-field`.
     pub no_depth_of_field: bool,
+    /// `--transparent`.
+    pub transparent: bool,
     /// `--sampler`.
     pub sampler: Option<SamplerKindDesc>,
     /// `--max-depth`.
@@ -141,6 +145,7 @@ impl Settings {
             overscan,
             crop: crop(desc, overrides, size, overscan)?,
             filter: desc.film.filter,
+            transparent: overrides.transparent || desc.film.transparent,
             sampler: overrides.sampler.unwrap_or(desc.sampler.kind).into(),
             spp: overrides.spp.unwrap_or(if overrides.target_error.is_some() { MOST_SAMPLES } else { desc.sampler.spp }),
             target_error: target_error(overrides)?,
@@ -377,6 +382,7 @@ mod tests {
             accel: Some(AccelKind::Linear),
             sampler: Some(SamplerKindDesc::Sobol),
             no_depth_of_field: true,
+            transparent: true,
             max_depth: Some(4),
             strategy: Some(StrategyDesc::Light),
             clamp: Some(2.5),
@@ -390,7 +396,7 @@ mod tests {
         let s = Settings::new(&scene(SCENE), &overrides).unwrap();
         assert_eq!((s.size, s.crop, s.threads), ([200, 80], Crop { x: 0, y: 0, width: 5, height: 6 }, 3));
         assert_eq!((s.sampler, s.spp, s.seed, s.accel), (SamplerKind::Sobol, 7, 1, AccelKind::Linear));
-        assert!(!s.depth_of_field && Settings::new(&scene(SCENE), &Overrides::default()).unwrap().depth_of_field);
+        assert!(s.transparent && !s.depth_of_field && Settings::new(&scene(SCENE), &Overrides::default()).unwrap().depth_of_field);
         // The same integrator: parameters that are not changed stay the scene's.
         let changed = IntegratorDesc::Path {
             max_depth: 4,

@@ -12,7 +12,6 @@ use crate::accel;
 use crate::bench::machine::{memory_in_use, reset_peak_memory};
 use crate::compile;
 use crate::error::{Error, Result};
-use crate::film;
 use crate::render::{self, Overrides, Settings, Silent};
 
 /// What a case took.
@@ -136,7 +135,7 @@ pub fn run_case(case: &Case) -> Result<Measured> {
         rays: stats.rays.total(),
         mesh_bytes: summary.geometry_bytes as u64,
         accelerator_bytes: accel.memory_bytes() as u64,
-        film_bytes_per_pixel: film::bytes_per_pixel(settings.layers, scene.light_groups.names().len() + 1) as u64,
+        film_bytes_per_pixel: render::film_bytes_per_pixel(&scene, &settings) as u64,
         memory,
     })
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use steradian::denoise::{self, Denoiser, FileOptions, Report, denoise_file};
+use steradian::desc::FilterSamplesDesc;
 use steradian::film::Image;
 use steradian::output::{self, FileUses, Format};
 use steradian::render::{Progress, Settings};
@@ -20,6 +21,7 @@ pub fn prepare(arguments: &RenderDenoiseArgs, settings: &mut Settings) -> Result
         return Ok(None);
     }
     denoise::add_features(&mut settings.layers);
+    settings.filter.samples_mut().get_or_insert(FilterSamplesDesc::Importance);
     Denoiser::open(arguments.oidn.oidn_library.as_deref(), settings.threads).map(Some)
 }
 

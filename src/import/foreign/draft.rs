@@ -12,6 +12,9 @@ use crate::desc::{
 use crate::import::{Assets, ImageData, MeshData, RgbImage};
 use crate::math::{DAffine3, DMat3, DVec3, Transform};
 
+/// What becomes of samplers of independent numbers.
+pub const SOBOL_FOR_INDEPENDENT: &str = "Sobol points: the same mean with less noise; --sampler independent for independent numbers";
+
 /// A scene under construction: names are made unique, and the places where things come from are kept for messages.
 #[derive(Debug, Default)]
 pub struct Draft {

@@ -191,16 +191,30 @@ impl EnvironmentMap {
     fn weights(&self, found_by: FoundBy) -> Vec<f64> {
         // Negative channels (of colours out of gamut) must not cancel others: such a texel is not black.
         let brightness = |t: Rgb| f64::from(t.map(f32::abs).luminance());
-        let cells = || (0..=self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
-        let mean = |(x, y): (usize, usize)| 0.25 * self.corners(x, y).map(brightness).iter().sum::<f64>();
+        let row = |y: usize| -> Vec<f64> { self.texels[y * self.width..(y + 1) * self.width].iter().map(|&t| brightness(t)).collect() };
         let solid_angle = |y: usize| (self.cosines[y] - self.cosines[y + 1]) * 2.0 * PI / self.width as f64;
+        let mut weights = Vec::with_capacity(self.width * (self.height + 1));
+        let mut upper = row(0);
+        for y in 0..=self.height {
+            let lower = row(y.min(self.height - 1));
+            let right = |x: usize| if x + 1 == self.width { 0 } else { x + 1 };
+            weights.extend((0..self.width).map(|x| 0.25 * (upper[x] + upper[right(x)] + lower[x] + lower[right(x)])));
+            upper = lower;
+        }
+        let rows =
+            |weights: &[f64]| -> f64 { weights.chunks(self.width).zip(0..).map(|(row, y)| row.iter().sum::<f64>() * solid_angle(y)).sum() };
         let found_without = match found_by {
             FoundBy::Lights => 0.0,
-            FoundBy::Both => cells().map(|cell| mean(cell) * solid_angle(cell.1)).sum::<f64>() / (4.0 * PI),
+            FoundBy::Both => rows(&weights) / (4.0 * PI),
         };
-        // Of an even image nothing but rounding would be left.
-        let left = |brightness: f64| if brightness > found_without * (1.0 + EVEN) { brightness - found_without } else { 0.0 };
-        cells().map(|cell| left(mean(cell)) * solid_angle(cell.1)).collect()
+        for (row, y) in weights.chunks_mut(self.width).zip(0..) {
+            for weight in row {
+                // Of an even image nothing but rounding would be left.
+                let left = if *weight > found_without * (1.0 + EVEN) { *weight - found_without } else { 0.0 };
+                *weight = left * solid_angle(y);
+            }
+        }
+        weights
     }
 
     fn density(&self, found_by: FoundBy) -> Option<&Piecewise2d> {

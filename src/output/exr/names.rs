@@ -51,6 +51,23 @@ pub fn plain_word(word: &str) -> String {
     if plain.starts_with(|c: char| c.is_ascii_digit()) { format!("_{plain}") } else { plain }
 }
 
+/// The channels of the layer `motion` and what the file says of them, where a profile's program expects others than ours: in pixels to the right and
+/// up, either from the begin of the shutter interval to its end, or from its middle to its begin and to its end.
+pub fn motion_channels(profile: ExrProfileDesc) -> Option<(&'static [&'static str], &'static str)> {
+    match profile {
+        ExrProfileDesc::Nuke => Some((
+            &["forward.u", "forward.v"],
+            "forward: motion of the nearest sample while the shutter is open, in pixels to the right and up; for VectorBlur with a shutter of 1",
+        )),
+        ExrProfileDesc::Blender => Some((
+            &["Vector.X", "Vector.Y", "Vector.Z", "Vector.W"],
+            "Vector: motion of the nearest sample in pixels to the right and up, from the middle of the shutter interval to its begin (X, Y) and to \
+             its end (Z, W); for Vector Blur with a shutter of 1",
+        )),
+        ExrProfileDesc::Default | ExrProfileDesc::Multipart => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

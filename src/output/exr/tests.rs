@@ -198,14 +198,14 @@ fn full_picture() -> Image {
     let pixels = 28 * 20;
     let key = |shape| ShapeKey { instance: ShapeKey::NO_INSTANCE, shape };
     // A quarter torus, half bunny in every pixel; the rest shows nothing.
-    let counts = [(key(0), 1), (key(1), 2), (ShapeKey::NONE, 1)];
+    let weights = vec![(key(0), 1.0), (key(1), 2.0), (ShapeKey::NONE, 1.0)];
     let mut layers = Vec::new();
     for info in LayerKind::ALL.iter().filter(|info| !matches!(info.source, crate::film::Source::Coverage)) {
         let data: Vec<f32> = (0..pixels * info.channels.len()).map(|i| (i % 101) as f32 / 64.0).collect();
         let groups: &[Option<&str>] = if info.kind == LayerKind::LightGroups { &[Some("key light"), Some("default")] } else { &[None] };
         layers.extend(groups.iter().map(|group| Layer { kind: info.kind, group: group.map(str::to_owned), data: data.clone() }));
     }
-    let coverage = Coverage::new(std::iter::repeat_n((&counts[..], 4), pixels));
+    let coverage = Coverage::new(std::iter::repeat_n(weights, pixels));
     Image { size, crop: Crop::full(size), overscan: 2, layers, coverage: Some(coverage) }
 }
 

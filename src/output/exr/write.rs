@@ -10,12 +10,12 @@ use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image
 use super::coverage::{self, Matte};
 use super::header_order::finish_headers;
 use super::metadata::{Common, Mattes, part_attributes, text};
-use super::names::{channel_name, plain_word};
+use super::names::{channel_name, motion_channels, plain_word};
 use super::plan::{self, PartKind};
 use super::plane::{Plane, Region, Source, planes};
 use crate::desc::{CryptoManifestDesc, ExrProfileDesc, OutputDesc};
 use crate::error::Result;
-use crate::film::{Crop, Identities, Image, LayerKind, LayerSet};
+use crate::film::{Crop, Identities, Image, Layer, LayerKind, LayerSet};
 use crate::output::color_space::REC709;
 use crate::output::{RenderInfo, write_atomically};
 
@@ -89,6 +89,10 @@ impl<'a> Contents<'a> {
         let wanted: LayerSet = output.layers.iter().collect();
         let mut contents = Self { sources: Vec::new(), mattes: Vec::new(), texts: Vec::new(), comments: Vec::new() };
         for layer in image.layers.iter().filter(|layer| wanted.contains(layer.kind) || layer.kind == LayerKind::Noisy) {
+            if layer.kind == LayerKind::Motion && motion_channels(output.profile).is_some() {
+                contents.add_motion(layer, output);
+                continue;
+            }
             let group = layer.group.as_ref().map(|group| format!("light_{}.", plain_word(group)));
             let names = match group {
                 Some(prefix) => layer.kind.info().channels.iter().map(|name| format!("{prefix}{name}")).collect(),
@@ -100,6 +104,19 @@ impl<'a> Contents<'a> {
             contents.add_covered(wanted, coverage, identities, output);
         }
         contents
+    }
+
+    /// Motion as the profile's program reads it: in pixels to the right and up.
+    fn add_motion(&mut self, layer: &Layer, output: &OutputDesc) {
+        let Some((names, comment)) = motion_channels(output.profile) else { return };
+        let data = layer.pixels().flat_map(|pixel| {
+            let [x, y] = [pixel[0], -pixel[1]];
+            // From the middle of the shutter interval back to its begin, and on to its end.
+            let halves = [-0.5 * x, -0.5 * y, 0.5 * x, 0.5 * y];
+            if names.len() == 2 { vec![x, y] } else { halves.to_vec() }
+        });
+        self.comments.push((PartKind::Utility, comment));
+        self.sources.push(Source { names: names.iter().map(|name| (*name).to_owned()).collect(), data: data.collect(), half: false });
     }
 
     fn add_covered(&mut self, wanted: LayerSet, coverage: &crate::film::Coverage, identities: &Identities, output: &OutputDesc) {

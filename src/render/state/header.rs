@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::container::Reader;
-use crate::desc::OutputDesc;
+use crate::desc::{MAX_FILTER_RADIUS, OutputDesc};
 use crate::error::Result;
-use crate::film::{Crop, Film, LayerSet};
+use crate::film::{Crop, FilmShape};
 use crate::import::SceneFingerprint;
 use crate::output::RenderInfo;
-use crate::render::{FINEST_SPP, Settings, TILE_SIZE};
+use crate::render::{BLOCK_SIZE, FINEST_SPP, Settings};
 use crate::scene::Scene;
 
 /// A part of the samples of every pixel: part `index` of `count`, from 1. All of them are part 1 of 1.
@@ -63,34 +63,6 @@ impl FromStr for Shard {
 
 /// The least that a file holds of a pixel, in bytes: the sums of colour and alpha.
 const LEAST_BYTES: u64 = 64;
-
-/// What a film holds.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FilmShape {
-    /// Width and height of the full picture in pixels.
-    pub size: [u32; 2],
-    /// The part that is there.
-    pub crop: Crop,
-    /// Its layers.
-    pub layers: LayerSet,
-    /// Names of the groups of lights.
-    pub light_groups: Vec<String>,
-}
-
-impl FilmShape {
-    /// Of this film.
-    pub fn of(film: &Film) -> Self {
-        Self { size: film.size(), crop: film.crop(), layers: film.layers(), light_groups: film.light_groups().to_vec() }
-    }
-
-    /// A black film of this shape.
-    ///
-    /// # Errors
-    /// As [`Film::new`].
-    pub fn film(&self) -> Result<Film> {
-        Film::with_light_groups(self.size, self.crop, &self.layers, self.light_groups.clone(), TILE_SIZE)
-    }
-}
 
 /// What a checkpoint or shard says of itself.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -163,8 +135,17 @@ impl Header {
             Some(format!("there is no shard {index} of {count}"))
         } else if self.done > self.spp {
             Some(format!("{} of {} samples per pixel are done", self.done, self.spp))
-        } else if x + width > full_width || y + height > full_height || (around > 0 && around >= full_width.min(full_height)) {
+        } else if x + width > full_width
+            || y + height > full_height
+            || (around > 0 && around >= full_width.min(full_height))
+            || full_width.max(full_height) > 1 << 30
+            || u64::from(self.film.overscan) > full_width.min(full_height)
+        {
             Some("its film is not within its picture".to_owned())
+        } else if !(self.film.filter.radius() > 0.0 && self.film.filter.radius() <= MAX_FILTER_RADIUS) {
+            Some("its pixel filter has no valid radius".to_owned())
+        } else if self.film.block_size.is_some_and(|size| size != BLOCK_SIZE) {
+            Some("its blocks of pixels have no valid size".to_owned())
         } else if self.info.identities.as_ref().is_some_and(|identities| !identities.is_ordered()) {
             Some("an instance is placed within itself".to_owned())
         } else if (width * height).saturating_mul(LEAST_BYTES) > bytes {

@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::container::Reader;
-use super::{FilmShape, Header, RenderState, Shard};
+use super::{Header, RenderState, Shard};
 use crate::error::{Error, Result};
+use crate::film::Film;
 use crate::integrator::RayCounts;
+use crate::render::TILE_SIZE;
 
 /// The picture of several shards.
 #[derive(Clone, Debug)]
@@ -42,7 +44,7 @@ pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
         let message = format!("{message}; --partial merges what is there");
         return Err(Error::Checkpoint { file: file.clone(), message });
     }
-    let film = headers[0].film.film().map_err(|error| match error {
+    let film = Film::new(headers[0].film.clone(), TILE_SIZE).map_err(|error| match error {
         error @ Error::OutOfMemory(_) => error,
         error => Error::Checkpoint { file: first.clone(), message: error.to_string() },
     })?;
@@ -106,7 +108,7 @@ fn lack(files: &[PathBuf], headers: &[Header]) -> Option<(PathBuf, String)> {
 /// Adds the samples of a file.
 fn add(state: &mut RenderState, file: &Path) -> Result<()> {
     let mut reader = Reader::open(file)?;
-    if reader.header().film != FilmShape::of(&state.film) {
+    if reader.header().film != *state.film.shape() {
         return Err(reader.fault("the film has other layers than that of the first file"));
     }
     for tile in state.film.tiles_mut() {

@@ -11,7 +11,7 @@ mod merge;
 
 pub use checkpoints::Checkpoints;
 pub use file::StateFile;
-pub use header::{FilmShape, Header, Shard};
+pub use header::{Header, Shard};
 pub use merge::{Merged, merge};
 
 use std::io::{self, Write};
@@ -21,9 +21,9 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::adaptive::Blocks;
-use super::{Settings, TILE_SIZE, light_groups};
+use super::{Settings, TILE_SIZE};
 use crate::error::{Error, Result};
-use crate::film::{Film, FilmTile, Image, LayerKind};
+use crate::film::{Film, FilmTile, Image};
 use crate::integrator::RayCounts;
 use crate::scene::Scene;
 use container::{Reader, Writer};
@@ -60,12 +60,8 @@ impl RenderState {
     /// # Errors
     /// As [`Film::new`].
     pub fn new(scene: &Scene, settings: &Settings, shard: Shard) -> Result<Self> {
-        let mut layers = settings.layers;
-        let blocks = settings.target_error.map(|_| Blocks::new(settings.crop));
-        if blocks.is_some() {
-            layers.insert(LayerKind::Variance);
-        }
-        let film = Film::with_light_groups(settings.film_size(), settings.crop, &layers, light_groups(scene), TILE_SIZE)?;
+        let film = Film::new(super::film_shape(scene, settings), TILE_SIZE)?;
+        let blocks = settings.target_error.map(|_| Blocks::new(film.sampled()));
         Ok(Self { film, shard, done: 0, tiles_ahead: 0, torn: false, complete: false, blocks, rays: RayCounts::default(), seconds: 0.0 })
     }
 
@@ -78,7 +74,7 @@ impl RenderState {
         let mut reader = Reader::open(path)?;
         fits(&reader, header)?;
         let mut state = Self::new(scene, settings, header.shard)?;
-        if reader.header().film != FilmShape::of(&state.film) {
+        if reader.header().film != *state.film.shape() {
             return Err(reader.fault("the film has other layers"));
         }
         (state.done, state.complete) = (reader.header().done, reader.header().complete);
@@ -112,7 +108,7 @@ impl RenderState {
             done: self.done,
             tiles_ahead: self.tiles_ahead as u64,
             complete: self.complete,
-            film: FilmShape::of(&self.film),
+            film: self.film.shape().clone(),
             rays: [camera, indirect, shadow],
             render_seconds,
             ..header.clone()

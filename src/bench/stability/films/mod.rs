@@ -14,7 +14,8 @@ use super::render::{Estimate, pixels, prepare, render, render_with};
 use super::{Effort, Outcome, sidak_level};
 use crate::accel::AccelKind;
 use crate::color::Rgb;
-use crate::film::{Crop, Film, Filter, Image, LayerKind, LayerSet, PixelSample, Sample, SurfaceSample};
+use crate::desc::{FilterDesc, FilterSamplesDesc};
+use crate::film::{Crop, Film, FilmShape, FilmTile, Filter, Image, LayerKind, LayerSet, PixelSample, Sample, Splats, SurfaceSample};
 use crate::render::Overrides;
 
 checks! {
@@ -39,12 +40,28 @@ fn gray(v: f32) -> PixelSample {
     PixelSample { radiance: Rgb::splat(v), alpha: 1.0 }
 }
 
-fn film(size: [u32; 2], crop: Crop, layers: &LayerSet, tile_size: u32) -> Film {
-    Film::new(size, crop, layers, tile_size).expect("crops of checks fit")
+fn film(shape: FilmShape, tile_size: u32) -> Film {
+    Film::new(shape, tile_size).expect("crops of checks fit")
 }
 
 fn one_pixel() -> Film {
-    film([1, 1], Crop::full([1, 1]), &LayerSet::COLOR, 16)
+    film(FilmShape::new([1, 1], Crop::full([1, 1]), LayerSet::COLOR), 16)
+}
+
+/// Adds samples of a pixel as renders do; `splats` is flushed after each.
+fn add(tile: &mut FilmTile, at: (usize, u32), value: &PixelSample, filter: &Filter, rng: &mut Rng, splats: &mut Splats) {
+    let place = filter.sample(rng.pair());
+    if filter.is_shared() {
+        tile.splat(at, value, filter, place, splats);
+        tile.flush(at.0, splats);
+    } else {
+        tile.add(at.0, at.1, value, place.weight);
+    }
+}
+
+/// Filters applied in both ways.
+fn filters() -> impl Iterator<Item = FilterDesc> {
+    [FilterSamplesDesc::Shared, FilterSamplesDesc::Importance].into_iter().flat_map(Filter::examples)
 }
 
 /// The mean of these values by a film of one pixel.
@@ -60,15 +77,16 @@ fn m3_constants(effort: Effort) -> Outcome {
     let mut rng = Rng::new(3);
     let (mut worst, mut short) = (0f64, 0);
     let error = |image: &Image| image.layers[0].data.iter().map(|v| f64::from((v - 1.0).abs())).fold(0.0, f64::max);
-    for (desc, tile_size) in Filter::EXAMPLES.iter().flat_map(|desc| [1, 7, 64].map(|size| (desc, size))) {
-        let filter = Filter::new(desc);
+    let mut splats = Splats::default();
+    for (desc, tile_size) in filters().flat_map(|desc| [1, 7, 64].map(|size| (desc, size))) {
+        let filter = Filter::new(&desc);
         for crop in [Crop::full([20, 13]), Crop { x: 3, y: 5, width: 11, height: 7 }] {
             for _ in 0..effort.pick(1, 40) {
-                let mut film = film([20, 13], crop, &LayerSet::COLOR, tile_size);
+                let mut film = film(FilmShape { filter: desc, ..FilmShape::new([20, 13], crop, LayerSet::COLOR) }, tile_size);
                 for tile in film.tiles_mut() {
                     for pixel in 0..tile.size().iter().product::<u32>() as usize {
                         for sample in 0..(1 + pixel as u32 % 5) {
-                            tile.add(pixel, sample, &gray(1.0), filter.sample(rng.pair()).weight);
+                            add(tile, (pixel, sample), &gray(1.0), &filter, &mut rng, &mut splats);
                         }
                     }
                 }
@@ -122,17 +140,18 @@ fn bytes(image: &Image) -> Vec<u8> {
 }
 
 /// A film whose tiles are filled in this order, each sample in that of its index.
-fn filled(order: &[usize]) -> Film {
-    let filter = Filter::new(&Filter::EXAMPLES[8]);
-    let mut film = film([40, 30], Crop::full([40, 30]), &LayerSet::FULL, 8);
+fn filled(order: &[usize], desc: &FilterDesc) -> Film {
+    let mut film = film(FilmShape { filter: *desc, ..FilmShape::new([40, 30], Crop::full([40, 30]), LayerSet::FULL) }, 8);
+    let (filter, mut splats) = (Filter::new(desc), Splats::default());
     for &tile in order {
-        let tile = &mut film.tiles_mut()[tile];
+        // Films of shared samples have more.
+        let Some(tile) = film.tiles_mut().get_mut(tile) else { continue };
         let [x, y] = tile.origin();
         let mut rng = Rng::new(u64::from(x * 64 + y));
         for sample in 0..5 {
             for pixel in 0..tile.size().iter().product::<u32>() as usize {
                 let value = gray((rng.magnitude(-3.0, 3.0)) as f32);
-                tile.add(pixel, sample, &value, filter.sample(rng.pair()).weight);
+                add(tile, (pixel, sample), &value, &filter, &mut rng, &mut splats);
             }
         }
     }
@@ -148,8 +167,10 @@ fn m4_same_bytes(effort: Effort) -> Outcome {
     let alone = of(1);
     let differ = [2, 3, 8].into_iter().filter(|&threads| bytes(&of(threads)) != bytes(&alone)).count();
 
-    let tiles: Vec<usize> = (0..filled(&[]).tiles().len()).collect();
-    let expected = bytes(&filled(&tiles).resolve());
+    let [of_lobes, shared] = [Filter::EXAMPLES[8], Filter::examples(FilterSamplesDesc::Shared)[8]];
+    let tiles: Vec<usize> = (0..filled(&[], &shared).tiles().len()).collect();
+    let pictures = |order: &[usize]| [&of_lobes, &shared].map(|desc| bytes(&filled(order, desc).resolve()));
+    let expected = pictures(&tiles);
     let mut rng = Rng::new(4);
     let mut orders = vec![tiles.iter().rev().copied().collect::<Vec<_>>()];
     for _ in 0..effort.pick(10, 1_000) {
@@ -157,7 +178,7 @@ fn m4_same_bytes(effort: Effort) -> Outcome {
         order.sort_by_cached_key(|_| rng.bits());
         orders.push(order);
     }
-    let shuffled = orders.iter().filter(|order| bytes(&filled(order).resolve()) != expected).count();
+    let shuffled = orders.iter().filter(|order| pictures(order) != expected).count();
     let files = files::differing_files(&[of(1), of(2), of(8)]);
     Outcome::new()
         .none("numbers of threads with other bits than one thread", differ)
@@ -218,7 +239,7 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
             _ => (gray(1.0), good, bad),
         }
     };
-    let mut film = film([8, 8], Crop::full([8, 8]), &LayerSet::FULL, 4);
+    let mut film = film(FilmShape::new([8, 8], Crop::full([8, 8]), LayerSet::FULL), 4);
     let (mut bad, mut taken, mut refused) = (0u64, 0, 0);
     for tile in film.tiles_mut() {
         for pixel in 0..16 {

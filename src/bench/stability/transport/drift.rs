@@ -4,7 +4,7 @@ use super::furnaces::glowing_sphere;
 use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::Plot;
-use crate::film::{Crop, Film, LayerSet, PartNeeds, SampleBatch};
+use crate::film::{Crop, Film, FilmShape, LayerSet, PartNeeds, SampleBatch};
 use crate::integrator::{self, CameraSample, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
@@ -83,7 +83,7 @@ fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let setup =
         Setup { sampler, needs: SurfaceNeeds::default(), parts: PartNeeds::default(), side_by_side: settings.side_by_side, guide: None };
     let integrator = integrator::build(&settings.integrator, setup);
-    let mut film = Film::new([WIDTH; 2], Crop::full([WIDTH; 2]), &LayerSet::COLOR, WIDTH).ok()?;
+    let mut film = Film::new(FilmShape::new([WIDTH; 2], Crop::full([WIDTH; 2]), LayerSet::COLOR), WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
     let mut out = SampleBatch::default();
     let (mut checkpoints, mut next) = (Vec::new(), 1);

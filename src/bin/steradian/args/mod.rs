@@ -238,6 +238,9 @@ pub struct RenderArgs {
     /// Render everything in focus, as if the camera had no lens
     #[arg(long, help_heading = "Picture")]
     pub no_depth_of_field: bool,
+    /// Do not show the background to the camera: alpha is 0 there
+    #[arg(long, help_heading = "Picture")]
+    pub transparent: bool,
     /// What finds hits: embree, bvh, kdtree, octree or linear, with options such as embree:high
     #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
@@ -350,6 +353,7 @@ impl RenderArgs {
             accel: self.accel,
             sampler: self.sampler,
             no_depth_of_field: self.no_depth_of_field,
+            transparent: self.transparent,
             max_depth: self.max_depth,
             strategy: self.strategy,
             clamp: self.clamp,
@@ -414,7 +418,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_overrides() {
         let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path --accel linear \
-                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic --no-depth-of-field -vv";
+                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic --no-depth-of-field --transparent -vv";
         let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
         let o = arguments.overrides(vec!["d.exr".to_owned()]);
         assert_eq!((o.spp, o.size, o.crop, o.threads, o.seed), (Some(5), Some([20, 10]), Some([1, 2, 3, 4]), Some(2), Some(9)));
@@ -428,7 +432,7 @@ mod tests {
             (vec![LayerDesc::Z, LayerDesc::Albedo], true, Some(-1.5), Some(ViewDesc::Filmic))
         );
         assert_eq!((o.outputs, o.default_outputs), (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()]));
-        assert!(o.guiding == Some(true) && o.no_depth_of_field);
+        assert!(o.guiding == Some(true) && o.no_depth_of_field && o.transparent);
         assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
     }
 

@@ -44,6 +44,7 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
             "comments",
             "fps",
             "no-depth-of-field",
+            "transparent",
             "view",
             "denoise",
             "define",

@@ -3,10 +3,9 @@
 use super::element::Element;
 use super::tree::{PluginId, Value};
 use super::{Reader, values};
-use crate::desc::{
-    CameraDesc, CameraKindDesc, FilterDesc, LensDesc, OutputDesc, PixelTypeDesc, SamplerKindDesc, TransformDesc, TransformStepDesc,
-};
+use crate::desc::{CameraDesc, CameraKindDesc, FilterDesc, LensDesc, OutputDesc, PixelTypeDesc, TransformDesc, TransformStepDesc};
 use crate::error::Result;
+use crate::import::foreign::draft::SOBOL_FOR_INDEPENDENT;
 use crate::math::{DAffine3, DMat3, DVec3};
 
 /// Mitsuba's camera looks along +Z with +X to the left of the picture; this turns ours into it.
@@ -22,10 +21,7 @@ impl Reader<'_> {
         };
         match element.one("sampler")? {
             Some(sampler) => self.sampler(sampler)?,
-            None => {
-                self.draft.desc.sampler.spp = 4;
-                self.draft.desc.sampler.kind = SamplerKindDesc::Independent;
-            }
+            None => self.draft.desc.sampler.spp = 4,
         }
         let map = element.transform("to_world")?;
         let near = element.float("near_clip")?.unwrap_or(1e-2);
@@ -105,7 +101,7 @@ impl Reader<'_> {
         }
         film.filter = match element.one("rfilter")? {
             Some(filter) => self.filter(filter)?,
-            None => FilterDesc::Gaussian { radius: 2.0, sigma: 0.5 },
+            None => FilterDesc::Gaussian { radius: 2.0, sigma: 0.5, samples: None },
         };
         if element.text("pixel_format")?.is_some_and(|format| format != "rgb") {
             element.ignored("pixel_format", "the picture has red, green and blue");
@@ -130,29 +126,29 @@ impl Reader<'_> {
     /// The film of a sensor without one.
     fn default_film(&mut self) -> f64 {
         let film = &mut self.draft.desc.film;
-        (film.width, film.height, film.filter) = (768, 576, FilterDesc::Gaussian { radius: 2.0, sigma: 0.5 });
+        (film.width, film.height, film.filter) = (768, 576, FilterDesc::Gaussian { radius: 2.0, sigma: 0.5, samples: None });
         768.0 / 576.0
     }
 
     fn filter(&mut self, id: PluginId) -> Result<FilterDesc> {
         let mut element = Element::new(self.document, id);
         let filter = match element.kind() {
-            "box" => FilterDesc::Box { radius: 0.5 },
-            "tent" => FilterDesc::Tent { radius: element.float("radius")?.unwrap_or(1.0) as f32 },
+            "box" => FilterDesc::Box { radius: 0.5, samples: None },
+            "tent" => FilterDesc::Tent { radius: element.float("radius")?.unwrap_or(1.0) as f32, samples: None },
             "gaussian" => {
                 let sigma = element.float("stddev")?.unwrap_or(0.5);
-                FilterDesc::Gaussian { radius: (4.0 * sigma) as f32, sigma: sigma as f32 }
+                FilterDesc::Gaussian { radius: (4.0 * sigma) as f32, sigma: sigma as f32, samples: None }
             }
             "mitchell" => {
                 let (b, c) = (element.float("B")?, element.float("C")?);
-                FilterDesc::Mitchell { radius: 2.0, b: b.unwrap_or(1.0 / 3.0) as f32, c: c.unwrap_or(1.0 / 3.0) as f32 }
+                FilterDesc::Mitchell { radius: 2.0, b: b.unwrap_or(1.0 / 3.0) as f32, c: c.unwrap_or(1.0 / 3.0) as f32, samples: None }
             }
             other => {
                 if other == "lanczos" {
                     element.float("lobes")?;
                     element.approximated("lobes", "a Catmull-Rom filter in place of Lanczos's");
                 }
-                FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5 }
+                FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5, samples: None }
             }
         };
         element.finish(&mut self.draft);
@@ -165,9 +161,11 @@ impl Reader<'_> {
         let seed = element.integer("seed")?.unwrap_or(0);
         // What stratifies the samples in other ways has the same mean: Sobol points do it here.
         element.boolean("jitter", true)?;
-        let kind = if element.kind() == "independent" { SamplerKindDesc::Independent } else { SamplerKindDesc::Sobol };
+        if element.kind() == "independent" {
+            element.approximated("", SOBOL_FOR_INDEPENDENT);
+        }
         let sampler = &mut self.draft.desc.sampler;
-        (sampler.spp, sampler.kind, sampler.seed) = (spp, kind, seed.unsigned_abs());
+        (sampler.spp, sampler.seed) = (spp, seed.unsigned_abs());
         element.finish(&mut self.draft);
         Ok(())
     }

@@ -1,9 +1,10 @@
 //! What comes before the world: film, filter, sampler, integrator.
 
 use super::params::Params;
-use crate::desc::{FilterDesc, IntegratorDesc, OutputDesc, PixelTypeDesc, SamplerKindDesc, StrategyDesc};
+use crate::desc::{FilterDesc, IntegratorDesc, OutputDesc, PixelTypeDesc, StrategyDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
+use crate::import::foreign::draft::SOBOL_FOR_INDEPENDENT;
 
 /// A directive with a type: `Film "rgb" ...`.
 #[derive(Clone, Debug)]
@@ -88,7 +89,7 @@ pub fn exposure(film: Option<&Typed>, shutter: [f64; 2]) -> Result<f64> {
 /// Sets the pixel filter.
 pub fn set_filter(draft: &mut Draft, filter: Option<&Typed>) -> Result<()> {
     let Some(Typed { kind, params }) = filter else {
-        draft.desc.film.filter = FilterDesc::Gaussian { radius: 1.5, sigma: 0.5 };
+        draft.desc.film.filter = FilterDesc::Gaussian { radius: 1.5, sigma: 0.5, samples: None };
         return Ok(());
     };
     let radius = |default: f64| -> Result<f32> {
@@ -100,13 +101,14 @@ pub fn set_filter(draft: &mut Draft, filter: Option<&Typed>) -> Result<()> {
         Ok((0.5 * (x + y)) as f32)
     };
     draft.desc.film.filter = match kind.as_str() {
-        "box" => FilterDesc::Box { radius: radius(0.5)? },
-        "triangle" => FilterDesc::Tent { radius: radius(2.0)? },
-        "gaussian" => FilterDesc::Gaussian { radius: radius(1.5)?, sigma: params.positive_or("sigma", 0.5)? as f32 },
+        "box" => FilterDesc::Box { radius: radius(0.5)?, samples: None },
+        "triangle" => FilterDesc::Tent { radius: radius(2.0)?, samples: None },
+        "gaussian" => FilterDesc::Gaussian { radius: radius(1.5)?, sigma: params.positive_or("sigma", 0.5)? as f32, samples: None },
         "mitchell" => FilterDesc::Mitchell {
             radius: radius(2.0)?,
             b: params.number_or("B", 1.0 / 3.0)? as f32,
             c: params.number_or("C", 1.0 / 3.0)? as f32,
+            samples: None,
         },
         "sinc" => {
             draft.approximated(&params.place, &params.element, "", "a Mitchell filter of radius 2");
@@ -114,7 +116,7 @@ pub fn set_filter(draft: &mut Draft, filter: Option<&Typed>) -> Result<()> {
             for name in ["xradius", "yradius", "tau"] {
                 params.ignore(name, "a Mitchell filter in place of sinc");
             }
-            FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0 }
+            FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0, samples: None }
         }
         other => return Err(params.error(format!("there is no pixel filter \"{other}\""))),
     };
@@ -133,7 +135,9 @@ pub fn set_sampler(draft: &mut Draft, sampler: Option<&Typed>) -> Result<()> {
         return Err(params.error(format!("pixelsamples must be at least 1, not {spp}")));
     }
     draft.desc.sampler.spp = spp as u32;
-    draft.desc.sampler.kind = if kind == "independent" { SamplerKindDesc::Independent } else { SamplerKindDesc::Sobol };
+    if kind == "independent" {
+        draft.approximated(&params.place, &params.element, "", SOBOL_FOR_INDEPENDENT);
+    }
     draft.desc.sampler.seed = params.integer_or("seed", 0)?.unsigned_abs();
     // Another order of random numbers gives the same picture.
     params.ignore("randomization", "points are Owen-scrambled");

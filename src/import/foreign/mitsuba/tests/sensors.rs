@@ -93,17 +93,17 @@ fn films_and_filters() {
     };
     let desc = film("");
     assert_eq!((desc.film.width, desc.film.height, desc.film.crop), (768, 576, None));
-    assert_eq!(desc.film.filter, FilterDesc::Gaussian { radius: 2.0, sigma: 0.5 });
+    assert_eq!(desc.film.filter, FilterDesc::Gaussian { radius: 2.0, sigma: 0.5, samples: None });
     let crop = r#"<integer name="crop_offset_x" value="3"/><integer name="crop_offset_y" value="4"/><integer name="crop_width" value="5"/>
         <integer name="crop_height" value="6"/><string name="component_format" value="float32"/><rfilter type="catmullrom"/>"#;
     let desc = film(crop);
     assert_eq!(desc.film.crop, Some([3, 4, 5, 6]));
-    assert_eq!(desc.film.filter, FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5 });
+    assert_eq!(desc.film.filter, FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5, samples: None });
     assert_eq!(desc.outputs[0].pixel_type, PixelTypeDesc::Float);
-    assert_eq!(film("<rfilter type=\"box\"/>").film.filter, FilterDesc::Box { radius: 0.5 });
-    assert_eq!(film("<rfilter type=\"tent\"/>").film.filter, FilterDesc::Tent { radius: 1.0 });
+    assert_eq!(film("<rfilter type=\"box\"/>").film.filter, FilterDesc::Box { radius: 0.5, samples: None });
+    assert_eq!(film("<rfilter type=\"tent\"/>").film.filter, FilterDesc::Tent { radius: 1.0, samples: None });
     let mitchell = r#"<rfilter type="mitchell"><float name="B" value="0.25"/><float name="C" value="0.5"/></rfilter>"#;
-    assert_eq!(film(mitchell).film.filter, FilterDesc::Mitchell { radius: 2.0, b: 0.25, c: 0.5 });
+    assert_eq!(film(mitchell).film.filter, FilterDesc::Mitchell { radius: 2.0, b: 0.25, c: 0.5, samples: None });
 }
 
 #[test]

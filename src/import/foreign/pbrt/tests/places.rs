@@ -176,7 +176,7 @@ fn parts_of_quadrics_are_ours() {
 fn options_are_pbrts_defaults_and_values() {
     let film = &read("WorldBegin").desc;
     assert_eq!((film.film.width, film.film.height, film.sampler.spp), (1280, 720, 16));
-    assert_eq!(film.film.filter, FilterDesc::Gaussian { radius: 1.5, sigma: 0.5 });
+    assert_eq!(film.film.filter, FilterDesc::Gaussian { radius: 1.5, sigma: 0.5, samples: None });
     assert!(matches!(film.integrator, IntegratorDesc::Path { max_depth: 6, .. }));
     let text = "Integrator \"path\" \"integer maxdepth\" 0 Sampler \"halton\" \"integer pixelsamples\" 7
         PixelFilter \"triangle\" \"float xradius\" 1 \"float yradius\" 1
@@ -184,7 +184,7 @@ fn options_are_pbrts_defaults_and_values() {
         WorldBegin";
     let desc = read(text).desc;
     assert!(matches!(desc.integrator, IntegratorDesc::Path { max_depth: 1, .. }));
-    assert_eq!((desc.sampler.spp, desc.film.filter), (7, FilterDesc::Tent { radius: 1.0 }));
+    assert_eq!((desc.sampler.spp, desc.film.filter), (7, FilterDesc::Tent { radius: 1.0, samples: None }));
     assert_eq!((desc.film.crop, desc.outputs[0].file.as_str()), (Some([10, 25, 40, 25]), "a.exr"));
 }
 

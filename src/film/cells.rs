@@ -1,0 +1,78 @@
+//! Where weighted samples are summed: pixels with a border that shared samples reach.
+
+use super::filter::Taps;
+
+/// The entries of a tile: its pixels in square cells, each with a border of entries for pixels of other cells that its samples reach. All samples of
+/// a cell's pixels are as many. Without a border, there is one cell, and its entries are the pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cells {
+    /// Width of the tile in pixels.
+    width: u32,
+    /// Cells in a row, and rows of cells.
+    count: [u32; 2],
+    /// Width and height of a cell in pixels, without the border.
+    size: [u32; 2],
+    border: u32,
+}
+
+impl Cells {
+    /// Of a tile of this width and height.
+    pub fn new(tile: [u32; 2], cell_size: u32, border: u32) -> Self {
+        let size = tile.map(|side| side.min(cell_size));
+        Self { width: tile[0], count: [tile[0].div_ceil(size[0]), tile[1].div_ceil(size[1])], size, border }
+    }
+
+    /// Number of entries.
+    pub fn entries(&self) -> usize {
+        (self.count[0] * self.count[1]) as usize * self.entries_of_cell()
+    }
+
+    /// Number of entries of one cell.
+    pub fn entries_of_cell(&self) -> usize {
+        self.stride() * (self.size[1] + 2 * self.border) as usize
+    }
+
+    /// Entries from one row of a cell to the next.
+    #[inline]
+    pub fn stride(&self) -> usize {
+        (self.size[0] + 2 * self.border) as usize
+    }
+
+    /// The cell of a pixel, which is counted row by row within the tile.
+    pub fn cell_of(&self, pixel: usize) -> usize {
+        let (x, y) = (pixel as u32 % self.width, pixel as u32 / self.width);
+        (y / self.size[1] * self.count[0] + x / self.size[0]) as usize
+    }
+
+    /// The entry of a pixel in its own cell.
+    #[inline]
+    pub fn entry_of(&self, pixel: usize) -> usize {
+        if self.border == 0 {
+            return pixel;
+        }
+        let (x, y) = (pixel as u32 % self.width, pixel as u32 / self.width);
+        let cell = (y / self.size[1] * self.count[0] + x / self.size[0]) as usize;
+        let row = (y % self.size[1] + self.border) as usize;
+        cell * self.entries_of_cell() + row * self.stride() + (x % self.size[0] + self.border) as usize
+    }
+
+    /// The entry of the pixel at this place of the tile in the cell of this column and row, whose border reaches it.
+    #[inline]
+    pub fn entry_in(&self, cell: [u32; 2], [x, y]: [i32; 2]) -> usize {
+        let [column, row] = [(cell[0], self.size[0], x), (cell[1], self.size[1], y)]
+            .map(|(cell, size, at)| (at - (cell * size) as i32 + self.border as i32) as usize);
+        (cell[1] * self.count[0] + cell[0]) as usize * self.entries_of_cell() + row * self.stride() + column
+    }
+
+    /// Calls `f` with every entry that a sample of the pixel with this entry reaches, and its weight there.
+    #[inline]
+    pub fn for_each_tap(&self, entry: usize, taps: &[Taps; 2], mut f: impl FnMut(usize, f32)) {
+        let stride = self.stride() as isize;
+        for row in 0..taps[1].count {
+            let first = entry as isize + (taps[1].first as isize + row as isize) * stride + taps[0].first as isize;
+            for column in 0..taps[0].count {
+                f((first + column as isize) as usize, taps[1].weights[row] * taps[0].weights[column]);
+            }
+        }
+    }
+}
