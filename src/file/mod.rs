@@ -7,7 +7,7 @@ mod input;
 mod lock;
 mod output;
 
-pub use input::{open, read, read_stream, read_to_string, without_mark};
+pub use input::{MARK, open, read, read_stream, read_to_string, skip_mark, without_mark};
 pub use lock::{Lock, Refusal};
 pub use output::{append, check_creatable, resolve, write_atomically, write_synchronized};
 
