@@ -2,6 +2,7 @@
 //! all. What is no regular file, such as `/dev/null` or a pipe, is written to and never replaced.
 
 mod aside;
+pub mod exr_blocks;
 pub mod exr_headers;
 mod input;
 mod lock;

@@ -214,12 +214,14 @@ pub fn bytes_per_pixel(layers: LayerSet, light_groups: usize) -> usize {
     spread + lists + counts + size_of::<Sums<4>>() + size_of::<f64>() * (layers.surface_stride() + layers.part_stride())
 }
 
-/// Asks for the film's memory in one piece first: many small requests would be granted long past what the machine has.
 fn check_memory(crop: &Crop, layers: FilmLayers) -> Result<()> {
     let each = bytes_per_pixel(layers.set, layers.parts.light_groups as usize);
     let bytes = usize::try_from(u128::from(crop.area()) * each as u128).unwrap_or(usize::MAX);
-    crate::memory::fallible(|| Vec::<u8>::new().try_reserve_exact(bytes))
-        .map_err(|_| Error::OutOfMemory(format!("a film of {}x{} pixels needs {} MiB", crop.width, crop.height, bytes >> 20)))
+    if crate::memory::is_available(bytes) {
+        Ok(())
+    } else {
+        Err(Error::OutOfMemory(format!("a film of {}x{} pixels needs {} MiB", crop.width, crop.height, bytes >> 20)))
+    }
 }
 
 #[cfg(test)]
