@@ -1,8 +1,11 @@
 //! What is done with bytes that claim to be a file: they are read as one, and what comes out is looked at. Used by the fuzz targets and by
 //! the test that replays their corpus.
 
+use std::collections::HashSet;
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
+use steradian::config::{self, Trust};
 use steradian::import::{self, ImportOptions, MeshData};
 use steradian::render::Recipe;
 
@@ -56,6 +59,18 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
                 assert_eq!(again.to_value(), value);
                 let settings = recipe.settings(1);
                 assert!(settings.crop.fits(settings.film_size()) && settings.spp > 0 && settings.threads == 1);
+            }
+        }
+        "config" => {
+            let file = write("steradian.toml", data);
+            let owner = file.metadata().expect("the file was written").uid();
+            for trust in [Trust::Project, Trust::User] {
+                let Ok(entries) = config::read(&file, trust, owner) else { continue };
+                let entries = entries.expect("the file belongs to its owner");
+                let keys: HashSet<&str> = entries.iter().map(|entry| entry.key.as_str()).collect();
+                assert_eq!(keys.len(), entries.len());
+                assert!(entries.is_sorted_by_key(|entry| entry.line));
+                assert!(trust == Trust::User || keys.iter().all(|key| config::trust(key) != Some(Trust::User)));
             }
         }
         _ => panic!("no kind {kind}"),

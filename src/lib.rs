@@ -15,7 +15,7 @@
 //! |---|---|
 //! | 0 | `id`, `error`, `memory`, `printable` |
 //! | 1 | `math`, `desc`, `file` |
-//! | 2 | `color`, `sampling`, `import` |
+//! | 2 | `color`, `sampling`, `import`, `config` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
 //! | 5 | `scene`, `convert`, `denoise` |
@@ -34,6 +34,7 @@ pub mod bsdf;
 pub mod camera;
 pub mod color;
 pub mod compile;
+pub mod config;
 pub mod convert;
 pub mod denoise;
 pub mod desc;

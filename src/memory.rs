@@ -15,6 +15,11 @@ pub fn fallible<T>(request: impl FnOnce() -> T) -> T {
     result
 }
 
+/// Whether so many bytes can be had in one piece. Many small requests would be granted long past what the machine has.
+pub fn is_available(bytes: usize) -> bool {
+    fallible(|| std::hint::black_box(Vec::<u8>::new()).try_reserve_exact(bytes).is_ok())
+}
+
 /// Whether this thread is in [`fallible`].
 pub fn is_fallible() -> bool {
     FALLIBLE.get()
@@ -23,6 +28,11 @@ pub fn is_fallible() -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_machine_has_all_bytes() {
+        assert!(is_available(1 << 20) && !is_available(1 << 60) && !is_available(usize::MAX));
+    }
 
     #[test]
     fn only_the_request_is_fallible() {

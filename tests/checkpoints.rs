@@ -463,8 +463,8 @@ fn faults_of_checkpoints_have_their_codes() {
     let whole = std::fs::read(folder.join("a.state")).unwrap();
     std::fs::write(folder.join("other"), "no checkpoint").unwrap();
     let cases = [
-        ("a.state --spp 2", 2, "--resume continues from it"),
-        ("other", 2, "there is such a file"),
+        ("a.state --spp 2", 2, "--resume continues it"),
+        ("other", 2, "the file exists"),
         ("other --resume", 6, "this is not a checkpoint"),
         ("scene.json --resume", 2, "scene.json (the scene) and scene.json (--checkpoint)"),
         ("missing/a.state", 5, "there is no folder missing"),

@@ -189,3 +189,32 @@ fn threads_that_cannot_be_started_are_one_error() {
         assert!(text.starts_with("error: ") && text.lines().count() == 1 && !text.contains("bug"), "{accel} {limit}: {text}");
     }
 }
+
+/// Of a picture of many layers no more is held than the channels looked at.
+#[test]
+fn large_exr_files_are_read_channel_by_channel() {
+    use exr::prelude::{
+        AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, Vec2,
+    };
+    use exr::prelude::{ImageAttributes, WritableImage};
+    let folder = tempfile::tempdir().unwrap();
+    let size = Vec2(512, 128);
+    let channel = |i: usize| {
+        let name = format!("layer{:02}.{}", i / 4, ["A", "B", "G", "R"][i % 4]);
+        AnyChannel::new(name.as_str(), FlatSamples::F32(vec![1.0 + i as f32; size.area()]))
+    };
+    let encoding = Encoding { compression: Compression::ZIP1, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let layer = Layer::new(size, LayerAttributes::default(), encoding, AnyChannels::sort((0..160).map(channel).collect()));
+    let image = Image::new(ImageAttributes::with_size(size), layer);
+    image.write().to_file(folder.path().join("large.exr")).unwrap();
+    drop(image);
+    let starts =
+        |megabytes: &i32| shell(folder.path(), &format!("ulimit -c 0; ulimit -v {megabytes}000; exec \"$0\" --version")).status.success();
+    let least = (40..400).step_by(10).find(starts).unwrap();
+    // All of it would be 42 MB; one thread, for others take address space of their own.
+    for (command, part) in [("compare large.exr large.exr", "512x256"), ("check-exr large.exr", "large.exr: ")] {
+        let line = format!("ulimit -c 0; ulimit -v {}000; exec taskset -c 0 \"$0\" {command}", least + 25);
+        let output = shell(folder.path(), &line);
+        assert!(String::from_utf8_lossy(&output.stdout).contains(part), "{command}: {:?} {}", output.status, told(&output));
+    }
+}

@@ -75,11 +75,11 @@ fn frames_that_are_there_are_skipped_unless_they_are_to_be_overwritten() {
     std::fs::write(folder.path().join("a.0003.exr"), "goes").unwrap();
     let output = run(folder.path(), "render a.json --frames 1-3 -o a.exr -o a.png");
     assert_eq!(output.status.code(), Some(0), "{}", told(&output));
-    assert!(told(&output).contains("1 frame is there already"), "{}", told(&output));
+    assert!(told(&output).contains("1 frame exists and is skipped"), "{}", told(&output));
     let size = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().len();
     assert!(size("a.0001.exr") > 5 && size("a.0002.exr") == 5 && size("a.0003.exr") > 5);
     let again = run(folder.path(), "render a.json --frames 1-3 -o a.exr -o a.png");
-    assert!(told(&again).contains("3 frames are there") && told(&again).ends_with("Progress: 100%\n"), "{}", told(&again));
+    assert!(told(&again).contains("3 frames exist") && told(&again).ends_with("Progress: 100%\n"), "{}", told(&again));
     assert!(run(folder.path(), "render a.json --frames 2 -o a.exr -o a.png --overwrite").status.success());
     assert!(size("a.0002.exr") > 5);
 }

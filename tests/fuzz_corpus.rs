@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use flate2::read::GzDecoder;
 
-const KINDS: [&str; 8] = ["scene_json", "obj", "ply", "image", "mitsuba_xml", "pbrt", "gltf", "recipe"];
+const KINDS: [&str; 9] = ["scene_json", "obj", "ply", "image", "mitsuba_xml", "pbrt", "gltf", "config", "recipe"];
 
 fn check(kind: &str, bytes: &[u8], folder: &Path, file: &Path) {
     let start = Instant::now();

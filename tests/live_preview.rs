@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use half::f16;
 use serde_json::{Value, json};
 use steradian::film::{Crop, Image, Layer, LayerKind};
-use steradian::live::{Fan, Live, Options, Preview, PreviewOptions, Snapshot, Statistics};
+use steradian::live::{Fan, Live, Options, Patience, Preview, PreviewOptions, Snapshot, Statistics};
 use steradian::render::Progress;
 
 use crate::util::program::{Running, Signal};
@@ -174,6 +174,41 @@ fn a_reader_that_takes_nothing_keeps_neither_the_render_nor_others_waiting() {
     let length = 2048 * 2048 * 4 * 2;
     Read::by_ref(&mut slow[0]).take(length).read_to_end(&mut body).unwrap();
     assert_eq!(body.len() as u64, length);
+}
+
+/// Neither one that takes a little now and then nor one that takes nothing.
+#[test]
+fn slow_readers_are_disconnected_and_keep_no_picture() {
+    let patience = Patience { stall: Duration::from_millis(300), least_rate: u64::MAX };
+    let options = PreviewOptions { patience, ..PreviewOptions::default() };
+    let preview = Preview::new(&options, "ball".to_owned(), Arc::new(Statistics::new(None))).unwrap();
+    // Far more than the buffers of a connection hold.
+    let layer = Layer::new(LayerKind::Color, vec![0.5; 2048 * 2048 * 4]);
+    let large = Image { size: [2048, 2048], crop: Crop::full([2048, 2048]), layers: vec![layer], ..Image::default() };
+    let old = Arc::new(Snapshot::new(&large, 1));
+    preview.show(&old);
+    let mut slow: Vec<TcpStream> = (0..2).map(|_| TcpStream::connect(address(&preview.url())).unwrap()).collect();
+    for stream in &mut slow {
+        stream.write_all(b"GET /layer?index=0 HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+        stream.read_exact(&mut [0]).unwrap();
+    }
+    preview.show(&Arc::new(Snapshot::new(&image(), 2)));
+    let held = Arc::downgrade(&old);
+    drop(old);
+    let (start, mut taken, mut piece) = (Instant::now(), [1usize; 2], vec![0; 1 << 16]);
+    while held.strong_count() > 0 {
+        assert!(start.elapsed() < Duration::from_secs(60));
+        // At this rate, all of it would take ten seconds.
+        taken[0] += slow[0].read(&mut piece).unwrap_or(0);
+        thread::sleep(Duration::from_millis(20));
+    }
+    for (stream, taken) in slow.iter_mut().zip(taken) {
+        let mut rest = Vec::new();
+        let _ = stream.read_to_end(&mut rest);
+        assert!(taken + rest.len() < 2048 * 2048 * 4 * 2, "{taken} and {}", rest.len());
+    }
+    // Those in time are served as before.
+    assert_eq!(get(address(&preview.url()), "/state").json()["picture_spp"], 2);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use steradian::film::{Image, LayerKind};
 
 use crate::bad_input::assert_error;
 use crate::util::folder::Folder;
+use crate::util::program::{run, told};
 
 /// A scene of everything with lengths, `s` times as large and moved by `offset`.
 fn scene(s: f64, offset: [f64; 3]) -> Value {
@@ -189,4 +190,60 @@ fn coincident_faces_of_an_emitter_are_one() {
     assert!(layer(&front, LayerKind::Color).iter().any(|&x| x > 0.5));
     assert_eq!(picture(json!([[0, 1, 2], [0, 3, 1]])), front);
     assert_eq!(picture(json!([[0, 3, 1], [0, 1, 2]])), picture(json!([[0, 3, 1]])));
+}
+
+/// One warning with the number and the first two shapes where another accelerator may meet another surface; none where it does not matter.
+#[test]
+fn coincident_faces_that_differ_are_one_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let face = |triangle: [usize; 3], material: &str| json!({ "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [triangle], "material": material });
+    let instanced = |x: f64| json!({ "object": "o", "transform": [{ "translate": [x, 0, 0] }] });
+    let warnings = |shapes: Vec<Value>, object: Vec<Value>| {
+        let scene = json!({
+            "camera": { "position": [0.25, 0.25, 4], "look_at": [0.25, 0.25, 0] },
+            "materials": {
+                "red": { "type": "diffuse", "albedo": [0.8, 0, 0] },
+                "crimson": { "type": "diffuse", "albedo": [0.8, 0, 0] },
+                "blue": { "type": "diffuse", "albedo": [0, 0, 0.8] }
+            },
+            "shapes": shapes,
+            "objects": { "o": { "shapes": object } },
+            "instances": [instanced(0.0), instanced(3.0)],
+            "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
+        });
+        std::fs::write(folder.path().join("faces.json"), scene.to_string()).unwrap();
+        let output = run(folder.path(), "info faces.json");
+        assert!(output.status.success(), "{}", told(&output));
+        told(&output).lines().filter(|line| line.contains("coincide")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let elsewhere = json!({ "type": "sphere", "radius": 0.1 });
+    let two = |a: Value, b: Value| warnings(vec![elsewhere.clone(), a, b], vec![elsewhere.clone()]);
+    for (first, second, warned) in [
+        (face([0, 1, 2], "red"), face([1, 2, 0], "blue"), true),
+        (face([0, 1, 2], "red"), face([0, 2, 1], "red"), true),
+        (face([0, 1, 2], "red"), face([1, 2, 0], "red"), false),
+        (face([0, 1, 2], "red"), face([1, 2, 0], "crimson"), false),
+    ] {
+        let lines = two(first.clone(), second.clone());
+        assert_eq!(lines.len(), usize::from(warned), "{first} {second}: {lines:?}");
+        for part in lines.iter().flat_map(|line| ["shapes[1]: 1 triangle coincides", "shapes[2]", "remove one"].map(|part| (line, part))) {
+            assert!(part.0.contains(part.1), "{part:?}");
+        }
+        // Of an object that is placed twice, once; and with none of another object or of the world.
+        assert_eq!(warnings(vec![elsewhere.clone()], vec![first.clone(), second.clone()]).len(), usize::from(warned));
+        assert_eq!(warnings(vec![first], vec![second]).len(), 0);
+    }
+    let mut apart = face([0, 1, 2], "blue");
+    apart["transform"] = json!([{ "translate": [0, 0, 1e-6] }]);
+    assert!(two(face([0, 1, 2], "red"), apart).is_empty());
+    let sides = |emission: Value| {
+        json!({ "type": "mesh", "triangles": [[6, 2, 1], [0, 2, 6]], "emission": emission,
+                "positions": [[-0.688, 0.6156, 0.7457], [-0.688, 0.6156, 0.7457], [-0.5833, -0.9415, -0.8049], [-0.8036, -0.7218, -0.0448],
+                              [0.5423, 0.1878, -0.2835], [0.9112, -0.5908, 0.243], [-0.6787, -0.1173, 0.0922]],
+                "transform": [{ "rotate": { "axis": [-0.1016, -0.0028, 0.2143], "degrees": 236.0464 } }] })
+    };
+    let within = warnings(vec![sides(Value::Null)], vec![elsewhere.clone()]);
+    assert!(within.len() == 1 && within[0].contains("shapes[0]: 1 triangle") && within[0].contains("of the same mesh"), "{within:?}");
+    // Those of emitters are dropped already.
+    assert!(warnings(vec![sides(json!({ "radiance": [11, 11, 11] }))], vec![elsewhere.clone()]).is_empty());
 }

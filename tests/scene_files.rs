@@ -1,13 +1,17 @@
 //! What scene files say reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
 
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
 use image::ImageBuffer;
 use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
 use steradian::bsdf::Bsdf;
 use steradian::compile::Summary;
+use steradian::config::{self, Trust};
 use steradian::geometry::{Mesh, Shape};
 use steradian::id::{PrimId, ShapeId};
-use steradian::import;
+use steradian::import::{self, ImportOptions};
 use steradian::integrator::World;
 use steradian::light::Light;
 use steradian::math::{DVec3, Ray, Vec2, Vec3};
@@ -333,4 +337,43 @@ fn the_summary_counts_what_is_there() {
     {
         assert!(features.contains(&json!(feature)), "{feature}");
     }
+}
+
+/// Some editors put a byte order mark before UTF-8.
+#[test]
+fn a_byte_order_mark_changes_nothing() {
+    let folder = Folder::new();
+    let files = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/regressions");
+    let named = |from: &str| std::fs::read(files.join(from)).unwrap();
+    let with = |mark: &str, content: &[u8]| [mark.as_bytes(), content].concat();
+    let marks = ["", "\u{feff}"];
+    for (from, name) in
+        [("scene_json/full", "a.json"), ("mitsuba_xml/min", "a.xml"), ("pbrt/box", "a.pbrt"), ("gltf/triangle.gltf", "a.gltf")]
+    {
+        let [plain, marked] = marks.map(|mark| {
+            let imported = import::read_scene(&folder.write(name, with(mark, &named(from))), &ImportOptions::default()).unwrap();
+            serde_json::to_value(&imported.desc).unwrap()
+        });
+        assert_eq!(plain, marked, "{name}");
+    }
+    for from in ["ply/ascii", "ply/big", "ply/little"] {
+        let [plain, marked] = marks.map(|mark| import::read_ply(&folder.write("a.ply", with(mark, &named(from)))).unwrap());
+        assert!(plain == marked && !plain.triangles.is_empty(), "{from}");
+    }
+    let [plain, marked] = marks.map(|mark| {
+        folder.write("a.mtl", format!("{mark}newmtl red\nKd 0.5 0 0\n"));
+        let obj = folder.write("a.obj", format!("{mark}mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+        format!("{:?}", import::read_obj(&obj, true).unwrap())
+    });
+    assert!(plain == marked && plain.contains("red"), "{marked}");
+    let [plain, marked] = marks.map(|mark| {
+        let ies = format!("{mark}TILT=NONE\n1 1000 1 2 1 1 1 0 0 0\n1 1 100\n0 90\n0\n100 50\n");
+        import::read_ies(&folder.write("a.ies", ies)).unwrap()
+    });
+    assert_eq!(plain, marked);
+    let [plain, marked] = marks.map(|mark| {
+        let file = folder.write("steradian.toml", format!("{mark}spp = 3\n"));
+        config::read(&file, Trust::Project, file.metadata().unwrap().uid()).unwrap().unwrap()
+    });
+    assert!(plain == marked && plain.len() == 1);
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: &[(u32, &[&str])] = &[
     (0, &["id", "error", "memory", "printable"]),
     (1, &["math", "desc", "file"]),
-    (2, &["color", "sampling", "import"]),
+    (2, &["color", "sampling", "import", "config"]),
     (3, &["geometry", "texture", "bsdf", "camera", "film", "guiding"]),
     (4, &["accel", "material", "medium", "opacity", "relief", "light", "output"]),
     (5, &["scene", "convert", "denoise"]),

@@ -8,6 +8,7 @@ mod machine;
 mod measure;
 mod mesh;
 mod naive;
+mod observed;
 mod record;
 pub mod report;
 mod reports;

@@ -5,12 +5,12 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
+use super::observed::{Call, Observed, Observer};
 use crate::accel::{Accelerator, Coherence};
 use crate::desc::IntegratorDesc;
 use crate::error::Result;
 use crate::film::Crop;
-use crate::geometry::Hit;
-use crate::math::{Aabb, Ray};
+use crate::math::Ray;
 use crate::render::{self, Settings, Silent};
 use crate::scene::Scene;
 
@@ -98,9 +98,9 @@ pub fn record(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, count
 }
 
 fn render_recorded(scene: &Scene, accel: &dyn Accelerator, settings: &Settings) -> Result<Vec<RaySet>> {
-    let recorder = Recorder { inner: accel, state: Mutex::default() };
-    render::render(scene, &recorder, settings, &Silent, &AtomicBool::new(false))?;
-    let state = recorder.state.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let observed = Observed { inner: accel, observer: Recorder::default() };
+    render::render(scene, &observed, settings, &Silent, &AtomicBool::new(false))?;
+    let state = observed.observer.0.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     let kinds = [RayKind::Camera, RayKind::Shadow, RayKind::FirstBounce, RayKind::DeepBounce];
     Ok(kinds.into_iter().zip(state.rays).map(|(kind, rays)| RaySet { kind, rays }).collect())
 }
@@ -114,11 +114,9 @@ fn thin(rays: &[Ray], count: usize) -> Vec<Ray> {
     (0..wanted).flat_map(|i| rays[i * runs / wanted * RUN..].iter().take(RUN)).copied().collect()
 }
 
-/// Hands rays on and keeps a copy. One thread at a time: which bounce a batch belongs to follows from the batches before it.
-struct Recorder<'a> {
-    inner: &'a dyn Accelerator,
-    state: Mutex<State>,
-}
+/// Keeps a copy of the rays. One thread at a time: which bounce a batch belongs to follows from the batches before it.
+#[derive(Default)]
+struct Recorder(Mutex<State>);
 
 #[derive(Default)]
 struct State {
@@ -128,47 +126,22 @@ struct State {
     rays: [Vec<Ray>; 4],
 }
 
-impl Recorder<'_> {
-    fn keep(&self, slot: impl FnOnce(&mut State) -> usize, rays: &[Ray]) {
-        let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let slot = slot(&mut state);
-        state.rays[slot].extend(rays.iter().filter(|ray| ray.is_valid()));
-    }
-}
-
-impl Accelerator for Recorder<'_> {
-    fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.inner.intersect(ray)
-    }
-
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.keep(|_| 1, std::slice::from_ref(ray));
-        self.inner.occluded(ray)
-    }
-
-    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
-        let slot = |state: &mut State| {
-            state.bounce = if coherence == Coherence::Coherent { 0 } else { state.bounce + 1 };
-            [0, 2, 3][state.bounce.min(2)]
+impl Observer for Recorder {
+    fn observe(&self, call: &Call, trace: &mut dyn FnMut()) {
+        let mut state = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let slot = match call.coherence {
+            _ if call.any_hit => Some(1),
+            // Single rays for the closest hit look again after a rounding artefact.
+            None => None,
+            Some(coherence) => {
+                state.bounce = if coherence == Coherence::Coherent { 0 } else { state.bounce + 1 };
+                Some([0, 2, 3][state.bounce.min(2)])
+            }
         };
-        self.keep(slot, rays);
-        self.inner.intersect_batch(rays, hits, coherence);
-    }
-
-    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
-        self.keep(|_| 1, rays);
-        self.inner.occluded_batch(rays, occluded, coherence);
-    }
-
-    fn bounds(&self) -> Aabb {
-        self.inner.bounds()
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.inner.memory_bytes()
-    }
-
-    fn description(&self) -> String {
-        self.inner.description()
+        if let Some(slot) = slot {
+            state.rays[slot].extend(call.rays.iter().filter(|ray| ray.is_valid()));
+        }
+        drop(state);
+        trace();
     }
 }

@@ -137,8 +137,7 @@ impl Coated {
         if wi.z * wo.z <= 0.0 {
             return None;
         }
-        let BsdfEval { value, pdf } = self.eval_from(wo, wi, coat_o, probability);
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        self.eval_from(wo, wi, coat_o, probability).sampled(wi)
     }
 
     /// Whether coat or base are rougher along one tangent than along the other.

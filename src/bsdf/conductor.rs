@@ -142,9 +142,7 @@ impl<D: Microfacets> Conductor<D> {
     /// The sample for a direction of the upper side, all lobes counted.
     #[inline]
     fn weigh(&self, wo: Vec3, o: Vec3, i: Vec3, at_once: f32) -> Option<BsdfSample> {
-        let BsdfEval { value, pdf } = self.eval_upper(o, i, at_once);
-        let wi = vec3(i.x, i.y, i.z.copysign(wo.z));
-        (i.z > 0.0 && pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        self.eval_upper(o, i, at_once).sampled(vec3(i.x, i.y, i.z.copysign(wo.z))).filter(|_| i.z > 0.0)
     }
 
     /// Alpha along both tangents.

@@ -140,9 +140,7 @@ impl Eon {
         if i.z <= MIN_COSINE {
             return None;
         }
-        let BsdfEval { value, pdf } = self.eval_upper(o, i);
-        let wi = vec3(i.x, i.y, i.z.copysign(wo.z));
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        self.eval_upper(o, i).sampled(vec3(i.x, i.y, i.z.copysign(wo.z)))
     }
 
     /// Never.

@@ -70,6 +70,15 @@ pub struct BsdfEval {
     pub pdf: f32,
 }
 
+impl BsdfEval {
+    /// The sample of the reflected direction `wi` that this value and density belong to; `None` if the density is 0.
+    #[inline(always)]
+    fn sampled(self, wi: Vec3) -> Option<BsdfSample> {
+        let Self { value, pdf } = self;
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+    }
+}
+
 /// Scattering at one point: all parameters are numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Bsdf {

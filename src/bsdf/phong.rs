@@ -89,8 +89,7 @@ impl Phong {
             return None;
         }
         let wi = vec3(i.x, i.y, i.z.copysign(wo.z));
-        let BsdfEval { value, pdf } = self.eval(wo, wi);
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        self.eval(wo, wi).sampled(wi)
     }
 
     /// Never.

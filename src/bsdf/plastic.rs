@@ -94,7 +94,7 @@ impl Plastic {
         let o = vec3(wo.x, wo.y, wo.z.abs());
         let coat_albedo = coat.albedo(o);
         let probability = self.coat_probability(coat_albedo);
-        let mut wi = if u_lobe < probability {
+        let i = if u_lobe < probability {
             if coat.is_smooth() {
                 return Some(Coat::mirrored(wo, coat_albedo, probability));
             }
@@ -102,15 +102,10 @@ impl Plastic {
         } else {
             warp::cosine_hemisphere(u)
         };
-        if wi.z <= 0.0 {
+        if i.z <= 0.0 {
             return None;
         }
-        let BsdfEval { value, pdf } = self.eval_upper(o, wi);
-        if pdf <= 0.0 {
-            return None;
-        }
-        wi.z = wi.z.copysign(wo.z);
-        Some(BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        self.eval_upper(o, i).sampled(vec3(i.x, i.y, i.z.copysign(wo.z)))
     }
 
     /// Whether the coat is rougher along one tangent than along the other.

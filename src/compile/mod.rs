@@ -3,6 +3,7 @@
 
 mod camera;
 mod check;
+mod coincident;
 mod composites;
 mod identities;
 mod keyframes;
@@ -81,12 +82,14 @@ fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
         geometry: Geometry::default(),
         surfaces: Vec::new(),
         opacities: Vec::new(),
+        paths: Vec::new(),
         lights: LightTable::default(),
         identities: IdentityTable::new(desc),
         space: RenderSpace::WORLD,
         object_spaces: Vec::new(),
     };
     builder.add_world(desc, &used)?;
+    builder.warn_of_coincident();
     for (i, light) in desc.lights.iter().enumerate() {
         let path = format!("lights[{i}]");
         let group = builder.lights.group(&builder.files, &path, light.group())?;
@@ -192,6 +195,8 @@ struct Builder {
     surfaces: Vec<Surface>,
     /// How much of each shape is there, if not all of it, by shape.
     opacities: Vec<Option<TextureId>>,
+    /// Where the scene has each shape.
+    paths: Vec<String>,
     lights: LightTable,
     identities: IdentityTable,
     /// Where everything is placed, once all shapes are known.

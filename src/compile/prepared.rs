@@ -288,6 +288,7 @@ impl Builder {
         self.surfaces.push(surface);
         self.identities.add_shape(identity);
         self.opacities.push(look.opacity);
+        self.paths.push(path);
         Ok(Some(id))
     }
 }

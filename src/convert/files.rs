@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Originals, folder_of, write_ply};
 use crate::error::{Error, Result};
-use crate::file::{self, write_atomically};
+use crate::file::{self, MARK, write_atomically};
 use crate::import::{Assets, ImageData, Imported, RgbImage, Samples};
 use crate::output::FileUses;
 
@@ -216,6 +216,7 @@ const START: u64 = 1 << 16;
 /// Refuses to copy what is not what its name says: a scene of a stranger could name any file, and who gets the copy would have it.
 fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
     let kind = path.extension().map(|e| e.to_string_lossy().to_uppercase()).unwrap_or_default();
+    let start = start.strip_prefix(MARK).unwrap_or(start);
     let has_line = |word: &str| start.split(|byte| *byte == b'\n').any(|line| line.trim_ascii_start().starts_with(word.as_bytes()));
     let is_image = || image::guess_format(start).is_ok();
     let is_so = match kind.as_str() {

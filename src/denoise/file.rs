@@ -6,11 +6,12 @@ use std::path::Path;
 use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers, WritableImage, f16, read};
 
-use super::layers::{Layers, Place, Rgb};
+use super::layers::{Layers, Rgb};
 use super::oidn::Triple;
 use super::prepared::Prepared;
 use super::{Denoiser, Report};
 use crate::error::{Error, Result};
+use crate::file::exr_blocks::{Place, check_memory};
 use crate::file::exr_headers::read_headers;
 use crate::file::{self, write_atomically};
 use crate::film::{LayerKind, Source};
@@ -27,6 +28,9 @@ const LIGHT_GROUP: &str = "light_";
 
 /// How far the parts' sum may be from the picture for them to be taken for its parts, of the picture's sum: 16-bit numbers round.
 const SUM_TOLERANCE: f64 = 0.01;
+
+/// Bytes a pixel for denoising beside the file: albedo, normals, colour before and after, and the original colour, of three floats each.
+const WORK_BYTES: usize = 5 * 12;
 
 /// What to do with a file.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +53,7 @@ pub struct FileOptions {
 pub fn denoise_file(denoiser: &Denoiser, input: &Path, output: &Path, options: &FileOptions) -> Result<Report> {
     let source = file::open(input).map_err(|e| Error::Missing { file: input.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: input.to_owned(), message };
-    read_headers(input).map_err(malformed)?;
+    check_memory(input, &read_headers(input).map_err(malformed)?, WORK_BYTES)?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     let mut file: FlatImage = reader.from_unbuffered(source).map_err(|e| malformed(e.to_string()))?;
     let plan = Plan::new(&file, options).map_err(malformed)?;

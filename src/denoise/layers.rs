@@ -2,12 +2,7 @@
 
 use ::exr::prelude::{FlatImage, Vec2};
 
-/// A channel of a part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
-    pub part: usize,
-    pub channel: usize,
-}
+use crate::file::exr_blocks::Place;
 
 /// Three channels of one part.
 pub type Rgb = [Place; 3];

@@ -21,7 +21,7 @@ pub struct Job {
     pub shards: u32,
     /// The frames of a sequence.
     pub frames: Option<FrameList>,
-    /// Whether frames that are there are rendered anew.
+    /// Whether frames whose files exist are rendered again.
     pub overwrite: bool,
     /// Seconds between checkpoints.
     pub every: u32,

@@ -1,7 +1,7 @@
 //! Files that are read.
 
 use std::fs::{File, Metadata};
-use std::io::{self, Read, Take};
+use std::io::{self, BufRead, Read, Take};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
@@ -52,13 +52,26 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
     String::from_utf8(without_mark(read(path)?)).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "the file is not UTF-8"))
 }
 
-/// The bytes of a text without the mark that some editors put before UTF-8.
+/// The byte order mark, which some editors put before UTF-8.
+pub const MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// The bytes of a text without a byte order mark.
 pub fn without_mark(mut bytes: Vec<u8>) -> Vec<u8> {
-    const MARK: &[u8] = "\u{feff}".as_bytes();
     if bytes.starts_with(MARK) {
         bytes.drain(..MARK.len());
     }
     bytes
+}
+
+/// A reader at its beginning, past a byte order mark.
+///
+/// # Errors
+/// The reader's.
+pub fn skip_mark<R: BufRead>(mut source: R) -> io::Result<R> {
+    if source.fill_buf()?.starts_with(MARK) {
+        source.consume(MARK.len());
+    }
+    Ok(source)
 }
 
 /// All bytes of a regular file or, up to 4 GiB, of a pipe. For files that the user names, not for those named by files: a pipe without a
@@ -91,6 +104,13 @@ mod tests {
         std::os::unix::fs::symlink("a", at("link")).unwrap();
         std::fs::write(at("marked"), "\u{feff}text\u{feff}").unwrap();
         assert_eq!(read_to_string(&at("marked")).unwrap(), "text\u{feff}");
+        for text in ["", "t", "text", "text\u{feff}"] {
+            for marked in [text.to_owned(), format!("\u{feff}{text}")] {
+                let mut read = String::new();
+                skip_mark(marked.as_bytes()).unwrap().read_to_string(&mut read).unwrap();
+                assert_eq!(read, text);
+            }
+        }
         assert_eq!((read(&at("a")).unwrap(), read_to_string(&at("link")).unwrap()), (b"text".to_vec(), "text".to_owned()));
         rustix::fs::mkfifoat(rustix::fs::CWD, at("pipe"), rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
         let _socket = UnixListener::bind(at("socket")).unwrap();

@@ -2,12 +2,13 @@
 //! all. What is no regular file, such as `/dev/null` or a pipe, is written to and never replaced.
 
 mod aside;
+pub mod exr_blocks;
 pub mod exr_headers;
 mod input;
 mod lock;
 mod output;
 
-pub use input::{open, read, read_stream, read_to_string, without_mark};
+pub use input::{MARK, open, read, read_stream, read_to_string, skip_mark, without_mark};
 pub use lock::{Lock, Refusal};
 pub use output::{append, check_creatable, resolve, write_atomically, write_synchronized};
 

@@ -264,15 +264,16 @@ fn pixel_bytes(layout: Layout) -> usize {
     filtered + weights + own + spread + lists + data + size_of::<u32>()
 }
 
-/// Asks for the film's memory in one piece first: many small requests would be granted long past what the machine has.
 fn check_memory(shape: &FilmShape, sampled: &Crop, layout: Layout) -> Result<()> {
     let side = u128::from(layout.cell_size);
     let entries = (side + 2 * u128::from(layout.border)).pow(2);
     let bytes = u128::from(sampled.area()) * pixel_bytes(layout) as u128 * entries / (side * side);
     let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
+    if crate::memory::is_available(bytes) {
+        return Ok(());
+    }
     let Crop { width, height, .. } = shape.crop;
-    crate::memory::fallible(|| Vec::<u8>::new().try_reserve_exact(bytes))
-        .map_err(|_| Error::OutOfMemory(format!("a film of {width}x{height} pixels needs {} MiB", bytes >> 20)))
+    Err(Error::OutOfMemory(format!("a film of {width}x{height} pixels needs {} MiB", bytes >> 20)))
 }
 
 #[cfg(test)]

@@ -76,8 +76,8 @@ impl Sector {
             // Outside by rounding: the nearer end.
             return if phi - self.phi_max <= TAU - phi { 1.0 } else { 0.0 };
         }
-        // Rounded so that -0.0, which the arctangent gives for y = -0.0, becomes 0.
-        phi.max(0.0) / self.phi_max
+        // The arctangent is -0.0 for y = -0.0; the maximum of that and 0 may be either.
+        if phi > 0.0 { phi / self.phi_max } else { 0.0 }
     }
 
     /// Cosine and sine of the angle `fraction * phi_max`.

@@ -2,11 +2,13 @@
 
 mod pfm;
 
+use std::io::BufReader;
 use std::path::Path;
 
-use exr::prelude::{ReadChannels, ReadLayers, Vec2};
+use exr::meta::header::Header;
 
 use super::AssetError;
+use crate::file::exr_blocks::{Place, Row, pixel_count, read_rows};
 use crate::file::exr_headers::read_headers;
 
 /// Pixels row by row from the top, linear RGB.
@@ -34,28 +36,23 @@ pub fn read_rgb_image(path: &Path) -> Result<RgbImage, AssetError> {
     }
 }
 
-/// More pixels than any environment has; a header that claims more is damaged.
-const MAX_PIXELS: u64 = 1 << 30;
-
+/// Reads the channels R, G and B of the first flat part that has them.
 fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR file: {e}"));
-    let open = || crate::file::open(path).map_err(|e| AssetError::missing(path, &e));
-    open()?;
+    let source = crate::file::open(path).map_err(|e| AssetError::missing(path, &e))?;
+    let headers = read_headers(path).map_err(|e| malformed(&e))?;
+    let choose = |(part, header): (usize, &Header)| {
+        let [r, g, b] = ["R", "G", "B"].map(|name| header.channels.list.iter().position(|channel| channel.name == *name));
+        Some([r?, g?, b?].map(|channel| Place { part, channel }))
+    };
+    let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
+    let wanted = flat.filter_map(choose).next().ok_or_else(|| malformed(&"there are no channels R, G and B"))?;
+    let header = &headers[wanted[0].part];
     // The size is believed only after a look: memory is asked for before any pixel is read.
-    for header in &read_headers(path).map_err(|e| malformed(&e))? {
-        let size = header.layer_size;
-        if size.width() as u64 * size.height() as u64 > MAX_PIXELS {
-            return Err(malformed(&format!("{} x {} pixels are too many", size.width(), size.height())));
-        }
-    }
-    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().rgba_channels(
-        |size: Vec2<usize>, _: &_| RgbImage { width: size.width(), height: size.height(), pixels: vec![[0.0; 3]; size.area()] },
-        |image: &mut RgbImage, at: Vec2<usize>, (r, g, b, _a): (f32, f32, f32, f32)| {
-            image.pixels[at.y() * image.width + at.x()] = [r, g, b];
-        },
-    );
-    let image = reader.first_valid_layer().all_attributes().from_unbuffered(open()?);
-    image.map(|image| image.layer_data.channel_data.pixels).map_err(|e| malformed(&e))
+    let mut pixels = vec![[0.0; 3]; pixel_count(header).map_err(|e| malformed(&e))?];
+    let keep = |row: Row| row.write(pixels[row.start..].iter_mut().map(|pixel| &mut pixel[row.wanted]), |v| v);
+    read_rows(BufReader::new(source), &headers, &wanted, false, keep).map_err(|e| malformed(&e))?;
+    Ok(RgbImage { width: header.layer_size.width(), height: header.layer_size.height(), pixels })
 }
 
 fn read_hdr(path: &Path) -> Result<RgbImage, AssetError> {

@@ -119,7 +119,7 @@ fn file_hash(path: &Path) -> Result<String, AssetError> {
 
 /// The MTL files that an OBJ names and their images, as far as they exist.
 fn files_of_obj(path: &Path) -> Result<BTreeSet<PathBuf>, AssetError> {
-    let read = |path: &Path| crate::file::read(path).map_err(|e| AssetError::missing(path, &e));
+    let read = |path: &Path| crate::file::read(path).map(crate::file::without_mark).map_err(|e| AssetError::missing(path, &e));
     let obj = read(path)?;
     let mut files = BTreeSet::new();
     for line in obj.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii_start().starts_with(b"mtllib")) {

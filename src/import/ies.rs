@@ -23,7 +23,7 @@ const MAX_VALUES: usize = 1 << 22;
 /// # Errors
 /// If the file is missing or malformed, with the line; or not of type C.
 pub fn read_ies(path: &Path) -> Result<IesData, AssetError> {
-    let bytes = crate::file::read(path).map_err(|e| AssetError::missing(path, &e))?;
+    let bytes = crate::file::without_mark(crate::file::read(path).map_err(|e| AssetError::missing(path, &e))?);
     // Old files name their makers in whatever encoding.
     parse(&String::from_utf8_lossy(&bytes)).map_err(AssetError::Malformed)
 }

@@ -3,11 +3,14 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use exr::meta::MetaData;
+use exr::meta::attribute::SampleType;
 use half::f16;
 use image::{DynamicImage, ImageFormat, ImageReader};
 
 use super::AssetError;
 use super::jpeg_check::is_whole_jpeg;
+use crate::file::exr_blocks::{Place, Row, read_rows};
 use crate::file::exr_headers::check_claims;
 
 /// An image as a file has it, row by row from the top.
@@ -140,40 +143,33 @@ fn in_half_if_exact(samples: Vec<f32>) -> Samples {
     }
 }
 
+/// Reads the channels of the first flat part: R, G and B, or Y, or the only one, and alpha.
 fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
-    use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
-
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable EXR image: {e}"));
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| malformed(&e))?;
-    for header in &meta.headers {
-        check_size(header.layer_size.width(), header.layer_size.height()).map_err(AssetError::Malformed)?;
-    }
-    check_claims(&meta.headers, bytes.len() as u64).map_err(|e| malformed(&e))?;
-    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
-    let layer = reader.from_buffered(Cursor::new(bytes)).map_err(|e| malformed(&e))?.layer_data;
+    let headers = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| malformed(&e))?.headers;
+    check_claims(&headers, bytes.len() as u64).map_err(|e| malformed(&e))?;
+    let part = headers.iter().position(|header| !header.deep).ok_or_else(|| malformed(&"deep data is unsupported"))?;
+    let (all, size) = (&headers[part].channels.list, headers[part].layer_size);
+    check_size(size.width(), size.height()).map_err(AssetError::Malformed)?;
 
-    let all = &layer.channel_data.list;
-    let find = |name: &str| all.iter().find(|channel| channel.name.to_string().eq_ignore_ascii_case(name));
+    let find = |name: &str| all.iter().position(|channel| channel.name.to_string().eq_ignore_ascii_case(name));
     let mut chosen = match (find("R"), find("G"), find("B"), find("Y")) {
         (Some(r), Some(g), Some(b), _) => vec![r, g, b],
         (.., Some(y)) => vec![y],
-        _ if all.len() == 1 => vec![&all[0]],
+        _ if all.len() == 1 => vec![0],
         _ => return Err(AssetError::Malformed("the EXR image has several channels, but neither R, G and B nor Y".into())),
     };
     chosen.extend(find("A"));
-    let (width, height, channels) = (layer.size.width(), layer.size.height(), chosen.len());
-    let samples = if chosen.iter().all(|channel| matches!(channel.sample_data, FlatSamples::F16(_))) {
+    let wanted: Vec<Place> = chosen.iter().map(|&channel| Place { part, channel }).collect();
+    let (width, height, channels) = (size.width(), size.height(), chosen.len());
+    let read = |keep: &mut dyn FnMut(Row)| read_rows(Cursor::new(bytes), &headers, &wanted, false, keep).map_err(|e| malformed(&e));
+    let samples = if chosen.iter().all(|&channel| all[channel].sample_type == SampleType::F16) {
         let mut out = vec![f16::ZERO; width * height * channels];
-        for (k, channel) in chosen.iter().enumerate() {
-            let FlatSamples::F16(values) = &channel.sample_data else { continue };
-            out.iter_mut().skip(k).step_by(channels).zip(values).for_each(|(out, value)| *out = *value);
-        }
+        read(&mut |row| row.write(out[channels * row.start + row.wanted..].iter_mut().step_by(channels), f16::from_f32))?;
         Samples::F16(out)
     } else {
         let mut out = vec![0.0; width * height * channels];
-        for (k, channel) in chosen.iter().enumerate() {
-            out.iter_mut().skip(k).step_by(channels).zip(channel.sample_data.values_as_f32()).for_each(|(out, value)| *out = value);
-        }
+        read(&mut |row| row.write(out[channels * row.start + row.wanted..].iter_mut().step_by(channels), |v| v))?;
         in_half_if_exact(out)
     };
     Ok(ImageData { width, height, channels, samples })

@@ -28,7 +28,7 @@ const INDICES: [&str; 2] = ["vertex_indices", "vertex_index"];
 const AT_ONCE: usize = 1 << 14;
 
 fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
-    let mut reader = Reader::new(source);
+    let mut reader = Reader::new(crate::file::skip_mark(source).map_err(|e| malformed("", &e))?);
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(|e| malformed("", &e))?;
     let mut mesh = MeshData::default();
     // Those of types that `f32` does not hold.

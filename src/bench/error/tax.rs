@@ -7,12 +7,11 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::plan::{ErrorOptions, Subject};
-use crate::accel::{AccelKind, Accelerator, Coherence, EmbreeAccel, EmbreeOptions, EmbreeReplay};
+use crate::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeOptions, EmbreeReplay};
+use crate::bench::observed::{Call, Observed, Observer};
 use crate::bench::{Watch, median_and_range};
 use crate::error::{Error, Result};
 use crate::film::Crop;
-use crate::geometry::Hit;
-use crate::math::{Aabb, Ray};
 use crate::render::{self, Settings, Silent};
 use crate::scene::Scene;
 
@@ -78,14 +77,15 @@ pub(super) fn bench_tax(scene: &Scene, options: &ErrorOptions, watch: &dyn Watch
     let one = Settings { spp: 1, seed: options.seed, time_limit: None, ..settings.clone() };
     let first = render::render(scene, &accel, &one, &Silent, stop)?.stats;
     let settings = within(&one, first.rays.total());
-    let recorder = Recorder { inner: &accel, replay: Mutex::new(EmbreeReplay::new(&accel)), hits: AtomicU64::new(0) };
+    let recorder = Recorder { replay: Mutex::new(EmbreeReplay::new(&accel)), hits: AtomicU64::new(0) };
+    let observed = Observed { inner: &accel, observer: recorder };
     // One thread, so that rays stay in their order.
-    let recorded = render::render(scene, &recorder, &Settings { threads: 1, ..settings.clone() }, &Silent, stop)?;
+    let recorded = render::render(scene, &observed, &Settings { threads: 1, ..settings.clone() }, &Silent, stop)?;
     if first.interrupted || recorded.stats.interrupted {
         return Ok(None);
     }
-    let expected = recorder.hits.load(Ordering::Relaxed);
-    let replay = recorder.replay.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let expected = observed.observer.hits.load(Ordering::Relaxed);
+    let replay = observed.observer.replay.into_inner().unwrap_or_else(PoisonError::into_inner);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(settings.threads)
         .build()
@@ -135,59 +135,19 @@ fn within(settings: &Settings, rays: u64) -> Settings {
     settings
 }
 
-/// Hands rays on, keeps a copy and counts hits.
+/// Keeps a copy of the rays and counts hits.
 struct Recorder<'a, 'g> {
-    inner: &'a EmbreeAccel<'g>,
     replay: Mutex<EmbreeReplay<'a, 'g>>,
     hits: AtomicU64,
 }
 
-impl Recorder<'_, '_> {
-    fn keep(&self, rays: &[Ray], any_hit: bool, coherence: Option<Coherence>) {
-        self.replay.lock().unwrap_or_else(PoisonError::into_inner).push(rays, any_hit, coherence);
+impl Observer for Recorder<'_, '_> {
+    fn observe(&self, call: &Call, trace: &mut dyn FnMut()) {
+        self.replay.lock().unwrap_or_else(PoisonError::into_inner).push(call.rays, call.any_hit, call.coherence);
+        trace();
     }
 
     fn count(&self, hits: usize) {
         self.hits.fetch_add(hits as u64, Ordering::Relaxed);
-    }
-}
-
-impl Accelerator for Recorder<'_, '_> {
-    fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.keep(std::slice::from_ref(ray), false, None);
-        let hit = self.inner.intersect(ray);
-        self.count(usize::from(hit.is_some()));
-        hit
-    }
-
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.keep(std::slice::from_ref(ray), true, None);
-        let hit = self.inner.occluded(ray);
-        self.count(usize::from(hit));
-        hit
-    }
-
-    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
-        self.keep(rays, false, Some(coherence));
-        self.inner.intersect_batch(rays, hits, coherence);
-        self.count(hits.iter().take(rays.len()).flatten().count());
-    }
-
-    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
-        self.keep(rays, true, Some(coherence));
-        self.inner.occluded_batch(rays, occluded, coherence);
-        self.count(occluded.iter().take(rays.len()).filter(|hit| **hit).count());
-    }
-
-    fn bounds(&self) -> Aabb {
-        self.inner.bounds()
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.inner.memory_bytes()
-    }
-
-    fn description(&self) -> String {
-        self.inner.description()
     }
 }

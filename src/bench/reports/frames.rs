@@ -8,14 +8,15 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::{Entry, FrameTiming, ReportsOptions};
-use crate::accel::{self, AccelKind, Accelerator, Coherence};
+use crate::accel::{self, AccelKind, Accelerator};
+use crate::bench::observed::{Call, Observed, Observer};
 use crate::bench::{Watch, median_and_range};
 use crate::compile;
 use crate::error::Result;
 use crate::film::{Image, LayerKind};
-use crate::geometry::{Hit, Mesh};
+use crate::geometry::Mesh;
 use crate::import::parse_scene;
-use crate::math::{Aabb, Ray};
+use crate::math::Ray;
 use crate::render::{self, Overrides, Settings, Silent};
 
 /// Rays whose primitive tests are counted, about.
@@ -112,17 +113,17 @@ pub fn measure(title: &str, kind: Kind, mesh: &Mesh, entries: &[Entry], options:
                 break;
             }
             watch.step(&format!("{title}, {name}: {accel}, round {} of {}", round + 1, options.rounds));
-            let timed = Timed { inner: &*subject.accel, state: Mutex::default() };
+            let observed = Observed { inner: &*subject.accel, observer: Timer::default() };
             let which = usize::from(*is_linear);
-            let (seconds, image) = frame(sizes[which], &timed)?;
-            let state = timed.state.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let (seconds, image) = frame(sizes[which], &observed)?;
+            let timed = observed.observer.0.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
             let scale = full as f64 / (f64::from(sizes[which][0]) * f64::from(sizes[which][1]));
             times[i].0.push(seconds * scale);
-            times[i].1.push(state.seconds * scale);
+            times[i].1.push(timed.seconds * scale);
             if round == 0 {
                 different[i] = different_pixels(&image, &pictures[which]);
-                let step = (state.rays.len() / COUNTED).max(1);
-                let counts: Option<Vec<f64>> = state.rays.iter().step_by(step).map(|ray| (subject.tests)(&*subject.accel, ray)).collect();
+                let step = (timed.rays.len() / COUNTED).max(1);
+                let counts: Option<Vec<f64>> = timed.rays.iter().step_by(step).map(|ray| (subject.tests)(&*subject.accel, ray)).collect();
                 tests[i] = counts.map(|counts| counts.iter().sum::<f64>() / counts.len().max(1) as f64);
             }
         }
@@ -147,56 +148,23 @@ fn different_pixels(a: &Image, b: &Image) -> usize {
     }
 }
 
-/// Takes the time of what is inside, and keeps the rays.
-struct Timed<'a> {
-    inner: &'a dyn Accelerator,
-    state: Mutex<TimedState>,
-}
+/// Takes the time of tracing, and keeps the rays.
+#[derive(Default)]
+struct Timer(Mutex<Timed>);
 
 #[derive(Default)]
-struct TimedState {
+struct Timed {
     seconds: f64,
     rays: Vec<Ray>,
 }
 
-impl Timed<'_> {
-    fn time<T>(&self, rays: &[Ray], trace: impl FnOnce() -> T) -> T {
+impl Observer for Timer {
+    fn observe(&self, call: &Call, trace: &mut dyn FnMut()) {
         let start = Instant::now();
-        let answer = trace();
+        trace();
         let seconds = start.elapsed().as_secs_f64();
-        let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        state.seconds += seconds;
-        state.rays.extend_from_slice(rays);
-        answer
-    }
-}
-
-impl Accelerator for Timed<'_> {
-    fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.time(std::slice::from_ref(ray), || self.inner.intersect(ray))
-    }
-
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.time(std::slice::from_ref(ray), || self.inner.occluded(ray))
-    }
-
-    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
-        self.time(rays, || self.inner.intersect_batch(rays, hits, coherence));
-    }
-
-    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
-        self.time(rays, || self.inner.occluded_batch(rays, occluded, coherence));
-    }
-
-    fn bounds(&self) -> Aabb {
-        self.inner.bounds()
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.inner.memory_bytes()
-    }
-
-    fn description(&self) -> String {
-        self.inner.description()
+        let mut timed = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        timed.seconds += seconds;
+        timed.rays.extend_from_slice(call.rays);
     }
 }

@@ -134,8 +134,9 @@ impl<'a> Sequence<'a> {
         let reporter = &self.session.reporter;
         let (skipped, todo): (Vec<i64>, Vec<i64>) = frames.numbers().iter().partition(|frame| self.is_done(**frame));
         if !skipped.is_empty() {
-            let count = if skipped.len() == 1 { "1 frame is".to_owned() } else { format!("{} frames are", skipped.len()) };
-            reporter.say(&format!("{count} there already and skipped (--overwrite renders anew)"));
+            let count =
+                if skipped.len() == 1 { "1 frame exists and is".to_owned() } else { format!("{} frames exist and are", skipped.len()) };
+            reporter.say(&format!("{count} skipped (--overwrite replaces files that exist)"));
         }
         reporter.expect(todo.len());
         let mut failures = Vec::new();
@@ -173,9 +174,9 @@ impl<'a> Sequence<'a> {
 
     /// Whether a frame's files, as far as the command line names them, are there already.
     fn is_done(&self, frame: i64) -> bool {
-        let (outputs, anew) = (&self.arguments.output, self.arguments.sequence.overwrite);
+        let (outputs, overwrite) = (&self.arguments.output, self.arguments.sequence.overwrite);
         let exists = |name: &String| Path::new(&file_of_frame(&with_frame_pattern(name), frame)).exists();
-        !anew && !outputs.is_empty() && outputs.iter().all(exists)
+        !overwrite && !outputs.is_empty() && outputs.iter().all(exists)
     }
 
     /// The picture of a frame; takes the frames whose files are to be compared with those of its scene.

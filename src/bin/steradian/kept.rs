@@ -59,7 +59,7 @@ impl<'a> Kept<'a> {
             && path.exists()
             && !arguments.resume
         {
-            let message = "there is such a file: --resume continues from it; remove it to begin anew";
+            let message = "the file exists: --resume continues it; remove it to start over";
             return Err(Error::Usage(format!("--checkpoint {}: {message}", path.display())));
         }
         let take = |path: Option<&Path>| path.map(StateFile::take).transpose();
@@ -89,7 +89,7 @@ impl<'a> Kept<'a> {
                 state
             }
             Some(file) => {
-                reporter.say(&format!("{}: there is no such checkpoint, beginning anew", file.path().display()));
+                reporter.say(&format!("{}: no checkpoint yet, starting from the first sample", file.path().display()));
                 RenderState::new(scene, settings, self.shard)?
             }
             None => RenderState::new(scene, settings, self.shard)?,

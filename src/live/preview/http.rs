@@ -10,11 +10,21 @@ const MAX_HEAD: usize = 8192;
 /// The most header lines of a request.
 const MAX_HEADERS: usize = 64;
 
-/// The time that any answer may take.
-const GRACE: Duration = Duration::from_secs(10);
+/// How long readers are waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// A connection ends after this time without a request, or without a byte of an answer taken.
+    pub stall: Duration,
+    /// Bytes a second that a reader has to take, after a first `stall`; at least 1.
+    pub least_rate: u64,
+}
 
-/// Bytes a second that a reader of a longer answer has to take.
-const LEAST_RATE: u64 = 1 << 20;
+impl Default for Patience {
+    /// Ten seconds, and 1 MiB a second.
+    fn default() -> Self {
+        Self { stall: Duration::from_secs(10), least_rate: 1 << 20 }
+    }
+}
 
 /// How long what is left of a refused request is read.
 const LINGER: Duration = Duration::from_secs(1);
@@ -73,6 +83,7 @@ impl Request {
 /// A connection to a browser.
 pub struct Connection {
     stream: TcpStream,
+    patience: Patience,
     /// When the present answer has to be sent.
     deadline: Option<Instant>,
     /// What has been read and not yet been used.
@@ -80,13 +91,16 @@ pub struct Connection {
 }
 
 impl Connection {
-    pub const fn new(stream: TcpStream) -> Self {
-        Self { stream, deadline: None, buffer: Vec::new() }
+    pub fn new(stream: TcpStream, patience: Patience) -> io::Result<Self> {
+        stream.set_read_timeout(Some(patience.stall))?;
+        stream.set_write_timeout(Some(patience.stall))?;
+        stream.set_nodelay(true)?;
+        Ok(Self { stream, patience, deadline: None, buffer: Vec::new() })
     }
 
-    /// The next request; `None` if there is none. Its head must be there after `patience`, and it must ask for this machine or for `host`.
-    pub fn request(&mut self, patience: Duration, host: &str) -> io::Result<Option<Result<Request, Refusal>>> {
-        let deadline = Instant::now() + patience;
+    /// The next request; `None` if there is none. Its head must be there in time, and it must ask for this machine or for `host`.
+    pub fn request(&mut self, host: &str) -> io::Result<Option<Result<Request, Refusal>>> {
+        let deadline = Instant::now() + self.patience.stall;
         loop {
             match parse(&self.buffer, host) {
                 Some(Ok((request, length))) => {
@@ -133,15 +147,19 @@ impl Connection {
              Referrer-Policy: no-referrer\r\n\r\n"
         );
         // The picture is held until then: who takes it byte by byte must not keep it for ever.
-        self.deadline = Some(Instant::now() + GRACE + Duration::from_secs(length / LEAST_RATE));
+        self.deadline = Some(Instant::now() + self.patience.stall + Duration::from_secs(length / self.patience.least_rate.max(1)));
         self.write(head.as_bytes())
     }
 
     /// Some of the body.
     pub fn write(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         while !bytes.is_empty() {
-            if self.deadline.is_some_and(|deadline| Instant::now() > deadline) {
-                return Err(ErrorKind::TimedOut.into());
+            if let Some(deadline) = self.deadline {
+                let left = deadline.saturating_duration_since(Instant::now());
+                if left.is_zero() {
+                    return Err(ErrorKind::TimedOut.into());
+                }
+                self.stream.set_write_timeout(Some(left.min(self.patience.stall)))?;
             }
             match self.stream.write(bytes) {
                 Ok(0) => return Err(ErrorKind::WriteZero.into()),

@@ -16,13 +16,11 @@ use super::{Snapshot, Statistics};
 use crate::desc::ViewDesc;
 use crate::error::{Error, Result};
 use board::Board;
+pub use http::Patience;
 use http::{Connection, Refusal};
 
 /// More connections than this are turned away.
 const MAX_CONNECTIONS: usize = 64;
-
-/// A connection ends after this time without a request, and when a reader takes nothing for this time.
-const PATIENCE: Duration = Duration::from_secs(10);
 
 /// After a failure to accept a connection (too many open files, say) the next attempt waits so long.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -36,12 +34,14 @@ pub struct PreviewOptions {
     pub port: u16,
     /// How light is shown until the page's user chooses.
     pub view: ViewDesc,
+    /// When slow readers are disconnected, so that they do not keep pictures in memory.
+    pub patience: Patience,
 }
 
 impl Default for PreviewOptions {
     /// Only this machine, any port.
     fn default() -> Self {
-        Self { host: Ipv4Addr::LOCALHOST.to_string(), port: 0, view: ViewDesc::default() }
+        Self { host: Ipv4Addr::LOCALHOST.to_string(), port: 0, view: ViewDesc::default(), patience: Patience::default() }
     }
 }
 
@@ -53,6 +53,7 @@ struct Shared {
     view: ViewDesc,
     /// The host asked for: requests may name it.
     host: String,
+    patience: Patience,
     connections: AtomicUsize,
     closing: AtomicBool,
 }
@@ -81,6 +82,7 @@ impl Preview {
             name,
             view: options.view,
             host: host.to_ascii_lowercase(),
+            patience: options.patience,
             connections: AtomicUsize::new(0),
             closing: AtomicBool::new(false),
         });
@@ -152,15 +154,12 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
 
 /// Answers the requests of a connection, one after the other.
 fn serve(stream: TcpStream, shared: &Shared, has_room: bool) -> std::io::Result<()> {
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
-    stream.set_nodelay(true)?;
-    let mut connection = Connection::new(stream);
+    let mut connection = Connection::new(stream, shared.patience)?;
     if !has_room {
         return connection.refuse(Refusal::Busy);
     }
     while !shared.closing.load(Ordering::Relaxed) {
-        match connection.request(PATIENCE, &shared.host)? {
+        match connection.request(&shared.host)? {
             None => break,
             Some(Err(refusal)) => return connection.refuse(refusal),
             Some(Ok(request)) => respond::respond(&mut connection, &request, shared)?,

@@ -3,26 +3,27 @@
 use std::collections::BTreeSet;
 
 use super::Fault;
-use super::crypto::distinct;
+use super::crypto::{Matte, distinct};
 use super::file::ExrFile;
+use crate::file::exr_blocks::Place;
 use crate::output::cryptomatte::{self, is_ordinary, layer_of};
 
 /// How far the coverage of a pixel may exceed 1 by rounding.
 const SLACK: f32 = 1e-3;
 
 /// A matte's ranks, layer by layer.
-struct Ranks {
+struct Ranks<'f> {
     part: usize,
     name: String,
     /// Ids and coverages in turn, each a picture.
-    planes: Vec<Vec<f32>>,
+    planes: Vec<&'f [f32]>,
     /// The ids of the manifest, if there is one.
     known: Option<BTreeSet<u32>>,
 }
 
-impl Ranks {
+impl Ranks<'_> {
     fn pixels(&self) -> usize {
-        self.planes.iter().map(Vec::len).min().unwrap_or(0)
+        self.planes.iter().map(|plane| plane.len()).min().unwrap_or(0)
     }
 
     /// The pairs of id and coverage of a pixel.
@@ -45,24 +46,41 @@ impl Ranks {
     }
 }
 
-fn ranks(file: &ExrFile) -> Vec<Ranks> {
-    let Some(image) = file.pixels() else { return Vec::new() };
-    let read = |matte: super::crypto::Matte| {
-        let name = matte.name()?.to_owned();
-        let mut planes = Vec::new();
-        for (part, layer) in image.layer_data.iter().enumerate() {
-            for channel in &layer.channel_data.list {
-                let Some((number, suffix)) = layer_of(&name, &channel.name.to_string()) else { continue };
-                let Some(place) = ["r", "g", "b", "a"].iter().position(|s| suffix.eq_ignore_ascii_case(s)) else { continue };
-                planes.push((number, place, part, channel.sample_data.values_as_f32().collect::<Vec<f32>>()));
-            }
+/// The channels of a matte, by layer and component: its ranks in order.
+fn places_of(file: &ExrFile, name: &str) -> Vec<((usize, usize), Place)> {
+    let mut places = Vec::new();
+    for (part, header) in file.headers.iter().enumerate() {
+        for (channel, description) in header.channels.list.iter().enumerate() {
+            let Some((number, suffix)) = layer_of(name, &description.name.to_string()) else { continue };
+            let Some(component) = ["r", "g", "b", "a"].iter().position(|s| suffix.eq_ignore_ascii_case(s)) else { continue };
+            places.push(((number, component), Place { part, channel }));
         }
-        planes.sort_by_key(|(number, place, ..)| (*number, *place));
-        let part = planes.first()?.2;
-        let whole = planes.iter().enumerate().all(|(i, (number, place, ..))| (*number, *place) == (i / 4, i % 4));
+    }
+    places.sort_by_key(|(rank, _)| *rank);
+    places
+}
+
+/// The channels whose pixels are looked at, each once.
+pub fn places(file: &ExrFile) -> Vec<Place> {
+    let mut places: Vec<Place> = Vec::new();
+    for (_, place) in distinct(file).iter().filter_map(Matte::name).flat_map(|name| places_of(file, name)) {
+        if !places.contains(&place) {
+            places.push(place);
+        }
+    }
+    places
+}
+
+fn ranks(file: &ExrFile) -> Vec<Ranks<'_>> {
+    let read = |matte: Matte| {
+        let name = matte.name()?.to_owned();
+        let places = places_of(file, &name);
+        let part = places.first()?.1.part;
+        let whole = places.iter().enumerate().all(|(i, (rank, _))| *rank == (i / 4, i % 4));
+        let planes: Option<Vec<&[f32]>> = places.iter().map(|(_, place)| file.plane(*place)).collect();
         let known = matte.manifest(file).and_then(|text| cryptomatte::parse_manifest(&text).ok());
         let known = known.map(|names| names.into_values().collect());
-        whole.then(|| Ranks { part, name, planes: planes.into_iter().map(|(.., values)| values).collect(), known })
+        planes.filter(|_| whole).map(|planes| Ranks { part, name, planes, known })
     };
     distinct(file).into_iter().filter_map(read).collect()
 }

@@ -1,23 +1,24 @@
 //! What a file says of itself.
 
-use std::cell::OnceCell;
-use std::io::{Read, Seek};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use exr::meta::attribute::{AttributeValue, SampleType, Text};
 use exr::meta::header::Header;
-use exr::prelude::{FlatImage, ReadChannels, ReadLayers, read};
 
+use super::crypto_pixels;
 use crate::error::{Error, Result};
 use crate::file;
+use crate::file::exr_blocks::{Place, Row, allocate, read_rows};
 use crate::file::exr_headers::read_headers;
 use crate::output::role::Role;
 
-/// A file's headers, and its pixels if a rule asks for them.
+/// A file's headers, and the pixels that rules look at.
 pub struct ExrFile {
     pub path: PathBuf,
     pub headers: Vec<Header>,
-    pixels: OnceCell<Option<FlatImage>>,
+    /// The samples of channels of mattes; empty if the file is deep or of a compression that the library does not know.
+    planes: Vec<(Place, Vec<f32>)>,
 }
 
 /// A channel of a file.
@@ -30,23 +31,29 @@ pub struct Channel<'a> {
 }
 
 impl ExrFile {
+    /// Reads a file's headers, and its pixels block by block: only those of mattes are kept.
     pub fn read(path: &Path) -> Result<Self> {
-        let open = || file::open(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() });
-        let malformed = |e: exr::error::Error| Error::Malformed { file: path.into(), message: e.to_string() };
-        open()?;
-        let headers = read_headers(path).map_err(|message| Error::Malformed { file: path.into(), message })?;
+        let source = file::open(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
+        let malformed = |message: String| Error::Malformed { file: path.into(), message };
+        let headers = read_headers(path).map_err(malformed)?;
         if headers.is_empty() {
-            return Err(Error::Malformed { file: path.into(), message: "there are no parts".into() });
+            return Err(malformed("there are no parts".into()));
         }
-        let file = Self { path: path.into(), headers, pixels: OnceCell::new() };
-        // Flat files are read as a whole, so that a truncated one is not called clean.
+        let mut file = Self { path: path.into(), headers, planes: Vec::new() };
+        // Flat files are decoded as a whole, so that a truncated one is not called clean.
         if file.headers.iter().all(|header| !header.deep) {
-            let image = match read_pixels(open()?) {
+            let wanted = crypto_pixels::places(&file);
+            let plane = |place: &Place| allocate(path, &file.headers[place.part], 1, 0.0);
+            let mut planes = wanted.iter().map(plane).collect::<Result<Vec<Vec<f32>>>>()?;
+            let keep = |row: Row| row.write(planes[row.wanted][row.start..].iter_mut(), |v| v);
+            match read_rows(BufReader::new(source), &file.headers, &wanted, true, keep) {
                 // Of a compression that the library does not know, the headers can still be checked.
-                Err(exr::error::Error::NotSupported(_)) => None,
-                image => Some(image.map_err(malformed)?),
-            };
-            let _ = file.pixels.set(image);
+                Err(exr::error::Error::NotSupported(_)) => {}
+                result => {
+                    result.map_err(|e| malformed(e.to_string()))?;
+                    file.planes = wanted.into_iter().zip(planes).collect();
+                }
+            }
         }
         Ok(file)
     }
@@ -61,9 +68,9 @@ impl ExrFile {
         })
     }
 
-    /// All pixels, if the file is flat and its compression known.
-    pub fn pixels(&self) -> Option<&FlatImage> {
-        self.pixels.get_or_init(|| None).as_ref()
+    /// The samples of a channel of a matte, row by row.
+    pub fn plane(&self, place: Place) -> Option<&[f32]> {
+        self.planes.iter().find(|(other, _)| *other == place).map(|(_, plane)| plane.as_slice())
     }
 
     /// An attribute of a part that the format gives no fixed place.
@@ -85,8 +92,4 @@ impl ExrFile {
 /// Text as UTF-8, which the format does not demand but readers expect.
 pub fn utf8(text: &Text) -> String {
     String::from_utf8_lossy(text.as_slice()).into_owned()
-}
-
-fn read_pixels(source: impl Read + Seek) -> Result<FlatImage, exr::error::Error> {
-    read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_unbuffered(source)
 }

@@ -1,13 +1,15 @@
 //! Colour out of any EXR file.
 
+use std::io::BufReader;
 use std::path::Path;
 
-use exr::meta::attribute::{AttributeValue, IntegerBounds};
-use exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers, Vec2, read};
+use exr::meta::attribute::{AttributeValue, ChannelDescription, IntegerBounds};
+use exr::prelude::Vec2;
 
 use super::metadata::{SETTINGS, text};
 use crate::error::{Error, Result};
 use crate::file;
+use crate::file::exr_blocks::{Place, Row, allocate, read_rows};
 use crate::file::exr_headers::read_headers;
 use crate::film::{Crop, Image, Layer, LayerKind};
 
@@ -15,39 +17,40 @@ use crate::film::{Crop, Image, Layer, LayerKind};
 /// shortest name, a "Combined" first), else Y as gray. Alpha is that of the same layer, or 1. The picture is the data window; where that
 /// reaches beyond the display window, the data window stands for the full picture.
 ///
+/// Only the channels of the colour are kept in memory.
+///
 /// # Errors
-/// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no such picture.
+/// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no such picture or too large, [`Error::OutOfMemory`].
 pub fn read_exr(path: &Path) -> Result<Image> {
     let source = file::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
-    read_headers(path).map_err(malformed)?;
-    let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    let file: FlatImage = reader.from_unbuffered(source).map_err(|e| malformed(e.to_string()))?;
-    for part in &file.layer_data {
-        let Some(choice) = choose_channels(&part.channel_data.list) else { continue };
-        let pixels = part.size.0 * part.size.1;
-        let mut data = vec![1.0; pixels * 4];
-        for (i, channel) in choice.iter().enumerate() {
-            let Some(channel) = channel else { continue };
-            if channel.sampling != Vec2(1, 1) {
-                return Err(malformed(format!("channel {} is subsampled", channel.name)));
-            }
-            for (to, value) in data.iter_mut().skip(i).step_by(4).zip(channel.sample_data.values_as_f32()) {
-                *to = value;
-            }
+    let headers = read_headers(path).map_err(malformed)?;
+    let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
+    let Some((part, choice)) = flat.filter_map(|(part, header)| Some((part, choose_channels(&header.channels.list)?))).next() else {
+        let deep = if headers.iter().any(|header| header.deep) { " (deep data is unsupported)" } else { "" };
+        let names: Vec<String> = headers.iter().flat_map(|header| &header.channels.list).map(|c| c.name.to_string()).collect();
+        return Err(malformed(format!("there are no channels R, G and B and no Y{deep}; it has {}", names.join(", "))));
+    };
+    let header = &headers[part];
+    let (mut wanted, mut components) = (Vec::new(), Vec::new());
+    for (component, channel) in choice.into_iter().enumerate().filter_map(|(component, channel)| Some((component, channel?))) {
+        let channel_header = &header.channels.list[channel];
+        if channel_header.sampling != Vec2(1, 1) {
+            return Err(malformed(format!("channel {} is subsampled", channel_header.name)));
         }
-        let (size, crop) = windows(&file.attributes.display_window, part.attributes.layer_position, part.size);
-        return Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() });
+        wanted.push(Place { part, channel });
+        components.push(component);
     }
-    let names: Vec<String> = file.layer_data.iter().flat_map(|part| &part.channel_data.list).map(|c| c.name.to_string()).collect();
-    Err(malformed(format!("there are no channels R, G and B and no Y; it has {}", names.join(", "))))
+    let mut data = allocate(path, header, 4, 1.0)?;
+    let keep = |row: Row| row.write(data[4 * row.start + components[row.wanted]..].iter_mut().step_by(4), |v| v);
+    read_rows(BufReader::new(source), &headers, &wanted, false, keep).map_err(|e| malformed(e.to_string()))?;
+    let (size, crop) = windows(&header.shared_attributes.display_window, header.own_attributes.layer_position, header.layer_size);
+    Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() })
 }
 
-type Channel = AnyChannel<FlatSamples>;
-
 /// Red, green, blue and (if there is one) alpha.
-fn choose_channels(list: &[Channel]) -> Option<[Option<&Channel>; 4]> {
-    let find = |name: &str| list.iter().find(|channel| channel.name == *name);
+fn choose_channels(list: &[ChannelDescription]) -> Option<[Option<usize>; 4]> {
+    let find = |name: &str| list.iter().position(|channel| channel.name == *name);
     let layer = |prefix: &str, names: [&str; 4]| {
         let [r, g, b, a] = names.map(|name| find(&format!("{prefix}{name}")));
         (r.is_some() && g.is_some() && b.is_some()).then_some([r, g, b, a])

@@ -67,7 +67,7 @@ pub struct JobArgs {
     /// The program as the machines know it. Default: this one
     #[arg(long, value_name = "FILE")]
     pub program: Option<PathBuf>,
-    /// Render frames whose files exist anew; they are skipped otherwise
+    /// Render frames whose files exist, too; they are skipped otherwise
     #[arg(long)]
     pub overwrite: bool,
     /// Options of `steradian render` for every shard

@@ -20,7 +20,7 @@ pub struct SequenceArgs {
     /// Frames in a second, for the animations of glTF files
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = parse_fps, requires = "frames", help_heading = "Frames")]
     pub fps: f64,
-    /// Render frames whose files exist anew; they are skipped otherwise
+    /// Render frames whose files exist, too; they are skipped otherwise
     #[arg(long, requires = "frames", help_heading = "Frames")]
     pub overwrite: bool,
     /// Go on after a frame that fails; the exit code is that of the first failure

@@ -39,7 +39,7 @@ impl LiveArgs {
         let tev = self.tev.as_ref().map(|address| TevOptions { address: address.clone(), ..TevOptions::default() });
         let preview = self.preview.map(|port| {
             let host = self.preview_bind.clone().unwrap_or(PreviewOptions::default().host);
-            PreviewOptions { host, port, view: settings.view() }
+            PreviewOptions { host, port, view: settings.view(), ..PreviewOptions::default() }
         });
         let name = scene.file_stem().map_or_else(|| "picture".to_owned(), |stem| stem.to_string_lossy().into_owned());
         Live::new(Options { name, time_limit: settings.time_limit, tev, preview })

@@ -1,98 +1,29 @@
-//! Configuration files: `steradian.toml` of a project and `config.toml` of a user, whose keys are the options of `render`.
+//! Options that configuration files set.
 
-use std::io::Read;
-use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use steradian::config::{self, Entry, Trust};
 use steradian::{Error, Result};
-use toml::de::{DeTable, DeValue};
 
-use super::{Options, Origin, PREFIX, Setting, Trust, Words};
+use super::{Options, Origin, Setting};
 
-/// Root's number: who can write such a file can do anything.
-const ROOT: u32 = 0;
-
-/// The project's file, in the scene's folder.
-const PROJECT: &str = "steradian.toml";
-
-/// No configuration is longer, in bytes.
-const MAX_LENGTH: u64 = 1 << 20;
-
-/// The files for a scene, the stronger first, with what they may set.
-pub fn for_scene(scene: &Path) -> Vec<(PathBuf, Trust)> {
-    let project = scene.parent().map(|folder| (folder.join(PROJECT), Trust::Project));
-    let user = user_file().map(|file| (file, Trust::User));
-    project.into_iter().chain(user).filter(|(file, _)| file.is_file()).collect()
-}
-
-/// The user's own file, whether it is there or not.
-fn user_file() -> Option<PathBuf> {
-    let variable = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let folder = variable("XDG_CONFIG_HOME").or_else(|| variable("HOME").map(|home| home.join(".config")));
-    folder.map(|folder| folder.join("steradian").join("config.toml"))
-}
-
-/// What a file sets, for a process of `user`; a warning if it is the file of somebody else, who is neither the user nor root, and not read.
+/// What a file sets, for a process of `user`; a warning if it is the file of somebody else, and not read.
 ///
 /// # Errors
-/// [`Error::Usage`] with file and line for what is no TOML, no option, no value of the option, or not for such a file to set.
+/// As [`config::read`], and [`Error::Usage`] with file and line for what is no option or no value of the option.
 pub fn read(options: &Options, file: &Path, trust: Trust, user: u32) -> Result<Result<Vec<Setting>, String>> {
-    let fault = |message: String| Error::Usage(format!("{}: {message}", file.display()));
-    let opened = steradian::file::open(file).map_err(|e| fault(e.to_string()))?;
-    // That of the open file: the name may belong to another one meanwhile.
-    let owner = opened.get_ref().metadata().map_err(|e| fault(e.to_string()))?.uid();
-    if owner != user && owner != ROOT {
-        return Ok(Err(format!("{} belongs to another user (uid {owner}): it is not read", file.display())));
+    match config::read(file, trust, user)? {
+        Ok(entries) => settings(options, file, entries).map(Ok),
+        Err(warning) => Ok(Err(warning)),
     }
-    let mut text = String::new();
-    opened.take(MAX_LENGTH + 1).read_to_string(&mut text).map_err(|e| fault(e.to_string()))?;
-    if text.len() as u64 > MAX_LENGTH {
-        return Err(fault(format!("longer than {MAX_LENGTH} bytes")));
-    }
-    parse(options, file, trust, &text).map(Ok)
 }
 
-/// What the file of somebody cannot set, with where it can be set.
-fn not_for_projects(key: &str) -> String {
-    let variable = format!("{PREFIX}{}", key.to_uppercase().replace('-', "_"));
-    let file = user_file().map_or_else(|| "~/.config/steradian/config.toml".to_owned(), |file| file.display().to_string());
-    format!(
-        "\"{key}\" is not for a project's file, which sets what the picture is, not what is loaded, written or connected to; use --{key}, \
-         {variable} or {file}"
-    )
-}
-
-fn parse(options: &Options, file: &Path, trust: Trust, text: &str) -> Result<Vec<Setting>> {
-    let line_of = |offset: usize| text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1;
-    let fault = |offset: usize, message: &str| Error::Usage(format!("{}:{}: {message}", file.display(), line_of(offset)));
-    let table = DeTable::parse(text).map_err(|e| fault(e.span().map_or(0, |span| span.start), e.message()))?;
-    let mut found = Vec::new();
-    for (key, value) in table.get_ref() {
-        let start = key.span().start;
-        let setting = words(value.get_ref()).and_then(|words| {
-            let origin = Origin::File(file.to_owned(), line_of(start));
-            let setting = options.setting(key.get_ref(), words, origin)?;
-            let may = super::trust(&setting.key).is_some_and(|needed| needed <= trust);
-            if may { Ok(setting) } else { Err(not_for_projects(&setting.key)) }
-        });
-        found.push((start, setting.map_err(|message| fault(start, &message))?));
-    }
-    found.sort_by_key(|(start, _)| *start);
-    Ok(found.into_iter().map(|(_, setting)| setting).collect())
-}
-
-fn words(value: &DeValue<'_>) -> Result<Words, String> {
-    let one = |value: &DeValue<'_>| match value {
-        DeValue::String(text) => Ok(text.to_string()),
-        DeValue::Integer(number) => Ok(number.as_str().replace('_', "")),
-        DeValue::Float(number) => Ok(number.as_str().replace('_', "")),
-        _ => Err("expected a word, a number, true, false or a list of words".to_owned()),
+fn settings(options: &Options, file: &Path, entries: Vec<Entry>) -> Result<Vec<Setting>> {
+    let setting = |Entry { key, words, line }| {
+        let setting = options.setting(&key, words, Origin::File(file.to_owned(), line));
+        setting.map_err(|message| Error::Usage(format!("{}:{line}: {message}", file.display())))
     };
-    match value {
-        DeValue::Boolean(on) => Ok(Words::Switch(*on)),
-        DeValue::Array(items) => items.iter().map(|item| one(item.get_ref())).collect::<Result<_, _>>().map(Words::Many),
-        value => one(value).map(Words::One),
-    }
+    entries.into_iter().map(setting).collect()
 }
 
 #[cfg(test)]
@@ -101,8 +32,13 @@ mod tests {
     use crate::args::Cli;
     use clap::CommandFactory;
 
+    fn parse(options: &Options, trust: Trust, text: &str) -> Result<Vec<Setting>> {
+        let file = Path::new("s.toml");
+        settings(options, file, config::parse(file, trust, text)?)
+    }
+
     fn parsed(text: &str) -> Result<Vec<Setting>> {
-        parse(&Options::new(&Cli::command()), Path::new("s.toml"), Trust::User, text)
+        parse(&Options::new(&Cli::command()), Trust::User, text)
     }
 
     #[test]
@@ -142,9 +78,9 @@ mod tests {
                 }
             };
             let text = format!("{key} = {value}");
-            let by = |trust| parse(&options, Path::new("s.toml"), trust, &text).map(|found| found.len()).map_err(|e| e.to_string());
+            let by = |trust| parse(&options, trust, &text).map(|found| found.len()).map_err(|e| e.to_string());
             assert_eq!(by(Trust::User), Ok(1), "{text}");
-            let expected = crate::config::trust(key) == Some(Trust::Project);
+            let expected = config::trust(key) == Some(Trust::Project);
             match by(Trust::Project) {
                 Ok(1) => assert!(expected, "{text}"),
                 refused => {
@@ -155,26 +91,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn files_of_others_are_not_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("s.toml");
-        std::fs::write(&file, "spp = 3").unwrap();
-        let options = Options::new(&Cli::command());
-        if std::fs::metadata(&file).unwrap().uid() == ROOT {
-            assert!(read(&options, &file, Trust::Project, 7).unwrap().is_ok());
-            std::os::unix::fs::chown(&file, Some(1), None).unwrap();
-        }
-        let owner = std::fs::metadata(&file).unwrap().uid();
-        assert_eq!(read(&options, &file, Trust::Project, owner).unwrap().unwrap().len(), 1);
-        for user in [owner + 1, ROOT] {
-            let warning = read(&options, &file, Trust::User, user).unwrap().unwrap_err();
-            assert!(warning.contains("s.toml belongs to another user"), "{warning}");
-        }
-        std::fs::write(&file, "#".repeat(2 << 20)).unwrap();
-        assert!(read(&options, &file, Trust::Project, owner).unwrap_err().to_string().contains("longer than"));
     }
 
     #[test]
@@ -193,12 +109,17 @@ mod tests {
         }
     }
 
-    /// Whatever the bytes are, they are settings or an error with its line.
+    /// Whatever the bytes are, they are settings or an error with its line: damaged files, and those that fuzzing found.
     #[test]
     fn damaged_files_are_read_or_refused() {
         const TEXT: &str =
             "# a\nspp = 64\nlayers = [\"Z\", \"N\"]\nsize = \"8x8\"\nexposure = -1.5e1\nfloat = true\nseed = 0x10\ncomments = 1979-05-27\n";
         let options = Options::new(&Cli::command());
+        let check = |text: &str| {
+            if let Err(error) = parse(&options, Trust::Project, text) {
+                assert!(matches!(&error, Error::Usage(told) if told.starts_with("s.toml:")), "{text}: {error}");
+            }
+        };
         let mut rng = steradian::math::Rng::new(5);
         for _ in 0..100 {
             let mut bytes = TEXT.as_bytes().to_vec();
@@ -210,10 +131,20 @@ mod tests {
                     _ => bytes.insert(at, (rng.bits() & 0x7f) as u8),
                 }
             }
-            let text = String::from_utf8_lossy(&bytes);
-            if let Err(error) = parse(&options, Path::new("s.toml"), Trust::Project, &text) {
-                assert!(matches!(&error, Error::Usage(told) if told.starts_with("s.toml:")), "{text}: {error}");
+            check(&String::from_utf8_lossy(&bytes));
+        }
+        let archive = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus.tar.gz");
+        let archive = flate2::read::GzDecoder::new(std::fs::File::open(archive).unwrap());
+        let mut count = 0;
+        for entry in tar::Archive::new(archive).entries().unwrap() {
+            let mut entry = entry.unwrap();
+            if entry.path().unwrap().starts_with("corpus/config") {
+                let mut bytes = Vec::new();
+                std::io::Read::read_to_end(&mut entry, &mut bytes).unwrap();
+                check(&String::from_utf8_lossy(&bytes));
+                count += 1;
             }
         }
+        assert!(count > 50, "{count}");
     }
 }

@@ -2,23 +2,19 @@
 
 mod files;
 mod show;
-mod trust;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
+use steradian::config::{PREFIX, Trust, Words, trust};
 use steradian::farm::message_lines;
 use steradian::{Error, Result, import};
 
 use crate::args::Cli;
 use crate::log;
 pub use show::run as show;
-use trust::{Trust, trust};
-
-/// What environment variables that stand for options begin with.
-const PREFIX: &str = "STERADIAN_";
 
 /// Variables in which farms say how many processors a task may use.
 const FARM_THREADS: [&str; 2] = ["SLURM_CPUS_PER_TASK", "CUE_THREADS"];
@@ -181,7 +177,7 @@ impl Options {
     fn setting(&self, key: &str, words: Words, origin: Origin) -> Result<Setting, String> {
         let key = key.replace('_', "-");
         let arg = self.find(&key).ok_or_else(|| self.unknown(&key))?;
-        let values = words.for_option(arg)?;
+        let values = values_of(words, arg)?;
         if arg.get_action().takes_values() {
             let line = ["steradian".to_owned(), "render".to_owned(), "scene".to_owned()].into_iter();
             let line = line.chain(values.iter().map(|value| format!("--{key}={value}")));
@@ -200,32 +196,19 @@ impl Options {
     }
 }
 
-/// What a variable or a file says of an option.
-#[derive(Clone, Debug)]
-pub enum Words {
-    /// A word or a number.
-    One(String),
-    /// A list.
-    Many(Vec<String>),
-    /// Yes or no.
-    Switch(bool),
-}
-
-impl Words {
-    /// The values as the command line would have them.
-    fn for_option(self, arg: &Arg) -> Result<Vec<String>, String> {
-        let name = arg.get_long().unwrap_or_default();
-        match (arg.get_action(), self) {
-            (ArgAction::SetTrue, Self::Switch(on)) => Ok(if on { vec!["true".to_owned()] } else { Vec::new() }),
-            (ArgAction::SetTrue, _) => Err(format!("{name} is true or false")),
-            (ArgAction::Count, Self::One(number)) if number.parse::<u8>().is_ok() => Ok(vec![number]),
-            (ArgAction::Count, Self::Switch(on)) => Ok(vec![u8::from(on).to_string()]),
-            (ArgAction::Count, _) => Err(format!("{name} is a number")),
-            (_, Self::Switch(on)) => Ok(vec![if on { "on" } else { "off" }.to_owned()]),
-            (ArgAction::Append, Self::Many(words)) => Ok(words),
-            (_, Self::Many(words)) => Ok(vec![words.join(",")]),
-            (_, Self::One(word)) => Ok(vec![word]),
-        }
+/// The value of an option as the command line would have it.
+fn values_of(words: Words, arg: &Arg) -> Result<Vec<String>, String> {
+    let name = arg.get_long().unwrap_or_default();
+    match (arg.get_action(), words) {
+        (ArgAction::SetTrue, Words::Switch(on)) => Ok(if on { vec!["true".to_owned()] } else { Vec::new() }),
+        (ArgAction::SetTrue, _) => Err(format!("{name} is true or false")),
+        (ArgAction::Count, Words::One(number)) if number.parse::<u8>().is_ok() => Ok(vec![number]),
+        (ArgAction::Count, Words::Switch(on)) => Ok(vec![u8::from(on).to_string()]),
+        (ArgAction::Count, _) => Err(format!("{name} is a number")),
+        (_, Words::Switch(on)) => Ok(vec![if on { "on" } else { "off" }.to_owned()]),
+        (ArgAction::Append, Words::Many(words)) => Ok(words),
+        (_, Words::Many(words)) => Ok(vec![words.join(",")]),
+        (_, Words::One(word)) => Ok(vec![word]),
     }
 }
 
@@ -245,7 +228,7 @@ pub fn settings(options: &Options, scene: &Path) -> Result<Found> {
     let mut found = environment(options, std::env::vars_os(), &mut warnings)?;
     let mut files = Vec::new();
     let user = rustix::process::geteuid().as_raw();
-    for (file, trust) in files::for_scene(scene) {
+    for (file, trust) in steradian::config::for_scene(scene) {
         match files::read(options, &file, trust, user)? {
             Ok(settings) => {
                 found.extend(settings);
@@ -330,5 +313,18 @@ mod tests {
         let (found, warnings) = from_environment(&[("STERADIAN_THREAD", "2"), ("STERADIAN_PIXEL", "1,2")]);
         assert!(found.unwrap().is_empty());
         assert!(warnings[0].contains("did you mean \"threads\"") && warnings[1].contains("belongs to the command line"), "{warnings:?}");
+    }
+
+    #[test]
+    fn every_option_of_render_has_its_class() {
+        let mut command = Cli::command();
+        command.build();
+        let render = command.find_subcommand("render").unwrap();
+        let mut options: Vec<&str> = render.get_arguments().filter_map(Arg::get_long).collect();
+        let mut classified: Vec<&str> = steradian::config::options().filter(|name| *name != "version").collect();
+        options.sort_unstable();
+        classified.sort_unstable();
+        assert_eq!(options, classified);
+        assert_eq!(trust("no-such-option"), None);
     }
 }

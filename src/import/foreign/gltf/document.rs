@@ -57,7 +57,7 @@ const NO_ELEMENT: &str = "there is no element of this index";
 pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
     let fault = |path: &str, message: String| Error::Scene { file: file.into(), path: path.into(), message };
     let (json, bin) = if bytes.starts_with(b"glTF") { split(bytes).map_err(|message| fault("GLB", message))? } else { (bytes, None) };
-    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    let json = json.strip_prefix(crate::file::MARK).unwrap_or(json);
     let misread = |e: serde_json::Error| {
         let text = e.to_string();
         let message = text.rsplit_once(" at line ").map_or(text.as_str(), |(message, _)| message);

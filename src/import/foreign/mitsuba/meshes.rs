@@ -50,9 +50,9 @@ pub fn has_normals(path: &Path) -> bool {
 
 /// Whether the header of a PLY file has a property whose line ends in one of these, or a line of an OBJ file begins so.
 fn has(path: &Path, endings: &[&str], word: &[u8]) -> bool {
-    let Ok(file) = crate::file::open(path) else { return false };
+    let Ok(source) = crate::file::open(path).and_then(|file| crate::file::skip_mark(BufReader::new(file))) else { return false };
     let begins = |line: &[u8], word: &[u8]| line.trim_ascii().starts_with(word);
-    let mut lines = BufReader::new(file).split(b'\n').map_while(std::io::Result::ok).peekable();
+    let mut lines = source.split(b'\n').map_while(std::io::Result::ok).peekable();
     if lines.peek().is_some_and(|line| begins(line, b"ply")) {
         let ends = |line: &[u8]| endings.iter().any(|ending| line.trim_ascii().ends_with(ending.as_bytes()));
         lines.take_while(|line| !begins(line, b"end_header")).any(|line| begins(&line, b"property") && ends(&line))

@@ -81,23 +81,7 @@ pub fn trust(option: &str) -> Option<Trust> {
     OPTIONS.iter().find(|(_, names)| names.contains(&option)).map(|(trust, _)| *trust)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::args::Cli;
-    use clap::{Arg, CommandFactory};
-
-    #[test]
-    fn every_option_of_render_has_its_class() {
-        let mut command = Cli::command();
-        command.build();
-        let render = command.find_subcommand("render").unwrap();
-        let mut options: Vec<&str> = render.get_arguments().filter_map(Arg::get_long).collect();
-        let mut classified: Vec<&str> =
-            OPTIONS.iter().flat_map(|(_, names)| names.iter().copied()).filter(|name| *name != "version").collect();
-        options.sort_unstable();
-        classified.sort_unstable();
-        assert_eq!(options, classified);
-        assert_eq!(trust("no-such-option"), None);
-    }
+/// The names of all options, without dashes.
+pub fn options() -> impl Iterator<Item = &'static str> {
+    OPTIONS.iter().flat_map(|(_, names)| names.iter().copied())
 }
