@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use steradian::denoise::{self, Denoiser, FileOptions, Report, denoise_file};
 use steradian::desc::FilterSamplesDesc;
-use steradian::film::Image;
+use steradian::film::{Filter, Image};
 use steradian::output::{self, FileUses, Format};
 use steradian::render::{Progress, Settings};
 use steradian::{Error, Result};
@@ -69,6 +69,11 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
             task.also.iter().try_for_each(|path| output::write_png(path, &image, arguments.exposure, arguments.view))?;
         }
         let input = task.input.display();
+        if shares_samples(&task.input) {
+            let message = "its pixels share samples, and a denoiser takes such noise for texture: render with --denoise, or with \
+                           \"samples\": \"importance\" in film.filter";
+            log::message(Level::Warning, &format!("{input}: {message}"));
+        }
         warnings(&report).iter().for_each(|warning| log::message(Level::Warning, &format!("{input}: {warning}")));
         log::message(Level::Note, &format!("wrote {}: {}", task.output.display(), summary(&report)));
         if arguments.json {
@@ -79,6 +84,12 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Whether a file's recipe has a pixel filter that shares samples.
+fn shares_samples(file: &Path) -> bool {
+    let filter = output::read_settings(file).ok().and_then(|recipe| recipe.pointer("/settings/filter").cloned());
+    filter.and_then(|filter| serde_json::from_value(filter).ok()).is_some_and(|desc| Filter::new(&desc).is_shared())
 }
 
 /// What was done, for people.

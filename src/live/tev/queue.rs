@@ -90,18 +90,22 @@ impl Queue {
     }
 
     pub fn offer(&self, snapshot: &Arc<Snapshot>) {
+        self.put(snapshot, false);
+    }
+
+    pub fn offer_final(&self, snapshot: &Arc<Snapshot>) {
+        self.put(snapshot, true);
+    }
+
+    /// Under one lock, so that the last picture is not sent before it is known to be the last.
+    fn put(&self, snapshot: &Arc<Snapshot>, is_last: bool) {
         let mut state = self.lock();
+        state.finishing |= is_last;
         state.offered = Some(Instant::now());
         state.counters.offered += 1;
         if state.waiting.replace(Arc::clone(snapshot)).is_some() {
             state.counters.replaced += 1;
         }
-        self.changed.notify_all();
-    }
-
-    pub fn offer_final(&self, snapshot: &Arc<Snapshot>) {
-        self.offer(snapshot);
-        self.lock().finishing = true;
         self.changed.notify_all();
     }
 

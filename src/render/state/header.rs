@@ -64,6 +64,9 @@ impl FromStr for Shard {
 /// The least that a file holds of a pixel, in bytes: the sums of colour and alpha.
 const LEAST_BYTES: u64 = 64;
 
+/// A bound for the width and height of pictures, far above those that can be rendered.
+const MOST_PIXELS: u64 = 1 << 30;
+
 /// What a checkpoint or shard says of itself.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Header {
@@ -135,12 +138,7 @@ impl Header {
             Some(format!("there is no shard {index} of {count}"))
         } else if self.done > self.spp {
             Some(format!("{} of {} samples per pixel are done", self.done, self.spp))
-        } else if x + width > full_width
-            || y + height > full_height
-            || (around > 0 && around >= full_width.min(full_height))
-            || full_width.max(full_height) > 1 << 30
-            || u64::from(self.film.overscan) > full_width.min(full_height)
-        {
+        } else if x + width > full_width || y + height > full_height || (around > 0 && around >= full_width.min(full_height)) {
             Some("its film is not within its picture".to_owned())
         } else if !(self.film.filter.radius() > 0.0 && self.film.filter.radius() <= MAX_FILTER_RADIUS) {
             Some("its pixel filter has no valid radius".to_owned())
@@ -150,6 +148,8 @@ impl Header {
             Some("an instance is placed within itself".to_owned())
         } else if (width * height).saturating_mul(LEAST_BYTES) > bytes {
             Some("a part is missing".to_owned())
+        } else if full_width.max(full_height) > MOST_PIXELS || u64::from(self.film.overscan) > full_width.min(full_height) {
+            Some("its film is larger than any picture".to_owned())
         } else {
             None
         }
