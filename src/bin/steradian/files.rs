@@ -20,6 +20,7 @@ pub fn of_command(cli: &Cli, mut uses: FileUses) -> Result<()> {
     let mut written: Vec<(PathBuf, &str)> = Vec::new();
     let (scene, output) = ("the scene", "--output");
     let mut outputs = |names: &[String]| written.extend(names.iter().map(|name| (PathBuf::from(name), output)));
+    #[cfg(feature = "bench")]
     let reports = |folder: &Option<PathBuf>, stem: &str| -> Vec<(PathBuf, &'static str)> {
         let kinds = folder.iter().flat_map(|folder| ["html", "md", "csv", "json"].map(|kind| folder.join(format!("{stem}.{kind}"))));
         kinds.map(|path| (path, "--out")).collect()

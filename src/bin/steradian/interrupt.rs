@@ -29,6 +29,7 @@ pub struct Interrupt {
 
 impl Interrupt {
     /// Starts to listen.
+    #[cfg(feature = "bench")]
     pub fn listen() -> Result<Self> {
         let interrupt = Self::listen_to_requests()?;
         interrupt.listen_to_stop()?;

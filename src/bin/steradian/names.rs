@@ -5,6 +5,7 @@ use std::fmt;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::value::{MapDeserializer, StrDeserializer};
 use serde::de::{Deserialize, DeserializeOwned, Error, IntoDeserializer};
+use steradian::desc::LayerDesc;
 
 /// The names that deserialisation accepts, caught from its complaint about one it does not.
 #[derive(Debug)]
@@ -46,6 +47,29 @@ pub fn plain<T: DeserializeOwned + Clone + Send + Sync + 'static>() -> impl Type
     PossibleValuesParser::new(names(from_name::<T>)).try_map(|name| from_name::<T>(&name))
 }
 
+/// Layers by their names, or all of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Layers {
+    All,
+    One(LayerDesc),
+}
+
+impl Layers {
+    pub fn list(self) -> Vec<LayerDesc> {
+        match self {
+            Self::All => names(from_name::<LayerDesc>).iter().filter_map(|name| from_name(name).ok()).collect(),
+            Self::One(layer) => vec![layer],
+        }
+    }
+}
+
+/// Parses the name of a layer, or `all`.
+pub fn layers() -> impl TypedValueParser<Value = Layers> {
+    let all = names(from_name::<LayerDesc>).iter().copied().chain(["all"]);
+    PossibleValuesParser::new(all.collect::<Vec<_>>())
+        .try_map(|name| if name == "all" { Ok(Layers::All) } else { from_name::<LayerDesc>(&name).map(Layers::One) })
+}
+
 /// Parses an enum whose variants are objects with a `type`; everything else has its default.
 pub fn tagged<T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static>() -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(names(from_type::<T>)).try_map(|name| from_type::<T>(&name))
@@ -54,7 +78,7 @@ pub fn tagged<T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static>() ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use steradian::desc::{IntegratorDesc, LayerDesc, SamplerKindDesc};
+    use steradian::desc::{IntegratorDesc, SamplerKindDesc};
     use steradian::film::LayerKind;
 
     #[test]

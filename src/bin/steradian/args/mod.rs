@@ -21,10 +21,10 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use clap_complete::Shell;
 use steradian::accel::AccelKind;
-use steradian::desc::{IntegratorDesc, LayerDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
+use steradian::desc::{IntegratorDesc, SamplerKindDesc, StrategyDesc, ViewDesc};
 use steradian::render::Overrides;
 
-use crate::names;
+use crate::names::{self, Layers};
 use crate::rerender::Repeat;
 #[cfg(feature = "bench")]
 pub use bench::{BenchAccelArgs, BenchCommand, BenchReportsArgs, BenchStabilityArgs};
@@ -195,9 +195,9 @@ pub struct RenderArgs {
     /// Render this many pixels more on each side: EXR files hold them around the picture (their data window), PNG files do not
     #[arg(long, value_name = "PIXELS", help_heading = "Picture")]
     pub overscan: Option<u32>,
-    /// EXR: store these beside the picture
-    #[arg(long, value_name = "LAYERS", value_delimiter = ',', value_parser = names::plain::<LayerDesc>(), help_heading = "Picture")]
-    pub layers: Vec<LayerDesc>,
+    /// EXR: store these beside the picture, or all
+    #[arg(long, value_name = "LAYERS", value_delimiter = ',', value_parser = names::layers(), help_heading = "Picture")]
+    pub layers: Vec<Layers>,
     /// EXR: store 32-bit floats instead of 16-bit ones
     #[arg(long, help_heading = "Picture")]
     pub float: bool,
@@ -361,7 +361,7 @@ impl RenderArgs {
             time_limit: self.time_limit,
             outputs: self.output.clone(),
             default_outputs,
-            layers: self.layers.clone(),
+            layers: self.layers.iter().flat_map(|layers| layers.list()).collect(),
             float: self.float,
             exr: self.exr.overrides(self.sequence.frames.is_some().then_some(self.sequence.fps)),
             exposure: self.exposure,
@@ -401,6 +401,7 @@ fn accel_help() -> String {
 mod tests {
     use super::*;
     use clap::CommandFactory;
+    use steradian::desc::LayerDesc;
 
     fn render(arguments: &[&str]) -> Result<RenderArgs, clap::Error> {
         let line = ["steradian", "render", "a.json"].iter().chain(arguments);
@@ -434,6 +435,13 @@ mod tests {
         assert_eq!((o.outputs, o.default_outputs), (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()]));
         assert!(o.guiding == Some(true) && o.no_depth_of_field && o.transparent);
         assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
+    }
+
+    #[test]
+    fn all_layers_are_those_of_the_scene_format() {
+        let layers = |line: &str| render(&line.split_whitespace().collect::<Vec<_>>()).unwrap().overrides(Vec::new()).layers;
+        let all = layers("--layers all");
+        assert!(all.len() > 20 && all.contains(&LayerDesc::CryptoAsset) && layers("--layers Z,all").len() == all.len() + 1);
     }
 
     #[test]
