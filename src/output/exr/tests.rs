@@ -109,7 +109,7 @@ fn the_reference_implementation_agrees() {
         "albedo.R, 16-bit floating-point",
         "zip, multi-scanline blocks",
         "worldToCamera (type m44f)",
-        "depth along the view axis; 1e10",
+        "depth along the view axis of the nearest sample; 1e10",
         "chromaticities",
     ];
     for text in expected {
