@@ -28,6 +28,9 @@ fi
 
 kept=${root:+yes}
 root=${root:-$(mktemp -d)}
+mkdir -p "$root"
+# As a root directory: other users, which tests run programs as, may enter it.
+chmod 755 "$root"
 toolchain=$(rustc --print sysroot)
 mounted() { grep -q " $1 " /proc/mounts; }
 clean_up() {
@@ -41,7 +44,6 @@ trap 'exit 130' INT TERM
 
 if [ ! -e "$root/etc/debian_version" ]; then
     mirror=$(sed -nE 's/^(URIs:|deb( \[[^]]*\])?) +(https?:[^ ]+).*/\3/p' /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2>/dev/null | head -1 || true)
-    mkdir -p "$root"
     debootstrap --variant=minbase "$suite" "$root" "${mirror:-http://deb.debian.org/debian}" >"$root/debootstrap.log" 2>&1 \
         || { tail -5 "$root/debootstrap.log" >&2; unavailable "debootstrap failed"; }
 fi
