@@ -81,7 +81,7 @@ impl Values<'_> {
 /// Most channels of layers of surfaces that are averaged.
 const MAX_MEANS: usize = channels_of(Filtering::Mean);
 
-/// Sums over the weighted samples that reach an entry of the tile's [cells](Cells), or over the samples of a pixel.
+/// Sums over the weighted samples that reach an entry of the tile's cells, or over the samples of a pixel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Accumulator {
     /// Radiance and alpha.
@@ -125,7 +125,7 @@ impl Accumulator {
 }
 
 /// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own; what shared samples bring to pixels of other tiles is
-/// in the borders of the tile's [cells](Cells) until the picture is made.
+/// in the borders of the tile's cells until the picture is made.
 ///
 /// [`Sums`] do not depend on the order of samples: whoever adds the same samples gets the same picture, in one tile or merged from several.
 #[derive(Clone, Debug)]
