@@ -266,7 +266,7 @@ fn headers_that_make_no_sense_are_refused() {
         ("/film/crop", json!([1, 0, huge, 16]), "not within"),
         ("/film/crop", json!([0, 0, 0, 0]), "a.shard"),
         ("/film/size", json!([0, 0]), "not within"),
-        ("/overscan", json!(12), "not within"),
+        ("/film/overscan", json!(12), "not within"),
         ("/done", json!(huge), "samples per pixel are done"),
     ];
     for (place, value, part) in cases {

@@ -41,38 +41,40 @@ impl CoverageCounts {
 }
 
 /// What each pixel of a picture shows: shapes with the share of the pixel that each covers, the largest first.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Coverage {
     /// Where each pixel's entries start, and last where they end.
     starts: Vec<usize>,
     entries: Vec<(ShapeKey, f32)>,
 }
 
+impl Default for Coverage {
+    fn default() -> Self {
+        Self { starts: vec![0], entries: Vec::new() }
+    }
+}
+
 impl Coverage {
-    /// From the weight of each shape in each pixel, row by row, that of [`ShapeKey::NONE`] included. A shape may occur several times.
-    pub fn new(pixels: impl Iterator<Item = Vec<(ShapeKey, f64)>>) -> Self {
-        let (mut starts, mut entries) = (vec![0], Vec::new());
-        for mut weights in pixels {
-            let whole: f64 = weights.iter().map(|(_, weight)| weight).sum();
-            weights.sort_by_key(|(key, _)| *key);
-            weights.dedup_by(|(key, weight), (kept, sum)| {
-                let same = key == kept;
-                if same {
-                    *sum += *weight;
-                }
-                same
-            });
-            weights.retain(|(key, weight)| *key != ShapeKey::NONE && *weight > 0.0);
-            weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-            entries.extend(weights.iter().map(|&(key, weight)| (key, (weight / whole) as f32)));
-            starts.push(entries.len());
-        }
-        Self { starts, entries }
+    /// Adds the next pixel: the weight of each shape, that of [`ShapeKey::NONE`] included. A shape may occur several times.
+    pub fn push(&mut self, mut weights: Vec<(ShapeKey, f64)>) {
+        let whole: f64 = weights.iter().map(|(_, weight)| weight).sum();
+        weights.sort_by_key(|(key, _)| *key);
+        weights.dedup_by(|(key, weight), (kept, sum)| {
+            let same = key == kept;
+            if same {
+                *sum += *weight;
+            }
+            same
+        });
+        weights.retain(|(key, weight)| *key != ShapeKey::NONE && *weight > 0.0);
+        weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        self.entries.extend(weights.iter().map(|&(key, weight)| (key, (weight / whole) as f32)));
+        self.starts.push(self.entries.len());
     }
 
     /// Number of pixels.
     pub fn pixels(&self) -> usize {
-        self.starts.len().saturating_sub(1)
+        self.starts.len() - 1
     }
 
     /// What a pixel shows: shapes with the share that each covers, above 0, the largest first; among equals in the order of their keys.
@@ -98,7 +100,8 @@ mod tests {
         counts.merge(&other);
         counts.add(0, ShapeKey::NONE, 5);
         let weights = |pixel| counts.of(pixel).iter().map(|&(key, units)| (key, units as f64)).collect();
-        let coverage = Coverage::new([0, 1].map(weights).into_iter());
+        let mut coverage = Coverage::default();
+        [0, 1].map(weights).into_iter().for_each(|weights| coverage.push(weights));
         assert_eq!(coverage.of(0), [(key(1), 0.2), (key(2), 0.2), (key(3), 0.1)]);
         assert_eq!(coverage.of(1), [(key(9), 1.0)]);
         assert_eq!(coverage.pixels(), 2);

@@ -197,6 +197,27 @@ fn shared_samples_give_the_weighted_mean_across_tiles_and_blocks() {
     }
 }
 
+/// Where pixels have different numbers of samples, each is normalised by its own: with weights of either sign, too.
+#[test]
+fn importance_sampled_pixels_do_not_depend_on_the_samples_of_others() {
+    for desc in Filter::EXAMPLES {
+        let filter = Filter::new(&desc);
+        let picture = |block_size: Option<u32>, others: u32| {
+            let shape = FilmShape { filter: desc, block_size, ..FilmShape::new([8, 8], Crop::full([8, 8]), LayerSet::COLOR) };
+            let mut film = Film::new(shape, 8).unwrap();
+            for (pixel, count) in [(9, 5), (60, others)] {
+                let mut rng = crate::math::Rng::new(pixel as u64);
+                for sample in 0..count {
+                    let place = filter.sample([rng.unit_f32(), rng.unit_f32()]);
+                    film.tiles_mut()[0].add(pixel, sample, &gray(rng.unit_f32()), place.weight);
+                }
+            }
+            film.resolve().rgb(1, 1).unwrap()
+        };
+        assert_eq!(picture(Some(4), 500), picture(None, 1), "{desc:?}");
+    }
+}
+
 /// A crop is a part of the whole, films of parts of the samples sum to the film of all, and states come back: all bit for bit.
 #[test]
 fn crops_merges_and_states_of_shared_samples_have_the_same_bits() {

@@ -41,7 +41,7 @@ pub struct FilterSample {
 
 /// The weights of a shared sample for the pixels along one axis. Over all offsets within a pixel, the weights of a sample have a mean sum of 1.
 #[derive(Clone, Copy, Debug)]
-pub struct Taps {
+pub(super) struct Taps {
     /// The first pixel, counted from the sample's own.
     pub first: i32,
     /// How many pixels; the weights beyond are 0.
@@ -60,7 +60,7 @@ pub struct VarianceKernel {
     pub means: Vec<f64>,
     /// Integral of the filter's square over each pixel.
     pub squares: Vec<f64>,
-    /// Sum over a pixel and all others of the squares of the correlation of their noise, in two dimensions.
+    /// Sum of the squared correlations of a pixel's noise with that of every pixel, itself included.
     pub correlation: f64,
 }
 
@@ -154,7 +154,7 @@ impl Filter {
 
     /// The weights along one axis of a shared sample at this offset from its pixel's centre, from -0.5 to 0.5.
     #[inline]
-    pub fn taps(&self, offset: f32) -> Taps {
+    pub(super) fn taps(&self, offset: f32) -> Taps {
         let mut weights = [0.0; MAX_TAPS];
         let Some(table) = &self.shared else { return Taps { first: 0, count: 1, weights: [1.0; MAX_TAPS] } };
         let radius = self.radius();
@@ -195,7 +195,7 @@ impl Filter {
         }
     }
 
-    /// Along one axis: sum over a pixel and all others of the squares of the correlation of their noise.
+    /// [`VarianceKernel::correlation`] along one axis.
     fn correlation(&self) -> f64 {
         let radius = f64::from(self.radius());
         let h = 2.0 * radius / STEPS as f64;

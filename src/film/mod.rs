@@ -19,7 +19,7 @@ mod tile;
 mod tiles;
 
 pub use coverage::{Coverage, CoverageCounts};
-pub use filter::{Filter, FilterSample, Taps, VarianceKernel};
+pub use filter::{Filter, FilterSample, VarianceKernel};
 pub use identities::{Identities, Label, NameId, PlacementId, ShapeIdentity};
 pub use image::{Crop, Image, Layer};
 pub use layer::{Filtering, LayerInfo, LayerKind, LayerSet, Source};

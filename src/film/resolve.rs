@@ -2,85 +2,98 @@
 
 use super::sum::slice;
 use super::tile::FilmTile;
-use super::{Coverage, Film, Filtering, Image, Layer, LayerInfo, LayerKind, ShapeKey, Source, VarianceKernel};
+use super::{Coverage, Film, Filtering, Image, Layer, LayerInfo, LayerKind, Layout, ShapeKey, Source, VarianceKernel};
 
 /// Depth where nothing was hit.
 const MISS_DEPTH: f32 = 1e10;
 
-/// What the samples around a pixel say of it: a weighted mean, linear in the values of the samples, so that parts of the radiance sum to the whole.
+/// The estimate of a pixel from the samples around it: a weighted mean, linear in the values of the samples, so that parts of the radiance sum to the whole.
 ///
 /// With the weights `w` of the samples `v` that reach the pixel, the mean is `sum(w v) / sum(w)`. Of a filter with negative lobes the sum of weights
 /// may be near zero; with its expected value `n` and the plain mean `m` of the pixel's own samples, the estimate is then `m + sum(w (v - m)) / n`.
 /// Both keep constants exactly and have a bias of order `1 / samples`.
 struct Estimator<'a> {
+    film: &'a Film,
     /// The pixel's own tile and the pixel's index there.
     own: (&'a FilmTile, usize),
     /// Entries of cells that reach the pixel, with the factor by which their sums count.
     entries: Vec<(&'a FilmTile, usize, f64)>,
     /// Sum of the weights.
     weight: f64,
-    /// For filters with negative lobes: expected sum of the weights, and how many own samples there are.
-    expected: Option<(f64, f64)>,
+    /// Expected sum of the weights.
+    expected: f64,
 }
 
 impl<'a> Estimator<'a> {
-    fn new(film: &'a Film, x: u32, y: u32) -> Option<Self> {
-        let own @ (tile, pixel) = film.tile_of(x, y)?;
-        let (border, size) = (film.layout.border, film.cell_size());
-        let mut entries = Vec::with_capacity(1);
+    /// Of no pixel yet; films have tiles.
+    fn new(film: &'a Film) -> Self {
+        Self { film, own: (&film.tiles()[0], 0), entries: Vec::new(), weight: 0.0, expected: 0.0 }
+    }
+
+    /// Goes to a pixel on the film's grid; `false` if the film does not have it.
+    fn move_to(&mut self, x: u32, y: u32) -> bool {
+        let film = self.film;
+        let Some(own @ (tile, pixel)) = film.tile_of(x, y) else { return false };
+        self.own = own;
+        self.entries.clear();
+        let Layout { border, cell_size: size, .. } = film.layout;
+        // Where cells differ in their samples, each counts by its own number; without a border, pixels are normalised by theirs.
+        let is_scaled = film.shape().block_size.is_some() && border > 0;
         let cells = |at: u32| at.saturating_sub(border) / size..=(at + border) / size;
         for row in cells(y) {
             for column in cells(x) {
                 // A pixel of the cell, by which its tile is found.
                 let corner = [(column * size).max(film.grid().area.x), (row * size).max(film.grid().area.y)];
                 let Some((tile, corner)) = film.tile_of(corner[0], corner[1]) else { continue };
-                let scale = if film.shape().block_size.is_some() { 1.0 / tile.samples_of_cell(corner).max(1.0) } else { 1.0 };
+                let scale = if is_scaled { 1.0 / tile.samples_of_cell(corner).max(1.0) } else { 1.0 };
                 let [left, top] = tile.origin();
                 let cell = [column - left / size, row - top / size];
                 let entry = tile.cells.entry_in(cell, [x as i32 - left as i32, y as i32 - top as i32]);
-                entries.push((tile, entry, scale));
+                self.entries.push((tile, entry, scale));
             }
         }
         let count = tile.count_at(pixel);
-        let weight = if film.layout.is_weighted() {
-            entries.iter().map(|&(tile, entry, scale)| scale * tile.weights[entry].values()[0]).sum()
-        } else {
-            // In cells of their own, samples count once.
-            entries.iter().map(|(_, _, scale)| scale * count).sum()
-        };
-        let own_scale = entries.iter().find(|(other, ..)| std::ptr::eq(*other, tile)).map_or(1.0, |(_, _, scale)| *scale);
-        let expected = film.layout.signed.then_some((if own_scale == 1.0 { count } else { 1.0 }, count));
-        Some(Self { own, entries, weight, expected })
+        self.expected = if is_scaled { 1.0 } else { count };
+        self.weight = if film.layout.is_weighted() { self.sum(|tile, entry| tile.weights[entry].values()[0]) } else { count };
+        true
     }
 
-    /// The mean of a value whose sum is `sum(tile, entry)` at an entry, and `own(tile, pixel)` over the pixel's own samples.
-    fn mean(&self, sum: impl Fn(&FilmTile, usize) -> f64, own: impl Fn(&FilmTile, usize) -> f64) -> f32 {
-        let weighted: f64 = self.entries.iter().map(|&(tile, entry, scale)| scale * sum(tile, entry)).sum();
-        let mean = match self.expected {
-            Some((_, 0.0)) => 0.0,
-            Some((expected, count)) => {
-                let plain = own(self.own.0, self.own.1) / count;
-                plain + (weighted - self.weight * plain) / expected
-            }
-            None if self.weight > 0.0 => weighted / self.weight,
-            None => 0.0,
+    /// The sum of a value over the samples that reach the pixel; `sum` gives that of an entry.
+    fn sum(&self, sum: impl Fn(&FilmTile, usize) -> f64) -> f64 {
+        self.entries.iter().map(|&(tile, entry, scale)| scale * sum(tile, entry)).sum()
+    }
+
+    /// The mean of a value whose weighted sum this is; `own` gives its sum over the pixel's own samples.
+    fn mean(&self, weighted: f64, own: impl FnOnce() -> f64) -> f32 {
+        let count = self.own.0.count_at(self.own.1);
+        let mean = if !self.film.layout.signed {
+            if self.weight > 0.0 { weighted / self.weight } else { 0.0 }
+        } else if count > 0.0 {
+            let plain = own() / count;
+            plain + (weighted - self.weight * plain) / self.expected
+        } else {
+            0.0
         };
         to_f32(mean)
     }
 
     fn color(&self, out: &mut [f32]) {
+        let mut weighted = [0.0; 4];
+        for &(tile, entry, scale) in &self.entries {
+            let sums = tile.filtered.color[entry].values();
+            weighted = std::array::from_fn(|k| weighted[k] + scale * sums[k]);
+        }
         for (k, out) in out.iter_mut().enumerate() {
-            let of = |sums: &[super::Sums<4>], index: usize| sums[index].values()[k];
-            *out = self.mean(|tile, entry| of(&tile.filtered.color, entry), |tile, pixel| of(&tile.own.color, pixel));
+            *out = self.mean(weighted[k], || self.own.0.own.color[self.own.1].values()[k]);
         }
     }
 
     /// The averaged channels from `first` on.
     fn channels(&self, first: usize, out: &mut [f32]) {
-        let stride = self.own.0.layout.channel_stride();
+        let stride = self.film.layout.channel_stride();
         for (k, out) in out.iter_mut().enumerate() {
             let of = |sums: &[f64], index: usize| slice::value(&sums[index * stride..(index + 1) * stride], first + k);
-            *out = self.mean(|tile, entry| of(&tile.filtered.channels, entry), |tile, pixel| of(&tile.own.channels, pixel));
+            *out = self.mean(self.sum(|tile, entry| of(&tile.filtered.channels, entry)), || of(&self.own.0.own.channels, self.own.1));
         }
     }
 
@@ -131,10 +144,12 @@ impl Film {
             });
         }
         let kernel = self.filter.variance_kernel();
-        let mut coverage = Vec::new();
-        let has_coverage = self.layout.set.needs_coverage();
+        let mut coverage = self.layout.set.needs_coverage().then(Coverage::default);
+        let mut estimator = Estimator::new(self);
         for (x, y) in crop.pixels() {
-            let Some(estimator) = Estimator::new(self, x, y) else { continue };
+            if !estimator.move_to(x, y) {
+                continue;
+            }
             for (layer, &first) in layers.iter_mut().zip(&firsts) {
                 let info = layer.kind.info();
                 let start = layer.data.len();
@@ -149,11 +164,10 @@ impl Film {
                     Source::Coverage | Source::Denoiser => {}
                 }
             }
-            if has_coverage {
+            if let Some(coverage) = &mut coverage {
                 coverage.push(estimator.coverage());
             }
         }
-        let coverage = has_coverage.then(|| Coverage::new(coverage.into_iter()));
         Image { size: self.shape().size, crop: self.shape().crop, overscan: 0, layers, coverage }
     }
 

@@ -250,7 +250,7 @@ impl FilmTile {
         splats.flush(&self.cells, self.cells.cell_of(pixel), &mut self.filtered, &mut self.weights);
     }
 
-    /// Takes up what a sample brings to its own pixel; `None` if it is not finite.
+    /// Adds a sample to what is kept of its own pixel and returns what is filtered; `None` if it is not finite.
     #[inline(always)]
     fn take<'a>(&mut self, pixel: usize, sample: u32, value: Sample<'a>, weight: f32) -> Option<Values<'a>> {
         let Sample { pixel: PixelSample { radiance, alpha }, surface, parts } = value;
@@ -338,8 +338,8 @@ impl FilmTile {
         }
     }
 
-    /// Adds all samples of another tile of the same pixels and layers, each counted `factor` times as much as a single one. Layers of data and of
-    /// coverage take no notice of it. Nothing may be added to this tile but by this.
+    /// Adds all samples of another tile of the same pixels and layers, each counted `factor` times as much as a single one, except in layers of data and
+    /// of coverage. Nothing may be added to this tile but by this.
     pub fn merge_weighed(&mut self, other: &Self, factor: f64) {
         self.weighed.resize(self.samples.len(), Weighed::default());
         for (pixel, weighed) in self.weighed.iter_mut().enumerate() {

@@ -242,11 +242,6 @@ impl Film {
         let tile = self.tiles.get((row * self.columns + column) as usize)?;
         tile.area.contains(x, y).then(|| (tile, tile.index(x, y)))
     }
-
-    /// Width and height of the cells, which lie on the full picture's grid.
-    pub(super) fn cell_size(&self) -> u32 {
-        self.layout.cell_size
-    }
 }
 
 /// Bytes that a film holds for each pixel, without the borders of cells and the lists of shapes that layers of objects need.

@@ -219,12 +219,12 @@ fn block_area(tile: &FilmTile, [x, y]: [u32; 2]) -> Crop {
     Crop { x: x * BLOCK_SIZE, y: y * BLOCK_SIZE, width: BLOCK_SIZE, height: BLOCK_SIZE }.intersection(&tile.active())
 }
 
-/// What a pixel's own samples say of it.
+/// Statistics of a pixel's own samples.
 #[derive(Clone, Copy, Debug, Default)]
 struct PixelStatistic {
     /// Variance of their mean, by channel.
     variance: [f64; 3],
-    /// What relates a squared error of the pixel to its colour, by channel.
+    /// `1 / (colour² + FLOOR)`, which makes a squared error of the pixel relative, by channel.
     weight: [f64; 3],
 }
 

@@ -22,7 +22,7 @@ pub fn run(arguments: &MergeArgs, mut uses: FileUses) -> Result<()> {
         output::check_writable(Path::new(&output.file))?;
     }
     let merged = render::merge(&arguments.shards, arguments.partial)?;
-    let image = Image { overscan: merged.header.overscan, ..merged.state.film.resolve() };
+    let image = Image { overscan: merged.state.film.shape().overscan, ..merged.state.film.resolve() };
     let (rays, nan_samples) = (merged.state.rays.total(), merged.state.film.dropped_count());
     let info = RenderInfo {
         statistics: merged.header.info.statistics.map(|statistics| RenderStatistics { rays, nan_samples, ..statistics }),

@@ -205,7 +205,8 @@ fn full_picture() -> Image {
         let groups: &[Option<&str>] = if info.kind == LayerKind::LightGroups { &[Some("key light"), Some("default")] } else { &[None] };
         layers.extend(groups.iter().map(|group| Layer { kind: info.kind, group: group.map(str::to_owned), data: data.clone() }));
     }
-    let coverage = Coverage::new(std::iter::repeat_n(weights, pixels));
+    let mut coverage = Coverage::default();
+    std::iter::repeat_n(weights, pixels).for_each(|weights| coverage.push(weights));
     Image { size, crop: Crop::full(size), overscan: 2, layers, coverage: Some(coverage) }
 }
 

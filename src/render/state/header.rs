@@ -90,8 +90,6 @@ pub struct Header {
     pub complete: bool,
     /// What the film holds.
     pub film: FilmShape,
-    /// Pixels on each side of it that lie around the picture.
-    pub overscan: u32,
     /// The files that the picture is to be written to.
     pub outputs: Vec<OutputDesc>,
     /// What these tell of the rendering.
@@ -112,7 +110,6 @@ impl Header {
             settings: compared(settings, scene),
             spp: settings.spp,
             shard,
-            overscan: settings.overscan,
             outputs: settings.outputs.clone(),
             ..Self::default()
         }
@@ -133,7 +130,7 @@ impl Header {
         let Crop { x, y, width, height } = self.film.crop;
         let [x, y, width, height] = [x, y, width, height].map(u64::from);
         let [full_width, full_height] = self.film.size.map(u64::from);
-        let around = 2 * u64::from(self.overscan);
+        let around = 2 * u64::from(self.film.overscan);
         if !(1..=count).contains(&index) {
             Some(format!("there is no shard {index} of {count}"))
         } else if self.done > self.spp {
@@ -148,7 +145,7 @@ impl Header {
             Some("an instance is placed within itself".to_owned())
         } else if (width * height).saturating_mul(LEAST_BYTES) > bytes {
             Some("a part is missing".to_owned())
-        } else if full_width.max(full_height) > MOST_PIXELS || u64::from(self.film.overscan) > full_width.min(full_height) {
+        } else if full_width.max(full_height) > MOST_PIXELS {
             Some("its film is larger than any picture".to_owned())
         } else {
             None

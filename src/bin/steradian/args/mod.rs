@@ -140,11 +140,11 @@ pub enum Command {
     #[cfg(feature = "bench")]
     #[command(subcommand)]
     Bench(BenchCommand),
-    /// Measure: not in this program, which was built without the feature `bench`
+    /// Benchmarks: unsupported by this program, which was built without the feature `bench`
     #[cfg(not(feature = "bench"))]
     #[command(hide = true)]
     Bench {
-        /// Anything
+        /// Arguments of the benchmark
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
         arguments: Vec<String>,
     },
@@ -195,7 +195,7 @@ pub struct RenderArgs {
     /// Render this many pixels more on each side: EXR files hold them around the picture (their data window), PNG files do not
     #[arg(long, value_name = "PIXELS", help_heading = "Picture")]
     pub overscan: Option<u32>,
-    /// EXR: store these beside the picture, or all
+    /// EXR: layers (AOVs) to store beside the picture; `all` for every one
     #[arg(long, value_name = "LAYERS", value_delimiter = ',', value_parser = names::layers(), help_heading = "Picture")]
     pub layers: Vec<Layers>,
     /// EXR: store 32-bit floats instead of 16-bit ones
