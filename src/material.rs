@@ -1,12 +1,14 @@
 //! Materials: textures and parameters that become a [`Bsdf`] at a point.
 
 mod inputs;
+mod principled;
 
-pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, RangedInput, ScalarInput};
+pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, PlasticCoat, RangedInput, ScalarInput};
+pub use principled::PrincipledInputs;
 
 use crate::bsdf::{
-    BeckmannBsdf, Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
-    PrincipledParameters, ThinDielectric,
+    Beckmann, Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
+    SeparableGgx, SingleBsdf, ThinDielectric,
 };
 use crate::color::Rgb;
 use crate::id::{MaterialId, TextureId};
@@ -79,6 +81,8 @@ pub enum Varying {
         alpha: AlphaInput,
         /// Its microfacets.
         facets: Facets,
+        /// Factors on what is reflected and on what crosses.
+        tints: [ColorInput; 2],
     },
     /// Phong's model.
     Phong {
@@ -108,13 +112,19 @@ pub enum Varying {
     ThinDielectric {
         /// Index of refraction over that of the outside.
         ior: RangedInput,
+        /// Factors on what is reflected and on what passes.
+        tints: [ColorInput; 2],
     },
     /// Plastic.
     Plastic {
         /// The coat.
-        coat: CoatInput,
+        coat: PlasticCoat,
         /// Colour of the diffuse base.
         albedo: ColorInput,
+        /// Factor on what the coat reflects.
+        tint: ColorInput,
+        /// As [`Plastic::nonlinear`].
+        nonlinear: bool,
     },
     /// A clear coat over another material.
     Coated {
@@ -127,84 +137,6 @@ pub enum Varying {
     },
     /// The principled model.
     Principled(PrincipledInputs),
-}
-
-/// What [`PrincipledParameters`] are made of.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PrincipledInputs {
-    /// What no texture changes, or a number below would replace.
-    pub rest: PrincipledParameters,
-    /// The base's colour.
-    pub base_color: ColorInput,
-    /// How much is metal.
-    pub metallic: ScalarInput,
-    /// Roughness.
-    pub roughness: ScalarInput,
-    /// Anisotropy.
-    pub anisotropic: ScalarInput,
-    /// Index of refraction over that of the outside.
-    pub ior: RangedInput,
-    /// Reflectance ahead in units of 0.08, in place of the index of refraction.
-    pub specular: Option<ScalarInput>,
-    /// Tint of the dielectric layer.
-    pub specular_tint: ScalarInput,
-    /// Strength of the sheen.
-    pub sheen: ScalarInput,
-    /// Tint of the sheen.
-    pub sheen_tint: ScalarInput,
-    /// Strength of the clear coat.
-    pub clearcoat: ScalarInput,
-    /// Gloss of the clear coat.
-    pub clearcoat_gloss: ScalarInput,
-    /// From the diffuse to the flat lobe.
-    pub subsurface: ScalarInput,
-    /// How much is glass.
-    pub transmission: ScalarInput,
-    /// How much the diffuse base of a thin sheet lets through.
-    pub diffuse_transmission: ScalarInput,
-}
-
-impl PrincipledInputs {
-    fn parameters(&self, textures: &[Texture], footprint: &Footprint) -> PrincipledParameters {
-        let at = |input: &ScalarInput| input.at(textures, footprint);
-        PrincipledParameters {
-            base_color: self.base_color.at(textures, footprint),
-            metallic: at(&self.metallic),
-            roughness: at(&self.roughness),
-            anisotropic: at(&self.anisotropic),
-            ior: match &self.specular {
-                Some(specular) => PrincipledParameters::ior_of_specular(at(specular)),
-                None => self.ior.at(textures, footprint),
-            },
-            specular_tint: at(&self.specular_tint),
-            sheen: at(&self.sheen),
-            sheen_tint: at(&self.sheen_tint),
-            clearcoat: at(&self.clearcoat),
-            clearcoat_gloss: at(&self.clearcoat_gloss),
-            subsurface: at(&self.subsurface),
-            transmission: at(&self.transmission),
-            diffuse_transmission: at(&self.diffuse_transmission),
-            ..self.rest
-        }
-    }
-
-    fn textures(&self) -> Vec<TextureId> {
-        let scalars = [
-            &self.metallic,
-            &self.roughness,
-            &self.anisotropic,
-            &self.specular_tint,
-            &self.sheen,
-            &self.sheen_tint,
-            &self.clearcoat,
-            &self.clearcoat_gloss,
-            &self.subsurface,
-            &self.transmission,
-            &self.diffuse_transmission,
-        ];
-        let scalars = scalars.into_iter().chain(&self.specular).filter_map(ScalarInput::texture);
-        self.base_color.texture().into_iter().chain(self.ior.texture()).chain(scalars).collect()
-    }
 }
 
 impl Varying {
@@ -225,15 +157,24 @@ impl Varying {
                 match facets {
                     Facets::Ggx => Bsdf::Conductor(metal.with_surface(alpha, tint)),
                     Facets::SingleGgx => Bsdf::Conductor(metal.with_surface(alpha, tint).single_scattering()),
-                    Facets::Beckmann => Bsdf::Beckmann(BeckmannBsdf::Conductor(metal.with_beckmann(alpha, tint))),
+                    Facets::SeparableGgx => Bsdf::SeparableGgx(SingleBsdf::Conductor(metal.with_facets(SeparableGgx::new(alpha), tint))),
+                    Facets::Beckmann => Bsdf::Beckmann(SingleBsdf::Conductor(metal.with_facets(Beckmann::new(alpha), tint))),
                 }
             }
-            Self::Dielectric { ior, alpha, facets } => {
-                let alpha = alpha.at(textures, footprint);
+            Self::Dielectric { ior, alpha, facets, tints } => {
+                let (ior, alpha) = (*ior, alpha.at(textures, footprint));
+                let [reflection, transmission] = tints.map(|tint| tint.at(textures, footprint));
                 match facets {
-                    Facets::Ggx => Bsdf::Dielectric(Dielectric::new(*ior, alpha)),
-                    Facets::SingleGgx => Bsdf::Dielectric(Dielectric::new(*ior, alpha).single_scattering()),
-                    Facets::Beckmann => Bsdf::Beckmann(BeckmannBsdf::Dielectric(Dielectric::beckmann(*ior, alpha))),
+                    Facets::Ggx => Bsdf::Dielectric(Dielectric::new(ior, alpha).tinted(reflection, transmission)),
+                    Facets::SingleGgx => Bsdf::Dielectric(Dielectric::new(ior, alpha).single_scattering().tinted(reflection, transmission)),
+                    Facets::SeparableGgx => {
+                        let glass = Dielectric::with_facets(ior, alpha, SeparableGgx::new).tinted(reflection, transmission);
+                        Bsdf::SeparableGgx(SingleBsdf::Dielectric(glass))
+                    }
+                    Facets::Beckmann => {
+                        let glass = Dielectric::with_facets(ior, alpha, Beckmann::new).tinted(reflection, transmission);
+                        Bsdf::Beckmann(SingleBsdf::Dielectric(glass))
+                    }
                 }
             }
             Self::Phong { diffuse, specular, exponent, cosine } => {
@@ -260,9 +201,13 @@ impl Varying {
                     m.at(textures, footprint),
                 ))
             }
-            Self::ThinDielectric { ior } => Bsdf::ThinDielectric(ThinDielectric { ior: ior.at(textures, footprint) }),
-            Self::Plastic { coat, albedo } => {
-                Bsdf::Plastic(Plastic { diffuse: albedo.at(textures, footprint), coat: coat.at(textures, footprint) })
+            Self::ThinDielectric { ior, tints } => {
+                let [reflection_tint, transmission_tint] = tints.map(|tint| tint.at(textures, footprint));
+                Bsdf::ThinDielectric(ThinDielectric { ior: ior.at(textures, footprint), reflection_tint, transmission_tint })
+            }
+            Self::Plastic { coat, albedo, tint, nonlinear } => {
+                let (albedo, tint) = (albedo.at(textures, footprint), tint.at(textures, footprint));
+                coat.over(albedo, tint, *nonlinear, textures, footprint)
             }
             Self::Coated { coat, tint, base } => {
                 let base = base.bsdf(textures, || *footprint);
@@ -294,11 +239,17 @@ impl Varying {
                 found.extend([albedo, f0].into_iter().filter_map(ColorInput::texture));
                 found.extend([d, s, m].into_iter().filter_map(ScalarInput::texture));
             }
-            Self::ThinDielectric { ior } => found.extend(ior.texture()),
+            Self::ThinDielectric { ior, tints } => {
+                found.extend(ior.texture().into_iter().chain(tints.iter().filter_map(ColorInput::texture)))
+            }
             Self::Conductor { tint, alpha, .. } => found.extend(tint.texture().into_iter().chain(alpha.textures())),
-            Self::Dielectric { alpha, .. } => found.extend(alpha.textures()),
+            Self::Dielectric { alpha, tints, .. } => {
+                found.extend(alpha.textures().into_iter().chain(tints.iter().filter_map(ColorInput::texture)));
+            }
             Self::Mirror { reflectance } => found.extend(reflectance.texture()),
-            Self::Plastic { coat, albedo } => found.extend(coat.textures().into_iter().chain(albedo.texture())),
+            Self::Plastic { coat, albedo, tint, .. } => {
+                found.extend(coat.textures().into_iter().chain(albedo.texture()).chain(tint.texture()));
+            }
             Self::Coated { coat, tint, base } => {
                 found.extend(coat.textures().into_iter().chain(tint.texture()));
                 found.extend(base.textures());
@@ -356,7 +307,9 @@ impl Material {
     pub fn boundary(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint, ior: f32) -> Option<Bsdf> {
         match self {
             Self::Varying(varying) => match **varying {
-                Varying::Dielectric { alpha, facets, .. } => Some(Varying::Dielectric { ior, alpha, facets }.bsdf(textures, &footprint())),
+                Varying::Dielectric { alpha, facets, tints, .. } => {
+                    Some(Varying::Dielectric { ior, alpha, facets, tints }.bsdf(textures, &footprint()))
+                }
                 _ => None,
             },
             Self::Constant(_) | Self::Mix { .. } | Self::TwoSided { .. } => None,

@@ -19,8 +19,6 @@ use std::f32::consts::{FRAC_1_PI, FRAC_2_SQRT_PI};
 
 use super::energy::Energy;
 use super::microfacet::{FacetReflection, Microfacets, usable};
-use super::{BsdfEval, BsdfSample, Conductor, Dielectric};
-use crate::color::Rgb;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec2, Vec3, vec2, vec3};
 
@@ -202,58 +200,6 @@ fn erf_inv(x: f32) -> f32 {
     let w = -((1.0 - x) * (1.0 + x)).ln();
     let (terms, at) = if w < 5.0 { (MIDDLE, w - 2.5) } else { (ENDS, w.sqrt() - 3.0) };
     x * terms.iter().fold(0.0, |sum, term| sum * at + term)
-}
-
-/// A material with Beckmann's microfacets. Apart from the others, so that their code stays as it is.
-#[derive(Clone, Debug, PartialEq)]
-pub enum BeckmannBsdf {
-    /// Metal.
-    Conductor(Conductor<Beckmann>),
-    /// Glass.
-    Dielectric(Dielectric<Beckmann>),
-}
-
-macro_rules! each {
-    ($self:expr, $bsdf:ident => $body:expr) => {
-        match $self {
-            BeckmannBsdf::Conductor($bsdf) => $body,
-            BeckmannBsdf::Dielectric($bsdf) => $body,
-        }
-    };
-}
-
-impl BeckmannBsdf {
-    /// As [`Bsdf::eval`](super::Bsdf::eval).
-    #[inline(never)]
-    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        each!(self, bsdf => bsdf.eval(wo, wi))
-    }
-
-    /// As [`Bsdf::sample`](super::Bsdf::sample).
-    #[inline(never)]
-    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        each!(self, bsdf => bsdf.sample(wo, u_lobe, u))
-    }
-
-    /// As [`Bsdf::is_delta`](super::Bsdf::is_delta).
-    pub fn is_delta(&self) -> bool {
-        each!(self, bsdf => bsdf.is_delta())
-    }
-
-    /// As [`Bsdf::is_anisotropic`](super::Bsdf::is_anisotropic).
-    pub fn is_anisotropic(&self) -> bool {
-        each!(self, bsdf => bsdf.is_anisotropic())
-    }
-
-    /// As [`Bsdf::transmits`](super::Bsdf::transmits).
-    pub fn transmits(&self) -> bool {
-        matches!(self, Self::Dielectric(_))
-    }
-
-    /// As [`Bsdf::albedo`](super::Bsdf::albedo).
-    pub fn albedo(&self, wo: Vec3) -> Rgb {
-        each!(self, bsdf => bsdf.albedo(wo))
-    }
 }
 
 #[cfg(test)]

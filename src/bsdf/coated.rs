@@ -38,7 +38,7 @@ const MIN_BASE: f32 = 0.05;
 impl Coated {
     /// A coat over an opaque base; `tint` within `[0, 1]` is what light keeps that crosses the coat twice along the normal.
     pub fn new(coat: Coat, tint: Rgb, base: Bsdf) -> Self {
-        let inverse = coat.inverse_transmittance();
+        let inverse = coat.interreflection(1.0);
         let diffuse = match base {
             Bsdf::Lambert(_) => Some(inverse),
             // A little more than a mean share of it goes where the coat lets it out.
@@ -121,7 +121,7 @@ impl Coated {
         let probability = self.coat_probability(wo, coat_o);
         let wi = if u_lobe < probability {
             if self.coat.is_smooth() {
-                return Some(Coat::mirrored(wo, coat_o, probability));
+                return Some(BsdfSample::mirrored(wo, Rgb::splat(coat_o / probability), probability));
             }
             let i = self.coat.sample(o, u);
             vec3(i.x, i.y, i.z * 1f32.copysign(wo.z))

@@ -6,7 +6,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use super::energy::{Energy, multiple_color};
 use super::fresnel::ComplexIndex;
 use super::microfacet::{MIN_COSINE, Microfacets, reflect};
-use super::{Beckmann, BsdfEval, BsdfSample, Ggx};
+use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
@@ -57,11 +57,11 @@ impl Conductor<Ggx> {
         Self { tint, facets: Ggx::new(alpha), ..self.single_scattering() }.with_multiple_scattering()
     }
 
-    /// The same metal with microfacets distributed as Beckmann's, other roughness and tint, and without multiple scattering.
+    /// The same metal with other microfacets and tint, and without multiple scattering.
     #[must_use]
-    pub fn with_beckmann(self, alpha: [f32; 2], tint: Rgb) -> Conductor<Beckmann> {
+    pub fn with_facets<D>(self, facets: D, tint: Rgb) -> Conductor<D> {
         let Self { index, average, .. } = self;
-        Conductor { index, tint, facets: Beckmann::new(alpha), average, multiple: Rgb::BLACK, share: 0.0 }
+        Conductor { index, tint, facets, average, multiple: Rgb::BLACK, share: 0.0 }
     }
 }
 

@@ -22,7 +22,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::energy::Energy;
 use super::fresnel;
 use super::microfacet::{MIN_COSINE, Microfacets, reflect, usable};
-use super::{Beckmann, BsdfEval, BsdfSample, Ggx};
+use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec3, vec3};
@@ -36,7 +36,12 @@ pub struct Dielectric<D = Ggx> {
     facets: D,
     /// What microfacets lose, for light from outside and from inside; `None` if it stays lost.
     multiple: Option<[Multiple; 2]>,
+    /// Factors on what is reflected and on what crosses.
+    tints: [Rgb; 2],
 }
+
+/// The tints of clear glass.
+const CLEAR: [Rgb; 2] = [Rgb::WHITE; 2];
 
 /// Light from one side that is scattered several times.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +80,7 @@ impl Dielectric<Ggx> {
     /// roughness.
     pub fn new(ior: f32, alpha: [f32; 2]) -> Self {
         let ggx = Ggx::new(usable_across(ior, alpha));
-        if ggx.is_smooth() { Self { ior, facets: ggx, multiple: None } } else { Self::rough(ior, ggx, true) }
+        if ggx.is_smooth() { Self { ior, facets: ggx, multiple: None, tints: CLEAR } } else { Self::rough(ior, ggx, true) }
     }
 
     /// A boundary of which the caller knows that it is rough.
@@ -83,7 +88,7 @@ impl Dielectric<Ggx> {
     pub(super) fn rough(ior: f32, ggx: Ggx, multiscatter: bool) -> Self {
         let [ax, ay] = ggx.alpha();
         let is_known = multiscatter && ax == ay;
-        Self { ior, facets: ggx, multiple: is_known.then(|| multiple_scattering(ior, &ggx)) }
+        Self { ior, facets: ggx, multiple: is_known.then(|| multiple_scattering(ior, &ggx)), tints: CLEAR }
     }
 
     /// Without the light that microfacets scatter several times.
@@ -93,14 +98,24 @@ impl Dielectric<Ggx> {
     }
 }
 
-impl Dielectric<Beckmann> {
-    /// As [`Dielectric::new`], with microfacets distributed as Beckmann's and without multiple scattering.
-    pub fn beckmann(ior: f32, alpha: [f32; 2]) -> Self {
-        Self { ior, facets: Beckmann::new(usable_across(ior, alpha)), multiple: None }
-    }
-}
-
 impl<D: Microfacets> Dielectric<D> {
+    /// As [`Dielectric::new`], with the microfacets that `facets` makes of an alpha, and without multiple scattering.
+    pub fn with_facets(ior: f32, alpha: [f32; 2], facets: impl FnOnce([f32; 2]) -> D) -> Self {
+        Self { ior, facets: facets(usable_across(ior, alpha)), multiple: None, tints: CLEAR }
+    }
+
+    /// With factors within `[0, 1]` on what is reflected and on what crosses.
+    #[must_use]
+    pub fn tinted(self, reflection: Rgb, transmission: Rgb) -> Self {
+        Self { tints: [reflection, transmission], ..self }
+    }
+
+    /// The factor on what is reflected, or on what crosses.
+    #[inline]
+    fn tint(&self, is_transmission: bool) -> Rgb {
+        self.tints[usize::from(is_transmission)]
+    }
+
     /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over that on its side.
     #[inline]
     fn lost(&self, eta: f32, w: Vec3) -> f32 {
@@ -123,13 +138,14 @@ impl<D: Microfacets> Dielectric<D> {
         let eta = self.eta(wo);
         let o = vec3(wo.x, wo.y, wo.z.abs());
         let i = vec3(wi.x, wi.y, wi.z * 1f32.copysign(wo.z));
-        match &self.multiple {
+        let BsdfEval { value, pdf } = match &self.multiple {
             None => self.eval_once(o, i, eta),
             Some(multiple) => self.eval_all(multiple, wo, o, i, eta),
-        }
+        };
+        BsdfEval { value: value * self.tint(i.z < 0.0), pdf }
     }
 
-    /// With multiple scattering; `o` on the upper side.
+    /// With multiple scattering, without the tints; `o` on the upper side.
     #[inline]
     fn eval_all(&self, multiple: &[Multiple; 2], wo: Vec3, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
         let [near, far] = if wo.z > 0.0 { [multiple[0], multiple[1]] } else { [multiple[1], multiple[0]] };
@@ -146,7 +162,7 @@ impl<D: Microfacets> Dielectric<D> {
         BsdfEval { value: once.value + Rgb::splat(value * cosine_pdf), pdf: (1.0 - lost) * once.pdf + lost * fraction * cosine_pdf }
     }
 
-    /// One encounter with a microfacet; `o` on the upper side.
+    /// One encounter with a microfacet, without the tints; `o` on the upper side.
     #[inline]
     fn eval_once(&self, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
         if i.z > 0.0 {
@@ -185,13 +201,15 @@ impl<D: Microfacets> Dielectric<D> {
         if wo.z.abs() <= MIN_COSINE {
             return None;
         }
-        if self.facets.is_smooth() {
-            return Some(self.sample_smooth(wo, u_lobe));
-        }
-        match &self.multiple {
-            None => self.sample_once(wo, u_lobe, u),
-            Some(multiple) => self.sample_all(multiple, wo, u_lobe, u),
-        }
+        let sample = if self.facets.is_smooth() {
+            self.sample_smooth(wo, u_lobe)
+        } else {
+            match &self.multiple {
+                None => self.sample_once(wo, u_lobe, u),
+                Some(multiple) => self.sample_all(multiple, wo, u_lobe, u),
+            }?
+        };
+        Some(BsdfSample { weight: sample.weight * self.tint(sample.is_transmission), ..sample })
     }
 
     /// With multiple scattering.
@@ -280,15 +298,16 @@ impl<D: Microfacets> Dielectric<D> {
         self.facets.is_smooth()
     }
 
-    /// One: nothing is absorbed.
-    pub fn albedo(&self, _wo: Vec3) -> Rgb {
-        Rgb::WHITE
+    /// What a plane reflects and lets through.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        let reflected = fresnel::dielectric(wo.z.abs().min(1.0), self.eta(wo)).reflectance;
+        self.tint(false) * reflected + self.tint(true) * (1.0 - reflected)
     }
 }
 
 /// The unit direction that `o` refracts to at the unit normal `m`, for the cosines on both sides.
 #[inline]
-fn refract(o: Vec3, m: Vec3, cos_o: f32, cos_t: f32, eta: f32) -> Vec3 {
+pub(super) fn refract(o: Vec3, m: Vec3, cos_o: f32, cos_t: f32, eta: f32) -> Vec3 {
     let scale = 1.0 / eta;
     m * (cos_o * scale - cos_t) - o * scale
 }

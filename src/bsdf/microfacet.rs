@@ -1,4 +1,4 @@
-//! Distributions of microfacet normals with Smith's shadowing; GGX is the one that everything has unless it says otherwise.
+//! Distributions of microfacet normals with Smith's shadowing; GGX with height-correlated shadowing is the default.
 //!
 //! Of GGX, with the stretched length `s(w) = |(ax wx, ay wy, wz)|` of a direction, everything is algebra:
 //!
@@ -42,7 +42,7 @@ pub trait Microfacets: Copy {
     /// How much of the light the microfacets scatter at once, where that is known.
     fn energy(&self) -> Option<Energy>;
 
-    /// Whether the surface is a plane mirror; nothing else may then be asked.
+    /// Whether the surface is a plane mirror; no other method may then be called.
     #[inline]
     fn is_smooth(&self) -> bool {
         self.alpha()[0] == 0.0
@@ -180,6 +180,68 @@ impl Microfacets for Ggx {
     #[inline]
     fn energy(&self) -> Option<Energy> {
         Some(Energy::new(self))
+    }
+}
+
+/// GGX whose two sides are masked independently of each other, `G2(o, i) = G1(o) G1(i)`, for agreement with Mitsuba; what several encounters
+/// scatter is lost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeparableGgx(Ggx);
+
+impl SeparableGgx {
+    /// As [`Ggx::new`].
+    pub fn new(alpha: [f32; 2]) -> Self {
+        Self(Ggx::new(alpha))
+    }
+}
+
+impl From<Ggx> for SeparableGgx {
+    fn from(ggx: Ggx) -> Self {
+        Self(ggx)
+    }
+}
+
+impl Microfacets for SeparableGgx {
+    #[inline]
+    fn alpha(&self) -> [f32; 2] {
+        self.0.alpha
+    }
+
+    #[inline]
+    fn normal_density(&self, m: Vec3) -> f32 {
+        self.0.normal_density(m)
+    }
+
+    #[inline]
+    fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
+        self.0.sample_visible_normal(o, u)
+    }
+
+    #[inline]
+    fn sampled_shadowing(&self, _o: Vec3, i: Vec3) -> f32 {
+        self.0.g1(i)
+    }
+
+    #[inline]
+    fn reflection(&self, o: Vec3, i: Vec3) -> FacetReflection {
+        let facet = self.0.reflection(o, i);
+        FacetReflection { value: facet.pdf * self.0.g1(i), ..facet }
+    }
+
+    #[inline]
+    fn reflection_pdf(&self, o: Vec3, m: Vec3) -> f32 {
+        self.0.reflection_pdf(o, m)
+    }
+
+    #[inline]
+    fn refraction(&self, o: Vec3, i: Vec3, x: f32) -> (f32, f32) {
+        let (_, pdf) = self.0.refraction(o, i, x);
+        (pdf * self.0.g1(i), pdf)
+    }
+
+    #[inline]
+    fn energy(&self) -> Option<Energy> {
+        None
     }
 }
 

@@ -18,13 +18,14 @@ mod mirror;
 mod phong;
 mod plastic;
 mod principled;
+mod single;
 mod split;
 #[cfg(test)]
 mod tests;
 mod thin;
 
-pub use beckmann::{Beckmann, BeckmannBsdf};
-pub use coat::Coat;
+pub use beckmann::Beckmann;
+pub use coat::{Coat, diffuse_mean, mitsuba_diffuse_mean};
 pub use coated::Coated;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
@@ -32,11 +33,12 @@ pub use energy::bake as bake_energy_tables;
 pub use eon::Eon;
 pub use glossy::Glossy;
 pub use lambert::{DiffuseDirection, Lambert};
-pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA};
+pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA, SeparableGgx};
 pub use mirror::Mirror;
 pub use phong::Phong;
 pub use plastic::Plastic;
-pub use principled::{Principled, PrincipledParameters};
+pub use principled::{Principled, PrincipledModel, PrincipledParameters};
+pub use single::SingleBsdf;
 pub use thin::{DiffuseTransmission, ThinDielectric};
 
 use crate::color::Rgb;
@@ -107,11 +109,13 @@ pub enum Bsdf {
     /// A clear coat over another opaque one.
     Coated(Box<Coated>),
     /// One of the above with Beckmann's microfacets.
-    Beckmann(BeckmannBsdf),
+    Beckmann(SingleBsdf<Beckmann>),
+    /// One of the above with GGX microfacets masked on each side independently.
+    SeparableGgx(SingleBsdf<SeparableGgx>),
 }
 
-// Made anew at every hit: no kind may make the others slower to pass around.
-const _: () = assert!(size_of::<Bsdf>() <= 96);
+// Constructed at every hit: no kind may make the others slower to pass around.
+const _: () = assert!(size_of::<Bsdf>() <= 112);
 
 macro_rules! each {
     ($self:expr, $bsdf:ident => $body:expr) => {
@@ -129,6 +133,7 @@ macro_rules! each {
             Bsdf::Principled($bsdf) => $body,
             Bsdf::Coated($bsdf) => $body,
             Bsdf::Beckmann($bsdf) => $body,
+            Bsdf::SeparableGgx($bsdf) => $body,
         }
     };
 }
@@ -180,6 +185,7 @@ impl Bsdf {
             Self::Principled(bsdf) => bsdf.is_anisotropic(),
             Self::Coated(bsdf) => bsdf.is_anisotropic(),
             Self::Beckmann(bsdf) => bsdf.is_anisotropic(),
+            Self::SeparableGgx(bsdf) => bsdf.is_anisotropic(),
         }
     }
 
@@ -190,6 +196,7 @@ impl Bsdf {
             Self::Dielectric(_) | Self::ThinDielectric(_) | Self::DiffuseTransmission(_) => true,
             Self::Principled(bsdf) => bsdf.transmits(),
             Self::Beckmann(bsdf) => bsdf.transmits(),
+            Self::SeparableGgx(bsdf) => bsdf.transmits(),
             Self::Lambert(_)
             | Self::Eon(_)
             | Self::Mirror(_)

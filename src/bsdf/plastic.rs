@@ -1,48 +1,57 @@
 //! A diffuse base under a clear dielectric coat.
 //!
-//! With `E(w)` the fraction of the light from `w` that the coat reflects (Fresnel's `F` for a smooth coat, the single-scattering albedo of
-//! its microfacets for a rough one) and `E_avg` its mean under diffuse light,
+//! With `T(w)` the fraction of the light from `w` that the coat lets through, `R` what it reflects back down of diffuse light below it, and `r` the
+//! colour of the base,
 //!
 //! ```text
-//! f = coat + (1 - E(wo)) (1 - E(wi)) / (1 - E_avg) * diffuse / pi
+//! f = coat + T(wo) T(wi) / (eta² (1 - r' R)) r / pi
 //! ```
 //!
-//! For a smooth coat `1 - E_avg = eta² (1 - F_internal)`, and this is the linear formula of Mitsuba's `plastic`: light that the coat throws
-//! back inside keeps the colour of one scattering. A white base loses nothing, whatever the coat (for an anisotropic one `E` between its axes
-//! is approximate: within a hundredth or two unless its alphas differ more than four times), and the base is reciprocal (Kelemen and
-//! Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model with Importance Sampling").
+//! where `r'` is `r` if the base is nonlinear: its colour deepens each time that light is thrown back. Otherwise `r'` is 1: the light keeps the colour
+//! of one scattering. For a smooth coat these are the formulas of Mitsuba's `plastic`. A rough coat that loses nothing has `T = 1 - E`, with
+//! `E` the single-scattering albedo of its microfacets, and `eta² (1 - R)` is then `1 - E_avg`, with `E_avg` the mean of `E` under diffuse light. A
+//! white base loses nothing, whatever the coat (for an anisotropic one `E` between its axes is approximate: within a hundredth or two unless
+//! its alphas differ more than four times), and the base is reciprocal (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled
+//! Specular-Matte BRDF Model with Importance Sampling").
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::microfacet::MIN_COSINE;
+use super::microfacet::{MIN_COSINE, Microfacets};
 use super::split::share;
-use super::{BsdfEval, BsdfSample, Coat};
+use super::{BsdfEval, BsdfSample, Coat, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
 
 /// A diffuse base under a clear coat, on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plastic {
+pub struct Plastic<D = Ggx> {
     /// Colour of the base, each channel within `[0, 1]`.
     pub diffuse: Rgb,
     /// The coat.
-    pub coat: Coat,
+    pub coat: Coat<D>,
+    /// Factor on what the coat reflects, each channel within `[0, 1]`.
+    pub tint: Rgb,
+    /// Whether the base's colour deepens each time that the coat throws light back.
+    pub nonlinear: bool,
 }
 
 impl Plastic {
     /// A base of colour `diffuse` under a coat with index of refraction `ior` over the outside, at least 1; smooth where
     /// [`Ggx::new`](super::Ggx::new) says so. A rough coat costs some milliseconds here.
     pub fn new(diffuse: Rgb, ior: f32, alpha: [f32; 2]) -> Self {
-        Self { diffuse, coat: Coat::new(ior, alpha) }
+        Self { diffuse, coat: Coat::new(ior, alpha), tint: Rgb::WHITE, nonlinear: false }
     }
+}
 
+impl<D: Microfacets> Plastic<D> {
     /// Probability of choosing the coat: by what the lobes scatter.
     #[inline]
     fn coat_probability(&self, coat_albedo: f32) -> f32 {
         let base = (1.0 - coat_albedo) * self.diffuse.mean();
-        let sum = coat_albedo + base;
-        if sum > 0.0 { coat_albedo / sum } else { 0.0 }
+        let coat = coat_albedo * self.tint.mean();
+        let sum = coat + base;
+        if sum > 0.0 { coat / sum } else { 0.0 }
     }
 
     /// Base and rough coat for directions on the same side.
@@ -66,13 +75,17 @@ impl Plastic {
             return BsdfEval { value, pdf };
         }
         let (reflected, density) = coat.eval(o, i);
-        BsdfEval { value: value + Rgb::splat(reflected), pdf: pdf + probability * density }
+        BsdfEval { value: value + self.tint * reflected, pdf: pdf + probability * density }
     }
 
     /// What the base scatters below a coat with these albedos.
     #[inline]
     fn base(&self, [coat_o, coat_i]: [f32; 2], cosine_pdf: f32) -> Rgb {
-        self.diffuse * ((1.0 - coat_o) * (1.0 - coat_i) * self.coat.inverse_transmittance() * cosine_pdf)
+        let through = (1.0 - coat_o) * (1.0 - coat_i) * cosine_pdf;
+        if self.nonlinear {
+            return self.diffuse.map(|r| r * (through * self.coat.interreflection(r)));
+        }
+        self.diffuse * (through * self.coat.interreflection(1.0))
     }
 
     /// As [`Bsdf::diffuse_fraction`](super::Bsdf::diffuse_fraction).
@@ -96,7 +109,7 @@ impl Plastic {
         let probability = self.coat_probability(coat_albedo);
         let i = if u_lobe < probability {
             if coat.is_smooth() {
-                return Some(Coat::mirrored(wo, coat_albedo, probability));
+                return Some(BsdfSample::mirrored(wo, self.tint * (coat_albedo / probability), probability));
             }
             coat.sample(o, u)
         } else {
@@ -122,6 +135,6 @@ impl Plastic {
     /// What coat and base reflect together.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         let coat = self.coat.albedo(vec3(wo.x, wo.y, wo.z.abs()));
-        Rgb::splat(coat) + self.diffuse * (1.0 - coat)
+        self.tint * coat + self.diffuse * (1.0 - coat)
     }
 }

@@ -11,12 +11,14 @@ impl Bsdf {
     pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
         match self {
             Self::Lambert(_) | Self::Eon(_) | Self::DiffuseTransmission(_) => Rgb::WHITE,
-            Self::Mirror(_) | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Beckmann(_) => Rgb::BLACK,
+            Self::Mirror(_) | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => Rgb::BLACK,
             Self::Glossy(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Phong(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Plastic(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Principled(bsdf) => bsdf.diffuse_fraction(wo, wi),
             Self::Coated(bsdf) => bsdf.diffuse_fraction(wo, wi),
+            Self::Beckmann(bsdf) => bsdf.diffuse_fraction(wo, wi),
+            Self::SeparableGgx(bsdf) => bsdf.diffuse_fraction(wo, wi),
         }
     }
 }

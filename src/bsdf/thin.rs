@@ -13,6 +13,10 @@ use crate::sampling::warp;
 pub struct ThinDielectric {
     /// Index of refraction of the pane over that of the outside, positive.
     pub ior: f32,
+    /// Factor on what is reflected, each channel within `[0, 1]`.
+    pub reflection_tint: Rgb,
+    /// Factor on what passes, each channel within `[0, 1]`.
+    pub transmission_tint: Rgb,
 }
 
 /// Reflectance of a pane that absorbs nothing: `R + T² R + T² R³ + ... = 2 R / (1 + R)`.
@@ -23,6 +27,11 @@ pub(super) fn pane_reflectance(cos: f32, ior: f32) -> f32 {
 }
 
 impl ThinDielectric {
+    /// A clear pane.
+    pub fn new(ior: f32) -> Self {
+        Self { ior, reflection_tint: Rgb::WHITE, transmission_tint: Rgb::WHITE }
+    }
+
     /// Zero: both lobes are deltas.
     #[inline]
     pub fn eval(&self, _wo: Vec3, _wi: Vec3) -> BsdfEval {
@@ -37,10 +46,10 @@ impl ThinDielectric {
         }
         let reflectance = pane_reflectance(wo.z.abs().min(1.0), self.ior);
         if u_lobe < reflectance {
-            return Some(BsdfSample::mirrored(wo, Rgb::WHITE, reflectance));
+            return Some(BsdfSample::mirrored(wo, self.reflection_tint, reflectance));
         }
         let pdf = 1.0 - reflectance;
-        Some(BsdfSample { wi: -wo, weight: Rgb::WHITE, pdf, is_delta: true, is_transmission: true, eta: 1.0 })
+        Some(BsdfSample { wi: -wo, weight: self.transmission_tint, pdf, is_delta: true, is_transmission: true, eta: 1.0 })
     }
 
     /// Always.
@@ -49,9 +58,10 @@ impl ThinDielectric {
         true
     }
 
-    /// One: nothing is absorbed.
-    pub fn albedo(&self, _wo: Vec3) -> Rgb {
-        Rgb::WHITE
+    /// What is reflected and what passes.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        let reflectance = pane_reflectance(wo.z.abs().min(1.0), self.ior);
+        self.reflection_tint * reflectance + self.transmission_tint * (1.0 - reflectance)
     }
 }
 

@@ -5,13 +5,15 @@ use std::fmt::Debug;
 
 use super::Files;
 use super::textures::{TextureTable, TextureUse};
-use crate::bsdf::{Conductor, Dielectric, Lambert, Mirror, Plastic};
+use crate::bsdf::{Beckmann, Coat, Conductor, Dielectric, Ggx, Lambert, Mirror, Plastic, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
 use crate::color::Rgb;
-use crate::desc::{ColorDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc, UsedNames};
+use crate::desc::{
+    ColorDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc, UsedNames,
+};
 use crate::error::Result;
 use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
-use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, RangedInput, ScalarInput, Varying};
+use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, Varying};
 use crate::medium::{Media, Medium};
 use crate::relief::Relief;
 use crate::texture::Texture;
@@ -182,11 +184,15 @@ impl Compiler<'_> {
             MaterialDesc::Dielectric(glass) => {
                 let ior = self.glass_ior(path, &glass.ior)?;
                 let alpha = self.alpha(path, glass.roughness.as_ref(), glass.alpha.as_ref())?;
-                let boundary = Varying::Dielectric { ior, alpha, facets: facets(glass.distribution, glass.multiscatter) };
+                let tints = self.tints(path, &glass.reflection_tint, &glass.transmission_tint)?;
+                let boundary = Varying::Dielectric { ior, alpha, facets: facets(glass.distribution, glass.multiscatter), tints };
                 // The relative index at a medium's surface depends on what is around it.
                 if glass.is_medium() { Material::Varying(Box::new(boundary)) } else { boundary.into() }
             }
-            MaterialDesc::ThinDielectric { ior } => Varying::ThinDielectric { ior: self.ior(path, ior, 0.1)? }.into(),
+            MaterialDesc::ThinDielectric { ior, reflection_tint, transmission_tint } => {
+                let tints = self.tints(path, reflection_tint, transmission_tint)?;
+                Varying::ThinDielectric { ior: self.ior(path, ior, 0.1)?, tints }.into()
+            }
             MaterialDesc::Phong { diffuse, specular, exponent, lobe } => {
                 let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
                     let is_sound = exponent >= 0.0 && exponent.is_finite();
@@ -210,16 +216,49 @@ impl Compiler<'_> {
             MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } | MaterialDesc::Relief { .. } => {
                 return Err(files.error(path, "cannot be part of a material"));
             }
-            MaterialDesc::Plastic { albedo, ior, roughness, alpha } => {
-                let ior = self.ranged(&format!("{path}.ior"), ior, |path, ior| {
-                    let is_sound = ior > 1.0 && ior <= 10.0;
-                    if is_sound { Ok(()) } else { Err(files.error(path, format!("must be above 1 and at most 10, not {ior}"))) }
-                })?;
-                let coat = CoatInput::new(ior, self.alpha(path, roughness.as_ref(), alpha.as_ref())?);
-                Varying::Plastic { coat, albedo: self.color(&format!("{path}.albedo"), albedo)? }.into()
+            MaterialDesc::Plastic(desc) => Varying::Plastic {
+                coat: self.plastic_coat(path, desc)?,
+                albedo: self.color(&format!("{path}.albedo"), &desc.albedo)?,
+                tint: self.color(&format!("{path}.coat_tint"), &desc.coat_tint)?,
+                nonlinear: desc.nonlinear,
             }
+            .into(),
             MaterialDesc::Principled(desc) => Varying::Principled(self.principled(path, desc)?).into(),
         })
+    }
+
+    /// The coat of plastic, prepared where no texture changes it.
+    fn plastic_coat(&self, path: &str, desc: &PlasticDesc) -> Result<PlasticCoat> {
+        let ior = self.ranged(&format!("{path}.ior"), &desc.ior, |path, ior| {
+            let is_sound = ior > 1.0 && ior <= 10.0;
+            if is_sound { Ok(()) } else { Err(self.files.error(path, format!("must be above 1 and at most 10, not {ior}"))) }
+        })?;
+        let alpha = self.alpha(path, desc.roughness.as_ref(), desc.alpha.as_ref())?;
+        let facets = facets(desc.distribution, desc.multiscatter);
+        if facets == Facets::Ggx {
+            return Ok(PlasticCoat::Ggx(CoatInput::new(ior, alpha)));
+        }
+        let (RangedInput::Constant(ior), [ScalarInput::Constant(u), ScalarInput::Constant(v)]) = (ior, alpha.axes) else {
+            let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come from textures";
+            return Err(self.files.error(path, message));
+        };
+        if u != v {
+            let message = "with a `distribution` or without `multiscatter`, the roughness must be the same along both axes";
+            return Err(self.files.error(path, message));
+        }
+        let alpha = [if alpha.squared { u * u } else { u }; 2];
+        Ok(match facets {
+            Facets::Ggx | Facets::SingleGgx => {
+                PlasticCoat::Ggx(CoatInput::Constant(Coat::single_scattering(ior, Ggx::new(alpha), diffuse_mean)))
+            }
+            Facets::SeparableGgx => PlasticCoat::SeparableGgx(Coat::single_scattering(ior, SeparableGgx::new(alpha), mitsuba_diffuse_mean)),
+            Facets::Beckmann => PlasticCoat::Beckmann(Coat::single_scattering(ior, Beckmann::new(alpha), mitsuba_diffuse_mean)),
+        })
+    }
+
+    /// Factors on what glass reflects and on what crosses it.
+    fn tints(&self, path: &str, reflection: &ColorDesc, transmission: &ColorDesc) -> Result<[ColorInput; 2]> {
+        Ok([self.color(&format!("{path}.reflection_tint"), reflection)?, self.color(&format!("{path}.transmission_tint"), transmission)?])
     }
 
     pub(super) fn color(&self, path: &str, desc: &ColorDesc) -> Result<ColorInput> {
@@ -333,6 +372,7 @@ impl Compiler<'_> {
 fn facets(distribution: DistributionDesc, multiscatter: bool) -> Facets {
     match distribution {
         DistributionDesc::Beckmann => Facets::Beckmann,
+        DistributionDesc::GgxSeparable => Facets::SeparableGgx,
         DistributionDesc::Ggx if multiscatter => Facets::Ggx,
         DistributionDesc::Ggx => Facets::SingleGgx,
     }

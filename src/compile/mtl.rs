@@ -3,13 +3,13 @@
 use super::materials::{Look, from_mtl};
 use super::textures::TextureUse;
 use super::{Builder, meshes};
-use crate::bsdf::Bsdf;
+use crate::bsdf::{Bsdf, Plastic};
 use crate::color::Rgb;
 use crate::error::Result;
 use crate::id::TextureId;
 use crate::import::{ObjMap, ObjMaterial};
 use crate::light::Emission;
-use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, ScalarInput, Varying};
+use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, ScalarInput, Varying};
 use crate::math::Vec2;
 use crate::relief::Relief;
 use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
@@ -166,7 +166,10 @@ fn with_specular(material: Material, color: ColorInput) -> Material {
 fn with_albedo(material: Material, albedo: ColorInput) -> Material {
     match material {
         Material::Constant(Bsdf::Lambert(_)) => Varying::Diffuse { albedo, roughness: ScalarInput::Constant(0.0) }.into(),
-        Material::Constant(Bsdf::Plastic(plastic)) => Varying::Plastic { coat: CoatInput::Constant(plastic.coat), albedo }.into(),
+        Material::Constant(Bsdf::Plastic(Plastic { coat, nonlinear, tint, .. })) => {
+            let coat = PlasticCoat::Ggx(CoatInput::Constant(coat));
+            Varying::Plastic { coat, albedo, tint: ColorInput::Constant(tint), nonlinear }.into()
+        }
         other => other,
     }
 }

@@ -1,8 +1,8 @@
 //! The principled material: its parameters checked.
 
 use super::materials::Compiler;
-use crate::bsdf::PrincipledParameters;
-use crate::desc::{PrincipledDesc, ScalarDesc};
+use crate::bsdf::{PrincipledModel, PrincipledParameters};
+use crate::desc::{PrincipledDesc, PrincipledModelDesc, ScalarDesc};
 use crate::error::Result;
 use crate::material::{PrincipledInputs, RangedInput, ScalarInput};
 
@@ -29,7 +29,15 @@ impl Compiler<'_> {
             }
         }
         Ok(PrincipledInputs {
-            rest: PrincipledParameters { thin: desc.thin, multiscatter: desc.multiscatter, ..PrincipledParameters::default() },
+            rest: PrincipledParameters {
+                thin: desc.thin,
+                multiscatter: desc.multiscatter,
+                model: match desc.model {
+                    PrincipledModelDesc::Burley => PrincipledModel::Burley,
+                    PrincipledModelDesc::Mitsuba => PrincipledModel::Mitsuba,
+                },
+                ..PrincipledParameters::default()
+            },
             base_color: self.color(&format!("{path}.base_color"), &desc.base_color)?,
             metallic: scalar("metallic", &desc.metallic)?,
             roughness: scalar("roughness", &desc.roughness)?,

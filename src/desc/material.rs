@@ -95,8 +95,11 @@ pub enum DistributionDesc {
     /// GGX, with long tails, as of most real surfaces.
     #[default]
     Ggx,
+    /// GGX, for agreement with scenes of Mitsuba: both sides are masked independently of each other, and light that microfacets scatter several
+    /// times is lost, whatever `multiscatter` is.
+    GgxSeparable,
     /// Beckmann's, for agreement with scenes of other renderers: both sides are masked independently of each other, and light that microfacets
-    /// scatter several times is lost, whatever `multiscatter` says.
+    /// scatter several times is lost, whatever `multiscatter` is.
     Beckmann,
 }
 
@@ -170,22 +173,15 @@ pub enum MaterialDesc {
         /// Index of refraction of the pane over that of the outside, from 1/10 to 10. Default: 1.5.
         #[serde(default = "glass_ior")]
         ior: RangedDesc,
+        /// Factor on what is reflected, within `[0, 1]`. Default: 1.
+        #[serde(default = "white", skip_serializing_if = "is_white")]
+        reflection_tint: ColorDesc,
+        /// Factor on what passes, within `[0, 1]`. Default: 1.
+        #[serde(default = "white", skip_serializing_if = "is_white")]
+        transmission_tint: ColorDesc,
     },
-    /// A diffuse base under a clear dielectric coat. Smooth unless `roughness` or `alpha` is given.
-    Plastic {
-        /// Colour of the base, each channel within `[0, 1]`. Default: 0.5.
-        #[serde(default = "half")]
-        albedo: ColorDesc,
-        /// Index of refraction of the coat over that of the outside, above 1 and at most 10. Default: 1.5.
-        #[serde(default = "glass_ior")]
-        ior: RangedDesc,
-        /// GGX roughness of the coat within `[0, 1]`; alpha is its square.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        roughness: Option<RoughnessDesc>,
-        /// GGX alpha itself, in place of `roughness`.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        alpha: Option<RoughnessDesc>,
-    },
+    /// A diffuse base under a clear dielectric coat.
+    Plastic(Box<PlasticDesc>),
     /// A clear dielectric coat over any opaque material: lacquer over metal or wood, a car's paint. It reflects as `plastic` does and is `plastic`
     /// over a diffuse base; over any other the base keeps `1 - max` of what the coat reflects of the light in and out, so that nothing is
     /// gained. Smooth unless `roughness` or `alpha` is given.
@@ -271,6 +267,39 @@ pub enum MaterialDesc {
     },
 }
 
+/// A diffuse base under a clear dielectric coat. Smooth unless `roughness` or `alpha` is given.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlasticDesc {
+    /// Colour of the base, each channel within `[0, 1]`. Default: 0.5.
+    #[serde(default = "half")]
+    pub albedo: ColorDesc,
+    /// Index of refraction of the coat over that of the outside, above 1 and at most 10. Default: 1.5.
+    #[serde(default = "glass_ior")]
+    pub ior: RangedDesc,
+    /// GGX roughness of the coat within `[0, 1]`; alpha is its square.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<RoughnessDesc>,
+    /// GGX alpha itself, in place of `roughness`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alpha: Option<RoughnessDesc>,
+    /// How the normals of the coat's microfacets are distributed; with another than `ggx`, `ior`, `roughness` and `alpha` are numbers, one for both
+    /// axes. Default: `ggx`.
+    #[serde(default, skip_serializing_if = "DistributionDesc::is_ggx")]
+    pub distribution: DistributionDesc,
+    /// Factor on what the coat reflects, within `[0, 1]`. Default: 1.
+    #[serde(default = "white", skip_serializing_if = "is_white")]
+    pub coat_tint: ColorDesc,
+    /// Whether the base's colour deepens each time that the coat throws light back onto it. Default: false, light keeps the colour of one
+    /// reflection.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub nonlinear: bool,
+    /// Whether light that a rough coat's microfacets scatter several times is kept. If not, `ior`, `roughness` and `alpha` are numbers, one for both
+    /// axes. Default: true.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub multiscatter: bool,
+}
+
 /// Glass, water and the like. Smooth unless `roughness` or `alpha` is given.
 ///
 /// With none of `priority`, `absorption` and `abbe` it is a boundary alone, whose `ior` is relative to whatever lies outside.
@@ -301,6 +330,12 @@ pub struct DielectricDesc {
     /// Whether light that rough microfacets scatter several times is kept. Default: true.
     #[serde(default = "yes")]
     pub multiscatter: bool,
+    /// Factor on what is reflected, within `[0, 1]`. Default: 1.
+    #[serde(default = "white", skip_serializing_if = "is_white")]
+    pub reflection_tint: ColorDesc,
+    /// Factor on what crosses the surface, within `[0, 1]`. Default: 1.
+    #[serde(default = "white", skip_serializing_if = "is_white")]
+    pub transmission_tint: ColorDesc,
     /// Which medium is there where several overlap: the one of the highest priority, a whole number. Default for a medium: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub priority: Option<i32>,
@@ -388,6 +423,19 @@ fn slope() -> ScalarDesc {
 
 fn plastic_reflectance() -> ColorDesc {
     ColorDesc::Grey(0.04)
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde expects")]
+fn is_yes(value: &bool) -> bool {
+    *value
+}
+
+fn is_white(color: &ColorDesc) -> bool {
+    match color {
+        ColorDesc::Grey(value) => *value == 1.0,
+        ColorDesc::Rgb(color) => *color == [1.0; 3],
+        ColorDesc::Texture { .. } => false,
+    }
 }
 
 fn yes() -> bool {

@@ -20,11 +20,11 @@ pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use files::NamedFile;
 pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
 pub use material::{
-    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, RangedDesc,
-    RoughnessDesc, ScalarDesc,
+    AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, PlasticDesc,
+    RangedDesc, RoughnessDesc, ScalarDesc,
 };
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerDesc, OutputDesc, PixelTypeDesc, ViewDesc};
-pub use principled::PrincipledDesc;
+pub use principled::{PrincipledDesc, PrincipledModelDesc};
 pub use settings::{
     FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS, SamplerDesc, SamplerKindDesc, StrategyDesc,
 };

@@ -59,6 +59,28 @@ pub struct PrincipledDesc {
     /// Whether light that rough microfacets scatter several times is kept. Default: true.
     #[serde(default = "yes")]
     pub multiscatter: bool,
+    /// Whose formulas the lobes have. Default: `burley`.
+    #[serde(default, skip_serializing_if = "PrincipledModelDesc::is_burley")]
+    pub model: PrincipledModelDesc,
+}
+
+/// Whose formulas the lobes of the principled model have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PrincipledModelDesc {
+    /// Burley's, with lobes limited so that nothing is gained.
+    #[default]
+    Burley,
+    /// Those of Mitsuba 3's `principled`, for agreement with its scenes: the lobes are added whatever their sum, and light that microfacets scatter several
+    /// times is lost, whatever `multiscatter` is.
+    Mitsuba,
+}
+
+impl PrincipledModelDesc {
+    /// Whether it is the default.
+    pub fn is_burley(&self) -> bool {
+        *self == Self::Burley
+    }
 }
 
 fn half_color() -> ColorDesc {

@@ -1,6 +1,6 @@
 //! Parameters of materials that are constant or come from textures.
 
-use crate::bsdf::Coat;
+use crate::bsdf::{Beckmann, Bsdf, Coat, Plastic, SeparableGgx, SingleBsdf};
 use crate::color::Rgb;
 use crate::id::TextureId;
 use crate::math::Vec2;
@@ -100,14 +100,16 @@ impl RangedInput {
     }
 }
 
-/// How the normals of microfacets are distributed, and what becomes of light that they scatter several times.
+/// How the normals of microfacets are distributed and masked, and what becomes of light that they scatter several times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Facets {
     /// GGX; it is kept.
     Ggx,
     /// GGX; it is lost.
     SingleGgx,
-    /// Beckmann's; it is lost.
+    /// GGX, each side masked independently; it is lost.
+    SeparableGgx,
+    /// Beckmann's, each side masked independently; it is lost.
     Beckmann,
 }
 
@@ -182,6 +184,45 @@ impl CoatInput {
         match self {
             Self::Constant(coat) => coat.is_anisotropic(),
             Self::Varying { alpha, .. } => alpha.axes[0] != alpha.axes[1],
+        }
+    }
+}
+
+/// The coat of plastic.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlasticCoat {
+    /// GGX.
+    Ggx(CoatInput),
+    /// GGX, each side masked independently.
+    SeparableGgx(Coat<SeparableGgx>),
+    /// Beckmann's microfacets.
+    Beckmann(Coat<Beckmann>),
+}
+
+impl PlasticCoat {
+    /// The coat over `footprint` with a base of colour `diffuse`, a factor `tint` on what the coat reflects, and whether the base is
+    /// [nonlinear](Plastic::nonlinear).
+    #[inline]
+    pub(super) fn over(&self, diffuse: Rgb, tint: Rgb, nonlinear: bool, textures: &[Texture], footprint: &Footprint) -> Bsdf {
+        match self {
+            Self::Ggx(coat) => Bsdf::Plastic(Plastic { diffuse, coat: coat.at(textures, footprint), tint, nonlinear }),
+            Self::SeparableGgx(coat) => Bsdf::SeparableGgx(SingleBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear })),
+            Self::Beckmann(coat) => Bsdf::Beckmann(SingleBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear })),
+        }
+    }
+
+    pub(super) fn textures(&self) -> Vec<TextureId> {
+        match self {
+            Self::Ggx(coat) => coat.textures(),
+            Self::SeparableGgx(_) | Self::Beckmann(_) => Vec::new(),
+        }
+    }
+
+    pub(super) fn is_anisotropic(&self) -> bool {
+        match self {
+            Self::Ggx(coat) => coat.is_anisotropic(),
+            Self::SeparableGgx(coat) => coat.is_anisotropic(),
+            Self::Beckmann(coat) => coat.is_anisotropic(),
         }
     }
 }

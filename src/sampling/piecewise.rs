@@ -1,4 +1,7 @@
 //! Piecewise-constant densities on the unit square, sampled by inversion so that stratified numbers stay stratified.
+//!
+//! Cells are grouped in blocks of 4 x 4. A block is found by inverting cumulative tables, which are small enough to stay in the processor's caches, a
+//! cell by the weights of its block, which are one cache line: a sample waits for memory once, however large the grid is.
 
 use crate::math::float::ONE_MINUS_EPSILON;
 
@@ -16,7 +19,7 @@ pub struct PiecewiseSample {
 }
 
 /// A cell chosen by a [`Piecewise2d`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PiecewiseCell {
     /// The column.
     pub x: usize,
@@ -33,8 +36,58 @@ pub struct PiecewiseCell {
 pub struct Piecewise2d {
     width: usize,
     height: usize,
+    /// Of rows of blocks, and of the blocks of each row.
     rows: Table,
     columns: Table,
+    /// By rows.
+    blocks: Vec<Block>,
+}
+
+/// Cells of a block along each axis.
+const SIDE: usize = 4;
+
+/// Weights of a block's cells, by rows, with the largest within `[1, 2)`; 0 beyond the grid.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+struct Block([[f32; SIDE]; SIDE]);
+
+impl Block {
+    fn new(weights: &[[f32; SIDE]; SIDE]) -> Self {
+        let largest = weights.iter().flatten().fold(0f32, |largest, &w| largest.max(w));
+        // A power of two keeps their ratios.
+        let scale = if largest > 0.0 { 2f64.powi(-f64::from(largest).log2().floor() as i32) } else { 0.0 };
+        Self(weights.map(|row| row.map(|w| (f64::from(w) * scale) as f32)))
+    }
+
+    #[inline]
+    fn rows(&self) -> [f32; SIDE] {
+        self.0.map(|[a, b, c, d]| (a + b) + (c + d))
+    }
+
+    /// The probability of a cell of a block that has the probability `pmf`; positive where the weight is.
+    #[inline]
+    fn pmf(&self, x: usize, y: usize, pmf: f64) -> f32 {
+        let weight = f64::from(self.0[y][x]);
+        if weight == 0.0 {
+            return 0.0;
+        }
+        let [a, b, c, d] = self.0.map(|row| {
+            let [a, b, c, d] = row.map(f64::from);
+            (a + b) + (c + d)
+        });
+        let sum = (a + b) + (c + d);
+        ((pmf * weight / sum) as f32).max(f32::MIN_POSITIVE)
+    }
+}
+
+/// The entry of a distribution of four weights at `u` in `[0, 1)`, never one of weight 0, and where in it `u` is.
+#[inline]
+fn invert_four(weights: &[f32; SIDE], u: f32) -> (usize, f32) {
+    let [a, b, c, d] = *weights;
+    let limits = [0.0, a, a + b, a + b + c];
+    let x = u * (limits[3] + d);
+    let index = usize::from(x >= limits[1]) + usize::from(x >= limits[2]) + usize::from(x >= limits[3]);
+    (index, ((x - limits[index]) / weights[index]).min(ONE_MINUS_EPSILON))
 }
 
 /// Cumulative distributions of equal length, one after another, each with a guide to where in it a number falls.
@@ -49,6 +102,25 @@ struct Table {
     guide: Vec<u32>,
 }
 
+/// A block that was chosen.
+#[derive(Clone, Copy, Default)]
+struct ChosenBlock {
+    x: usize,
+    y: usize,
+    within: [f32; 2],
+    pmf: f64,
+}
+
+impl ChosenBlock {
+    /// A cell of the block.
+    #[inline]
+    fn cell_in(&self, block: &Block) -> PiecewiseCell {
+        let (y, v) = invert_four(&block.rows(), self.within[1]);
+        let (x, u) = invert_four(&block.0[y], self.within[0]);
+        PiecewiseCell { x: SIDE * self.x + x, y: SIDE * self.y + y, within: [u, v], pmf: block.pmf(x, y, self.pmf) }
+    }
+}
+
 #[derive(Clone, Copy)]
 struct Inverse {
     index: usize,
@@ -58,8 +130,9 @@ struct Inverse {
 
 impl Table {
     fn new(len: usize, count: usize) -> Self {
-        // About four entries share a guide entry.
-        let guide_bits = usize::BITS - (len / 4).leading_zeros();
+        // As many guide entries as there are entries: a search then takes less than two steps on average, however uneven the weights are (Chen and
+        // Asau, "On Generating Random Variates from an Empirical Distribution").
+        let guide_bits = usize::BITS - len.leading_zeros();
         let guide_shift = u32::BITS - guide_bits.clamp(1, 16);
         Self { len, limits: Vec::with_capacity((len + 1) * count), guide_shift, guide: Vec::with_capacity(((1 << guide_bits) + 1) * count) }
     }
@@ -117,8 +190,10 @@ impl Table {
         let x = f64::from(u) * f64::from(WHOLE);
         let unit = x as u32;
         let k = (unit >> self.guide_shift) as usize;
-        let (first, last) = (guide[k] as usize, guide[k + 1] as usize);
-        let index = first + limits[first + 1..=last].partition_point(|&upper| upper <= unit);
+        let (mut index, last) = (guide[k] as usize, guide[k + 1] as usize);
+        while index < last && limits[index + 1] <= unit {
+            index += 1;
+        }
         let lower = limits[index];
         let mass = f64::from(limits[index + 1] - lower);
         let within = ((x - f64::from(lower)) / mass) as f32;
@@ -134,30 +209,69 @@ impl Piecewise2d {
         if !fits || !weights.iter().all(|w| w.is_finite() && *w >= 0.0) || !weights.iter().any(|w| *w > 0.0) {
             return None;
         }
-        let mut columns = Table::new(width, height);
-        let mut sums = Vec::with_capacity(height);
-        for row in weights.chunks_exact(width) {
-            let row = row.iter().map(|&w| f64::from(w));
-            sums.push(row.clone().sum::<f64>());
-            columns.push(row);
+        let (across, down) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
+        let (mut columns, mut rows) = (Table::new(across, down), Table::new(down, 1));
+        let (mut blocks, mut sums) = (Vec::with_capacity(across * down), Vec::with_capacity(down));
+        let mut row_sums = vec![0.0; across];
+        for y in 0..down {
+            for (x, sum) in row_sums.iter_mut().enumerate() {
+                let weight = |row: usize, column: usize| {
+                    let (x, y) = (SIDE * x + column, SIDE * y + row);
+                    if x < width && y < height { weights[y * width + x] } else { 0.0 }
+                };
+                let block: [[f32; SIDE]; SIDE] = std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column)));
+                *sum = block.iter().flatten().map(|&w| f64::from(w)).sum();
+                blocks.push(Block::new(&block));
+            }
+            sums.push(row_sums.iter().sum::<f64>());
+            columns.push(row_sums.iter().copied());
         }
-        let mut rows = Table::new(height, 1);
         rows.push(sums.into_iter());
-        Some(Self { width, height, rows, columns })
+        Some(Self { width, height, rows, columns, blocks })
     }
 
     /// A cell with its probability and a uniform point inside; `u` in `[0, 1)²`. The first number chooses the column, the second the row.
     #[inline]
     pub fn sample_cell(&self, u: [f32; 2]) -> PiecewiseCell {
+        let chosen = self.choose_block(u);
+        chosen.cell_in(&self.blocks[self.block_at(&chosen)])
+    }
+
+    /// Cells for as many numbers as there are places for the results, as [`sample_cell`](Self::sample_cell): all wait for memory at once.
+    #[inline]
+    pub fn sample_cells<const N: usize>(&self, us: &[[f32; 2]], cells: &mut [PiecewiseCell; N]) {
+        let mut chosen = [ChosenBlock::default(); N];
+        for (chosen, &u) in chosen.iter_mut().zip(us) {
+            *chosen = self.choose_block(u);
+        }
+        // Nothing but copies, which do not wait for one another.
+        let mut blocks = [Block::default(); N];
+        for (block, chosen) in blocks.iter_mut().zip(&chosen).take(us.len()) {
+            *block = self.blocks[self.block_at(chosen)];
+        }
+        for ((cell, chosen), block) in cells.iter_mut().zip(&chosen).zip(&blocks).take(us.len()) {
+            *cell = chosen.cell_in(block);
+        }
+    }
+
+    #[inline]
+    fn choose_block(&self, u: [f32; 2]) -> ChosenBlock {
         let row = self.rows.invert(0, u[1]);
         let column = self.columns.invert(row.index, u[0]);
-        PiecewiseCell { x: column.index, y: row.index, within: [column.within, row.within], pmf: (row.pmf * column.pmf) as f32 }
+        ChosenBlock { x: column.index, y: row.index, within: [column.within, row.within], pmf: row.pmf * column.pmf }
+    }
+
+    #[inline]
+    fn block_at(&self, chosen: &ChosenBlock) -> usize {
+        chosen.y * self.columns.len + chosen.x
     }
 
     /// The probability of a cell.
     #[inline]
     pub fn pmf(&self, x: usize, y: usize) -> f32 {
-        (self.rows.pmf(0, y) * self.columns.pmf(y, x)) as f32
+        let (across, down) = (x / SIDE, y / SIDE);
+        let block = self.rows.pmf(0, down) * self.columns.pmf(down, across);
+        self.blocks[down * self.columns.len + across].pmf(x % SIDE, y % SIDE, block)
     }
 
     /// A point with its density; `u` in `[0, 1)²`.

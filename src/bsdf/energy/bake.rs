@@ -1,6 +1,6 @@
 //! Computes the tables.
 
-use super::super::coat::integrate_albedo;
+use super::super::coat::{above_axis, first_encounter};
 use super::super::fresnel;
 use super::super::microfacet::{Microfacets, reflect};
 use super::super::principled::shapes::{self, ClearCoat};
@@ -117,7 +117,7 @@ fn clear_coat(entry: usize) -> f32 {
 fn coat(entry: usize) -> f32 {
     let [alpha, ior, node] = places(entry, [ALPHAS, IORS, COAT_NODES]);
     let root = node as f32 / (COAT_NODES - 1) as f32;
-    integrate_albedo(node_ior(ior), Ggx::new([node_alpha(alpha); 2]), root * root, 0)
+    first_encounter(node_ior(ior), &Ggx::new([node_alpha(alpha); 2]), above_axis(root * root, 0)).reflected
 }
 
 /// Of the table as it is read, linear in the square root of the cosine.

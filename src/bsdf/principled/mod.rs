@@ -18,87 +18,24 @@
 //! - subsurface scattering is the flat lobe of 2012 for solids as well; glass has exact Fresnel terms, all else Schlick's;
 //! - the specular lobe that passes a thin sheet has the width of the one that it reflects.
 //!
-//! Mitsuba 3's `principled` adds its lobes as well, has exact Fresnel terms for the untinted layer, G as a product, no compensation, and no
-//! `diffuse_transmission` without `principledthin`.
+//! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled`: added without limit, with exact Fresnel terms for the untinted layer, G as a
+//! product, no compensation, tints over the luminance, and a clear coat that is larger by 4 cos cos.
 
-mod corners;
+mod parameters;
 pub(super) mod shapes;
 mod split;
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::energy::{Energy, principled_clear_coat, principled_diffuse, principled_sheen, schlick_weight};
-use super::microfacet::{MIN_COSINE, Microfacets, reflect};
+use super::microfacet::{FacetReflection, MIN_COSINE, Microfacets, SeparableGgx, reflect};
 use super::thin::pane_reflectance;
-use super::{BsdfEval, BsdfSample, Dielectric, Ggx};
+use super::{BsdfEval, BsdfSample, Dielectric, Ggx, fresnel};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
+pub use parameters::{PrincipledModel, PrincipledParameters};
 use shapes::ClearCoat;
-
-/// Parameters of the principled model, within `[0, 1]` where nothing else is said.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PrincipledParameters {
-    /// Colour of the base, the metal and what is refracted.
-    pub base_color: Rgb,
-    /// How much of the surface is metal.
-    pub metallic: f32,
-    /// Square root of GGX's alpha; shape of the diffuse lobe.
-    pub roughness: f32,
-    /// How much the highlight is stretched along x.
-    pub anisotropic: f32,
-    /// Index of refraction over that of the outside, within `[1, 10]`; see [`PrincipledParameters::ior_of_specular`].
-    pub ior: f32,
-    /// How much the dielectric layer's reflection ahead has the base's colour.
-    pub specular_tint: f32,
-    /// Strength of the sheen.
-    pub sheen: f32,
-    /// How much the sheen has the base's colour.
-    pub sheen_tint: f32,
-    /// Strength of the clear coat.
-    pub clearcoat: f32,
-    /// Sharpness of the clear coat.
-    pub clearcoat_gloss: f32,
-    /// From the diffuse to the flat lobe.
-    pub subsurface: f32,
-    /// How much of what is not metal is glass.
-    pub transmission: f32,
-    /// How much of what the diffuse base of a thin sheet scatters goes to the other side.
-    pub diffuse_transmission: f32,
-    /// Whether the surface is a sheet with the outside on both sides.
-    pub thin: bool,
-    /// Whether light scattered by microfacets several times counts.
-    pub multiscatter: bool,
-}
-
-impl Default for PrincipledParameters {
-    fn default() -> Self {
-        Self {
-            base_color: Rgb::splat(0.5),
-            metallic: 0.0,
-            roughness: 0.5,
-            anisotropic: 0.0,
-            ior: 1.5,
-            specular_tint: 0.0,
-            sheen: 0.0,
-            sheen_tint: 0.5,
-            clearcoat: 0.0,
-            clearcoat_gloss: 1.0,
-            subsurface: 0.0,
-            transmission: 0.0,
-            diffuse_transmission: 0.0,
-            thin: false,
-            multiscatter: true,
-        }
-    }
-}
-
-impl PrincipledParameters {
-    /// The index of refraction whose reflectance ahead is `0.08 specular`.
-    pub fn ior_of_specular(specular: f32) -> f32 {
-        2.0 / (1.0 - (0.08 * specular).sqrt()) - 1.0
-    }
-}
 
 /// The least alpha: no lobe is a delta.
 const MIN_ALPHA: f32 = 1e-3;
@@ -126,8 +63,10 @@ pub struct Principled {
     roughness: f32,
     flat: f32,
     diffuse_transmission: f32,
+    specular_tint: f32,
     thin: bool,
     multiscatter: bool,
+    model: PrincipledModel,
 }
 
 /// What the layers reflect of the light from one direction, each if it alone were there.
@@ -163,12 +102,11 @@ impl Principled {
         let ggx = Ggx::new([squared / aspect, squared * aspect].map(|a| a.clamp(least, 1.0)));
 
         let ahead = (p.ior - 1.0) / (p.ior + 1.0);
-        let largest = p.base_color.max_channel();
-        let tint = if largest > 0.0 { p.base_color / largest } else { Rgb::WHITE };
-        let specular = mix(Rgb::WHITE, tint, p.specular_tint) * (ahead * ahead);
+        let specular = mix(Rgb::WHITE, tint(p.base_color, p.model), p.specular_tint) * (ahead * ahead);
         let dielectric = 1.0 - p.metallic - glass;
         let mut multiple = Rgb::BLACK;
-        if p.multiscatter && p.metallic + dielectric > 0.0 {
+        let multiscatter = p.multiscatter && p.model == PrincipledModel::Burley;
+        if multiscatter && p.metallic + dielectric > 0.0 {
             let lost = Energy::new(&ggx).mirrors_lost();
             let color = p.base_color.map(|f| schlick_multiple(f, 1.0 - lost)) * p.metallic
                 + specular.map(|f| schlick_multiple(f, 1.0 - lost)) * dielectric.max(0.0);
@@ -189,9 +127,17 @@ impl Principled {
             roughness: p.roughness,
             flat: p.subsurface,
             diffuse_transmission: p.diffuse_transmission,
+            specular_tint: p.specular_tint,
             thin: p.thin,
-            multiscatter: p.multiscatter,
+            multiscatter,
+            model: p.model,
         }
+    }
+
+    /// Whether the lobes are Mitsuba's.
+    #[inline]
+    fn is_mitsuba(&self) -> bool {
+        self.model == PrincipledModel::Mitsuba
     }
 
     /// Weight of the diffuse base with its layer.
@@ -208,14 +154,40 @@ impl Principled {
 
     #[inline]
     fn sheen_color(&self) -> Rgb {
-        let largest = self.base.max_channel();
-        let tint = if largest > 0.0 { self.base / largest } else { Rgb::WHITE };
-        mix(Rgb::WHITE, tint, self.sheen_tint) * self.sheen
+        mix(Rgb::WHITE, tint(self.base, self.model), self.sheen_tint) * self.sheen
+    }
+
+    #[inline]
+    fn eval_glass(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        if self.is_mitsuba() {
+            return Dielectric::with_facets(self.ior, self.ggx.alpha(), SeparableGgx::new).eval(wo, wi);
+        }
+        self.glass().eval(wo, wi)
     }
 
     #[inline]
     fn glass(&self) -> Dielectric {
         Dielectric::rough(self.ior, self.ggx, self.multiscatter)
+    }
+
+    /// Reflection by the microfacets of metal and layer, all but the Fresnel factor.
+    #[inline]
+    fn facet(&self, o: Vec3, i: Vec3) -> FacetReflection {
+        if self.is_mitsuba() { SeparableGgx::from(self.ggx).reflection(o, i) } else { self.ggx.reflection(o, i) }
+    }
+
+    /// Reflectance of the microfacets of metal and layer at a cosine.
+    #[inline]
+    fn reflectance(&self, cos: f32) -> Rgb {
+        let weight = schlick_weight(cos);
+        let schlick = |ahead: Rgb, grazing: f32| ahead * (1.0 - weight) + Rgb::splat(grazing * weight);
+        if !self.is_mitsuba() {
+            return schlick(self.reflectance_ahead(), self.metallic + self.dielectric());
+        }
+        let exact = fresnel::dielectric(cos, self.ior).reflectance;
+        let ahead = (self.ior - 1.0) / (self.ior + 1.0);
+        let tinted = schlick(tint(self.base, self.model) * (ahead * ahead), 1.0);
+        schlick(self.base, 1.0) * self.metallic + mix(Rgb::splat(exact), tinted, self.specular_tint) * self.dielectric()
     }
 
     #[inline]
@@ -301,20 +273,19 @@ impl Principled {
         let mut value = Rgb::BLACK;
         let mut coat = 0.0;
         let mut pdf = 0.0;
+        // Seen from inside of a solid, Mitsuba's has nothing but glass.
+        let is_within = self.is_mitsuba() && self.glass > 0.0 && !self.thin && wo.z < 0.0;
 
         // Clear coat, metal and dielectric layer.
         if reflects {
             if self.clearcoat > 0.0 {
                 let (unscaled, density) = ClearCoat::new(self.gloss).eval(o, i);
-                coat = self.clearcoat * unscaled;
+                coat = self.clearcoat * unscaled * if self.is_mitsuba() { 4.0 * o.z * i.z } else { 1.0 };
                 pdf += choice.clearcoat * density;
             }
             if self.metallic + self.dielectric() > 0.0 {
-                let facet = self.ggx.reflection(o, i);
-                let weight = schlick_weight(facet.cos);
-                let ahead = self.reflectance_ahead();
-                let grazing = Rgb::splat(self.metallic + self.dielectric());
-                value += (ahead * (1.0 - weight) + grazing * weight) * facet.value;
+                let facet = self.facet(o, i);
+                value += self.reflectance(facet.cos) * facet.value;
                 value += self.multiple * ((1.0 - at_o.mirrors) * (1.0 - at_i.mirrors) * i.z);
                 pdf += choice.specular * facet.pdf;
             }
@@ -327,19 +298,20 @@ impl Principled {
         }
         pdf += if reflects { choice.diffuse } else { choice.diffuse_transmission } * cosine_pdf;
 
+        if is_within {
+            (value, coat) = (Rgb::BLACK, 0.0);
+        }
+
         // Glass.
         if self.glass > 0.0 {
-            let (color, glass) = if self.thin {
-                (self.base, self.eval_sheet(o, i, reflects))
-            } else {
-                (self.base.map(f32::sqrt), self.glass().eval(wo, wi))
-            };
+            let (color, glass) =
+                if self.thin { (self.base, self.eval_sheet(o, i, reflects)) } else { (self.base.map(f32::sqrt), self.eval_glass(wo, wi)) };
             value += if reflects { glass.value } else { glass.value * color } * self.glass;
             pdf += choice.glass * glass.pdf;
         }
         if self.clearcoat > 0.0 {
             let clear = |at: &Albedos| Rgb::splat(at.clearcoat);
-            let below = left_below([clear(at_o), clear(&at_i)], [self.uncoated_albedo(at_o), self.uncoated_albedo(&at_i)]);
+            let below = self.left_below([clear(at_o), clear(&at_i)], [self.uncoated_albedo(at_o), self.uncoated_albedo(&at_i)]);
             value = value * below + Rgb::splat(coat);
         }
         BsdfEval { value, pdf }
@@ -349,7 +321,7 @@ impl Principled {
     #[inline]
     fn base_value(&self, o: Vec3, i: Vec3, reflects: bool, at_o: &Albedos, at_i: &Albedos) -> Rgb {
         let layer = [self.layer_albedo(at_o), self.layer_albedo(at_i)];
-        let below_layer = left_below(layer, [self.base_albedo(at_o), self.base_albedo(at_i)]);
+        let below_layer = self.left_below(layer, [self.base_albedo(at_o), self.base_albedo(at_i)]);
         if !reflects {
             return self.base * below_layer * (self.diffuse_transmission * FRAC_1_PI * i.z);
         }
@@ -436,6 +408,20 @@ impl Principled {
         Some(if reflects { reflected } else { vec3(reflected.x, reflected.y, -reflected.z) })
     }
 
+    /// The share of what is below a layer that is left for a pair of directions: the layer's albedos for both, and those of what is below.
+    #[inline]
+    fn left_below(&self, layer: [Rgb; 2], below: [Rgb; 2]) -> Rgb {
+        if self.is_mitsuba() {
+            return Rgb::WHITE;
+        }
+        let left = |layer: [f32; 2], below: [f32; 2]| {
+            let (rest, wanted) = ((1.0 - layer[0].max(layer[1])).max(0.0), below[0].max(below[1]));
+            if wanted > rest { rest / wanted } else { 1.0 }
+        };
+        let channel = |of: fn(Rgb) -> f32| left(layer.map(of), below.map(of));
+        Rgb::new(channel(|c| c.r), channel(|c| c.g), channel(|c| c.b))
+    }
+
     /// Whether the highlight is stretched.
     pub fn is_anisotropic(&self) -> bool {
         self.ggx.alpha()[0] != self.ggx.alpha()[1]
@@ -468,20 +454,19 @@ fn facets_albedo(f: f32, at: &Albedos) -> f32 {
     f * (at.mirrors - at.schlick) + at.schlick + (1.0 - at.mirrors) * average * average
 }
 
-/// The share of what is below a layer that is left for a pair of directions: the layer's albedos for both, and those of what is below.
-#[inline]
-fn left_below(layer: [Rgb; 2], below: [Rgb; 2]) -> Rgb {
-    let left = |layer: [f32; 2], below: [f32; 2]| {
-        let (rest, wanted) = ((1.0 - layer[0].max(layer[1])).max(0.0), below[0].max(below[1]));
-        if wanted > rest { rest / wanted } else { 1.0 }
-    };
-    let channel = |of: fn(Rgb) -> f32| left(layer.map(of), below.map(of));
-    Rgb::new(channel(|c| c.r), channel(|c| c.g), channel(|c| c.b))
-}
-
 #[inline]
 fn rgb_min(a: Rgb, b: Rgb) -> Rgb {
     Rgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b))
+}
+
+/// A colour without its brightness: over its largest channel, so that none exceeds 1, or in Mitsuba over its luminance.
+#[inline]
+fn tint(color: Rgb, model: PrincipledModel) -> Rgb {
+    let brightness = match model {
+        PrincipledModel::Burley => color.max_channel(),
+        PrincipledModel::Mitsuba => color.luminance(),
+    };
+    if brightness > 0.0 { color / brightness } else { Rgb::WHITE }
 }
 
 #[inline]

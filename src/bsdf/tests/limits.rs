@@ -16,7 +16,10 @@ fn everything_is_finite_at_every_angle_and_alpha() {
         all.extend([1.5, 1.0, 1.000_1, 1.001, 0.1, 10.0, 1.0 / 1.5].map(|ior| Bsdf::Dielectric(Dielectric::new(ior, alpha))));
         all.push(Bsdf::Plastic(Plastic::new(Rgb::BLACK, 1.0, alpha)));
         all.push(beckmann_gold(alpha));
-        all.extend([1.5, 1.0, 1.001, 0.1, 10.0].map(|ior| Bsdf::Beckmann(BeckmannBsdf::Dielectric(Dielectric::beckmann(ior, alpha)))));
+        all.extend(
+            [1.5, 1.0, 1.001, 0.1, 10.0]
+                .map(|ior| Bsdf::Beckmann(SingleBsdf::Dielectric(Dielectric::with_facets(ior, alpha, Beckmann::new)))),
+        );
         for bsdf in all {
             for cos in cosines.iter().flat_map(|&cos| [cos, -cos]) {
                 let wo = direction(cos, 0.2);

@@ -1,6 +1,5 @@
 //! Scenes of other renderers, read into our own description.
 
-mod coat;
 mod draft;
 mod gltf;
 mod missing;

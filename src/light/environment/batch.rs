@@ -6,6 +6,7 @@ use crate::light::{FoundBy, InfinityEval, LightSample};
 use crate::math::Vec3;
 use crate::math::rows::BATCH;
 use crate::math::vectorize::{Kernel, vectorize};
+use crate::sampling::PiecewiseCell;
 
 const NOWHERE: Location = Location { x: 0, y: 0, within: [0.0; 2] };
 
@@ -27,11 +28,11 @@ impl EnvironmentMap {
             samples.fill(None);
             return;
         };
+        let mut cells = [PiecewiseCell::default(); BATCH];
         let mut chosen = [Chosen { wi: Vec3::ZERO, at: NOWHERE, pdf: 0.0 }; BATCH];
         for (us, samples) in us.chunks(BATCH).zip(samples.chunks_mut(BATCH)) {
-            for (chosen, &u) in chosen.iter_mut().zip(us) {
-                *chosen = self.choose(density, u);
-            }
+            density.sample_cells(us, &mut cells);
+            vectorize(Turn { map: self, cells: &cells[..us.len()], chosen: &mut chosen });
             for (chosen, sample) in chosen.iter().zip(samples) {
                 *sample = Some(far_away(chosen.wi, self.lookup(chosen.at), chosen.pdf));
             }
@@ -52,6 +53,23 @@ impl Kernel for Locate<'_> {
     fn call(self) {
         for (location, &direction) in self.locations.iter_mut().zip(self.directions) {
             *location = self.map.locate(direction);
+        }
+    }
+}
+
+struct Turn<'a> {
+    map: &'a EnvironmentMap,
+    cells: &'a [PiecewiseCell],
+    chosen: &'a mut [Chosen; BATCH],
+}
+
+impl Kernel for Turn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (chosen, cell) in self.chosen.iter_mut().zip(self.cells) {
+            *chosen = self.map.direction_in(cell);
         }
     }
 }

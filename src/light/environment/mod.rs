@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 use super::{FoundBy, InfinityEval, LightSample, ShadowTarget, unit_circle};
 use crate::color::Rgb;
 use crate::math::{DMat3, Vec3, angle_of};
-use crate::sampling::Piecewise2d;
+use crate::sampling::{Piecewise2d, PiecewiseCell};
 
 const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
 
@@ -281,8 +281,12 @@ impl EnvironmentMap {
     /// A direction chosen by a density.
     #[inline]
     fn choose(&self, density: &Piecewise2d, u: [f32; 2]) -> Chosen {
-        let cell = density.sample_cell(u);
+        self.direction_in(&density.sample_cell(u))
+    }
 
+    /// The direction at a point of a cell.
+    #[inline(always)]
+    fn direction_in(&self, cell: &PiecewiseCell) -> Chosen {
         // Uniform on the cell: in the cosine of the polar angle and in the azimuth.
         let (upper, lower) = (self.cosines[cell.y], self.cosines[cell.y + 1]);
         let cos = upper + f64::from(cell.within[1]) * (lower - upper);

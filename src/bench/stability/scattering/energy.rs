@@ -166,7 +166,7 @@ fn smooth() -> Vec<White> {
     let mut list = vec![
         Bsdf::Lambert(Lambert { albedo: Rgb::WHITE }),
         Bsdf::Mirror(Mirror { reflectance: Rgb::WHITE }),
-        Bsdf::ThinDielectric(ThinDielectric { ior: 1.5 }),
+        Bsdf::ThinDielectric(ThinDielectric::new(1.5)),
         Bsdf::Conductor(white_metal([0.0; 2])),
         glass(1.5, [0.0; 2]).bsdf,
         plastic([0.0; 2]),

@@ -152,7 +152,7 @@ pub fn smooth() -> Vec<Material> {
         Material::new("mirror", Bsdf::Mirror(Mirror { reflectance: COLOR })),
         Material::new("gold, smooth", gold([0.0; 2])),
         glass(1.5, [0.0; 2]),
-        Material::new("pane", Bsdf::ThinDielectric(ThinDielectric { ior: 1.5 })),
+        Material::new("pane", Bsdf::ThinDielectric(ThinDielectric::new(1.5))),
     ]
 }
 
@@ -164,7 +164,7 @@ pub fn white() -> Vec<Material> {
         Material::new("lambert", Bsdf::Lambert(Lambert { albedo: Rgb::WHITE })),
         Material::new("leaf", Bsdf::DiffuseTransmission(leaf)),
         Material::new("mirror", Bsdf::Mirror(Mirror { reflectance: Rgb::WHITE })),
-        Material::new("pane", Bsdf::ThinDielectric(ThinDielectric { ior: 1.5 })),
+        Material::new("pane", Bsdf::ThinDielectric(ThinDielectric::new(1.5))),
     ];
     list.extend(
         [0.01, 0.3, 0.7, 1.0].map(|roughness| Material::new(format!("eon {roughness}"), Bsdf::Eon(Eon { albedo: Rgb::WHITE, roughness }))),

@@ -6,8 +6,8 @@ use super::textures::{Role, TextureValue, UvOrigin};
 use super::tree::PluginId;
 use super::{Reader, names};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, OpacityDesc, RangedDesc,
-    RoughnessDesc, ScalarDesc, TextureDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, OpacityDesc, PlasticDesc,
+    RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
 };
 use crate::error::Result;
 use crate::import::closest_name;
@@ -122,13 +122,14 @@ impl<'a> Reader<'a> {
             "dielectric" | "roughdielectric" => {
                 let ior = relative_index(element, "bk7")?;
                 let (alpha, distribution) = self.microfacets(element, "roughdielectric", uv)?;
-                lossless(element);
                 let glass = DielectricDesc {
                     ior: RangedDesc::Constant(ior),
                     roughness: None,
                     alpha,
                     distribution,
                     multiscatter: false,
+                    reflection_tint: self.color(element, "specular_reflectance", 1.0, uv)?,
+                    transmission_tint: self.color(element, "specular_transmittance", 1.0, uv)?,
                     priority: None,
                     absorption: None,
                     abbe: None,
@@ -137,31 +138,24 @@ impl<'a> Reader<'a> {
             }
             "thindielectric" => {
                 let ior = RangedDesc::Constant(relative_index(element, "bk7")?);
-                lossless(element);
-                (MaterialDesc::ThinDielectric { ior }, false)
+                let reflection_tint = self.color(element, "specular_reflectance", 1.0, uv)?;
+                let transmission_tint = self.color(element, "specular_transmittance", 1.0, uv)?;
+                (MaterialDesc::ThinDielectric { ior, reflection_tint, transmission_tint }, false)
             }
             "plastic" | "roughplastic" => {
                 let ior = relative_index(element, "polypropylene")?;
                 let (alpha, distribution) = self.microfacets(element, "roughplastic", uv)?;
-                if distribution == DistributionDesc::Beckmann {
-                    element.approximated("distribution", "GGX of the same alpha in place of Beckmann's distribution");
-                }
-                let color = self.color(element, "diffuse_reflectance", 0.5, uv)?;
-                let rough = match alpha {
-                    Some(RoughnessDesc::Isotropic(alpha)) => alpha,
-                    None | Some(_) => 0.0,
+                let plastic = PlasticDesc {
+                    albedo: self.color(element, "diffuse_reflectance", 0.5, uv)?,
+                    ior: RangedDesc::Constant(ior),
+                    roughness: None,
+                    alpha,
+                    distribution,
+                    coat_tint: self.color(element, "specular_reflectance", 1.0, uv)?,
+                    nonlinear: element.boolean("nonlinear", false)?,
+                    multiscatter: false,
                 };
-                if rough > 0.0 {
-                    element.approximated(
-                        "diffuse_reflectance",
-                        "scaled: the base reflects as much diffuse light as Mitsuba's below a rough coat",
-                    );
-                }
-                let albedo = self.plastic_base(color, ior, rough, element.boolean("nonlinear", false)?);
-                if element.take("specular_reflectance").is_some() {
-                    element.ignored("specular_reflectance", "the coat is clear");
-                }
-                (MaterialDesc::Plastic { albedo, ior: RangedDesc::Constant(ior), roughness: None, alpha }, true)
+                (MaterialDesc::Plastic(Box::new(plastic)), true)
             }
             "principled" => self.principled(element, uv)?,
             other => {
@@ -211,7 +205,7 @@ impl<'a> Reader<'a> {
             return Ok((None, DistributionDesc::default()));
         }
         let distribution = match element.text("distribution")?.unwrap_or("beckmann") {
-            "ggx" => DistributionDesc::Ggx,
+            "ggx" => DistributionDesc::GgxSeparable,
             "beckmann" => DistributionDesc::Beckmann,
             other => return Err(element.place_of("distribution").error(format!("\"{other}\" is neither beckmann nor ggx"))),
         };
@@ -371,13 +365,4 @@ fn unit(element: &mut Element, name: &str, value: f32) -> f32 {
         element.approximated(name, "1, the largest alpha");
     }
     value.min(1.0)
-}
-
-/// Our glass has no colours at its surface.
-fn lossless(element: &mut Element) {
-    for name in ["specular_reflectance", "specular_transmittance"] {
-        if element.take(name).is_some() {
-            element.ignored(name, "glass reflects and lets through all of the light");
-        }
-    }
 }

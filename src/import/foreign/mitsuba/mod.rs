@@ -5,7 +5,6 @@
 //! is lost.
 
 mod bsdfs;
-mod coats;
 mod element;
 mod emitters;
 mod integrators;
@@ -30,7 +29,6 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::coat::Coat;
 use super::{Draft, ImportOptions, Imported};
 use crate::error::Result;
 use bsdfs::Look;
@@ -48,8 +46,6 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
         looks: BTreeMap::new(),
         surfaces: BTreeMap::new(),
         groups: BTreeMap::new(),
-        coats: BTreeMap::new(),
-        recolored: BTreeMap::new(),
         reliefs: BTreeSet::new(),
         black: None,
         open: Vec::new(),
@@ -71,10 +67,6 @@ struct Reader<'a> {
     surfaces: BTreeMap<(PluginId, UvOrigin), String>,
     /// Objects of shape groups; none where a group is empty.
     groups: BTreeMap<PluginId, Option<String>>,
-    /// Coats of plastics by index of refraction and alpha.
-    coats: BTreeMap<[u32; 2], Coat>,
-    /// Textures whose colours were changed for a coat, by their names, the coat and whether it is nonlinear.
-    recolored: BTreeMap<(String, [u32; 2], bool), String>,
     /// Materials that have relief, or parts with it.
     reliefs: BTreeSet<String>,
     /// The material that reflects nothing.

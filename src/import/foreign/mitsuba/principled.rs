@@ -4,7 +4,7 @@ use super::Reader;
 use super::bsdfs::Look;
 use super::element::Element;
 use super::textures::UvOrigin;
-use crate::desc::{MaterialDesc, PrincipledDesc, RangedDesc, ScalarDesc};
+use crate::desc::{MaterialDesc, PrincipledDesc, PrincipledModelDesc, RangedDesc, ScalarDesc};
 use crate::error::Result;
 
 const ZERO: ScalarDesc = ScalarDesc::Constant(0.0);
@@ -48,6 +48,7 @@ impl<'a> Reader<'a> {
             thin: false,
             diffuse_transmission: ZERO,
             multiscatter: false,
+            model: PrincipledModelDesc::Mitsuba,
         })
     }
 

@@ -4,12 +4,11 @@ use super::colors::{Colors, Meaning};
 use super::params::Params;
 use super::textures::{Texture, Textures};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, RangedDesc, RoughnessDesc,
-    TextureDesc, TextureFilterDesc, WrapDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PlasticDesc, RangedDesc,
+    RoughnessDesc, TextureDesc, TextureFilterDesc, WrapDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
-use crate::import::foreign::coat::Coat;
 use crate::import::foreign::recolor::recolored;
 use crate::import::{Named, named};
 
@@ -65,6 +64,8 @@ impl Materials<'_> {
                     alpha: self.alpha(params, "", 0.0)?,
                     distribution: DistributionDesc::default(),
                     multiscatter: false,
+                    reflection_tint: ColorDesc::Grey(1.0),
+                    transmission_tint: ColorDesc::Grey(1.0),
                     priority: None,
                     absorption: None,
                     abbe,
@@ -72,7 +73,11 @@ impl Materials<'_> {
             }
             "thindielectric" => {
                 let (ior, _) = self.colors.index(params, "eta", 1.5)?;
-                MaterialDesc::ThinDielectric { ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)) }
+                MaterialDesc::ThinDielectric {
+                    ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)),
+                    reflection_tint: ColorDesc::Grey(1.0),
+                    transmission_tint: ColorDesc::Grey(1.0),
+                }
             }
             "diffusetransmission" => self.diffuse_transmission(params)?,
             "mix" => self.mix(params, find)?,
@@ -107,26 +112,18 @@ impl Materials<'_> {
         let (ior, _) = self.colors.index(params, "eta", index)?;
         let ior = ior.clamp(1.0 + 1e-4, 10.0);
         let alpha = self.alpha(params, "", 0.0)?;
-        let mean_alpha = match alpha {
-            Some(RoughnessDesc::Isotropic(alpha)) => alpha,
-            Some(RoughnessDesc::Anisotropic([u, v])) => (u * v).sqrt(),
-            Some(RoughnessDesc::Texture { .. } | RoughnessDesc::Axes { .. }) => 0.1,
-            None => 0.0,
-        };
-        // pbrt's base reflects within the coat; ours is what is left of that outside.
-        let coat = Coat::new(f64::from(ior), f64::from(mean_alpha));
-        let base = |r: f32| coat.base(r.clamp(0.0, 1.0), true);
-        let albedo = match self.textures.reflectance(params, &self.colors, "reflectance", 0.5)? {
-            Texture::Constant(color) => ColorDesc::Rgb(color.map(base)),
-            Texture::Named { name, factor } => match recolored(self.draft, self.colors.folder, &name, factor, &base) {
-                Some(texture) => ColorDesc::Texture { texture },
-                None => {
-                    params.approximate("reflectance", "lighter than below a coat");
-                    Texture::Named { name, factor }.color(self.draft, &params.place)
-                }
-            },
-        };
-        Ok(MaterialDesc::Plastic { albedo, ior: RangedDesc::Constant(ior), roughness: None, alpha })
+        // The means of its walk through layers: nothing is added for light that microfacets lose.
+        let multiscatter = !matches!(alpha, None | Some(RoughnessDesc::Isotropic(_)));
+        Ok(MaterialDesc::Plastic(Box::new(PlasticDesc {
+            albedo: self.color(params, "reflectance", 0.5)?,
+            ior: RangedDesc::Constant(ior),
+            roughness: None,
+            alpha,
+            distribution: DistributionDesc::default(),
+            coat_tint: ColorDesc::Grey(1.0),
+            nonlinear: true,
+            multiscatter,
+        })))
     }
 
     /// What pbrt's walk through layers has and ours has not.

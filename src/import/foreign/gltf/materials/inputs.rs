@@ -2,7 +2,7 @@
 
 use super::super::Source;
 use super::super::textures::{TextureRef, TextureSet};
-use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, PrincipledDesc, ScalarDesc, TextureDesc};
+use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, PrincipledDesc, PrincipledModelDesc, ScalarDesc, TextureDesc};
 use crate::error::Result;
 use crate::import::Draft;
 
@@ -126,5 +126,6 @@ pub fn default_principled() -> PrincipledDesc {
         thin: false,
         diffuse_transmission: ScalarDesc::Constant(0.0),
         multiscatter: true,
+        model: PrincipledModelDesc::Burley,
     }
 }

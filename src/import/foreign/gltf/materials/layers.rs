@@ -186,6 +186,8 @@ impl Builder<'_, '_> {
             alpha: None,
             distribution: DistributionDesc::default(),
             multiscatter: true,
+            reflection_tint: ColorDesc::Grey(1.0),
+            transmission_tint: ColorDesc::Grey(1.0),
             priority: None,
             absorption,
             abbe: abbe.map(|abbe| abbe.clamp(1.0, 1000.0)),

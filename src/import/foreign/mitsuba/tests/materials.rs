@@ -55,8 +55,8 @@ fn indices_of_refraction_are_relative() {
     assert_near(glass(""), 1.5046 / 1.000277);
     assert_near(glass(r#"<string name="int_ior" value="Diamond"/><float name="ext_ior" value="1"/>"#), 2.419);
     assert_near(glass(r#"<float name="int_ior" value="1"/><string name="ext_ior" value="water"/>"#), 1.0 / 1.333);
-    let MaterialDesc::Plastic { ior: coat, .. } = front("<bsdf type=\"plastic\"/>") else { panic!() };
-    assert_near(ior(&coat), 1.49 / 1.000277);
+    let MaterialDesc::Plastic(plastic) = front("<bsdf type=\"plastic\"/>") else { panic!() };
+    assert_near(ior(&plastic.ior), 1.49 / 1.000277);
 }
 
 #[test]
@@ -81,20 +81,19 @@ fn metals_by_name_index_and_mirror() {
 }
 
 #[test]
-fn beckmann_is_the_default_of_rough_surfaces_and_approximated_on_plastic_alone() {
+fn beckmann_is_the_default_of_rough_surfaces() {
     let rough = |kind: &str, more: &str| format!(r#"<bsdf type="{kind}">{more}</bsdf>"#);
     let of = |bsdf: &str| match front(bsdf) {
         MaterialDesc::Conductor { distribution, .. } => distribution,
         MaterialDesc::Dielectric(glass) => glass.distribution,
+        MaterialDesc::Plastic(plastic) => plastic.distribution,
         other => panic!("{other:?}"),
     };
     let ggx = r#"<string name="distribution" value="ggx"/>"#;
-    for kind in ["roughconductor", "roughdielectric"] {
-        assert_eq!((of(&rough(kind, "")), of(&rough(kind, ggx))), (DistributionDesc::Beckmann, DistributionDesc::Ggx), "{kind}");
+    for kind in ["roughconductor", "roughdielectric", "roughplastic"] {
+        assert_eq!((of(&rough(kind, "")), of(&rough(kind, ggx))), (DistributionDesc::Beckmann, DistributionDesc::GgxSeparable), "{kind}");
         assert!(notes(&format!("<shape type=\"sphere\">{}</shape>", rough(kind, ""))).is_empty(), "{kind}");
     }
-    let plastic = notes(&format!("<shape type=\"sphere\">{}</shape>", rough("roughplastic", "")));
-    assert!(plastic.iter().any(|(outcome, _, note)| *outcome == Outcome::Approximated && note.contains("Beckmann")), "{plastic:?}");
 }
 
 #[test]
@@ -105,27 +104,33 @@ fn each_alpha_has_its_texture() {
 }
 
 #[test]
-fn plastics_deepen_their_colours_if_they_are_nonlinear() {
-    let base = |more: &str| {
-        let text = format!(r#"<bsdf type="plastic"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/>{more}</bsdf>"#);
-        match front(&text) {
-            MaterialDesc::Plastic { albedo: ColorDesc::Grey(v), .. } => f64::from(v),
-            other => panic!("{other:?}"),
-        }
+fn plastics_are_as_written() {
+    let plastic = |kind: &str, more: &str| match front(&format!(r#"<bsdf type="{kind}">{more}</bsdf>"#)) {
+        MaterialDesc::Plastic(plastic) => plastic,
+        other => panic!("{other:?}"),
     };
-    assert_near(base(""), 0.5);
-    // r (1 - F) / (1 - r F) with the internal reflectance F = 0.5963.
-    assert!((base(r#"<boolean name="nonlinear" value="true"/>"#) - 0.2876).abs() < 1e-3);
-    let textured = format!(
-        r#"<scene version="3.0.0">{SENSOR}<shape type="sphere"><bsdf type="plastic"><boolean name="nonlinear" value="true"/>{}</bsdf></shape></scene>"#,
-        bitmap("diffuse_reflectance", "")
-    );
-    let mut png = std::io::Cursor::new(Vec::new());
-    image::DynamicImage::new_rgb8(2, 2).write_to(&mut png, image::ImageFormat::Png).unwrap();
-    let imported = read_with(&textured, &[], &[("a.png", png.get_ref())]).unwrap();
-    assert_eq!(imported.assets.images.len(), 1);
-    // An image that is missing is found out later.
-    assert!(read_with(&textured, &[], &[]).unwrap().assets.images.is_empty());
+    let plain = plastic("plastic", "");
+    assert!(!plain.nonlinear && plain.alpha.is_none() && matches!(plain.albedo, ColorDesc::Grey(v) if v == 0.5));
+    assert!(matches!(plain.coat_tint, ColorDesc::Grey(v) if v == 1.0));
+    let more = r#"<boolean name="nonlinear" value="true"/><rgb name="specular_reflectance" value="0.1 0.2 0.3"/>"#;
+    let rough = plastic("roughplastic", &format!(r#"<string name="distribution" value="ggx"/>{more}"#));
+    assert!(rough.nonlinear && rough.distribution == DistributionDesc::GgxSeparable && !rough.multiscatter);
+    assert!(matches!(rough.coat_tint, ColorDesc::Rgb(color) if color == [0.1, 0.2, 0.3]));
+    assert_eq!(plastic("roughplastic", "").distribution, DistributionDesc::Beckmann);
+}
+
+#[test]
+fn glass_has_colours_at_its_surface() {
+    let colors = r#"<rgb name="specular_reflectance" value="0.1 0.2 0.3"/><rgb name="specular_transmittance" value="0.4 0.5 0.6"/>"#;
+    for kind in ["dielectric", "roughdielectric", "thindielectric"] {
+        let (reflection, transmission) = match front(&format!(r#"<bsdf type="{kind}">{colors}</bsdf>"#)) {
+            MaterialDesc::Dielectric(glass) => (glass.reflection_tint, glass.transmission_tint),
+            MaterialDesc::ThinDielectric { reflection_tint, transmission_tint, .. } => (reflection_tint, transmission_tint),
+            other => panic!("{other:?}"),
+        };
+        assert!(matches!(reflection, ColorDesc::Rgb(color) if color == [0.1, 0.2, 0.3]), "{kind}");
+        assert!(matches!(transmission, ColorDesc::Rgb(color) if color == [0.4, 0.5, 0.6]), "{kind}");
+    }
 }
 
 #[test]

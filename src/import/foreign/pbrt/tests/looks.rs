@@ -109,15 +109,18 @@ fn glass_has_an_index_by_number_or_by_name() {
 }
 
 #[test]
-fn bases_below_coats_lose_what_stays_inside() {
-    let MaterialDesc::Plastic { albedo: ColorDesc::Rgb(base), .. } =
-        material("Material \"coateddiffuse\" \"rgb reflectance\" [0.578596 1 0]")
-    else {
-        panic!()
+fn colours_below_coats_deepen() {
+    let plastic = |text: &str| match material(&format!("Material \"coateddiffuse\" {text}")) {
+        MaterialDesc::Plastic(plastic) => plastic,
+        other => panic!("{other:?}"),
     };
-    // r (1 - R) / (1 - r R) with R = 0.5963.
-    assert!(close(base, [0.3567, 1.0, 0.0].map(|x: f32| x)) || (base[0] - 0.3567).abs() < 2e-3, "{base:?}");
-    assert!((base[1] - 1.0).abs() < 1e-3 && base[2] == 0.0);
+    let constant = plastic("\"rgb reflectance\" [0.578596 1 0] \"float roughness\" 0.04");
+    assert!(
+        constant.nonlinear
+            && !constant.multiscatter
+            && matches!(constant.albedo, ColorDesc::Rgb(base) if close(base, [0.578596, 1.0, 0.0]))
+    );
+    assert!(plastic("\"float uroughness\" 0.04 \"float vroughness\" 0.1").multiscatter);
 }
 
 #[test]

@@ -1,0 +1,70 @@
+//! Materials whose microfacets scatter light once, for agreement with other renderers.
+
+use super::microfacet::Microfacets;
+use super::{BsdfEval, BsdfSample, Conductor, Dielectric, Plastic};
+use crate::color::Rgb;
+use crate::math::Vec3;
+
+/// A material with microfacets distributed by `D`, which lose light that they scatter several times. Apart from the others, so that their code
+/// stays as it is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SingleBsdf<D> {
+    /// Metal.
+    Conductor(Conductor<D>),
+    /// Glass.
+    Dielectric(Dielectric<D>),
+    /// A diffuse base under a rough coat.
+    Plastic(Plastic<D>),
+}
+
+macro_rules! each {
+    ($self:expr, $bsdf:ident => $body:expr) => {
+        match $self {
+            SingleBsdf::Conductor($bsdf) => $body,
+            SingleBsdf::Dielectric($bsdf) => $body,
+            SingleBsdf::Plastic($bsdf) => $body,
+        }
+    };
+}
+
+impl<D: Microfacets> SingleBsdf<D> {
+    /// As [`Bsdf::eval`](super::Bsdf::eval).
+    #[inline(never)]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        each!(self, bsdf => bsdf.eval(wo, wi))
+    }
+
+    /// As [`Bsdf::sample`](super::Bsdf::sample).
+    #[inline(never)]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        each!(self, bsdf => bsdf.sample(wo, u_lobe, u))
+    }
+
+    /// As [`Bsdf::is_delta`](super::Bsdf::is_delta).
+    pub fn is_delta(&self) -> bool {
+        each!(self, bsdf => bsdf.is_delta())
+    }
+
+    /// As [`Bsdf::is_anisotropic`](super::Bsdf::is_anisotropic).
+    pub fn is_anisotropic(&self) -> bool {
+        each!(self, bsdf => bsdf.is_anisotropic())
+    }
+
+    /// As [`Bsdf::transmits`](super::Bsdf::transmits).
+    pub fn transmits(&self) -> bool {
+        matches!(self, Self::Dielectric(_))
+    }
+
+    /// As [`Bsdf::diffuse_fraction`](super::Bsdf::diffuse_fraction).
+    pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        match self {
+            Self::Conductor(_) | Self::Dielectric(_) => Rgb::BLACK,
+            Self::Plastic(bsdf) => bsdf.diffuse_fraction(wo, wi),
+        }
+    }
+
+    /// As [`Bsdf::albedo`](super::Bsdf::albedo).
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        each!(self, bsdf => bsdf.albedo(wo))
+    }
+}
