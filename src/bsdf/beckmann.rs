@@ -90,6 +90,10 @@ impl Beckmann {
 }
 
 impl Microfacets for Beckmann {
+    fn with_alpha(alpha: [f32; 2]) -> Self {
+        Self::new(alpha)
+    }
+
     #[inline]
     fn alpha(&self) -> [f32; 2] {
         self.alpha

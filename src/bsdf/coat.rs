@@ -116,6 +116,16 @@ impl<D: Microfacets> Coat<D> {
         self.facets.is_smooth()
     }
 
+    /// Alpha along both tangents.
+    pub(super) fn alpha(&self) -> [f32; 2] {
+        self.facets.alpha()
+    }
+
+    /// The same coat with another roughness of what it reflects; how much it lets through stays.
+    pub(super) fn with_facets(&self, alpha: [f32; 2]) -> Self {
+        Self { facets: D::with_alpha(alpha), ..*self }
+    }
+
     /// Index of refraction over that of the outside.
     #[inline]
     pub fn ior(&self) -> f32 {

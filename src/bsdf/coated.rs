@@ -15,6 +15,7 @@
 
 use super::fresnel;
 use super::microfacet::MIN_COSINE;
+use super::rougher::widened;
 use super::split::share;
 use super::{Bsdf, BsdfEval, BsdfSample, Coat, Eon};
 use crate::color::Rgb;
@@ -46,6 +47,16 @@ impl Coated {
             _ => None,
         };
         Self { coat, tint: (tint != Rgb::WHITE).then_some(tint), diffuse, base }
+    }
+
+    /// As [`Bsdf::with_least_alpha`], of coat and base.
+    pub(super) fn with_least_alpha(&self, alpha: f32) -> Option<Self> {
+        let (coat, base) = (widened(self.coat.alpha(), alpha), self.base.with_least_alpha(alpha));
+        if coat.is_none() && base.is_none() {
+            return None;
+        }
+        let coat = coat.map_or(self.coat, |alpha| self.coat.with_facets(alpha));
+        Some(Self { coat, base: base.unwrap_or_else(|| self.base.clone()), ..*self })
     }
 
     /// What is left of the light from `i` to `o`, both on the upper side, on its way through the coat to the base and back.

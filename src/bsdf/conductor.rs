@@ -57,6 +57,12 @@ impl Conductor<Ggx> {
         Self { tint, facets: Ggx::new(alpha), ..self.single_scattering() }.with_multiple_scattering()
     }
 
+    /// The same metal with another roughness.
+    #[must_use]
+    pub(super) fn with_surface_alpha(&self, alpha: [f32; 2]) -> Self {
+        if self.share > 0.0 { self.with_surface(alpha, self.tint) } else { self.with_wider_facets(alpha) }
+    }
+
     /// The same metal with other microfacets and tint, and without multiple scattering.
     #[must_use]
     pub fn with_facets<D>(self, facets: D, tint: Rgb) -> Conductor<D> {
@@ -66,6 +72,11 @@ impl Conductor<Ggx> {
 }
 
 impl<D: Microfacets> Conductor<D> {
+    /// With another roughness, for single scattering.
+    pub(super) fn with_wider_facets(&self, alpha: [f32; 2]) -> Self {
+        Self { facets: D::with_alpha(alpha), ..*self }
+    }
+
     #[inline]
     fn reflectance(&self, cos: f32) -> Rgb {
         self.tint * Rgb::from(self.index.map(|index| index.reflectance(cos)))

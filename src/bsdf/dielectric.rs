@@ -91,6 +91,11 @@ impl Dielectric<Ggx> {
         Self { ior, facets: ggx, multiple: is_known.then(|| multiple_scattering(ior, &ggx)), tints: CLEAR }
     }
 
+    /// The same glass with another roughness.
+    pub(super) fn with_surface_alpha(&self, alpha: [f32; 2]) -> Self {
+        Self { tints: self.tints, ..Self::rough(self.ior, Ggx::new(alpha), self.multiple.is_some()) }
+    }
+
     /// Without the light that microfacets scatter several times.
     #[must_use]
     pub fn single_scattering(self) -> Self {
@@ -102,6 +107,16 @@ impl<D: Microfacets> Dielectric<D> {
     /// As [`Dielectric::new`], with the microfacets that `facets` makes of an alpha, and without multiple scattering.
     pub fn with_facets(ior: f32, alpha: [f32; 2], facets: impl FnOnce([f32; 2]) -> D) -> Self {
         Self { ior, facets: facets(usable_across(ior, alpha)), multiple: None, tints: CLEAR }
+    }
+
+    /// With another roughness, for single scattering.
+    pub(super) fn with_wider_facets(&self, alpha: [f32; 2]) -> Self {
+        Self { facets: D::with_alpha(alpha), ..*self }
+    }
+
+    /// Alpha along both tangents.
+    pub fn alpha(&self) -> [f32; 2] {
+        self.facets.alpha()
     }
 
     /// With factors within `[0, 1]` on what is reflected and on what crosses.

@@ -35,6 +35,16 @@ impl Glossy {
         Self { diffuse, ahead, grazing, ggx: Ggx::new([alpha.max(MIN_ALPHA); 2]) }
     }
 
+    /// Alpha along both tangents.
+    pub(super) fn alpha(&self) -> [f32; 2] {
+        self.ggx.alpha()
+    }
+
+    /// With another roughness.
+    pub(super) fn with_alpha(&self, alpha: [f32; 2]) -> Self {
+        Self { ggx: Ggx::new(alpha), ..*self }
+    }
+
     /// Phong's model with the highlight of the same width: alpha is `sqrt(2 / (exponent + 2))` (Walter et al., "Microfacet Models for
     /// Refraction through Rough Surfaces").
     pub fn phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Self {

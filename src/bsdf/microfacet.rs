@@ -18,6 +18,9 @@ use crate::math::{Vec3, sin_cos_turns, vec3};
 
 /// A distribution of microfacet normals with its shadowing.
 pub trait Microfacets: Copy {
+    /// The distribution for an alpha within `[0, 1]` along x and y; smooth if both are below [`SMOOTH_ALPHA`].
+    fn with_alpha(alpha: [f32; 2]) -> Self;
+
     /// Alpha along x and y.
     fn alpha(&self) -> [f32; 2];
 
@@ -115,6 +118,10 @@ impl Ggx {
 }
 
 impl Microfacets for Ggx {
+    fn with_alpha(alpha: [f32; 2]) -> Self {
+        Self::new(alpha)
+    }
+
     #[inline]
     fn alpha(&self) -> [f32; 2] {
         self.alpha
@@ -202,6 +209,10 @@ impl From<Ggx> for SeparableGgx {
 }
 
 impl Microfacets for SeparableGgx {
+    fn with_alpha(alpha: [f32; 2]) -> Self {
+        Self::new(alpha)
+    }
+
     #[inline]
     fn alpha(&self) -> [f32; 2] {
         self.0.alpha

@@ -18,6 +18,7 @@ mod mirror;
 mod phong;
 mod plastic;
 mod principled;
+mod rougher;
 mod single;
 mod split;
 #[cfg(test)]

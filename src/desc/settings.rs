@@ -215,6 +215,11 @@ pub enum IntegratorDesc {
         /// channel more than this, above 0. Default: no limit, no bias.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         clamp: Option<f32>,
+        /// Takes the noise of caustics that paths find by rare chance, and some of their sharpness with it: the least alpha of microfacets, within `(0, 1]`, at
+        /// surfaces that a path meets after one that is not ideally smooth, for a pixel's first sample. It falls with the sixth root of the sample's
+        /// number, so that the bias vanishes as samples are added. Default: none, no bias.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        regularize: Option<f32>,
         /// Whether what gives off light is hidden from the camera: its rays pass through emitting shapes, both sides of them, and show no light from
         /// infinity, where alpha is 0. Light, mirror images and what is seen through glass stay. Default: false.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -269,16 +274,17 @@ impl IntegratorDesc {
     }
 }
 
+impl IntegratorDesc {
+    /// Path tracing by its depths, all else by default.
+    pub fn path(max_depth: u32, rr_depth: u32) -> Self {
+        let strategy = StrategyDesc::default();
+        Self::Path { max_depth, rr_depth, strategy, clamp: None, regularize: None, hide_emitters: false, guiding: false }
+    }
+}
+
 impl Default for IntegratorDesc {
     fn default() -> Self {
-        Self::Path {
-            max_depth: default_max_depth(),
-            rr_depth: default_rr_depth(),
-            strategy: StrategyDesc::default(),
-            clamp: None,
-            hide_emitters: false,
-            guiding: false,
-        }
+        Self::path(default_max_depth(), default_rr_depth())
     }
 }
 

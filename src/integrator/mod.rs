@@ -11,6 +11,7 @@ mod guided;
 mod media;
 mod parts;
 mod path;
+mod regularization;
 mod shading;
 mod strategy;
 mod surface;
@@ -21,6 +22,7 @@ mod world;
 pub use cancel::Cancel;
 pub use debug::{AmbientOcclusion, DebugView, View};
 pub use path::PathIntegrator;
+pub use regularization::Regularization;
 pub(crate) use shading::{facing_normal, terminator_factor};
 pub use strategy::Strategy;
 pub use surface::SurfaceNeeds;
@@ -119,11 +121,12 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
     let Setup { sampler, needs, parts, side_by_side, guide } = setup;
     let view = |view| Box::new(DebugView { view, needs, parts }) as Box<dyn Integrator>;
     match *desc {
-        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, hide_emitters, .. } => Box::new(PathIntegrator {
+        IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => Box::new(PathIntegrator {
             max_depth,
             rr_depth,
             strategy: strategy.into(),
             clamp: clamp.unwrap_or(f32::INFINITY),
+            regularization: regularize.map(|alpha| Regularization { alpha }),
             hide_emitters,
             sampler,
             needs,

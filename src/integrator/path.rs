@@ -3,6 +3,7 @@
 //! One round lengthens every living path by a segment: trace, shade (emission, choice of a light, choice of a direction), trace shadow
 //! rays, drop dead paths. Each path draws its numbers from its own (pixel, sample, bounce), so a path is the same in any batch.
 
+mod draws;
 mod escapes;
 mod lanes;
 mod side_by_side;
@@ -15,6 +16,7 @@ use super::cancel;
 use super::guided::{Steered, Steering, Turns};
 use super::media::MediaState;
 use super::parts::{Way, group_of};
+use super::regularization::Regularization;
 use super::surface::albedo_at;
 use super::vertex::Vertex;
 use super::{CameraSample, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions};
@@ -29,7 +31,8 @@ use crate::light::{Light, Receiver};
 use crate::math::rows::BATCH;
 use crate::math::{DVec3, Ray, RayCone, Vec3};
 use crate::medium::RelativeIor;
-use crate::sampling::{Numbers, PixelSeed, Requests, Sampler, power_heuristic};
+use crate::sampling::{PixelSeed, Sampler, power_heuristic};
+use draws::Draws;
 use escapes::Escapes;
 use side_by_side::Shaded;
 use sorting::{Sorting, seen_through};
@@ -45,6 +48,8 @@ pub struct PathIntegrator {
     pub strategy: Strategy,
     /// Largest channel that a single contribution of indirect light keeps: less noise for too little light. Infinite for no bias.
     pub clamp: f32,
+    /// How surfaces are made rougher for light that comes by narrow lobes, if they are.
+    pub regularization: Option<Regularization>,
     /// Whether the camera does not see what gives off light.
     pub hide_emitters: bool,
     /// Where random numbers come from.
@@ -69,6 +74,8 @@ struct Path {
     /// What roulette multiplies the throughput by, lest it mistakes for absorption what is none: the squares of the relative indices of refraction
     /// passed, which scale radiance, and how far a guide has raised densities above those of the surfaces.
     roulette_scale: f32,
+    /// Whether a surface that is not ideally smooth has scattered it.
+    is_blurred: bool,
     /// Its place in the batch.
     slot: u32,
     seed: PixelSeed,
@@ -105,27 +112,6 @@ struct Scratch {
     turns: Turns,
 }
 
-/// Random numbers for the vertices that are shaded next.
-#[derive(Default)]
-struct Draws {
-    requests: Requests,
-    light: Numbers,
-    bsdf: Numbers,
-}
-
-impl Draws {
-    /// Draws for at most [`BATCH`] paths; numbers for lights only `with_light`.
-    fn draw(&mut self, sampler: &Sampler, paths: &[Path], bounce: u32, with_light: bool) {
-        for (path, (pixel, sample)) in paths.iter().zip(self.requests.pixels.iter_mut().zip(&mut self.requests.samples)) {
-            (*pixel, *sample) = (path.seed, path.sample);
-        }
-        if with_light {
-            sampler.sample_4d_batch(&self.requests, paths.len(), dimensions::light(bounce), &mut self.light);
-        }
-        sampler.sample_4d_batch(&self.requests, paths.len(), dimensions::bsdf(bounce), &mut self.bsdf);
-    }
-}
-
 thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
@@ -145,6 +131,7 @@ impl PathIntegrator {
             throughput: Rgb::WHITE,
             pdf: f32::INFINITY,
             roulette_scale: 1.0,
+            is_blurred: false,
             slot,
             seed: sample.seed,
             sample: sample.sample,
@@ -338,6 +325,10 @@ impl PathIntegrator {
         if let Some(boundary) = &boundary {
             vertex.bsdf = boundary;
         }
+        let rougher = self.regularization.filter(|_| path.is_blurred).and_then(|r| vertex.bsdf.with_least_alpha(r.alpha(path.sample)));
+        if let Some(rougher) = &rougher {
+            vertex.bsdf = rougher;
+        }
         let steering = if GUIDED { Steering::new(self, &vertex) } else { None };
         if let Some(mut shadow) = self.sample_light(world, path, &vertex, steering, draws.light.of(i - first)) {
             if MEDIA {
@@ -485,7 +476,8 @@ impl PathIntegrator {
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
         note(sample);
-        Some((Path { throughput, pdf, roulette_scale, from: vertex.receiver(), ..*path }, *ray))
+        let is_blurred = path.is_blurred || !sample.is_delta;
+        Some((Path { throughput, pdf, roulette_scale, is_blurred, from: vertex.receiver(), ..*path }, *ray))
     }
 }
 

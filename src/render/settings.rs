@@ -106,6 +106,8 @@ pub struct Overrides {
     pub strategy: Option<StrategyDesc>,
     /// `--clamp`; infinity stands for no limit.
     pub clamp: Option<f32>,
+    /// `--regularize`; 0 stands for none.
+    pub regularize: Option<f32>,
     /// `--guiding`.
     pub guiding: Option<bool>,
     /// `--time-limit`, in seconds.
@@ -250,6 +252,15 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
             return Err(usage(format!("--clamp {limit}: a number above 0, or inf for no limit")));
         }
         *clamp = Some(limit).filter(|limit| limit.is_finite());
+    }
+    if let Some(alpha) = overrides.regularize {
+        let IntegratorDesc::Path { regularize, .. } = &mut integrator else {
+            return Err(usage("--regularize: only the integrator path makes surfaces rougher"));
+        };
+        if !(0.0..=1.0).contains(&alpha) {
+            return Err(usage(format!("--regularize {alpha}: an alpha within 0 and 1, 0 for none")));
+        }
+        *regularize = Some(alpha).filter(|&alpha| alpha > 0.0);
     }
     if let Some(wanted) = overrides.guiding {
         let IntegratorDesc::Path { guiding, .. } = &mut integrator else {
@@ -403,6 +414,7 @@ mod tests {
             rr_depth: 3,
             strategy: StrategyDesc::Light,
             clamp: Some(2.5),
+            regularize: None,
             hide_emitters: false,
             guiding: false,
         };
@@ -463,6 +475,9 @@ mod tests {
             ("--clamp", Overrides { clamp: Some(0.0), ..d() }),
             ("--clamp", Overrides { clamp: Some(f32::NAN), ..d() }),
             ("--clamp", Overrides { clamp: Some(1.0), integrator: Some(IntegratorDesc::Uv), ..d() }),
+            ("--regularize", Overrides { regularize: Some(-0.1), ..d() }),
+            ("--regularize", Overrides { regularize: Some(f32::NAN), ..d() }),
+            ("--regularize", Overrides { regularize: Some(0.1), integrator: Some(IntegratorDesc::Uv), ..d() }),
             ("--time-limit", Overrides { time_limit: Some(0.0), ..d() }),
             ("--time-limit", Overrides { time_limit: Some(f64::NAN), ..d() }),
             ("--layers", Overrides { layers: vec![LayerDesc::Z], outputs: vec!["a.png".to_owned()], ..d() }),

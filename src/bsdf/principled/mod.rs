@@ -422,6 +422,16 @@ impl Principled {
         Rgb::new(channel(|c| c.r), channel(|c| c.g), channel(|c| c.b))
     }
 
+    /// Alpha along both tangents.
+    pub(super) fn alpha(&self) -> [f32; 2] {
+        self.ggx.alpha()
+    }
+
+    /// With another roughness of the highlight; the clear coat stays.
+    pub(super) fn with_alpha(&self, alpha: [f32; 2]) -> Self {
+        Self { ggx: Ggx::new(alpha), ..*self }
+    }
+
     /// Whether the highlight is stretched.
     pub fn is_anisotropic(&self) -> bool {
         self.ggx.alpha()[0] != self.ggx.alpha()[1]

@@ -71,3 +71,23 @@ fn tints_colour_what_is_reflected_and_what_crosses() {
     assert_eq!(pane.sample(wo, 0.0, [0.5; 2]).unwrap().weight, reflection);
     assert_eq!(pane.sample(wo, 0.99, [0.5; 2]).unwrap().weight, transmission);
 }
+
+#[test]
+fn least_alphas_widen_rough_surfaces_alone() {
+    let alpha_of = |bsdf: &Bsdf| match bsdf {
+        Bsdf::Conductor(metal) => metal.alpha(),
+        Bsdf::Dielectric(glass) => glass.alpha(),
+        other => panic!("{other:?}"),
+    };
+    for make in [gold, glass] {
+        assert_eq!(alpha_of(&make([0.01, 0.3]).with_least_alpha(0.2).unwrap()), [0.2, 0.3]);
+        assert!(make([0.2; 2]).with_least_alpha(0.2).is_none() && make([0.0; 2]).with_least_alpha(0.2).is_none());
+    }
+    for (name, bsdf) in rough_bsdfs() {
+        let Some(rougher) = bsdf.with_least_alpha(0.6) else { continue };
+        assert!(rougher.with_least_alpha(0.6).is_none(), "{name}");
+        // A wider lobe is lower at its peak.
+        let (o, i) = (direction(0.8, 0.1), direction(0.8, 0.6));
+        assert!(rougher.eval(o, i).value.g < bsdf.eval(o, i).value.g, "{name}");
+    }
+}

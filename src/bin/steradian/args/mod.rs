@@ -223,6 +223,10 @@ pub struct RenderArgs {
     /// Limit what a single path of indirect light brings: less noise, but biased (too dark). Off unless given; inf for no limit
     #[arg(long, value_name = "LIMIT", help_heading = "Algorithm")]
     pub clamp: Option<f32>,
+    /// Make surfaces that a path meets after a rough one at least as rough as this alpha, falling with the samples: less noise of caustics, but biased.
+    /// Off unless given; 0 for off
+    #[arg(long, value_name = "ALPHA", help_heading = "Algorithm")]
+    pub regularize: Option<f32>,
     /// Whether paths learn from earlier ones where light comes from: on or off
     ///
     /// For scenes whose light comes by few ways, such as through a door ajar. Passes double; each follows what those before have taught, and their
@@ -357,6 +361,7 @@ impl RenderArgs {
             max_depth: self.max_depth,
             strategy: self.strategy,
             clamp: self.clamp,
+            regularize: self.regularize,
             guiding: self.guiding,
             time_limit: self.time_limit,
             outputs: self.output.clone(),
@@ -419,7 +424,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_overrides() {
         let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path --accel linear \
-                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic --no-depth-of-field --transparent -vv";
+                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --regularize 0.2 --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic --no-depth-of-field --transparent -vv";
         let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
         let o = arguments.overrides(vec!["d.exr".to_owned()]);
         assert_eq!((o.spp, o.size, o.crop, o.threads, o.seed), (Some(5), Some([20, 10]), Some([1, 2, 3, 4]), Some(2), Some(9)));
@@ -433,7 +438,7 @@ mod tests {
             (vec![LayerDesc::Z, LayerDesc::Albedo], true, Some(-1.5), Some(ViewDesc::Filmic))
         );
         assert_eq!((o.outputs, o.default_outputs), (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()]));
-        assert!(o.guiding == Some(true) && o.no_depth_of_field && o.transparent);
+        assert!(o.guiding == Some(true) && o.regularize == Some(0.2) && o.no_depth_of_field && o.transparent);
         assert_eq!((arguments.verbosity.verbose, arguments.verbosity.quiet), (2, false));
     }
 

@@ -3,7 +3,7 @@
 use super::Reader;
 use super::element::Element;
 use super::tree::PluginId;
-use crate::desc::{IntegratorDesc, StrategyDesc};
+use crate::desc::IntegratorDesc;
 use crate::error::Result;
 
 /// Stands for paths of any length.
@@ -11,11 +11,7 @@ const UNLIMITED: u32 = 65_536;
 
 /// What a scene without an integrator is rendered with.
 pub(super) fn unlimited_path() -> IntegratorDesc {
-    path(UNLIMITED, 5)
-}
-
-fn path(max_depth: u32, rr_depth: u32) -> IntegratorDesc {
-    IntegratorDesc::Path { max_depth, rr_depth, strategy: StrategyDesc::Mis, clamp: None, hide_emitters: false, guiding: false }
+    IntegratorDesc::path(UNLIMITED, 5)
 }
 
 impl Reader<'_> {
@@ -55,25 +51,25 @@ impl Reader<'_> {
             }
             "path" | "prb" | "prb_basic" | "direct_projective" | "prb_projective" => {
                 let (max_depth, rr_depth) = ends(&mut element)?;
-                self.draft.desc.integrator = path(max_depth, rr_depth);
+                self.draft.desc.integrator = IntegratorDesc::path(max_depth, rr_depth);
                 if kind != "path" {
                     element.approximated("", "path tracing, without derivatives");
                 }
             }
             "volpath" | "volpathmis" | "prbvolpath" => {
                 let (max_depth, rr_depth) = ends(&mut element)?;
-                self.draft.desc.integrator = path(max_depth, rr_depth);
+                self.draft.desc.integrator = IntegratorDesc::path(max_depth, rr_depth);
                 if self.document.plugins.iter().any(|plugin| plugin.class == "medium") {
                     element.approximated("", "path tracing: there are no participating media");
                 }
             }
             "ptracer" => {
                 let (max_depth, rr_depth) = ends(&mut element)?;
-                self.draft.desc.integrator = path(max_depth, rr_depth);
+                self.draft.desc.integrator = IntegratorDesc::path(max_depth, rr_depth);
                 element.approximated("", "path tracing from the camera, which has the same mean, in place of light tracing");
             }
             "direct" | "emission_direct" => {
-                self.draft.desc.integrator = path(2, 5);
+                self.draft.desc.integrator = IntegratorDesc::path(2, 5);
                 for name in ["shading_samples", "emitter_samples", "bsdf_samples"] {
                     if element.take(name).is_some() {
                         element.approximated(name, "one sample of each, more samples per pixel have the same mean");

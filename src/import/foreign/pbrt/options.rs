@@ -1,7 +1,7 @@
 //! What comes before the world: film, filter, sampler, integrator.
 
 use super::params::Params;
-use crate::desc::{FilterDesc, IntegratorDesc, OutputDesc, PixelTypeDesc, StrategyDesc};
+use crate::desc::{FilterDesc, IntegratorDesc, OutputDesc, PixelTypeDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
 use crate::import::foreign::draft::SOBOL_FOR_INDEPENDENT;
@@ -175,13 +175,6 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
     }
     // pbrt counts bounces, we count segments: one bounce is the light that arrives over two.
     let max_depth = u32::try_from(max_depth.max(0)).unwrap_or(u32::MAX).saturating_add(1);
-    draft.desc.integrator = IntegratorDesc::Path {
-        max_depth,
-        rr_depth: 5,
-        strategy: StrategyDesc::default(),
-        clamp: None,
-        hide_emitters: false,
-        guiding: false,
-    };
+    draft.desc.integrator = IntegratorDesc::path(max_depth, 5);
     Ok(())
 }
