@@ -28,6 +28,7 @@ const OPTIONS: [(Trust, &[&str]); 3] = [
             "max-depth",
             "strategy",
             "clamp",
+            "regularize",
             "guiding",
             "sampler",
             "seed",

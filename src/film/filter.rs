@@ -26,8 +26,18 @@ const KERNEL_STEPS: u32 = 1000;
 pub struct Filter {
     desc: FilterDesc,
     kernel: Kernel,
-    /// With shared samples: one axis of the filter over its integral, at distances of `i * radius / CELLS`.
-    shared: Option<Box<[f32; CELLS + 2]>>,
+    shared: Option<Box<Shared>>,
+}
+
+/// How shared samples are weighted.
+#[derive(Clone, Debug)]
+struct Shared {
+    /// As of the filter.
+    radius: f32,
+    /// As [`Filter::border`].
+    border: i32,
+    /// One axis of the filter over its integral, at distances of `i * radius / CELLS`.
+    table: [f32; CELLS + 2],
 }
 
 /// An offset from the pixel's centre and the weight of a sample there.
@@ -103,7 +113,11 @@ impl Filter {
         // Samples within a pixel reach another from a radius of 0.5 on.
         let can_share = desc.radius() > 0.5 && desc.radius() <= MAX_TAPS as f32 / 2.0;
         let shared = can_share && *desc.samples_mut() != Some(FilterSamplesDesc::Importance);
-        Self { desc, kernel, shared: shared.then(|| Box::new(tabulate(&desc))) }
+        let shared = shared.then(|| {
+            let radius = desc.radius();
+            Box::new(Shared { radius, border: (radius - 0.5).ceil() as i32, table: tabulate(&desc) })
+        });
+        Self { desc, kernel, shared }
     }
 
     /// Where a sample lies: uniform within the pixel if samples are shared, else in proportion to the filter's absolute value.
@@ -149,18 +163,19 @@ impl Filter {
 
     /// How many pixels beyond its own a sample reaches in each direction.
     pub fn border(&self) -> u32 {
-        if self.is_shared() { (self.radius() - 0.5).ceil() as u32 } else { 0 }
+        self.shared.as_ref().map_or(0, |shared| shared.border as u32)
     }
 
     /// The weights along one axis of a shared sample at this offset from its pixel's centre, from -0.5 to 0.5.
     #[inline]
     pub(super) fn taps(&self, offset: f32) -> Taps {
         let mut weights = [0.0; MAX_TAPS];
-        let Some(table) = &self.shared else { return Taps { first: 0, count: 1, weights: [1.0; MAX_TAPS] } };
-        let radius = self.radius();
-        let border = self.border() as i32;
-        let first = ((offset - radius).floor() as i32 + 1).max(-border);
-        let last = ((offset + radius).ceil() as i32 - 1).min(border);
+        let Some(shared) = &self.shared else { return Taps { first: 0, count: 1, weights: [1.0; MAX_TAPS] } };
+        let Shared { radius, border, table } = &**shared;
+        let (low, high) = (offset - radius, offset + radius);
+        // floor(low) + 1 and ceil(high) - 1.
+        let first = (low as i32 + i32::from(low >= (low as i32) as f32)).max(-border);
+        let last = (high as i32 - i32::from(high <= (high as i32) as f32)).min(*border);
         let count = ((last - first + 1).max(0) as usize).min(MAX_TAPS);
         let scale = CELLS as f32 / radius;
         for (k, weight) in weights[..count].iter_mut().enumerate() {

@@ -13,7 +13,7 @@ use crate::log::{self, Level};
 use crate::text;
 
 /// Options whose values a scene has, with their places in it.
-const IN_SCENES: [(&str, &[&str]); 10] = [
+const IN_SCENES: [(&str, &[&str]); 11] = [
     ("output", &["/outputs"]),
     ("spp", &["/sampler/spp"]),
     ("size", &["/film/width", "/film/height"]),
@@ -22,6 +22,7 @@ const IN_SCENES: [(&str, &[&str]); 10] = [
     ("max-depth", &["/integrator/max_depth"]),
     ("strategy", &["/integrator/strategy"]),
     ("clamp", &["/integrator/clamp"]),
+    ("regularize", &["/integrator/regularize"]),
     ("sampler", &["/sampler/type"]),
     ("seed", &["/sampler/seed"]),
 ];

@@ -169,21 +169,23 @@ impl<'a> Reader<'a> {
         let (alpha, distribution) = self.microfacets(element, "roughconductor", uv)?;
         let tint = self.color(element, "specular_reflectance", 1.0, uv)?;
         let (eta, k) = (self.constant(element, "eta", uv)?, self.constant(element, "k", uv)?);
-        let name = element.text("material")?;
+        // Without any of them, Mitsuba's is an ideal mirror.
+        let name = element.text("material")?.or((eta.is_none() && k.is_none()).then_some("none"));
         let (eta, k) = match (name, eta, k) {
             (None, Some(eta), k) => (eta, k.unwrap_or([0.0; 3])),
             (None, None, Some(k)) => ([0.0; 3], k),
             (Some("none"), None, None) if alpha.is_none() => return Ok(MaterialDesc::Mirror { reflectance: tint }),
             (Some("none"), None, None) => ([0.0; 3], [1.0; 3]),
-            (name, None, None) => {
-                let name = name.unwrap_or("Cu");
+            (Some(name), None, None) => {
                 let unknown = || {
                     let hint = closest_name(name, metals::names()).map(|near| format!(" (did you mean \"{near}\"?)"));
                     element.place_of("material").error(format!("no material named \"{name}\"{}", hint.unwrap_or_default()))
                 };
                 metals::find(name).ok_or_else(unknown)?
             }
-            (Some(_), ..) => return Err(element.place_of("material").error("give either \"material\" or \"eta\" and \"k\"")),
+            (None, None, None) | (Some(_), ..) => {
+                return Err(element.place_of("material").error("give either \"material\" or \"eta\" and \"k\""));
+            }
         };
         // An index of zero is that of an ideal mirror, which the smallest one comes to.
         let eta = eta.map(|eta| eta.max(1e-6));
