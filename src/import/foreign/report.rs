@@ -28,7 +28,7 @@ pub struct ReportEntry {
     pub parameter: String,
     /// What became of it.
     pub outcome: Outcome,
-    /// How it was approximated, or why it was ignored.
+    /// How it was approximated, why it was ignored, or how the scene says it.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
 }

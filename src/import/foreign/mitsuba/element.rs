@@ -141,6 +141,11 @@ impl<'a> Element<'a> {
         }
     }
 
+    /// Says how the scene says a parameter, or the plugin as a whole.
+    pub fn mapped(&mut self, name: &str, how: impl Into<String>) {
+        self.set(name, Outcome::Mapped, how.into());
+    }
+
     /// Says how a parameter (or, if there is none of that name, the plugin's default) was approximated.
     pub fn approximated(&mut self, name: &str, how: impl Into<String>) {
         self.set(name, Outcome::Approximated, how.into());
@@ -177,12 +182,7 @@ impl<'a> Element<'a> {
             draft.mapped(&self.plugin.place.to_string(), &title, "");
         }
         for (outcome, note) in self.notes {
-            let place = self.plugin.place.to_string();
-            if outcome == Outcome::Approximated {
-                draft.approximated(&place, &title, "", note);
-            } else {
-                draft.ignored(&place, &title, "", note);
-            }
+            draft.note(&self.plugin.place.to_string(), &title, "", outcome, note);
         }
         for (property, outcome) in self.plugin.properties.iter().zip(self.outcomes) {
             let place = property.place.to_string();
@@ -192,9 +192,7 @@ impl<'a> Element<'a> {
                 _ => property.name.clone(),
             };
             match outcome {
-                Some((Outcome::Mapped, _)) => draft.mapped(&place, &title, &name),
-                Some((Outcome::Approximated, how)) => draft.approximated(&place, &title, &name, how),
-                Some((Outcome::Ignored, why)) => draft.ignored(&place, &title, &name, why),
+                Some((outcome, note)) => draft.note(&place, &title, &name, outcome, note),
                 None => draft.ignored(&place, &title, &name, format!("not a parameter that this reader knows of a {}", self.plugin.kind)),
             }
         }

@@ -162,7 +162,7 @@ impl Reader<'_> {
         // What stratifies the samples in other ways has the same mean: Sobol points do it here.
         element.boolean("jitter", true)?;
         if element.kind() == "independent" {
-            element.approximated("", SOBOL_FOR_INDEPENDENT);
+            element.mapped("", SOBOL_FOR_INDEPENDENT);
         }
         let sampler = &mut self.draft.desc.sampler;
         (sampler.spp, sampler.seed) = (spp, seed.unsigned_abs());

@@ -227,6 +227,31 @@ fn blends_and_reliefs_consist_of_others() {
 }
 
 #[test]
+fn parts_and_textures_may_be_references() {
+    let shared = format!(
+        r#"{}<bsdf type="diffuse" id="d"><rgb name="reflectance" value="1 0 0"/></bsdf><bsdf type="plastic" id="p"/>"#,
+        bitmap("t", "").replace("name=", "id=").replacen("id=\"filename\"", "name=\"filename\"", 1)
+    );
+    let nested = |bsdf: &str| scene(&format!("{shared}<shape type=\"sphere\"><bsdf type=\"twosided\">{bsdf}</bsdf></shape>"));
+    let is_red = |desc: &SceneDesc, name: &str| matches!(&desc.materials[name], MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(c), .. } if *c == [1.0, 0.0, 0.0]);
+    for (bsdf, texture) in [("normalmap", "normalmap"), ("bumpmap", "arbitrary")] {
+        for part in ["<ref id=\"d\"/>", "<ref name=\"bsdf\" id=\"d\"/>", "<bsdf type=\"twosided\"><ref id=\"d\"/></bsdf>"] {
+            let desc = nested(&format!("<bsdf type=\"{bsdf}\"><ref name=\"{texture}\" id=\"t\"/>{part}</bsdf>"));
+            let MaterialDesc::Relief { material: inner, normal_map, bump_map } = material(&desc, 0) else { panic!("{bsdf} {part}") };
+            assert!(is_red(&desc, &inner), "{bsdf} {part}");
+            assert_eq!(normal_map.map(|map| map.texture).or(bump_map.map(|map| map.texture)).as_deref(), Some("t"));
+        }
+    }
+    let desc = nested("<bsdf type=\"blendbsdf\"><ref name=\"weight\" id=\"t\"/><ref id=\"p\"/><ref id=\"d\"/></bsdf>");
+    let MaterialDesc::Mix { materials, amount: ScalarDesc::Texture { texture } } = material(&desc, 0) else { panic!() };
+    assert_eq!((materials[0].as_str(), is_red(&desc, &materials[1]), texture.as_str()), ("p", true, "t"));
+    let desc = nested("<bsdf type=\"mask\"><ref name=\"opacity\" id=\"t\"/><ref id=\"d\"/></bsdf>");
+    assert!(is_red(&desc, desc.shapes[0].common().material.unwrap()));
+    assert!(matches!(desc.shapes[0].common().opacity, Some(OpacityDesc::Texture { .. })));
+    assert!(message("<shape type=\"sphere\"><bsdf type=\"bumpmap\"><ref id=\"x\"/></bsdf></shape>").contains("nothing has the id"));
+}
+
+#[test]
 fn where_a_number_is_asked_for_checkers_have_the_other_colour() {
     // As in Mitsuba 3.9.
     let checker =
