@@ -3,6 +3,7 @@
 use super::names;
 use super::tree::{Document, Place, Plugin, PluginId, Property, Value};
 use crate::error::Result;
+use crate::import::foreign::report::PART_OF_IGNORED;
 use crate::import::{Draft, Outcome};
 use crate::math::DAffine3;
 
@@ -178,6 +179,7 @@ impl<'a> Element<'a> {
     /// Reports what became of the parameters; of the plugin as a whole, too, unless it has any.
     pub fn finish(self, draft: &mut Draft) {
         let title = self.plugin.title();
+        let is_ignored = self.notes.iter().any(|(outcome, _)| *outcome == Outcome::Ignored);
         if self.notes.is_empty() && self.plugin.properties.is_empty() {
             draft.mapped(&self.plugin.place.to_string(), &title, "");
         }
@@ -193,6 +195,7 @@ impl<'a> Element<'a> {
             };
             match outcome {
                 Some((outcome, note)) => draft.note(&place, &title, &name, outcome, note),
+                None if is_ignored => draft.ignored(&place, &title, &name, PART_OF_IGNORED),
                 None => draft.ignored(&place, &title, &name, format!("not a parameter that this reader knows of a {}", self.plugin.kind)),
             }
         }

@@ -154,13 +154,17 @@ fn attributes_of_meshes_are_colours_of_vertices() {
     };
     let shape = |bsdf: &str| format!(r#"<shape type="ply"><string name="filename" value="m.ply"/>{bsdf}</shape>"#);
     let desc = scene(&shape(&attribute("vertex_color", "")));
-    assert!(matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::VertexColor]));
+    let is_attribute = |desc: &SceneDesc, wanted: &str, factor: f32| matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::MeshAttribute { name, scale }] if name == wanted && *scale == factor);
+    assert!(is_attribute(&desc, "vertex_color", 1.0));
     let scaled = scene(&shape(&attribute("vertex_color", r#"<float name="scale" value="0.5"/>"#)));
-    let MaterialDesc::Diffuse { albedo: ColorDesc::Texture { texture }, .. } = material(&scaled, 0) else { panic!() };
-    assert!(matches!(&scaled.textures[&texture], TextureDesc::Product { factors } if matches!(factors[1], ColorDesc::Grey(0.5))));
-    assert!(notes(&shape(&attribute("face_color", ""))).iter().any(|(outcome, name, _)| *outcome == Outcome::Ignored && name == "name"));
+    assert!(is_attribute(&scaled, "vertex_color", 0.5));
+    assert!(is_attribute(&scene(&shape(&attribute("face_temp", ""))), "face_temp", 1.0));
+    assert!(message(&shape(&attribute("temp", ""))).contains("vertex_ or face_"));
+    let hole = r#"<bsdf type="mask"><texture type="mesh_attribute" name="opacity"><string name="name" value="vertex_a"/></texture><bsdf type="diffuse"/></bsdf>"#;
+    assert!(matches!(scene(&shape(hole)).shapes[0].common().opacity, Some(OpacityDesc::Texture { texture, .. }) if texture == "vertex_a"));
     let light = r#"<emitter type="area"><texture type="mesh_attribute" name="radiance"><string name="name" value="vertex_color"/></texture></emitter>"#;
-    assert!(notes(&shape(light)).iter().any(|(outcome, name, _)| *outcome == Outcome::Approximated && name == "radiance"));
+    assert_eq!(scene(&shape(light)).shapes[0].common().emission.unwrap().texture.as_deref(), Some("vertex_color"));
+    assert!(notes(&shape(light)).is_empty());
 }
 
 #[test]
