@@ -185,8 +185,8 @@ fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
     is_near(corners(&shown(&scene("face_b", none(), none()))), [[0.25; 3], [0.75; 3]], 1e-5);
     is_near(corners(&shown(&scene("face_b", json!({ "scale": 0.5 }), none()))), [[0.125; 3], [0.375; 3]], 1e-5);
     // Half a pixel from the second and the fourth corner.
-    is_near(corners(&shown(&scene("vertex_tint", none(), none()))), [[0.25, 0.5, 0.0], [0.75, 0.5, 0.0]], 0.02);
-    is_near(corners(&shown(&scene("vertex_a", none(), none()))), [[0.1; 3], [0.3; 3]], 0.02);
+    is_near(corners(&shown(&scene("vertex_tint", none(), none()))), [[0.25, 0.5, 0.0], [0.71875, 0.5, 0.0]], 0.005);
+    is_near(corners(&shown(&scene("vertex_a", none(), none()))), [[0.1; 3], [0.2875; 3]], 0.005);
 
     // Light, brighter than 1; points on it that are sampled have the same radiance.
     let light = json!({ "emission": { "radiance": [1, 1, 1], "texture": "colors" } });
