@@ -38,6 +38,8 @@ ids! {
     MediumId,
     /// A texture.
     TextureId,
+    /// The name of an attribute of meshes.
+    AttributeId,
     /// A relief.
     ReliefId,
     /// A light.

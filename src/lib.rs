@@ -14,7 +14,7 @@
 //! | # | modules |
 //! |---|---|
 //! | 0 | `id`, `error`, `memory`, `printable` |
-//! | 1 | `math`, `desc`, `file` |
+//! | 1 | `math`, `desc`, `file`, `attribute` |
 //! | 2 | `color`, `sampling`, `import`, `config` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
@@ -28,6 +28,7 @@
 #![cfg_attr(not(feature = "bench"), allow(dead_code, unused_imports))]
 
 pub mod accel;
+pub mod attribute;
 #[cfg(feature = "bench")]
 pub mod bench;
 pub mod bsdf;

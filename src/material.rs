@@ -294,7 +294,7 @@ impl Varying {
 impl Material {
     /// The scattering over a footprint; nothing for what consists of other materials, which [`Material::part`] resolves first.
     #[inline]
-    pub fn bsdf(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint) -> Bsdf {
+    pub fn bsdf<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>) -> Bsdf {
         match self {
             Self::Constant(bsdf) => bsdf.clone(),
             Self::Varying(varying) => varying.bsdf(textures, &footprint()),
@@ -304,7 +304,7 @@ impl Material {
 
     /// The scattering over a footprint of a dielectric as a boundary with another relative index of refraction, inside over outside; `None`
     /// for all other materials.
-    pub fn boundary(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint, ior: f32) -> Option<Bsdf> {
+    pub fn boundary<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>, ior: f32) -> Option<Bsdf> {
         match self {
             Self::Varying(varying) => match **varying {
                 Varying::Dielectric { alpha, facets, tints, .. } => {
@@ -318,10 +318,10 @@ impl Material {
 
     /// The material that this one stands for on one side at a point, if it consists of others; `u` within `[0, 1)` chooses.
     #[inline]
-    pub fn part(
+    pub fn part<'f>(
         &self,
         textures: &[Texture],
-        point: impl FnOnce() -> Footprint,
+        point: impl FnOnce() -> Footprint<'f>,
         is_front: bool,
         u: impl FnOnce() -> f32,
     ) -> Option<MaterialId> {

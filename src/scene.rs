@@ -50,8 +50,8 @@ pub struct Features {
     pub instances: bool,
     /// Some material is textured.
     pub textures: bool,
-    /// Some mesh has colours, which a material uses.
-    pub vertex_colors: bool,
+    /// Some mesh has attributes, which a texture takes.
+    pub attributes: bool,
     /// Some material has an image that is looked up over what a ray stands for.
     pub filtered_textures: bool,
     /// Some surface has a normal map or a bump map.
@@ -116,24 +116,24 @@ impl Scene {
 
     /// A point of a surface for textures.
     #[inline]
-    pub fn texture_point(&self, at: &SurfaceInteraction) -> Footprint {
-        self.colored(at, Footprint::point(at.uv))
+    pub fn texture_point(&self, at: &SurfaceInteraction) -> Footprint<'_> {
+        self.with_attributes(at, Footprint::point(at.uv))
     }
 
-    /// A footprint at a point of a surface, with the colour that the surface has there.
+    /// A footprint at a point of a surface, with the attributes of the mesh there.
     #[inline]
-    pub fn colored(&self, at: &SurfaceInteraction, footprint: Footprint) -> Footprint {
-        if self.features.vertex_colors { Footprint { color: self.geometry.vertex_color(at), ..footprint } } else { footprint }
+    pub fn with_attributes<'a>(&'a self, at: &SurfaceInteraction, footprint: Footprint<'a>) -> Footprint<'a> {
+        if self.features.attributes { Footprint { attributes: self.geometry.attributes(at), ..footprint } } else { footprint }
     }
 
     /// The scattering at a point for a ray that arrives in `direction` and stands for `footprint`.
     /// What is not the same everywhere is made in `place`.
     #[inline(always)]
-    pub fn bsdf<'a>(
+    pub fn bsdf<'a, 'f>(
         &'a self,
         at: &SurfaceInteraction,
         direction: Vec3,
-        footprint: impl FnOnce() -> Footprint,
+        footprint: impl FnOnce() -> Footprint<'f>,
         place: &'a mut Option<Bsdf>,
     ) -> &'a Bsdf {
         let material = self.material(at.shape);

@@ -158,3 +158,65 @@ fn limits_of_samples_time_and_crops_hold() {
     assert_eq!(adaptive(&black, 1e-6, 0).stats.spp_done, 16);
     let _: &Settings = &prepare(&room(), &Overrides::default()).settings;
 }
+
+/// A floor of tiles and a ball under the sun and a pale sky: edges of shadows and of colours.
+fn yard() -> Value {
+    json!({
+        "camera": { "position": [0, 1.6, 4], "look_at": [0, 0.4, 0], "vertical_fov_degrees": 40 },
+        "film": {},
+        "integrator": { "type": "path", "max_depth": 5 },
+        "textures": { "tiles": { "type": "checker", "color0": [0.8, 0.7, 0.6], "color1": [0.1, 0.2, 0.3], "scale": [6, 6] } },
+        "materials": { "tiled": { "type": "diffuse", "albedo": { "texture": "tiles" } }, "coated": { "type": "plastic", "albedo": [0.6, 0.1, 0.1] } },
+        "shapes": [
+            { "type": "quad", "material": "tiled", "origin": [-3, 0, -3], "edge_u": [0, 0, 6], "edge_v": [6, 0, 0] },
+            { "type": "sphere", "material": "coated", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] }
+        ],
+        "lights": [
+            { "type": "directional", "direction": [-1, -1.5, -0.5], "irradiance": [3, 2.8, 2.5], "angular_diameter_degrees": 8 },
+            { "type": "environment", "radiance": [0.2, 0.25, 0.3] }
+        ]
+    })
+}
+
+/// The promise by 200 renders each, with samples that pixels share.
+#[test]
+#[ignore = "takes minutes: for changes to filters, their variance or adaptive sampling"]
+fn of_200_pictures_95_in_100_are_as_good_as_promised_with_every_filter() {
+    let filters = [
+        json!({ "type": "tent", "radius": 1 }),
+        json!({ "type": "gaussian", "radius": 1.5, "sigma": 0.5 }),
+        json!({ "type": "mitchell", "radius": 2, "b": 0.33, "c": 0.33 }),
+    ];
+    let mut broken = Vec::new();
+    for (name, scene, target) in [("room", room(), 0.0005), ("yard", yard(), 0.0002)] {
+        for filter in &filters {
+            let mut scene = scene.clone();
+            scene["film"] = json!({ "width": 48, "height": 48, "filter": filter });
+            let spp = Overrides { spp: Some(1024), ..Overrides::default() };
+            let others: Vec<_> =
+                (0..8).map(|i| colors(&render(&scene, &Overrides { seed: Some(10_000 + i), ..spp.clone() }).image)).collect();
+            let of_pixel = |i: usize| [0, 1, 2].map(|k| others.iter().map(|picture| picture[i][k]).sum::<f64>() / 8.0);
+            let reference: Vec<_> = (0..others[0].len()).map(of_pixel).collect();
+            // The error of a reference is that of one of its parts over their number.
+            let own = others.iter().map(|picture| relative_error(&reference, picture)).sum::<f64>() / (8.0 * 7.0);
+            let results: Vec<_> = (0..200).map(|seed| adaptive(&scene, target, seed)).collect();
+            let errors: Vec<f64> = results.iter().map(|result| relative_error(&reference, &colors(&result.image))).collect();
+            let kept = errors.iter().filter(|error| **error <= target).count();
+            let mean = |of: &dyn Fn(usize) -> f64| (0..200).map(of).sum::<f64>() / 200.0;
+            let error = mean(&|i| errors[i]);
+            let estimated = mean(&|i| results[i].stats.estimated_error.unwrap());
+            let samples = mean(&|i| results[i].stats.samples as f64) / reference.len() as f64;
+            let line = format!(
+                "{name}, {}: {kept} of 200 within {target}; mean error {error:.3e}, estimated {estimated:.3e}, {samples:.1} samples per pixel, \
+                 reference {own:.1e}",
+                filter["type"]
+            );
+            eprintln!("{line}");
+            assert!(own < 0.05 * target && samples > 20.0, "{line}");
+            if kept < 190 {
+                broken.push(line);
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{broken:#?}");
+}

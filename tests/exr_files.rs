@@ -235,6 +235,8 @@ fn checks_have_their_exit_codes() {
         let output = run(dir, arguments);
         assert_eq!(output.status.code(), Some(code), "{arguments}: {}{}", text(&output.stdout), text(&output.stderr));
     }
+    let many = text(&run(dir, "check-exr error.exr a.exr error.exr a.exr").stdout);
+    assert!(many.starts_with("2 files: clean") && many.contains("error matrix-rows: 2 times in 1 of 4 files\n    error.exr:"), "{many}");
     let json: Value = serde_json::from_str(&run_ok(dir, "check-exr warning.exr --json")).unwrap();
     assert_eq!(json[0]["findings"][0]["rule"], "color-id");
     assert_eq!(json[0]["findings"][0]["severity"], "warning");

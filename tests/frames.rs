@@ -85,6 +85,36 @@ fn frames_that_are_there_are_skipped_unless_they_are_to_be_overwritten() {
 }
 
 #[test]
+fn frames_that_are_skipped_are_compared_with_this_render() {
+    let folder = folder_with(&[("a.json", scene())]);
+    let render = |arguments: &str| told(&run(folder.path(), &format!("render a.json -o a.exr {arguments}")));
+    assert!(!render("--frames 1-3").contains("warning"));
+    // The same again is no mixture, whatever frame comes first.
+    let same = render("--frames 2-4");
+    assert!(same.contains("2 frames exist") && !same.contains("warning"), "{same}");
+    let other = render("--frames 1-5 --spp 8 --compression piz");
+    let warning = other.lines().find(|line| line.contains("warning")).unwrap_or_default().to_owned();
+    for part in ["frames 1-4: ", "spp: 4 in the file, 8 for the rest", "output.compression", "--overwrite"] {
+        assert!(warning.contains(part), "{part}: {other}");
+    }
+    assert!(!warning.contains("seed") && !warning.contains("scene"), "{other}");
+    // Another scene, and files without settings.
+    let mut changed = scene();
+    changed["lights"][0]["radiance"] = json!([2, 2, 2]);
+    std::fs::write(folder.path().join("a.json"), changed.to_string()).unwrap();
+    std::fs::write(folder.path().join("a.0002.exr"), "by others").unwrap();
+    let other = render("--frames 1-3");
+    assert!(other.contains("frames 1,3: ") && other.contains("another scene: the scene's description"), "{other}");
+    assert!(other.contains("the files of 1 of the frames have no settings"), "{other}");
+    // Names that the scene has.
+    changed["outputs"] = json!([{ "file": "a.exr" }]);
+    std::fs::write(folder.path().join("b.json"), changed.to_string()).unwrap();
+    let other = told(&run(folder.path(), "render b.json --frames 5"));
+    assert!(other.contains("frame 5: ") && other.contains("spp: 8 in the file, 4 for the rest"), "{other}");
+    assert!(!told(&run(folder.path(), "render a.json -o a.exr --frames 1-3 --overwrite")).contains("warning"));
+}
+
+#[test]
 fn a_scene_for_each_frame_is_read_for_each_and_a_failure_stops_unless_told_otherwise() {
     let mut bright = scene();
     bright["lights"][0]["radiance"] = json!([4, 4, 4]);

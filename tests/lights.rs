@@ -28,6 +28,61 @@ fn a_measured_light_shines_as_its_file_says() {
     }
 }
 
+/// A checker of two pairs of squares along each side: 0.25 where both of u and v lie in the same halves of their quarters, else 0.75.
+#[test]
+fn projectors_and_textured_spots_throw_pictures() {
+    let textures = json!({ "board": { "type": "checker", "color0": [0.25, 0.25, 0.25], "color1": [0.75, 0.75, 0.75], "scale": [2, 2] } });
+    // Above the floor at height 1, looking down with -Z up: u grows with x and v against z, over 2 x 1 of the floor for the projector.
+    let lights = [
+        json!({ "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "irradiance": [2, 2, 2], "texture": "board",
+            "vertical_fov_degrees": 2.0 * 0.5f64.atan().to_degrees(), "aspect": 2 }),
+        json!({ "type": "spot", "position": [0, 1, 0], "look_at": [0, 0, 0], "intensity": [2, 2, 2], "texture": "board",
+            "cutoff_angle_degrees": 45, "beam_angle_degrees": 45 }),
+    ];
+    for (x, z) in [(0.1, 0.1), (-0.3, 0.2), (0.4, -0.3), (-0.4, -0.1), (0.9, 0.2), (-0.7, -0.35)] {
+        let squares = |half_v: f64| {
+            let half = |t: f64| (4.0 * t).floor() as i32;
+            if (half(0.5 + 0.5 * x) + half(0.5 - 0.5 * z / half_v)) % 2 == 0 { 0.25 } else { 0.75 }
+        };
+        // A projector's irradiance is that of its plane; a spot's falls with the square of the distance and the cosine.
+        let fall = (1.0f64 + x * x + z * z).powf(-1.5);
+        for (light, expected) in lights.iter().zip([2.0 * squares(0.5), 2.0 * squares(1.0) * fall]) {
+            let mut scene = floor_probe([x, 0.0, z], json!([]));
+            scene["textures"] = textures.clone();
+            scene["lights"] = json!([light]);
+            assert_irradiance(&scene, expected, &format!("{} at {x}, {z}", light["type"]));
+        }
+    }
+    let mut beside = floor_probe([1.1, 0.0, 0.0], json!([]));
+    (beside["textures"], beside["lights"]) = (textures.clone(), json!([lights[0]]));
+    assert_irradiance(&beside, 0.0, "beside the picture");
+}
+
+#[test]
+fn wrong_projectors_are_refused_with_their_place() {
+    let folder = Folder::new();
+    let light = json!({ "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "vertical_fov_degrees": 40 });
+    let spot = json!({ "type": "spot", "position": [0, 1, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1], "texture": "tiles" });
+    for (light, key, value) in [
+        (&light, "vertical_fov_degrees", json!(180)),
+        (&light, "aspect", json!(0)),
+        (&light, "up", json!([0, 3, 0])),
+        (&light, "look_at", json!([0, 1, 0])),
+        (&light, "texture", json!("none")),
+        (&light, "texture", json!("colors")),
+        (&spot, "cutoff_angle_degrees", json!(90)),
+        (&spot, "up", json!([0, -1, 0])),
+    ] {
+        let mut scene = good_scene();
+        let mut light = light.clone();
+        set(&mut light, key, value);
+        set(&mut scene, "lights", json!([light]));
+        set(&mut scene, "textures.colors", json!({ "type": "vertex_color" }));
+        let error = folder.compile(&scene).unwrap_err();
+        assert!(error.kind() == ErrorKind::Scene && error.to_string().contains(&format!("lights[0].{key}")), "{error}");
+    }
+}
+
 #[test]
 fn a_textured_light_shines_where_its_texture_is_bright() {
     // Above the corner of a square of side 2 at height 1, of whose four squares two are lit.

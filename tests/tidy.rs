@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Modules by layer: a module imports only from lower layers, never sideways; its own folder is free.
 const LAYERS: &[(u32, &[&str])] = &[
     (0, &["id", "error", "memory", "printable"]),
-    (1, &["math", "desc", "file"]),
+    (1, &["math", "desc", "file", "attribute"]),
     (2, &["color", "sampling", "import", "config"]),
     (3, &["geometry", "texture", "bsdf", "camera", "film", "guiding"]),
     (4, &["accel", "material", "medium", "opacity", "relief", "light", "output"]),
@@ -21,7 +21,10 @@ const NARROW: &[(&str, &[&str])] = &[
     ("accel", &["geometry", "math", "error", "id"]),
     ("denoise", &["film", "error", "file", "math", "color", "output"]),
     ("output", &["film", "color", "error", "desc", "file", "math"]),
-    ("scene", &["bsdf", "camera", "film", "geometry", "id", "light", "material", "medium", "relief", "texture", "math", "color"]),
+    (
+        "scene",
+        &["attribute", "bsdf", "camera", "film", "geometry", "id", "light", "material", "medium", "relief", "texture", "math", "color"],
+    ),
 ];
 
 const MAX_LINES: usize = 500;

@@ -120,7 +120,7 @@ fn faults_name_the_shape_and_the_material() {
     }
     let mut few = scene_of(inline());
     set(&mut few, "shapes[0].colors", json!([[1, 1, 1], [0, 0, 0]]));
-    assert_error(&folder, &few, ErrorKind::Scene, &["shapes[0]", "colors: 2 for 4 vertices"]);
+    assert_error(&folder, &few, ErrorKind::Scene, &["shapes[0]", "\"vertex_color\": 2 for 4 vertices"]);
     // Parts of a material count, too.
     let mut mixed = good_scene();
     set(&mut mixed, "textures.colors", json!({ "type": "vertex_color" }));
@@ -134,18 +134,12 @@ fn faults_name_the_shape_and_the_material() {
 }
 
 #[test]
-fn what_knows_only_uv_takes_no_colours_of_vertices() {
+fn relief_takes_no_colours_of_vertices() {
     let folder = Folder::new();
     let texture = json!({ "texture": "colors" });
-    for (path, value) in [
-        ("shapes[0].opacity", texture.clone()),
-        ("shapes[0].emission", json!({ "radiance": [1, 1, 1], "texture": "colors" })),
-        ("materials.bumpy", json!({ "type": "relief", "material": "m", "bump_map": { "texture": "colors", "height": 1 } })),
-    ] {
-        let mut scene = scene_of(inline());
-        set(&mut scene, path, value);
-        assert_error(&folder, &scene, ErrorKind::Scene, &[path, "\"colors\" has the colours of vertices"]);
-    }
+    let mut scene = scene_of(inline());
+    set(&mut scene, "materials.bumpy", json!({ "type": "relief", "material": "m", "bump_map": { "texture": "colors", "height": 1 } }));
+    assert_error(&folder, &scene, ErrorKind::Scene, &["materials.bumpy", "\"colors\" takes attributes of meshes"]);
     // Numbers of materials are luminances.
     let mut scene = scene_of(inline());
     set(&mut scene, "materials.m.roughness", texture.clone());
@@ -153,4 +147,93 @@ fn what_knows_only_uv_takes_no_colours_of_vertices() {
     set(&mut scene, "materials.mixed", json!({ "type": "mix", "materials": ["m", "gold"], "amount": texture }));
     set(&mut scene, "shapes[0].material", json!("mixed"));
     folder.render(&scene);
+}
+
+/// A PLY file of the square with colours and numbers of vertices and faces.
+fn attributes_ply() -> String {
+    let row = |([x, y, z], i): (&[f32; 3], usize)| format!("{x} {y} {z} {} {} 0 {}\n", 0.25 * i as f32, 0.5, 0.1 * i as f32);
+    let rows: String = CORNERS.iter().zip(0..).map(row).collect();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 4\n{}element face 3\nproperty list uchar int vertex_indices\n{}end_header\n{rows}3 0 0 1 0.9 0.9 0.9 0.9\n\
+         3 0 1 2 1 0 0.5 0.25\n3 0 2 3 0 1 0.5 0.75\n",
+        ["x", "y", "z", "tint_0", "tint_1", "tint_2", "a_0"].map(|name| format!("property float {name}\n")).concat(),
+        ["tint_0", "tint_1", "tint_2", "b_0"].map(|name| format!("property float {name}\n")).concat()
+    )
+}
+
+#[test]
+fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
+    let folder = Folder::new();
+    folder.write("m.ply", attributes_ply());
+    let scene = |attribute: &str, of_texture: Value, shape: Value| {
+        let mut scene = scene_of(json!({ "type": "mesh", "material": "m", "file": "m.ply" }));
+        set(&mut scene, "textures.colors", json!({ "type": "mesh_attribute", "name": attribute }));
+        for (whole, changes) in [("textures.colors", of_texture), ("shapes[0]", shape)] {
+            changes.as_object().unwrap().iter().for_each(|(key, value)| set(&mut scene, &format!("{whole}.{key}"), value.clone()));
+        }
+        scene
+    };
+    let shown = |scene: &Value| -> Vec<[f32; 3]> { pixels(&folder.render(scene)).collect() };
+    // Right and below the diagonal the first triangle with an area, else the second: the one without is left out with its values.
+    let corners = |image: &[[f32; 3]]| [image[16 * 15 + 15], image[0]];
+    let none = || json!({});
+    let is_near = |found: [[f32; 3]; 2], wanted: [[f32; 3]; 2], bound: f32| {
+        let near = found.as_flattened().iter().zip(wanted.as_flattened()).all(|(a, b)| (a - b).abs() < bound);
+        assert!(near, "{found:?} for {wanted:?}");
+    };
+    is_near(corners(&shown(&scene("face_tint", none(), none()))), [[1.0, 0.0, 0.5], [0.0, 1.0, 0.5]], 1e-5);
+    is_near(corners(&shown(&scene("face_b", none(), none()))), [[0.25; 3], [0.75; 3]], 1e-5);
+    is_near(corners(&shown(&scene("face_b", json!({ "scale": 0.5 }), none()))), [[0.125; 3], [0.375; 3]], 1e-5);
+    // Half a pixel from the second and the fourth corner.
+    is_near(corners(&shown(&scene("vertex_tint", none(), none()))), [[0.25, 0.5, 0.0], [0.71875, 0.5, 0.0]], 0.005);
+    is_near(corners(&shown(&scene("vertex_a", none(), none()))), [[0.1; 3], [0.2875; 3]], 0.005);
+
+    // Light, brighter than 1; points on it that are sampled have the same radiance.
+    let light = json!({ "emission": { "radiance": [1, 1, 1], "texture": "colors" } });
+    let mut lit = scene("face_b", json!({ "scale": 4 }), light);
+    set(&mut lit, "materials.m.albedo", json!(0));
+    is_near(corners(&shown(&lit)), [[1.0; 3], [3.0; 3]], 1e-5);
+    set(&mut lit, "integrator", json!({ "type": "path" }));
+    is_near(corners(&shown(&lit)), [[1.0; 3], [3.0; 3]], 1e-5);
+
+    // Holes: means over 16 * 64 samples of a half each are within 5.5 standard deviations (false alarm 4e-8).
+    let mut holes = scene("face_b", none(), json!({ "opacity": { "texture": "colors" } }));
+    set(&mut holes, "materials.m.albedo", json!(1));
+    set(&mut holes, "sampler", json!({ "type": "independent", "spp": 64 }));
+    let image = shown(&holes);
+    for (wanted, is_first) in [(0.25f32, true), (0.75, false)] {
+        let of_half = |i: usize| (i % 16 > i / 16) == is_first && i % 16 != i / 16;
+        let alike: Vec<f32> = (0..256).filter(|&i| of_half(16 * (15 - i / 16) + i % 16)).map(|i| image[i][0]).collect();
+        let mean = alike.iter().sum::<f32>() / alike.len() as f32;
+        let deviation = (wanted * (1.0 - wanted) / (alike.len() * 64) as f32).sqrt();
+        assert!((mean - wanted).abs() < 5.5 * deviation, "{mean} for {wanted}");
+    }
+}
+
+#[test]
+fn attributes_of_inline_meshes_and_their_faults() {
+    let folder = Folder::new();
+    folder.write("m.ply", attributes_ply());
+    let inline = json!({ "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]],
+        "attributes": { "face_tint": [[1, 0, 0.5], [0, 1, 0.5]], "vertex_a": [0, 0.1, 0.2, 0.3], "vertex_unused": [-1, 9, 9, 9] } });
+    let with = |shape: &Value, attribute: &str| {
+        let mut scene = scene_of(shape.clone());
+        set(&mut scene, "textures.colors", json!({ "type": "mesh_attribute", "name": attribute }));
+        scene
+    };
+    let file = json!({ "type": "mesh", "material": "m", "file": "m.ply" });
+    for attribute in ["face_tint", "vertex_a"] {
+        let of_file: Vec<[f32; 3]> = pixels(&folder.render(&with(&file, attribute))).collect();
+        assert!(pixels(&folder.render(&with(&inline, attribute))).eq(of_file.iter().copied()), "{attribute}");
+    }
+    assert_error(&folder, &with(&file, "vertex_b"), ErrorKind::Scene, &["m.ply", "\"m\"", "\"vertex_b\": the shape has none"]);
+    assert_error(&folder, &with(&file, "b"), ErrorKind::Scene, &["textures.colors.name", "vertex_ or face_"]);
+    assert_error(&folder, &with(&inline, "vertex_unused"), ErrorKind::Scene, &["vertex 0", "-1", "within 0 and 1"]);
+    let mut bad = with(&inline, "face_tint");
+    set(&mut bad, "shapes[0].attributes.face_tint", json!([1, 0, 1]));
+    assert_error(&folder, &bad, ErrorKind::Scene, &["shapes[0]", "\"face_tint\": 3 for 2 triangles"]);
+    set(&mut bad, "shapes[0].attributes.face_tint", json!([0.5, 1.25]));
+    assert_error(&folder, &bad, ErrorKind::Scene, &["triangle 1", "1.25"]);
+    set(&mut bad, "shapes[0].attributes", json!({ "tint": [1, 1] }));
+    assert_error(&folder, &bad, ErrorKind::Scene, &["shapes[0].attributes.tint"]);
 }

@@ -3,13 +3,17 @@
 use std::sync::Arc;
 
 use super::Files;
+use super::textures::TextureTable;
 use crate::color::Rgb;
-use crate::desc::{EnvironmentLightDesc, IesLightDesc, LightDesc};
+use crate::desc::{EnvironmentLightDesc, IesLightDesc, LightDesc, ProjectorLightDesc};
 use crate::error::Result;
 use crate::id::{LightGroupId, LightId};
 use crate::import::{AssetError, read_ies, read_rgb_image};
-use crate::light::{DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, SpotLight};
-use crate::math::{DAffine3, DMat3, DVec3, RenderSpace};
+use crate::light::{
+    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, Projection, Projector, SpotLight,
+};
+use crate::math::{DAffine3, DMat3, DVec3, RenderSpace, Vec2};
+use crate::texture::Texture;
 
 /// The most letters of a group's name: names of channels have at most 255 in OpenEXR, of which `light_` and the channel take some.
 const MOST_LETTERS: usize = 240;
@@ -57,7 +61,7 @@ impl LightTable {
 }
 
 /// One entry of `lights`, placed into `space`.
-pub fn compile(files: &Files, path: &str, desc: &LightDesc, space: &RenderSpace) -> Result<Light> {
+pub fn compile(files: &Files, path: &str, desc: &LightDesc, space: &RenderSpace, textures: &TextureTable) -> Result<Light> {
     let at = |key: &str| format!("{path}.{key}");
     Ok(match desc {
         LightDesc::Point(light) => Light::Point(PointLight {
@@ -75,8 +79,17 @@ pub fn compile(files: &Files, path: &str, desc: &LightDesc, space: &RenderSpace)
             let beam = light.beam_angle_degrees.unwrap_or(0.75 * cutoff);
             let beam = files.within(&at("beam_angle_degrees"), beam, 0.0, cutoff)?;
             let intensity = files.intensity(&at("intensity"), light.intensity, space)?;
-            Light::Spot(Box::new(SpotLight::new(position, axis, intensity, beam.to_radians(), cutoff.to_radians())))
+            let spot = SpotLight::new(position, axis, intensity, beam.to_radians(), cutoff.to_radians());
+            let Some(name) = &light.texture else { return Ok(Light::Spot(Box::new(spot))) };
+            if cutoff >= 90.0 {
+                return Err(files.error(&at("cutoff_angle_degrees"), format!("must be below 90 with a texture, not {cutoff}")));
+            }
+            let texture = textures.of_light(files, &at("texture"), name, intensity)?;
+            let half = Vec2::splat(cutoff.to_radians().tan() as f32);
+            let projection = Projection::new(Some(texture), axis, files.up(&at("up"), light.up, axis)?, half);
+            Light::Spot(Box::new(spot.with_texture(projection, &textures.textures)))
         }
+        LightDesc::Projector(light) => Light::Projector(Box::new(projector(files, path, light, space, textures)?)),
         LightDesc::Ies(light) => Light::Ies(Box::new(ies(files, path, light, space)?)),
         LightDesc::Directional(light) => {
             let direction = files.direction(&at("direction"), light.direction)?;
@@ -99,6 +112,14 @@ impl Files {
         Ok(space.point(world))
     }
 
+    /// A direction that is up across an axis.
+    fn up(&self, path: &str, given: Option<[f64; 3]>, axis: DVec3) -> Result<DVec3> {
+        let is_across = |up: DVec3| up.cross(axis).length() > 1e-6;
+        let Some(given) = given else { return Ok(if is_across(DVec3::Y) { DVec3::Y } else { DVec3::NEG_Z }) };
+        let up = self.direction(path, given)?;
+        if is_across(up) { Ok(up) } else { Err(self.error(path, "is the direction of the light's axis")) }
+    }
+
     /// Radiant intensity, which grows with the square of lengths.
     fn intensity(&self, path: &str, value: [f32; 3], space: &RenderSpace) -> Result<Rgb> {
         let scale = space.scale() * space.scale();
@@ -108,6 +129,31 @@ impl Files {
         }
         Ok(scaled.into())
     }
+}
+
+fn projector(files: &Files, path: &str, desc: &ProjectorLightDesc, space: &RenderSpace, textures: &TextureTable) -> Result<Projector> {
+    let at = |key: &str| format!("{path}.{key}");
+    let position = files.placed(&at("position"), desc.position, space)?;
+    let toward = files.position(&at("look_at"), desc.look_at)? - files.position(&at("position"), desc.position)?;
+    let axis = toward.try_normalize().ok_or_else(|| files.error(&at("look_at"), "is the light's own position"))?;
+    let irradiance = files.intensity(&at("irradiance"), desc.irradiance, space)?;
+    let fov = desc.vertical_fov_degrees;
+    if !(fov > 0.0 && fov < 180.0) {
+        return Err(files.error(&at("vertical_fov_degrees"), format!("must be above 0 and below 180, not {fov}")));
+    }
+    let texture = desc.texture.as_ref().map(|name| textures.of_light(files, &at("texture"), name, irradiance)).transpose()?;
+    let of_image = match texture.map(|id| textures.get(id)) {
+        Some(Texture::Bitmap(bitmap)) => bitmap.image.width() as f64 / bitmap.image.height() as f64,
+        _ => 1.0,
+    };
+    let aspect = desc.aspect.unwrap_or(of_image);
+    let half = (0.5 * fov.to_radians()).tan();
+    let half = Vec2::new((half * aspect) as f32, half as f32);
+    if !(aspect > 0.0 && half.min_element() > 0.0 && half.is_finite()) {
+        return Err(files.error(&at("aspect"), format!("must be above 0 and of a picture that can be thrown, not {aspect}")));
+    }
+    let projection = Projection::new(texture, axis, files.up(&at("up"), desc.up, axis)?, half);
+    Ok(Projector::new(position, irradiance, projection, &textures.textures))
 }
 
 fn ies(files: &Files, path: &str, desc: &IesLightDesc, space: &RenderSpace) -> Result<IesLight> {

@@ -123,14 +123,9 @@ impl MaterialTable {
 
     /// Whether a surface without uv cannot look so.
     pub fn needs_uv(&self, look: &Look) -> bool {
-        let cut_out = look.opacity.is_some_and(|id| !matches!(self.textures.get(id), Texture::Constant(_)));
+        let cut_out = look.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
         let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.relief_of(id).is_some();
         cut_out || look.relief.is_some() || self.any_part(look.material, &needs)
-    }
-
-    /// Whether a surface whose vertices have no colours cannot look so.
-    pub fn needs_colors(&self, look: &Look) -> bool {
-        self.any_part(look.material, &|id| self.has_texture(id, Texture::uses_vertex_colors))
     }
 
     fn has_texture(&self, id: MaterialId, is: impl Fn(&Texture) -> bool) -> bool {

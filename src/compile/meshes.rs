@@ -1,12 +1,13 @@
 //! Meshes: buffers from files or the scene itself to placed, checked [`Mesh`]es.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
-use super::Files;
 use super::normals::{self, Smoothing};
-use crate::desc::{MeshDesc, MeshShadingDesc, SceneDesc, ShapeDesc, UsedNames};
+use super::{Files, attributes};
+use crate::attribute::{AttributeValues, VERTEX_COLOR, is_of_faces};
+use crate::desc::{AttributeDesc, MeshDesc, MeshShadingDesc, SceneDesc, ShapeDesc, UsedNames};
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, MeshError, MeshStep};
 use crate::import::{self, AssetError, MeshData, ObjMaterial};
@@ -22,7 +23,11 @@ pub struct LoadedMesh {
 
 /// The meshes of a scene's files, read in parallel before the shapes are placed one after another.
 #[derive(Default)]
-pub struct MeshStore(HashMap<String, Result<Vec<LoadedMesh>>>);
+pub struct MeshStore {
+    loaded: HashMap<String, Result<Vec<LoadedMesh>>>,
+    /// The attributes that textures take.
+    attributes: BTreeSet<String>,
+}
 
 impl MeshStore {
     /// Reads the files of all meshes that are used.
@@ -32,16 +37,18 @@ impl MeshStore {
             _ => None,
         });
         let meshes: Vec<(String, &MeshDesc)> = meshes.collect();
-        Self(meshes.into_par_iter().map(|(path, mesh)| (path.clone(), load(files, &path, mesh))).collect())
+        let attributes = desc.attribute_names(used);
+        let loaded = meshes.into_par_iter().map(|(path, mesh)| (path.clone(), load(files, &path, mesh, &attributes))).collect();
+        Self { loaded, attributes }
     }
 
     /// The meshes of the shape at `path`: several where an OBJ has several materials.
     pub fn take(&mut self, files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
-        self.0.remove(path).unwrap_or_else(|| load(files, path, desc))
+        self.loaded.remove(path).unwrap_or_else(|| load(files, path, desc, &self.attributes))
     }
 }
 
-fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
+fn load(files: &Files, path: &str, desc: &MeshDesc, attributes: &BTreeSet<String>) -> Result<Vec<LoadedMesh>> {
     for (key, times) in [("deform_files", desc.deform_files.len()), ("deform_positions", desc.deform_positions.len())] {
         if times >= Mesh::MAX_STEPS {
             let message = format!("{times} further times: there can be {}", Mesh::MAX_STEPS - 1);
@@ -50,12 +57,16 @@ fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
     }
     match (&desc.file, &desc.positions, &desc.triangles) {
         (Some(file), None, None)
-            if desc.normals.is_none() && desc.uvs.is_none() && desc.colors.is_none() && desc.deform_positions.is_empty() =>
+            if desc.normals.is_none()
+                && desc.uvs.is_none()
+                && desc.colors.is_none()
+                && desc.attributes.is_empty()
+                && desc.deform_positions.is_empty() =>
         {
-            let mut meshes = load_file(files, &format!("{path}.file"), file, desc.material.is_none())?;
+            let mut meshes = load_file(files, &format!("{path}.file"), file, desc.material.is_none(), attributes)?;
             for (i, file) in desc.deform_files.iter().enumerate() {
                 let place = format!("{path}.deform_files[{i}]");
-                let later = load_file(files, &place, file, desc.material.is_none())?;
+                let later = load_file(files, &place, file, desc.material.is_none(), &BTreeSet::new())?;
                 if later.len() != meshes.len() || meshes.iter().zip(&later).any(|(a, b)| a.data.triangles != b.data.triangles) {
                     return Err(files.error(&place, "the triangles are not those of `file`: only positions may differ"));
                 }
@@ -72,24 +83,45 @@ fn load(files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
                 triangles: triangles.clone(),
                 normals: desc.normals.clone(),
                 uvs: desc.uvs.clone(),
-                colors: desc.colors.clone(),
+                attributes: inline_attributes(files, path, desc)?,
                 origin,
             };
             let at = |positions: &Vec<[f64; 3]>| {
                 let (positions, origin) = MeshData::rounded(positions);
-                MeshData { positions, origin, ..data.clone() }
+                MeshData { positions, origin, attributes: BTreeMap::new(), ..data.clone() }
             };
             let later = desc.deform_positions.iter().map(at).collect();
             Ok(vec![LoadedMesh { data, later, material: None }])
         }
-        _ => {
-            Err(files
-                .error(path, "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs` and `colors`)"))
-        }
+        _ => Err(files.error(
+            path,
+            "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs`, `colors` and `attributes`)",
+        )),
     }
 }
 
-fn load_file(files: &Files, place: &str, file: &str, with_materials: bool) -> Result<Vec<LoadedMesh>> {
+/// The attributes of a mesh without a file, its colours among them.
+fn inline_attributes(files: &Files, path: &str, desc: &MeshDesc) -> Result<BTreeMap<String, AttributeValues>> {
+    let mut attributes = BTreeMap::new();
+    for (name, values) in &desc.attributes {
+        let place = format!("{path}.attributes.{name}");
+        if is_of_faces(name).is_none() {
+            return Err(files.error(&place, "the name of an attribute begins with vertex_ or face_"));
+        }
+        if name == VERTEX_COLOR && desc.colors.is_some() {
+            return Err(files.error(&place, "`colors` are this attribute: give one of the two"));
+        }
+        let values = match values {
+            AttributeDesc::Numbers(values) => AttributeValues::Numbers(values.clone()),
+            AttributeDesc::Colors(values) => AttributeValues::Colors(values.clone()),
+        };
+        attributes.insert(name.clone(), values);
+    }
+    attributes.extend(desc.colors.clone().map(|colors| (VERTEX_COLOR.to_owned(), AttributeValues::Colors(colors))));
+    Ok(attributes)
+}
+
+fn load_file(files: &Files, place: &str, file: &str, with_materials: bool, attributes: &BTreeSet<String>) -> Result<Vec<LoadedMesh>> {
     let plain = |data, material| LoadedMesh { data, later: Vec::new(), material };
     if let Some(data) = files.assets.meshes.get(file) {
         return Ok(vec![plain(data.clone(), None)]);
@@ -97,7 +129,7 @@ fn load_file(files: &Files, place: &str, file: &str, with_materials: bool) -> Re
     let asset = files.asset(file);
     let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
     let loaded = match extension.as_deref() {
-        Some("ply") => import::read_ply(&asset).map(|data| vec![plain(data, None)]),
+        Some("ply") => import::read_ply_attributes(&asset, Some(attributes)).map(|data| vec![plain(data, None)]),
         Some("obj") => {
             import::read_obj(&asset, with_materials).map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect())
         }
@@ -115,6 +147,8 @@ pub struct Placement<'a> {
     pub reverse_normal: bool,
     /// Whether the mesh gives off light.
     pub emits: bool,
+    /// Names of attributes by their ids.
+    pub attributes: &'a [String],
 }
 
 /// The error about a mesh, in its file if it has one.
@@ -143,9 +177,7 @@ pub fn place(
     if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
         return Err(refuse(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }));
     }
-    if let Some(colors) = data.colors.as_ref().filter(|colors| colors.len() != count) {
-        return Err(refuse(MeshError::Count { what: "colors", count: colors.len(), vertices: count }));
-    }
+    attributes::check_counts(&data.attributes, count, data.triangles.len()).map_err(|message| refusal(files, path, file, message))?;
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
     let place_positions = |mut positions: Vec<[f32; 3]>, origin: [f64; 3]| {
@@ -162,8 +194,12 @@ pub fn place(
         triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
     let before = triangles.len();
+    let by_face = data.attributes.keys().any(|name| is_of_faces(name) == Some(true));
+    // The numbers that triangles have in the file, where something goes by them.
+    let mut numbers: Option<Vec<u32>> = by_face.then(|| (0..before as u32).collect());
     // What deforms may get an area later.
-    triangles.retain(|t| !later.is_empty() || has_area(t.map(|i| Vec3::from(positions[i as usize]))));
+    let is_kept = |t: &[u32; 3]| !later.is_empty() || has_area(t.map(|i| Vec3::from(positions[i as usize])));
+    retain(&mut triangles, &mut numbers, is_kept);
     let dropped = before - triangles.len();
     if triangles.is_empty() {
         let why = if before == 0 { "the mesh has no triangles".into() } else { format!("all {before} triangles of the mesh have no area") };
@@ -174,7 +210,7 @@ pub fn place(
         files.warn(path, format_args!("{dropped} of {before} triangles have no area and were dropped"));
     }
     if placement.emits {
-        drop_coincident(files, path, &positions, &mut triangles);
+        drop_coincident(files, path, &positions, &mut triangles, &mut numbers);
     }
 
     let mut steps = vec![MeshStep { positions, normals: data.normals }];
@@ -184,17 +220,15 @@ pub fn place(
         }
         steps.push(MeshStep { positions: place_positions(step.positions, step.origin), normals: step.normals });
     }
-    let (mut uvs, mut colors) = (data.uvs, data.colors);
-    if let Some(vertices) = find_normals(&mut steps, &mut triangles, placement) {
+    let mut uvs = data.uvs;
+    let vertices = find_normals(&mut steps, &mut triangles, placement);
+    if let Some(vertices) = &vertices {
         uvs = uvs.map(|uvs| vertices.iter().map(|&v| uvs[v as usize]).collect());
-        colors = colors.map(|colors| vertices.iter().map(|&v| colors[v as usize]).collect());
     }
+    let attributes = attributes::placed(data.attributes, placement.attributes, vertices.as_deref(), numbers.as_deref());
     let mut steps = steps.into_iter();
     let MeshStep { positions, normals } = steps.next().unwrap_or_default();
-    let mut mesh = Mesh::new(positions, triangles, normals, uvs).map_err(refuse)?;
-    if let Some(colors) = colors {
-        mesh = mesh.with_colors(colors).map_err(refuse)?;
-    }
+    let mesh = Mesh::new(positions, triangles, normals, uvs).map_err(refuse)?.with_attributes(attributes);
     let later: Vec<MeshStep> = steps.collect();
     let mesh = if later.is_empty() { mesh } else { mesh.deforming(later).map_err(refuse)? };
     Ok(Some(mesh))
@@ -235,12 +269,22 @@ fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement
     }
 }
 
+/// Keeps the triangles of which something is true, and their numbers.
+fn retain(triangles: &mut Vec<[u32; 3]>, numbers: &mut Option<Vec<u32>>, mut is_kept: impl FnMut(&[u32; 3]) -> bool) {
+    let Some(numbers) = numbers else { return triangles.retain(is_kept) };
+    let kept: Vec<bool> = triangles.iter().map(&mut is_kept).collect();
+    let mut of_triangles = kept.iter();
+    triangles.retain(|_| of_triangles.next() == Some(&true));
+    let mut of_numbers = kept.iter();
+    numbers.retain(|_| of_numbers.next() == Some(&true));
+}
+
 /// Of triangles of an emitter that are in one place, keeps the first, with a warning: which of them a ray meets, and so which side shines, is
 /// otherwise left to the accelerator.
-fn drop_coincident(files: &Files, path: &str, positions: &[[f32; 3]], triangles: &mut Vec<[u32; 3]>) {
+fn drop_coincident(files: &Files, path: &str, positions: &[[f32; 3]], triangles: &mut Vec<[u32; 3]>, numbers: &mut Option<Vec<u32>>) {
     let before = triangles.len();
     let mut places = HashSet::with_capacity(before);
-    triangles.retain(|t| {
+    retain(triangles, numbers, |t| {
         // Adding zero makes a negative zero positive.
         let mut corners = t.map(|i| positions[i as usize].map(|x| (x + 0.0).to_bits()));
         corners.sort_unstable();
@@ -317,7 +361,8 @@ mod tests {
         let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.0, 1.0, -0.0], [1.0, 1.0, 0.0]];
         // The same, turned, turned over, and with another vertex at the same place; the last shares an edge alone.
         let mut triangles = vec![[0, 1, 2], [1, 2, 0], [2, 1, 0], [3, 1, 0], [1, 4, 2]];
-        drop_coincident(&Files::new("s.json"), "shapes[0]", &positions, &mut triangles);
-        assert_eq!(triangles, [[0, 1, 2], [1, 4, 2]]);
+        let mut numbers = Some((0..5).collect());
+        drop_coincident(&Files::new("s.json"), "shapes[0]", &positions, &mut triangles, &mut numbers);
+        assert_eq!((triangles, numbers), (vec![[0, 1, 2], [1, 4, 2]], Some(vec![0, 4])));
     }
 }

@@ -1,6 +1,7 @@
 //! What the user wrote to a scene ready to render: names become ids, meshes are loaded and placed, and whatever makes no sense is refused
 //! with its place. The only module that sees both [`SceneDesc`] and [`Scene`].
 
+mod attributes;
 mod camera;
 mod check;
 mod coincident;
@@ -93,7 +94,7 @@ fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
     for (i, light) in desc.lights.iter().enumerate() {
         let path = format!("lights[{i}]");
         let group = builder.lights.group(&builder.files, &path, light.group())?;
-        let light = lights::compile(&builder.files, &path, light, &builder.space)?;
+        let light = lights::compile(&builder.files, &path, light, &builder.space, &builder.materials.textures)?;
         builder.lights.add([light], group);
     }
     let camera = camera::place_in(&builder.files, &desc.camera, camera, builder.space)?;
@@ -234,7 +235,7 @@ impl Builder {
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
             instances: !self.geometry.instances.is_empty(),
             textures: materials.iter().any(Material::is_textured),
-            vertex_colors: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Mesh(mesh) if mesh.has_colors())),
+            attributes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Mesh(mesh) if mesh.has_attributes())),
             filtered_textures: materials.iter().any(Material::is_textured)
                 && self.materials.textures.textures.iter().any(Texture::is_filtered),
             reliefs,

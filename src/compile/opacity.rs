@@ -27,7 +27,7 @@ impl Builder {
             }
             OpacityDesc::Texture { texture: name, threshold } => {
                 let place = format!("{path}.texture");
-                let named = textures.find_by_uv(&self.files, &place, name, TextureUse::Data)?;
+                let named = textures.find(&self.files, &place, name, TextureUse::Data)?;
                 let alpha = match textures.get(named) {
                     Texture::Bitmap(bitmap) if bitmap.channel.is_none() && bitmap.image.has_alpha() => {
                         Some(Bitmap { channel: Some(Channel::A), ..bitmap.clone() })

@@ -6,7 +6,7 @@ use super::planes::{self, Plane};
 use super::{Builder, meshes, shapes};
 use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::film::ShapeIdentity;
 use crate::geometry::{Analytic, Placed, Shape};
 use crate::id::{LightGroupId, ShapeId};
@@ -40,7 +40,8 @@ const SMALLEST_MESH: f64 = 1.0 / (1u64 << 40) as f64;
 /// Light given off, and the group it belongs to.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedEmission {
-    emission: Emission,
+    /// The light.
+    pub emission: Emission,
     group: Option<LightGroupId>,
 }
 
@@ -109,8 +110,8 @@ impl Builder {
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
         }
-        if !matches!(desc, ShapeDesc::Mesh(_)) && self.materials.needs_colors(&look) {
-            return Err(self.without_colors(path, None, common.material));
+        if !matches!(desc, ShapeDesc::Mesh(_)) {
+            self.check_attributes(path, None, (&look, emission.as_ref(), common.material), None)?;
         }
         let form = match desc {
             ShapeDesc::Mesh(mesh) if !is_used && mesh.file.is_some() => {
@@ -172,11 +173,8 @@ impl Builder {
                     "the material or the opacity has textures, but the mesh has no uv".into(),
                 ));
             }
-            if !self.materials.needs_colors(&look) {
-                loaded.data.colors = None;
-            } else if loaded.data.colors.is_none() {
-                return Err(self.without_colors(path, desc.file.as_deref(), desc.material.as_deref()));
-            }
+            let taken = (&look, emission.as_ref(), desc.material.as_deref());
+            self.check_attributes(path, desc.file.as_deref(), taken, Some(&mut loaded.data.attributes))?;
             if moves && emission.is_some() {
                 return Err(self.files.error(path, "a shape that gives off light cannot move"));
             }
@@ -192,13 +190,6 @@ impl Builder {
             });
         }
         Ok(prepared)
-    }
-
-    /// The error about a shape whose material asks for colours that it does not have.
-    fn without_colors(&self, path: &str, file: Option<&str>, material: Option<&str>) -> Error {
-        let material = material.unwrap_or_default();
-        let message = format!("the material \"{material}\" takes the colours of vertices, but the shape has none");
-        meshes::refusal(&self.files, path, file, message)
     }
 
     fn smoothing(&self, path: &str, desc: &MeshDesc) -> Result<Smoothing> {
@@ -251,7 +242,8 @@ impl Builder {
             }
             Form::Mesh { data, shading, smoothing, later, file } => {
                 let emits = emission.is_some();
-                let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal, emits };
+                let attributes = &self.materials.textures.attributes;
+                let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal, emits, attributes };
                 let Some(mesh) = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)? else {
                     return Ok(None);
                 };

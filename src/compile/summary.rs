@@ -63,6 +63,7 @@ impl Summary {
                 Light::Area(_) => "area",
                 Light::Point(_) => "point",
                 Light::Spot(_) => "spot",
+                Light::Projector(_) => "projector",
                 Light::Ies(_) => "ies",
                 Light::Directional(_) => "directional",
                 Light::Environment(_) => "environment",

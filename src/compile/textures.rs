@@ -7,10 +7,11 @@ use std::sync::Arc;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::Files;
+use crate::attribute::{VERTEX_COLOR, is_of_faces};
 use crate::color::Rgb;
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, UsedNames, WrapDesc, WrapModeDesc};
 use crate::error::Result;
-use crate::id::TextureId;
+use crate::id::{AttributeId, TextureId};
 use crate::import::{AssetError, ImageData, Samples, read_image};
 use crate::material::ColorInput;
 use crate::math::Vec2;
@@ -35,6 +36,8 @@ pub enum TextureUse {
 #[derive(Default)]
 pub struct TextureTable {
     pub textures: Vec<Texture>,
+    /// Names of attributes of meshes, by [`AttributeId`].
+    pub attributes: Vec<String>,
     names: BTreeMap<String, Entry>,
     images: HashMap<PathBuf, Arc<Image>>,
 }
@@ -50,7 +53,15 @@ impl TextureTable {
     pub fn new(files: &Files, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
         let mut table = Self::default();
         let images = read_all(files, desc, used);
-        let mut loader = Loader { files, descs: &desc.textures, used: &used.textures, images, open: Vec::new(), made: HashMap::new() };
+        let mut loader = Loader {
+            files,
+            descs: &desc.textures,
+            used: &used.textures,
+            images,
+            attributes: Vec::new(),
+            open: Vec::new(),
+            made: HashMap::new(),
+        };
         for name in desc.textures.keys() {
             let place = format!("textures.{name}");
             if let Some(TextureDesc::Image { file, .. }) = desc.textures.get(name).filter(|_| !used.textures.contains(name)) {
@@ -61,7 +72,7 @@ impl TextureTable {
             let data = if made.depends_on_use { table.push(loader.named(&place, name, TextureUse::Data)?.texture) } else { color };
             table.names.insert(name.clone(), Entry { color, data });
         }
-        table.images = loader.images;
+        (table.images, table.attributes) = (loader.images, loader.attributes);
         Ok(table)
     }
 
@@ -88,8 +99,10 @@ impl TextureTable {
     /// The texture that `path` names, for something that knows nothing of a surface but uv.
     pub fn find_by_uv(&self, files: &Files, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
         let id = self.find(files, path, name, wanted)?;
-        if self.get(id).uses_vertex_colors() {
-            let message = format!("the texture \"{name}\" has the colours of vertices, which are for parameters of materials");
+        if !self.get(id).attributes().is_empty() {
+            let message = format!(
+                "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and emission of shapes can"
+            );
             return Err(files.error(path, message));
         }
         Ok(id)
@@ -107,7 +120,7 @@ impl TextureTable {
 
     /// The texture that `path` names, for light given off: no channel is below 0.
     pub fn radiance(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
-        let id = self.find_by_uv(files, path, name, TextureUse::Color)?;
+        let id = self.find(files, path, name, TextureUse::Color)?;
         let [min, _] = self.get(id).range();
         if min < 0.0 {
             return Err(files.error(path, format!("the texture \"{name}\" goes down to {min}: light is not negative")));
@@ -116,6 +129,17 @@ impl TextureTable {
             Texture::Constant(color) => ColorInput::Constant(*color),
             _ => ColorInput::Texture(id),
         })
+    }
+
+    /// The texture that `path` names, for a light that is no shape, of which it multiplies `radiance`.
+    pub fn of_light(&self, files: &Files, path: &str, name: &str, radiance: Rgb) -> Result<TextureId> {
+        let id = self.find_by_uv(files, path, name, TextureUse::Color)?;
+        let [min, max] = self.get(id).range();
+        if min < 0.0 {
+            return Err(files.error(path, format!("the texture \"{name}\" goes down to {min}: light is not negative")));
+        }
+        files.emitted(path, (radiance * max).to_array())?;
+        Ok(id)
     }
 
     /// Refuses a texture with colours that a surface cannot reflect; the error says what it does.
@@ -138,6 +162,7 @@ struct Loader<'a> {
     descs: &'a BTreeMap<String, TextureDesc>,
     used: &'a BTreeSet<String>,
     images: HashMap<PathBuf, Arc<Image>>,
+    attributes: Vec<String>,
     /// The textures on the way to the one being made.
     open: Vec<String>,
     /// Textures made so far, by name and use.
@@ -176,6 +201,15 @@ impl Loader<'_> {
         let made = made?;
         self.made.insert(key, made.clone());
         Ok(made)
+    }
+
+    /// The id of an attribute's name.
+    fn attribute(&mut self, name: &str) -> AttributeId {
+        let at = self.attributes.iter().position(|known| known == name).unwrap_or_else(|| {
+            self.attributes.push(name.to_owned());
+            self.attributes.len() - 1
+        });
+        AttributeId::new(at)
     }
 
     /// The product of these factors.
@@ -224,7 +258,17 @@ impl Loader<'_> {
                 let colors = [color("color0", *color0)?, color("color1", *color1)?];
                 Texture::Checker(Checker { colors, scale: files.uv(&format!("{path}.scale"), *scale)? })
             }
-            TextureDesc::VertexColor => Texture::VertexColor,
+            TextureDesc::VertexColor => Texture::Attribute(self.attribute(VERTEX_COLOR), 1.0),
+            TextureDesc::MeshAttribute { name, scale } => {
+                if is_of_faces(name).is_none() {
+                    let message = format!("\"{name}\" is no name of an attribute: it begins with vertex_ or face_");
+                    return Err(files.error(&format!("{path}.name"), message));
+                }
+                if !(scale.is_finite() && *scale >= 0.0) {
+                    return Err(files.error(&format!("{path}.scale"), format!("must be finite and not below 0, not {scale}")));
+                }
+                Texture::Attribute(self.attribute(name), *scale)
+            }
             TextureDesc::Product { factors } => return self.product(path, factors, wanted),
             TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert } => {
                 let scale = files.uv(&format!("{path}.scale"), *scale)?;

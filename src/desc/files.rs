@@ -39,7 +39,7 @@ impl SceneDesc {
             let file = match light {
                 LightDesc::Environment(light) => light.file.as_mut(),
                 LightDesc::Ies(light) => Some(&mut light.file),
-                LightDesc::Point(_) | LightDesc::Spot(_) | LightDesc::Directional(_) => None,
+                LightDesc::Point(_) | LightDesc::Spot(_) | LightDesc::Projector(_) | LightDesc::Directional(_) => None,
             };
             files.extend(file.map(|name| NamedFile { path: format!("lights[{i}].file"), name, is_used: true }));
         }

@@ -13,6 +13,8 @@ pub enum LightDesc {
     Point(PointLightDesc),
     /// Radiant intensity from a point within a cone.
     Spot(SpotLightDesc),
+    /// A picture that is thrown from a point.
+    Projector(ProjectorLightDesc),
     /// Radiant intensity by direction, as a luminaire was measured.
     Ies(IesLightDesc),
     /// Light from infinitely far away, such as the sun.
@@ -27,6 +29,7 @@ impl LightDesc {
         match self {
             Self::Point(light) => light.group.as_deref(),
             Self::Spot(light) => light.group.as_deref(),
+            Self::Projector(light) => light.group.as_deref(),
             Self::Ies(light) => light.group.as_deref(),
             Self::Directional(light) => light.group.as_deref(),
             Self::Environment(light) => light.group.as_deref(),
@@ -63,6 +66,41 @@ pub struct SpotLightDesc {
     /// Half-angle in degrees within which the intensity is full. Default: three quarters of the cutoff.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam_angle_degrees: Option<f64>,
+    /// A texture by name that multiplies the intensity, in perspective: its unit square of uv lies around the cone, whose cutoff is then below
+    /// 90 degrees. u grows to the right and v upward for one who looks along the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub texture: Option<String>,
+    /// For the texture: a direction that is up, not that of the axis. Default: +Y (-Z if the axis lies along Y).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<[f64; 3]>,
+    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
+}
+
+/// A light that throws a picture in perspective, as a projector does: on a plane across its axis at distance d, the irradiance is that of the
+/// picture over d².
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProjectorLightDesc {
+    /// Where it stands.
+    pub position: [f64; 3],
+    /// A point it shines at, the middle of the picture.
+    pub look_at: [f64; 3],
+    /// A direction that is up in the picture, not that of the axis. Default: +Y (-Z if the axis lies along Y).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<[f64; 3]>,
+    /// The picture: a texture by name, of which the unit square of uv is shown. Default: white.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub texture: Option<String>,
+    /// Factor on the picture: irradiance on the plane at distance 1, linear RGB. Default: [1, 1, 1].
+    #[serde(default = "white")]
+    pub irradiance: [f32; 3],
+    /// Full angle in degrees from the picture's lower edge to its upper edge, above 0 and below 180.
+    pub vertical_fov_degrees: f64,
+    /// Width over height, above 0. Default: that of the image, if the texture is one; else 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aspect: Option<f64>,
     /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,

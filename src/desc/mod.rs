@@ -18,7 +18,7 @@ mod used;
 
 pub use camera::{BladesDesc, CameraDesc, CameraKindDesc, LensDesc};
 pub use files::NamedFile;
-pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
+pub use light::{DirectionalLightDesc, EnvironmentLightDesc, IesLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc, SpotLightDesc};
 pub use material::{
     AbsorptionDesc, BumpMapDesc, ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PhongLobeDesc, PlasticDesc,
     RangedDesc, RoughnessDesc, ScalarDesc,
@@ -29,9 +29,9 @@ pub use settings::{
     FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS, SamplerDesc, SamplerKindDesc, StrategyDesc,
 };
 pub use shape::{
-    ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ObjectDesc,
-    OpacityDesc, PlaneDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeCommonMut, ShapeDesc,
-    SmoothByDesc, SphereDesc,
+    AttributeDesc, ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc,
+    ObjectDesc, OpacityDesc, PlaneDesc, ProfileDesc, ProfileParameterDesc, QuadDesc, RevolutionDesc, ShapeCommon, ShapeCommonMut,
+    ShapeDesc, SmoothByDesc, SphereDesc,
 };
 pub use texture::{ChannelDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 pub use transform::{KeyframeDesc, ScaleDesc, TransformDesc, TransformStepDesc};

@@ -1,5 +1,7 @@
 //! Shapes, objects and instances as written.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -155,9 +157,13 @@ shapes! {
         /// Inline: a uv for each vertex.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         uvs: Option<Vec<[f32; 2]>>,
-        /// Inline: a linear colour from 0 to 1 for each vertex, for textures of type `vertex_color`.
+        /// Inline: a linear colour for each vertex, which is the attribute `vertex_color`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         colors: Option<Vec<[f32; 3]>>,
+        /// Inline: numbers, or colours, for each vertex (`vertex_NAME`) or each triangle (`face_NAME`) by name, for textures of type
+        /// `mesh_attribute`.
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        attributes: BTreeMap<String, AttributeDesc>,
         /// A mesh that deforms: the files with its vertices at further times, evenly spaced until the shutter closes, as many and in the same
         /// order as in `file`, which has those at its opening. Between them vertices move along straight lines.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -342,6 +348,16 @@ pub enum SmoothByDesc {
     Index,
 }
 
+/// The values of an attribute of a mesh: a number each, or a linear colour each.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a list of numbers, or of colours such as [0.5, 0.2, 0.1]")]
+pub enum AttributeDesc {
+    /// Numbers.
+    Numbers(Vec<f32>),
+    /// Linear colours.
+    Colors(Vec<[f32; 3]>),
+}
+
 impl MeshDesc {
     /// The mesh of a file, with every other default.
     pub fn from_file(file: impl Into<String>) -> Self {
@@ -353,6 +369,7 @@ impl MeshDesc {
             None,
             None,
             None,
+            BTreeMap::new(),
             Vec::new(),
             Vec::new(),
             shading,

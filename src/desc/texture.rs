@@ -60,8 +60,20 @@ pub enum TextureDesc {
     },
     /// The colour of the surface itself: between those of a mesh's vertices, which may have any. In a PLY file these are `red`, `green` and
     /// `blue` (or `r`, `g` and `b`) of the vertices, linear as floats and sRGB as whole numbers; in an OBJ file three numbers behind those of a
-    /// position, sRGB. For parameters of materials on meshes whose vertices have colours, from 0 to 1.
+    /// position, sRGB. The same as `mesh_attribute` with the name `vertex_color`.
     VertexColor,
+    /// An attribute of the mesh itself: numbers or colours, between those of its vertices or one for each face. Opacity and what is no colour
+    /// take the luminance of a colour. For parameters of materials, opacity and emission, on meshes that have it.
+    MeshAttribute {
+        /// `vertex_NAME` or `face_NAME`. A PLY file has it if consecutive properties of its vertices or faces are called `NAME_0` (a number) or
+        /// `NAME_0`, `NAME_1`, `NAME_2` (a colour; as well from `_1`, or with `_x`, `_y`, `_z`; with `_r`, `_g`, `_b` it is `NAME_color`); `r`,
+        /// `g`, `b` and `red`, `green`, `blue` are `vertex_color` or `face_color`, linear as floats and sRGB as whole numbers. All others are
+        /// taken as they are. Inline meshes have `attributes`.
+        name: String,
+        /// Factor on the values; with it they are from 0 to 1, of emission not below 0. Default: 1.
+        #[serde(default = "one", skip_serializing_if = "is_one")]
+        scale: f32,
+    },
     /// The product of several colours and textures, such as an image and a tint.
     Product {
         /// What is multiplied: colours, numbers or textures by name.
@@ -139,6 +151,15 @@ pub enum ChannelDesc {
     B,
     /// Alpha; 1 where the image has none.
     A,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_one(scale: &f32) -> bool {
+    *scale == 1.0
 }
 
 fn dark() -> [f32; 3] {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{SceneDesc, ShapeDesc};
+use super::{SceneDesc, ShapeDesc, TextureDesc};
 
 /// Names of objects, materials and textures that the world uses, directly or through others.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub struct UsedNames {
     pub objects: BTreeSet<String>,
     /// Materials of shapes that are used, and what these consist of.
     pub materials: BTreeSet<String>,
-    /// Textures of those materials and shapes.
+    /// Textures of those materials and shapes, and of lights.
     pub textures: BTreeSet<String>,
 }
 
@@ -39,7 +39,18 @@ impl SceneDesc {
             common.emission.into_iter().for_each(|emission| self.use_words(emission, &mut used));
             common.opacity.into_iter().for_each(|opacity| self.use_words(opacity, &mut used));
         }
+        self.lights.iter().for_each(|light| self.use_words(light, &mut used));
         used
+    }
+
+    /// The attributes of meshes that the textures among these take.
+    pub fn attribute_names(&self, used: &UsedNames) -> BTreeSet<String> {
+        let name = |texture: &TextureDesc| match texture {
+            TextureDesc::VertexColor => Some("vertex_color".to_owned()),
+            TextureDesc::MeshAttribute { name, .. } => Some(name.clone()),
+            _ => None,
+        };
+        self.textures.iter().filter(|(name, _)| used.textures.contains(*name)).filter_map(|(_, texture)| name(texture)).collect()
     }
 
     /// Adds what a word names, and what that refers to.
@@ -82,6 +93,7 @@ mod tests {
             "textures": {
                 "a": { "type": "constant", "color": [0, 0, 0] }, "b": { "type": "product", "factors": [{ "texture": "c" }] },
                 "c": { "type": "checker" }, "d": { "type": "checker" }, "e": { "type": "checker" }, "f": { "type": "checker" },
+                "g": { "type": "checker" },
                 "diffuse": { "type": "checker" }
             },
             "materials": {
@@ -89,6 +101,7 @@ mod tests {
                 "x": { "type": "diffuse", "albedo": { "texture": "b" } }, "y": { "type": "plastic" },
                 "z": { "type": "diffuse", "albedo": { "texture": "d" } }
             },
+            "lights": [{ "type": "spot", "position": [0, 0, 0], "look_at": [0, 0, 1], "intensity": [1, 1, 1], "texture": "g" }],
             "shapes": [{ "type": "quad", "emission": { "radiance": [1, 1, 1], "texture": "e" } }],
             "objects": {
                 "outer": { "instances": [{ "object": "inner" }] },
@@ -102,7 +115,7 @@ mod tests {
         let expected = UsedNames {
             objects: names(&["inner", "outer"]),
             materials: names(&["top", "x", "y"]),
-            textures: names(&["a", "b", "c", "e", "f"]),
+            textures: names(&["a", "b", "c", "e", "f", "g"]),
         };
         assert_eq!(desc.used_names(), expected);
     }

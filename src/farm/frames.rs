@@ -16,6 +16,11 @@ const DEFAULT_DIGITS: usize = 4;
 pub struct FrameList(Vec<i64>);
 
 impl FrameList {
+    /// These frames; `None` without any.
+    pub fn new(numbers: Vec<i64>) -> Option<Self> {
+        (!numbers.is_empty()).then_some(Self(numbers))
+    }
+
     /// The frames' numbers.
     pub fn numbers(&self) -> &[i64] {
         &self.0

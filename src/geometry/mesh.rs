@@ -2,10 +2,11 @@
 
 use std::sync::OnceLock;
 
+use super::attributes::weights;
 use super::tangents::{self, CornerTangents};
 pub use super::triangle::TrianglePoints;
-use super::vertex_color::weights;
 use super::{Detail, Hit, SurfaceInteraction};
+use crate::attribute::Attribute;
 use crate::id::PrimId;
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
 use crate::math::{Aabb, Bounds, DVec3, Ray, Transform, Vec2, Vec3};
@@ -25,14 +26,6 @@ pub enum MeshError {
     /// A uv that is not finite.
     #[error("the uv of vertex {0} is not finite")]
     Uv(usize),
-    /// A colour that nothing can reflect.
-    #[error("the colour of vertex {vertex} is {color:?}, but must be within 0 and 1")]
-    Color {
-        /// The vertex.
-        vertex: usize,
-        /// Its colour.
-        color: [f32; 3],
-    },
     /// A corner that names no vertex.
     #[error("triangle {triangle} refers to vertex {index}, but there are only {count}")]
     Index {
@@ -43,7 +36,7 @@ pub enum MeshError {
         /// The number of vertices.
         count: usize,
     },
-    /// Normals, uvs or colours that do not match the positions in number.
+    /// Normals or uvs that do not match the positions in number.
     #[error("{what}: {count} for {vertices} vertices")]
     Count {
         /// Which attribute.
@@ -63,8 +56,8 @@ pub struct Mesh {
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) normals: Option<Vec<[f32; 3]>>,
     pub(super) uvs: Option<Vec<[f32; 2]>>,
-    /// Colours of the vertices.
-    pub(super) colors: Option<Box<[[f32; 3]]>>,
+    /// What textures take; empty if they take nothing.
+    pub(super) attributes: Box<[Attribute]>,
     /// Of a mesh that deforms, its vertices at further times.
     pub(super) later: Vec<MeshStep>,
     /// For normal maps, those of each triangle at each time; else empty.
@@ -133,7 +126,7 @@ impl Mesh {
             triangles,
             normals,
             uvs,
-            colors: None,
+            attributes: Box::default(),
             later: Vec::new(),
             tangents: Vec::new(),
             has_slivers: false,
@@ -295,12 +288,13 @@ impl Mesh {
     /// Bytes of the buffers.
     pub fn memory_bytes(&self) -> usize {
         let normals = self.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
-        let uvs = self.uvs.as_ref().map_or(0, |n| size_of_val(n.as_slice())) + self.colors.as_ref().map_or(0, |n| size_of_val(&**n));
+        let uvs = self.uvs.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
+        let attributes: usize = self.attributes.iter().map(|attribute| size_of_val(attribute.values.numbers())).sum();
         let of_step =
             |step: &MeshStep| size_of_val(step.positions.as_slice()) + step.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
         let later: usize = self.later.iter().map(of_step).sum();
         let tangents: usize = self.tangents.iter().map(|t| size_of_val(t.as_slice())).sum();
-        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs + later + tangents
+        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs + attributes + later + tangents
     }
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).

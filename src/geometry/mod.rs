@@ -1,5 +1,6 @@
 //! Shapes and everything an accelerator sees of a scene: bounds, counts, ids and intersection; nothing of materials or lights.
 
+mod attributes;
 mod cutout;
 mod disk;
 mod frustum;
@@ -19,7 +20,6 @@ mod tangents;
 #[cfg(test)]
 mod testing;
 mod triangle;
-mod vertex_color;
 
 pub use cutout::{Coverage, Cutouts};
 pub use disk::Disk;

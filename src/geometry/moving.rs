@@ -1,13 +1,13 @@
 //! Points of surfaces by the corners of their triangles: where they are at other times, and their parameters.
 
-use super::vertex_color::weights;
+use super::attributes::weights;
 use super::{Geometry, Hit, Mesh, Shape, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::{DVec3, Vec2};
 
 impl Mesh {
     /// The weights of a triangle's corners at a point of it, at a time from 0 to 1.
-    fn weights_at(&self, prim: PrimId, p: DVec3, time: f32) -> [f64; 3] {
+    pub(super) fn weights_at(&self, prim: PrimId, p: DVec3, time: f32) -> [f64; 3] {
         let points = self.triangle_points_at(prim, time);
         let weights = weights([points.a, points.b, points.c].map(|corner| p - corner.as_dvec3()));
         let sum: f64 = weights.iter().sum();

@@ -28,6 +28,24 @@ pub struct SceneFingerprint {
 }
 
 impl SceneFingerprint {
+    fn of(scene: String, assets: BTreeMap<String, String>) -> Self {
+        let mut whole = Hash::default();
+        whole.text(&scene);
+        for (name, hash) in &assets {
+            whole.text(name);
+            whole.text(hash);
+        }
+        Self { whole: whole.finish(), scene, assets }
+    }
+
+    /// That of another description with the same files, which are not read again.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if the description cannot be hashed.
+    pub fn with_description(&self, desc: &SceneDesc) -> Result<Self> {
+        Ok(Self::of(description_hash(desc.clone())?, self.assets.clone()))
+    }
+
     /// What differs from another scene: the description and files, by name.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let names: BTreeSet<&String> = self.assets.keys().chain(other.assets.keys()).collect();
@@ -54,13 +72,7 @@ pub fn scene_fingerprint(imported: &Imported, scene_file: &Path) -> Result<Scene
         })
         .collect::<Result<_>>()?;
     let assets: BTreeMap<String, String> = hashed.into_iter().flatten().collect();
-    let mut whole = Hash::default();
-    whole.text(&scene);
-    for (name, hash) in &assets {
-        whole.text(name);
-        whole.text(hash);
-    }
-    Ok(SceneFingerprint { whole: whole.finish(), scene, assets })
+    Ok(SceneFingerprint::of(scene, assets))
 }
 
 /// The files that a scene is made of beside its own: those that its description names, each with the place, materials and images of OBJ files, and
@@ -178,13 +190,18 @@ impl Hash {
     }
 
     fn mesh(&mut self, mesh: &MeshData) {
-        let MeshData { positions, triangles, normals, uvs, colors, origin } = mesh;
+        let MeshData { positions, triangles, normals, uvs, attributes, origin } = mesh;
         self.numbers(triangles.as_flattened().iter().copied(), u32::to_le_bytes);
-        let triples = [Some(positions), normals.as_ref(), colors.as_ref()].map(|list| list.map(|list| list.as_flattened()));
+        let triples = [Some(positions), normals.as_ref()].map(|list| list.map(|list| list.as_flattened()));
         let pairs = uvs.as_ref().map(|list| list.as_flattened());
         for list in triples.into_iter().chain([pairs]) {
             self.hasher.update(&[u8::from(list.is_some())]);
             self.numbers(list.unwrap_or_default().iter().copied(), f32::to_le_bytes);
+        }
+        for (name, values) in attributes {
+            self.text(name);
+            self.numbers([values.channels() as u64], u64::to_le_bytes);
+            self.numbers(values.numbers().iter().copied(), f32::to_le_bytes);
         }
         if *origin != [0.0; 3] {
             self.numbers(origin.iter().copied(), f64::to_le_bytes);
@@ -209,6 +226,7 @@ impl Hash {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::attribute::AttributeValues;
     use crate::import::{Draft, ImportOptions, read_scene};
 
     /// The hashes of a scene in a folder with a mesh and an image.
@@ -256,7 +274,7 @@ mod tests {
 
     #[test]
     fn assets_without_files_count() {
-        let hash = |change: fn(&mut MeshData)| {
+        let hash = |change: &dyn Fn(&mut MeshData)| {
             let mut imported = Draft::default().finish();
             let mut mesh = MeshData { positions: vec![[0.0; 3], [1.0, 2.0, 3.0]], triangles: vec![[0, 1, 1]], ..MeshData::default() };
             change(&mut mesh);
@@ -265,10 +283,13 @@ mod tests {
             imported.desc.shapes.push(shape);
             scene_fingerprint(&imported, Path::new("s.gltf")).unwrap().assets["a.ply"].clone()
         };
-        let same = hash(|_| {});
-        assert_eq!(hash(|_| {}), same);
-        assert_ne!(hash(|mesh| mesh.positions[1][2] = 3.5), same);
-        assert_ne!(hash(|mesh| mesh.normals = Some(vec![])), same);
-        assert_ne!(hash(|mesh| mesh.colors = Some(vec![])), hash(|mesh| mesh.normals = Some(vec![])));
+        let same = hash(&|_| {});
+        assert_eq!(hash(&|_| {}), same);
+        assert_ne!(hash(&|mesh| mesh.positions[1][2] = 3.5), same);
+        assert_ne!(hash(&|mesh| mesh.normals = Some(vec![])), same);
+        let attribute = |name: &str, values: &AttributeValues| hash(&|mesh| drop(mesh.attributes.insert(name.into(), values.clone())));
+        let (number, color) = (AttributeValues::Numbers(vec![0.5; 3]), AttributeValues::Colors(vec![[0.5; 3]]));
+        let hashes = [attribute("vertex_a", &number), attribute("vertex_a", &color), attribute("vertex_b", &number), same];
+        assert!((0..4).all(|i| !hashes[..i].contains(&hashes[i])));
     }
 }

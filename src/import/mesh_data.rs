@@ -1,6 +1,9 @@
 //! A mesh as a file gives it: buffers that nobody has checked.
 
+use std::collections::BTreeMap;
+
 use super::AssetError;
+use crate::attribute::{AttributeValues, VERTEX_COLOR, is_of_faces};
 use crate::math::{Bounds, DVec3};
 
 /// Buffers of a triangle mesh.
@@ -14,8 +17,8 @@ pub struct MeshData {
     pub normals: Option<Vec<[f32; 3]>>,
     /// A uv for each vertex, with the origin at the bottom left.
     pub uvs: Option<Vec<[f32; 2]>>,
-    /// A linear colour for each vertex.
-    pub colors: Option<Vec<[f32; 3]>>,
+    /// Values for each vertex or each triangle, by [name](crate::attribute); colours of vertices are [`VERTEX_COLOR`].
+    pub attributes: BTreeMap<String, AttributeValues>,
     /// What all positions are relative to: zero, unless they were given so far away that `f32` would spoil them.
     pub origin: [f64; 3],
 }
@@ -37,6 +40,21 @@ impl MeshData {
         let extent = (bounds.max - bounds.min).max_element();
         let is_far = extent > 0.0 && bounds.min.abs().max(bounds.max.abs()).max_element() > FAR * extent;
         first.copied().filter(|p| is_far && p.iter().all(|x| x.is_finite())).unwrap_or_default()
+    }
+
+    /// Gives every vertex a linear colour.
+    #[must_use]
+    pub fn with_colors(mut self, colors: Option<Vec<[f32; 3]>>) -> Self {
+        self.attributes.extend(colors.map(|colors| (VERTEX_COLOR.to_owned(), AttributeValues::Colors(colors))));
+        self
+    }
+
+    /// The linear colours of the vertices, if they have any.
+    pub fn colors(&self) -> Option<&[[f32; 3]]> {
+        match self.attributes.get(VERTEX_COLOR) {
+            Some(AttributeValues::Colors(colors)) => Some(colors),
+            _ => None,
+        }
     }
 
     /// The position of a vertex.
@@ -70,8 +88,10 @@ impl MeshData {
         if let (Some(uvs), Some(others)) = (&mut self.uvs, &mut other.uvs) {
             uvs.append(others);
         }
-        if let (Some(colors), Some(others)) = (&mut self.colors, &mut other.colors) {
-            colors.append(others);
+        for (name, values) in other.attributes {
+            if let Some(own) = self.attributes.get_mut(&name) {
+                own.append(values);
+            }
         }
         Ok(())
     }
@@ -81,7 +101,10 @@ impl MeshData {
         if self.uvs.is_some() {
             return;
         }
-        for values in [Some(&mut self.positions), self.normals.as_mut(), self.colors.as_mut()].into_iter().flatten() {
+        for (_, values) in self.attributes.iter_mut().filter(|(name, _)| is_of_faces(name) == Some(false)) {
+            *values = values.gathered(self.triangles.as_flattened().iter().copied());
+        }
+        for values in [Some(&mut self.positions), self.normals.as_mut()].into_iter().flatten() {
             *values = self.triangles.as_flattened().iter().map(|&i| values.get(i as usize).copied().unwrap_or_default()).collect();
         }
         self.uvs = Some(corners.repeat(self.triangles.len()));

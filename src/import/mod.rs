@@ -14,6 +14,7 @@ mod mtl_maps;
 mod obj;
 mod obj_check;
 mod ply;
+mod ply_attributes;
 mod scene_file;
 mod spectrum;
 
@@ -26,7 +27,7 @@ pub use image_file::{ImageData, Samples, read_image, read_image_bytes};
 pub use mesh_data::MeshData;
 pub use mtl_maps::{ObjMap, ObjMaps};
 pub use obj::{ObjMaterial, ObjMesh, read_obj};
-pub use ply::read_ply;
+pub use ply::{read_ply, read_ply_attributes};
 pub use scene_file::{closest_name, load_scene, parse_scene, scene_as_written};
 pub use spectrum::{Named, Spectrum, named};
 

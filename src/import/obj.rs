@@ -184,14 +184,15 @@ fn from_tobj(mesh: &tobj::Mesh) -> MeshData {
     let normals = triples(&mesh.normals);
     let uvs = mesh.texcoords.as_chunks::<2>().0.to_vec();
     let colors: Vec<[f32; 3]> = mesh.vertex_color.as_chunks::<3>().0.iter().map(|color| color.map(linear)).collect();
+    let colors = (colors.len() == positions.len()).then_some(colors);
     MeshData {
         normals: (normals.len() == positions.len()).then_some(normals),
         uvs: (uvs.len() == positions.len()).then_some(uvs),
-        colors: (colors.len() == positions.len()).then_some(colors),
         positions,
         triangles: mesh.indices.as_chunks::<3>().0.to_vec(),
-        origin: [0.0; 3],
+        ..MeshData::default()
     }
+    .with_colors(colors)
 }
 
 #[cfg(test)]
@@ -248,12 +249,12 @@ mod tests {
         let mesh = |text: &str| read_obj(&write(&folder, "q.obj", text), true).unwrap().remove(0).mesh;
         let blue = linear(0.2);
         let mixed = mesh(&format!("{colored}f 3 1 2\n"));
-        assert_eq!(mixed.colors, Some(vec![[0.0, 0.0, 1.0], [1.0, 0.0, blue], [0.0, 1.0, blue]]));
+        assert_eq!(mixed.colors(), Some(&[[0.0, 0.0, 1.0], [1.0, 0.0, blue], [0.0, 1.0, blue]][..]));
         for some in [format!("{colored}v 0 1 0\n"), format!("v 0 1 0\n{colored}")] {
             let mesh = mesh(&format!("{some}f 1 2 3 4\n"));
-            assert_eq!((mesh.colors, mesh.positions.len()), (None, 4));
+            assert_eq!((mesh.colors(), mesh.positions.len()), (None, 4));
         }
-        assert_eq!(mesh("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").colors, None);
+        assert_eq!(mesh("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").colors(), None);
     }
 
     #[test]

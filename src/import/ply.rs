@@ -1,6 +1,8 @@
 //! PLY files, ASCII and binary: element `vertex` with x y z, optionally nx ny nz, u v (or s t) and red green blue (or r g b), and element `face`
 //! with a list of vertex indices. Polygons become fans. Colours are linear as floats and sRGB as whole numbers, of which the largest is 1.
+//! Faces may have colours too, and both other [attributes](super::ply_attributes).
 
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -10,15 +12,25 @@ use ply_rs_bw::ply::{
 };
 
 use super::foreign::linear;
+use super::ply_attributes::{self, Column};
 use super::{AssetError, MeshData};
+use crate::attribute::{AttributeValues, VERTEX_COLOR};
 
-/// Reads a PLY file. One with no faces, such as a cloud of points, is a mesh without triangles.
+/// Reads a PLY file with all of its attributes. One with no faces, such as a cloud of points, is a mesh without triangles.
 ///
 /// # Errors
 /// If the file is missing, malformed, ends early, or has no element `vertex`, or faces without a list `vertex_indices`.
 pub fn read_ply(path: &Path) -> Result<MeshData, AssetError> {
+    read_ply_attributes(path, None)
+}
+
+/// As [`read_ply`], with the attributes of these names only, where they are given.
+///
+/// # Errors
+/// As of [`read_ply`].
+pub fn read_ply_attributes(path: &Path, wanted: Option<&BTreeSet<String>>) -> Result<MeshData, AssetError> {
     let file = crate::file::open(path).map_err(|e| AssetError::missing(path, &e))?;
-    parse_ply(BufReader::with_capacity(1 << 20, file))
+    parse_with(BufReader::with_capacity(1 << 20, file), wanted)
 }
 
 /// Names of the list of a face's vertices.
@@ -27,7 +39,15 @@ const INDICES: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// Elements that are read at a time: as the parser has them, they take several times the memory that they end in.
 const AT_ONCE: usize = 1 << 14;
 
+#[cfg(test)]
 fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
+    parse_with(source, None)
+}
+
+/// The colours of faces.
+const FACE_COLOR: &str = "face_color";
+
+fn parse_with(source: impl BufRead, wanted: Option<&BTreeSet<String>>) -> Result<MeshData, AssetError> {
     let mut reader = Reader::new(crate::file::skip_mark(source).map_err(|e| malformed("", &e))?);
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(|e| malformed("", &e))?;
     let mut mesh = MeshData::default();
@@ -44,21 +64,35 @@ fn parse_ply(source: impl BufRead) -> Result<MeshData, AssetError> {
                     return Err(AssetError::Malformed(format!("the vertices have no property {axis}")));
                 }
                 let is_wide = is_wide(element);
-                read_elements(&mut reader, element, &header, |_, vertices: Vec<Vertex>| {
+                let (marked, mut columns) = columns(element, "vertex_", wanted);
+                let mut colors = colors(element, VERTEX_COLOR, wanted);
+                read_elements(&mut reader, &marked, &header, |_, vertices: Vec<Vertex>| {
                     if is_wide {
                         wide.extend(vertices.iter().map(|v| v.position));
                     }
                     take_vertices(&mut mesh, &vertices, element);
+                    colors.iter_mut().for_each(|colors| colors.extend(vertices.iter().map(|v| v.color)));
+                    if !columns.is_empty() {
+                        vertices.iter().for_each(|vertex| ply_attributes::push(&mut columns, &vertex.numbers, 1));
+                    }
                 })?;
+                add(&mut mesh, VERTEX_COLOR, colors, columns);
             }
             "face" => {
                 let mut negative = None;
-                read_elements(&mut reader, element, &header, |first, faces: Vec<Face>| {
+                let (marked, mut columns) = columns(element, "face_", wanted);
+                let mut colors = colors(element, FACE_COLOR, wanted);
+                read_elements(&mut reader, &marked, &header, |first, faces: Vec<Face>| {
                     for (i, face) in faces.iter().enumerate() {
                         negative = negative.or(face.negative.map(|bad| (first + i, bad)));
                         mesh.push_polygon(&face.corners);
+                        // Every triangle of a polygon has what the polygon has.
+                        let triangles = face.corners.len().saturating_sub(2);
+                        colors.iter_mut().for_each(|colors| colors.extend(std::iter::repeat_n(face.color, triangles)));
+                        ply_attributes::push(&mut columns, &face.numbers, triangles);
                     }
                 })?;
+                add(&mut mesh, FACE_COLOR, colors, columns);
                 if let Some((face, bad)) = negative {
                     return Err(AssetError::Malformed(format!("face {face} refers to vertex {bad}")));
                 }
@@ -124,9 +158,37 @@ fn take_vertices(mesh: &mut MeshData, vertices: &[Vertex], element: &ElementDef)
     if has(&["u", "v"]) || has(&["s", "t"]) || has(&["texture_u", "texture_v"]) {
         mesh.uvs.get_or_insert_default().extend(vertices.iter().map(|v| v.uv));
     }
-    if has(&["red", "green", "blue"]) || has(&["r", "g", "b"]) {
-        mesh.colors.get_or_insert_default().extend(vertices.iter().map(|v| v.color));
-    }
+}
+
+/// The attributes of an element, and the element with their properties marked.
+fn columns(element: &ElementDef, prefix: &str, wanted: Option<&BTreeSet<String>>) -> (ElementDef, Vec<(Column, AttributeValues)>) {
+    let columns = ply_attributes::columns(element, prefix, wanted);
+    (ply_attributes::marked(element, &columns), columns.into_iter().map(|column| (column.clone(), column.values())).collect())
+}
+
+/// A list for the colours of an element, if it has any and they are wanted.
+fn colors(element: &ElementDef, name: &str, wanted: Option<&BTreeSet<String>>) -> Option<Vec<[f32; 3]>> {
+    let has = |names: [&str; 3]| names.iter().all(|name| element.properties.contains_key(*name));
+    let is_wanted = wanted.is_none_or(|wanted| wanted.contains(name));
+    (is_wanted && (has(["red", "green", "blue"]) || has(["r", "g", "b"]))).then(Vec::new)
+}
+
+/// Adds attributes to a mesh. Colours come before others of their name.
+fn add(mesh: &mut MeshData, name: &str, colors: Option<Vec<[f32; 3]>>, columns: Vec<(Column, AttributeValues)>) {
+    mesh.attributes.extend(columns.into_iter().map(|(column, values)| (column.name, values)));
+    mesh.attributes.extend(colors.map(|colors| (name.to_owned(), AttributeValues::Colors(colors))));
+}
+
+/// The channel of a colour that a property is, and its linear value.
+fn channel(name: &str, property: &Property) -> Option<(usize, f32)> {
+    let channel = match name {
+        "red" | "r" => 0,
+        "green" | "g" => 1,
+        "blue" | "b" => 2,
+        _ => return None,
+    };
+    let value = number(property)? as f32;
+    Some((channel, largest(property).map_or(value, |largest| linear(value / largest))))
 }
 
 #[derive(Default)]
@@ -135,6 +197,8 @@ struct Vertex {
     normal: [f32; 3],
     uv: [f32; 2],
     color: [f32; 3],
+    /// Of attributes, in the order of the file.
+    numbers: Vec<f32>,
 }
 
 impl PropertyAccess for Vertex {
@@ -150,26 +214,23 @@ impl PropertyAccess for Vertex {
             self.position[axis] = exact;
             return PropertyAccessResult::Set;
         }
-        let mut value = exact as f32;
+        if ply_attributes::is_marked(name) {
+            self.numbers.push(exact as f32);
+            return PropertyAccessResult::Set;
+        }
+        if let Some((channel, value)) = channel(name, &property) {
+            self.color[channel] = value;
+            return PropertyAccessResult::Set;
+        }
         let place = match name {
             "nx" => &mut self.normal[0],
             "ny" => &mut self.normal[1],
             "nz" => &mut self.normal[2],
             "u" | "s" | "texture_u" => &mut self.uv[0],
             "v" | "t" | "texture_v" => &mut self.uv[1],
-            "red" | "r" | "green" | "g" | "blue" | "b" => {
-                if let Some(largest) = largest(&property) {
-                    value = linear(value / largest);
-                }
-                &mut self.color[match name {
-                    "red" | "r" => 0,
-                    "green" | "g" => 1,
-                    _ => 2,
-                }]
-            }
             _ => return PropertyAccessResult::Ignored,
         };
-        *place = value;
+        *place = exact as f32;
         PropertyAccessResult::Set
     }
 }
@@ -206,6 +267,9 @@ fn largest(property: &Property) -> Option<f32> {
 struct Face {
     corners: Vec<u32>,
     negative: Option<i64>,
+    color: [f32; 3],
+    /// Of attributes, in the order of the file.
+    numbers: Vec<f32>,
 }
 
 impl Face {
@@ -225,7 +289,14 @@ impl PropertyAccess for Face {
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
         if !INDICES.contains(&name) {
-            return PropertyAccessResult::Ignored;
+            if ply_attributes::is_marked(name) {
+                self.numbers.extend(number(&property).map(|value| value as f32));
+            } else if let Some((channel, value)) = channel(name, &property) {
+                self.color[channel] = value;
+            } else {
+                return PropertyAccessResult::Ignored;
+            }
+            return PropertyAccessResult::Set;
         }
         match property {
             Property::ListInt(list) => list.into_iter().for_each(|i| self.take(i)),
@@ -278,6 +349,26 @@ mod tests {
         assert_eq!(parse_ply(little.as_slice()).unwrap(), expected());
         let big = binary("binary_big_endian", f32::to_be_bytes, i32::to_be_bytes);
         assert_eq!(parse_ply(big.as_slice()).unwrap(), expected());
+    }
+
+    #[test]
+    fn vertices_and_faces_have_attributes() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float temp_0\nproperty float x\nproperty float y\nproperty float z\n\
+                    property double d_x\nproperty uchar d_y\nproperty float d_z\nelement face 2\nproperty float q_0\n\
+                    property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n\
+                    0.5 0 0 0 0.25 7 1\n1.5 1 0 0 1 8 2\n2.5 1 1 0 2 9 3\n-1 0 1 0 3 10 4\n9 4 0 1 2 3 255 0 0\n8 3 0 1 2 0 255 0\n";
+        let mesh = parse_ply(text.as_bytes()).unwrap();
+        let expected = [
+            ("face_color", AttributeValues::Colors(vec![[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])),
+            ("face_q", AttributeValues::Numbers(vec![9.0, 9.0, 8.0])),
+            ("vertex_d", AttributeValues::Colors(vec![[0.25, 7.0, 1.0], [1.0, 8.0, 2.0], [2.0, 9.0, 3.0], [3.0, 10.0, 4.0]])),
+            ("vertex_temp", AttributeValues::Numbers(vec![0.5, 1.5, 2.5, -1.0])),
+        ];
+        assert_eq!(mesh.attributes, expected.clone().map(|(name, values)| (name.to_owned(), values)).into());
+        let wanted = BTreeSet::from(["face_q".to_owned(), "vertex_other".to_owned()]);
+        let some = parse_with(text.as_bytes(), Some(&wanted)).unwrap();
+        assert_eq!(some.attributes, [expected[1].clone()].map(|(name, values)| (name.to_owned(), values)).into());
+        assert_eq!((some.positions, some.triangles), (mesh.positions, mesh.triangles));
     }
 
     #[test]
@@ -371,7 +462,7 @@ mod tests {
             assert_eq!(mesh.positions, [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, -2.0, 0.0]]);
             assert_eq!(mesh.triangles, [[2, 1, 0]]);
             assert_eq!(mesh.normals, Some(vec![[0.0, 0.0, 1.0]; 3]));
-            assert_eq!((mesh.uvs, mesh.colors), (None, None));
+            assert_eq!((&mesh.uvs, mesh.colors()), (&None, None));
         }
     }
 
@@ -383,7 +474,7 @@ mod tests {
                 "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{properties}\
                  element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 {color}\n1 0 0 {color}\n0 1 0 {color}\n3 0 1 2\n"
             );
-            parse_ply(text.as_bytes()).unwrap().colors
+            parse_ply(text.as_bytes()).unwrap().colors().map(<[_]>::to_vec)
         };
         assert_eq!(colors("float", ["red", "green", "blue"], "0.25 2 -1"), Some(vec![[0.25, 2.0, -1.0]; 3]));
         assert_eq!(colors("double", ["r", "g", "b"], "0.25 0.5 1"), Some(vec![[0.25, 0.5, 1.0]; 3]));

@@ -49,13 +49,13 @@ impl World<'_> {
 
     /// What `ray`, whose hit led to `at`, stands for in uv.
     #[inline(never)]
-    pub(super) fn footprint(&self, cone: Option<&RayCone>, ray: &Ray, hit: Option<&Hit>, at: &SurfaceInteraction) -> Footprint {
+    pub(super) fn footprint(&self, cone: Option<&RayCone>, ray: &Ray, hit: Option<&Hit>, at: &SurfaceInteraction) -> Footprint<'_> {
         // Behind a rounding artefact another surface is met than the hit says.
         let hit = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids());
         let (Some(cone), Some(hit)) = (cone, hit) else { return self.scene.texture_point(at) };
         let derivatives = self.scene.geometry.uv_derivatives(ray, hit);
         let footprint = Footprint::of_cone(at.uv, cone.width_at(at.t), ray.direction.dot(at.n_g), derivatives);
-        self.scene.colored(at, footprint)
+        self.scene.with_attributes(at, footprint)
     }
 }
 

@@ -394,7 +394,7 @@ impl PathIntegrator {
         let Light::Area(light) = world.scene.lights.get(id) else {
             return Rgb::BLACK;
         };
-        let radiance = light.radiance(&world.scene.textures, at, -ray.direction);
+        let radiance = light.radiance(&world.scene.geometry, &world.scene.textures, at, -ray.direction);
         if radiance.is_black() || path.pdf == f32::INFINITY || self.strategy != Strategy::Mis {
             return radiance * self.found_by_chance(path, 0.0);
         }

@@ -43,12 +43,12 @@ pub(super) fn place_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInter
 
 /// What the layers need of the first surface, which `ray` meets at `at`, for integrators that follow no mirrors to tell denoisers of what is
 /// behind; `hit` is what the accelerator found.
-pub(super) fn surface_sample(
+pub(super) fn surface_sample<'f>(
     world: &World,
     needs: SurfaceNeeds,
     at: &SurfaceInteraction,
     (ray, hit): (&Ray, Option<&Hit>),
-    footprint: impl FnOnce() -> Footprint,
+    footprint: impl FnOnce() -> Footprint<'f>,
 ) -> SurfaceSample {
     let mut sample = place_sample(world, needs, at, hit);
     if needs.albedo || needs.features {
@@ -62,7 +62,7 @@ pub(super) fn surface_sample(
 }
 
 /// What a surface scatters of the light that goes back along a ray.
-pub(super) fn albedo_at(world: &World, at: &SurfaceInteraction, ray: &Ray, footprint: impl FnOnce() -> Footprint) -> Rgb {
+pub(super) fn albedo_at<'f>(world: &World, at: &SurfaceInteraction, ray: &Ray, footprint: impl FnOnce() -> Footprint<'f>) -> Rgb {
     let frame = Frame::from_normal(at.n_s);
     world.scene.bsdf(at, ray.direction, footprint, &mut None).albedo(frame.to_local(-ray.direction))
 }

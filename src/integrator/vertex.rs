@@ -63,7 +63,7 @@ impl<'a> Vertex<'a> {
         world: &'a World,
         at: &'a SurfaceInteraction,
         ray: &Ray,
-        footprint: impl FnOnce() -> Footprint,
+        footprint: impl FnOnce() -> Footprint<'a>,
         bsdf: &'a mut Option<Bsdf>,
     ) -> Self {
         let back = -ray.direction;

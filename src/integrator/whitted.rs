@@ -152,7 +152,7 @@ impl Segment {
     }
 
     /// What the ray stands for on the surface at its end.
-    fn footprint(&self, world: &World, at: &SurfaceInteraction) -> Footprint {
+    fn footprint<'a>(&self, world: &'a World, at: &SurfaceInteraction) -> Footprint<'a> {
         world.footprint(self.cone.as_ref(), &self.ray, self.hit.as_ref(), at)
     }
 

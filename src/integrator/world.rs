@@ -155,7 +155,7 @@ impl<'a> World<'a> {
     pub fn emitted(&self, at: &SurfaceInteraction, wo: Vec3) -> Rgb {
         let light = self.scene.surface(at.shape).light(at.prim).map(|id| self.scene.lights.get(id));
         match light {
-            Some(Light::Area(light)) => light.radiance(&self.scene.textures, at, wo),
+            Some(Light::Area(light)) => light.radiance(&self.scene.geometry, &self.scene.textures, at, wo),
             _ => Rgb::BLACK,
         }
     }

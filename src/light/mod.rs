@@ -7,6 +7,7 @@ mod environment;
 mod groups;
 mod ies;
 mod point;
+mod projector;
 mod set;
 mod spot;
 #[cfg(test)]
@@ -19,6 +20,7 @@ pub use environment::{Environment, EnvironmentMap, EnvironmentMapError};
 pub use groups::LightGroups;
 pub use ies::{IesLight, IesProfile};
 pub use point::PointLight;
+pub use projector::{Projection, Projector};
 pub use set::{LightChoice, LightSelection, LightSet};
 pub use spot::SpotLight;
 pub use tree::Receiver;
@@ -38,6 +40,8 @@ pub enum Light {
     Point(PointLight),
     /// Radiant intensity within a cone.
     Spot(Box<SpotLight>),
+    /// A picture from a point.
+    Projector(Box<Projector>),
     /// Radiant intensity as measured of a luminaire.
     Ies(Box<IesLight>),
     /// Light from far away within a small (or no) angle.
@@ -115,7 +119,7 @@ impl Light {
         match self {
             Self::Directional(light) => !light.is_delta(),
             Self::Environment(_) => true,
-            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Ies(_) => false,
+            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Projector(_) | Self::Ies(_) => false,
         }
     }
 
@@ -126,7 +130,7 @@ impl Light {
         match self {
             Self::Environment(light) => light.eval(wi, found_by),
             Self::Directional(light) => light.eval(wi),
-            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Ies(_) => InfinityEval::default(),
+            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Projector(_) | Self::Ies(_) => InfinityEval::default(),
         }
     }
 
@@ -141,7 +145,8 @@ impl Light {
         match self {
             Self::Area(light) => light.sample(geometry, textures, p, u),
             Self::Point(light) => light.sample(p),
-            Self::Spot(light) => light.sample(p),
+            Self::Spot(light) => light.sample(textures, p),
+            Self::Projector(light) => light.sample(textures, p),
             Self::Ies(light) => light.sample(p),
             Self::Directional(light) => light.sample(u),
             Self::Environment(light) => light.sample(u, found_by),
@@ -154,6 +159,7 @@ impl Light {
             Self::Area(light) => light.bounds(geometry),
             Self::Point(light) => light.bounds(),
             Self::Spot(light) => light.bounds(),
+            Self::Projector(light) => light.bounds(),
             Self::Ies(light) => light.bounds(),
             Self::Directional(_) | Self::Environment(_) => None,
         }
@@ -165,6 +171,7 @@ impl Light {
             Self::Area(light) => light.power(),
             Self::Point(light) => light.power(),
             Self::Spot(light) => light.power(),
+            Self::Projector(light) => light.power(),
             Self::Ies(light) => light.power(),
             Self::Directional(light) => light.power(scene_radius),
             Self::Environment(light) => light.power(scene_radius),

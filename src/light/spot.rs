@@ -3,9 +3,10 @@
 use std::f64::consts::{PI, TAU};
 
 use super::bounds::{EmissionCone, LightBounds};
-use super::{LightSample, PointLight};
+use super::{LightSample, PointLight, Projection};
 use crate::color::Rgb;
 use crate::math::{DVec3, Vec3};
+use crate::texture::Texture;
 
 /// Light from a point within a cone.
 ///
@@ -21,6 +22,8 @@ pub struct SpotLight {
     cos_cutoff: f32,
     /// `1 / (cutoff - beam)`.
     slope: f32,
+    /// What multiplies the intensity, and the power with it.
+    texture: Option<(Projection, f64)>,
 }
 
 impl SpotLight {
@@ -37,7 +40,16 @@ impl SpotLight {
             cos_beam: beam.cos() as f32,
             cos_cutoff: cutoff.cos() as f32,
             slope: (1.0 / (cutoff - beam)) as f32,
+            texture: None,
         }
+    }
+
+    /// This light with a texture that multiplies its intensity.
+    #[must_use]
+    pub fn with_texture(mut self, projection: Projection, textures: &[Texture]) -> Self {
+        let share = projection.integral(textures, |w, _| f64::from(self.falloff(w)));
+        self.texture = Some((projection, share * f64::from(self.source.intensity.luminance())));
+        self
     }
 
     /// Where it stands.
@@ -47,10 +59,13 @@ impl SpotLight {
 
     /// The light that arrives at `p`; `None` outside the cone.
     #[inline]
-    pub fn sample(&self, p: DVec3) -> Option<LightSample> {
+    pub fn sample(&self, textures: &[Texture], p: DVec3) -> Option<LightSample> {
         let mut sample = self.source.sample(p)?;
         let factor = self.falloff(-sample.wi);
         sample.radiance *= factor;
+        if let Some((projection, _)) = &self.texture {
+            sample.radiance *= projection.color(textures, -sample.wi);
+        }
         (factor > 0.0).then_some(sample)
     }
 
@@ -71,13 +86,19 @@ impl SpotLight {
 
     /// For the choice of a light.
     pub(super) fn bounds(&self) -> Option<LightBounds> {
-        let intensity = f64::from(self.source.intensity.luminance());
+        // Of a texture, the mean.
+        let intensity = f64::from(self.source.intensity.luminance()) * self.power() / self.even_power().max(f64::MIN_POSITIVE);
         let cone = EmissionCone { axis: self.axis, spread: self.beam as f32, reach: (self.cutoff - self.beam) as f32 };
         (intensity > 0.0).then(|| LightBounds::at_point(self.source.position, cone, intensity))
     }
 
     /// Emitted power, as luminance.
     pub fn power(&self) -> f64 {
+        self.texture.map_or_else(|| self.even_power(), |(_, power)| power)
+    }
+
+    /// Power without a texture.
+    fn even_power(&self) -> f64 {
         let (beam, cutoff) = (self.beam, self.cutoff);
         // The integral of falloff(theta) sin(theta) dtheta.
         let share = if cutoff - beam > 1e-6 * cutoff {
@@ -98,7 +119,7 @@ mod tests {
     }
 
     fn intensity(light: &SpotLight, theta: f64) -> f64 {
-        light.sample(DVec3::new(theta.sin(), 0.0, -theta.cos())).map_or(0.0, |s| f64::from(s.radiance.g))
+        light.sample(&[], DVec3::new(theta.sin(), 0.0, -theta.cos())).map_or(0.0, |s| f64::from(s.radiance.g))
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! How a picture was made: all that is needed to make it again.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::Settings;
+use super::state::put;
 use crate::compile::check_film_and_integrator;
 use crate::desc::{FilmDesc, OutputDesc};
 use crate::error::{Error, Result};
@@ -90,6 +92,37 @@ impl Recipe {
             self.settings.spp = spp;
         }
         self
+    }
+
+    /// The same but for what makes frames of a sequence different from each other: the number of the frame, and the seed that grows with it.
+    #[must_use]
+    pub fn of_frame(&self, number: i64) -> Self {
+        let seed = self.settings.seed.wrapping_add_signed(number.wrapping_neg());
+        Self { frame: None, settings: Settings { seed, ..self.settings.clone() }, ..self.clone() }
+    }
+
+    /// What of this is not as in `expected`, of which a file is to be written as `output` says: settings by name, each with both values. The
+    /// command line, the folder and the version of the program do not count.
+    pub fn differences(&self, expected: &Self, output: &OutputDesc) -> Vec<String> {
+        let flat = |recipe: &Self, output: Option<&OutputDesc>| {
+            let mut values = BTreeMap::new();
+            put(&mut values, "", &serde_json::to_value(&recipe.settings).unwrap_or_default());
+            put(&mut values, "denoise", &Value::Bool(recipe.denoise));
+            put(&mut values, "output", &serde_json::to_value(output).unwrap_or_default());
+            values.remove("output.file");
+            values
+        };
+        let (own, other) = (flat(self, self.output.as_ref()), flat(expected, Some(output)));
+        let names: BTreeSet<&String> = own.keys().chain(other.keys()).collect();
+        let mut found = Vec::new();
+        if self.scene.whole != expected.scene.whole {
+            found.push(format!("another scene: {}", self.scene.differences(&expected.scene).join(", ")));
+        }
+        found.extend(names.into_iter().filter_map(|name| {
+            let [a, b] = [&own, &other].map(|values| values.get(name).map_or("none", String::as_str));
+            (a != b).then(|| format!("{name}: {a} in the file, {b} for the rest"))
+        }));
+        found
     }
 
     /// As files keep it.
@@ -179,6 +212,26 @@ mod tests {
         let settings = Recipe::from_value(value.clone(), Path::new("a.exr")).unwrap().settings(3);
         assert_eq!((serde_json::to_value(&settings).unwrap(), settings.threads), (value["settings"].clone(), 3));
         assert_eq!(settings.outputs[0].file, "a.exr");
+    }
+
+    #[test]
+    fn frames_of_a_sequence_differ_in_their_seed_alone() {
+        let recipe = Recipe::from_value(recipe(), Path::new("a.exr")).unwrap();
+        let of_frame = |number: i64| {
+            let settings = Settings { seed: 5u64.wrapping_add_signed(number), ..recipe.settings.clone() };
+            Recipe { frame: Some(Frame { number, per_second: 24.0 }), settings, ..recipe.clone() }.of_frame(number)
+        };
+        let differences = |own: &Recipe, output: &OutputDesc| own.differences(&of_frame(-7), output);
+        let output = OutputDesc::new("b.exr");
+        assert_eq!(differences(&of_frame(3), &output), Vec::<String>::new());
+        let mut other = of_frame(9);
+        (other.settings.spp, other.denoise, other.scene.whole) = (recipe.settings.spp + 1, true, "x".into());
+        other.scene.scene = "x".into();
+        let spp = format!("spp: {} in the file, {} for the rest", other.settings.spp, recipe.settings.spp);
+        let expected = ["another scene: the scene's description", "denoise: true in the file, false for the rest", &spp];
+        assert_eq!(differences(&other, &output), expected);
+        let commented = OutputDesc { comments: Some("other".into()), ..output };
+        assert_eq!(differences(&of_frame(3), &commented), ["output.comments: none in the file, other for the rest"]);
     }
 
     #[test]

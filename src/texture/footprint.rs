@@ -1,27 +1,27 @@
 //! What part of a texture a lookup stands for.
 
-use crate::color::Rgb;
+use crate::attribute::AttributePoint;
 use crate::math::{Vec2, Vec3};
 
 /// The least cosine between a ray and a surface: what is seen edge-on has no end.
 const LEAST_COSINE: f32 = 1e-3;
 
-/// A place on a surface: in uv, with how much of uv around it a sample stands for, and the colour that the surface has there.
+/// A place on a surface: in uv, with how much of uv around it a sample stands for, and the attributes of the mesh there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Footprint {
+pub struct Footprint<'a> {
     /// The middle.
     pub uv: Vec2,
     /// An area, in units of uv squared; zero for a point.
     pub area: f32,
-    /// Between the colours of a mesh's vertices; white where there are none.
-    pub color: Rgb,
+    /// Of a mesh that has any which textures take.
+    pub attributes: Option<AttributePoint<'a>>,
 }
 
-impl Footprint {
-    /// Nothing but a point, of white.
+impl Footprint<'_> {
+    /// Nothing but a point.
     #[inline]
     pub fn point(uv: Vec2) -> Self {
-        Self { uv, area: 0.0, color: Rgb::WHITE }
+        Self { uv, area: 0.0, attributes: None }
     }
 
     /// Where a cone of this `width`, whose unit axis meets the surface's unit normal at the cosine `cos`, meets a surface that changes with u

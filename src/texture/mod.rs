@@ -1,4 +1,4 @@
-//! Textures: colours and numbers as functions of uv, or those that vertices have.
+//! Textures: colours and numbers as functions of uv, or attributes of meshes.
 //!
 //! A lookup is a point, or stands for what a sample of a pixel covers: then it takes a smaller version of the image where the samples of the
 //! pixel together would miss texels.
@@ -18,6 +18,7 @@ pub use mapping::{UvTransform, Wrap};
 pub use pyramid::Pyramid;
 
 use crate::color::Rgb;
+use crate::id::AttributeId;
 use crate::math::Vec2;
 
 /// A texture.
@@ -29,8 +30,8 @@ pub enum Texture {
     Checker(Checker),
     /// An image.
     Bitmap(Bitmap),
-    /// The colour that the surface itself has, between those of its vertices; white where nothing but uv is known.
-    VertexColor,
+    /// An attribute of the mesh times a factor; white where nothing but uv is known.
+    Attribute(AttributeId, f32),
     /// The product of several textures.
     Product(Box<[Texture]>),
     /// 1 where the [number](Texture::scalar) of a texture reaches a threshold, else 0; never filtered.
@@ -45,7 +46,7 @@ impl Texture {
             Self::Constant(color) => *color,
             Self::Checker(checker) => checker.color(uv),
             Self::Bitmap(bitmap) => bitmap.color(uv),
-            Self::VertexColor => Rgb::WHITE,
+            Self::Attribute(..) => Rgb::WHITE,
             Self::Product(factors) => factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color(uv)),
             Self::Step(..) => Rgb::splat(self.scalar(uv)),
         }
@@ -58,7 +59,8 @@ impl Texture {
             Self::Bitmap(bitmap) => bitmap.scalar(uv),
             Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar(uv)),
             Self::Step(of, threshold) => f32::from(of.scalar(uv) >= *threshold),
-            Self::Constant(_) | Self::Checker(_) | Self::VertexColor => self.color(uv).luminance(),
+            Self::Attribute(..) => 1.0,
+            Self::Constant(_) | Self::Checker(_) => self.color(uv).luminance(),
         }
     }
 
@@ -66,9 +68,10 @@ impl Texture {
     #[inline]
     pub fn color_over(&self, footprint: &Footprint) -> Rgb {
         match self {
-            Self::Constant(_) | Self::Checker(_) | Self::Step(..) => self.color(footprint.uv),
+            Self::Constant(_) | Self::Checker(_) => self.color(footprint.uv),
+            Self::Step(..) => Rgb::splat(self.scalar_over(footprint)),
             Self::Bitmap(bitmap) => bitmap.color_over(footprint),
-            Self::VertexColor => footprint.color,
+            Self::Attribute(id, scale) => attribute(*id, *scale, footprint),
             Self::Product(factors) => factors.iter().fold(Rgb::WHITE, |product, factor| product * factor.color_over(footprint)),
         }
     }
@@ -78,16 +81,21 @@ impl Texture {
     pub fn scalar_over(&self, footprint: &Footprint) -> f32 {
         match self {
             Self::Bitmap(bitmap) => bitmap.scalar_over(footprint),
-            Self::VertexColor => footprint.color.luminance(),
+            Self::Attribute(id, scale) => match attribute(*id, *scale, footprint) {
+                // Exact for numbers.
+                Rgb { r, g, b } if r == g && g == b => r,
+                color => color.luminance(),
+            },
+            Self::Step(of, threshold) => f32::from(of.scalar_over(&Footprint { area: 0.0, ..*footprint }) >= *threshold),
             Self::Product(factors) => factors.iter().fold(1.0, |product, factor| product * factor.scalar_over(footprint)),
-            Self::Constant(_) | Self::Checker(_) | Self::Step(..) => self.scalar(footprint.uv),
+            Self::Constant(_) | Self::Checker(_) => self.scalar(footprint.uv),
         }
     }
 
     /// Whether a footprint has a say in it.
     pub fn is_filtered(&self) -> bool {
         match self {
-            Self::Constant(_) | Self::Checker(_) | Self::VertexColor | Self::Step(..) => false,
+            Self::Constant(_) | Self::Checker(_) | Self::Attribute(..) | Self::Step(..) => false,
             Self::Bitmap(bitmap) => bitmap.filter == Filter::Trilinear,
             Self::Product(factors) => factors.iter().any(Self::is_filtered),
         }
@@ -96,27 +104,27 @@ impl Texture {
     /// Whether uv have a say in it.
     pub fn uses_uv(&self) -> bool {
         match self {
-            Self::Constant(_) | Self::VertexColor => false,
+            Self::Constant(_) | Self::Attribute(..) => false,
             Self::Checker(_) | Self::Bitmap(_) => true,
             Self::Product(factors) => factors.iter().any(Self::uses_uv),
             Self::Step(of, _) => of.uses_uv(),
         }
     }
 
-    /// Whether the colours of vertices have a say in it.
-    pub fn uses_vertex_colors(&self) -> bool {
+    /// The attributes of meshes that have a say in it, with their factors.
+    pub fn attributes(&self) -> Vec<(AttributeId, f32)> {
         match self {
-            Self::Constant(_) | Self::Checker(_) | Self::Bitmap(_) => false,
-            Self::VertexColor => true,
-            Self::Product(factors) => factors.iter().any(Self::uses_vertex_colors),
-            Self::Step(of, _) => of.uses_vertex_colors(),
+            Self::Constant(_) | Self::Checker(_) | Self::Bitmap(_) => Vec::new(),
+            Self::Attribute(id, scale) => vec![(*id, *scale)],
+            Self::Product(factors) => factors.iter().flat_map(Self::attributes).collect(),
+            Self::Step(of, _) => of.attributes(),
         }
     }
 
     /// The size of a texel in uv, the smallest of all images; `None` without an image.
     pub fn texel(&self) -> Option<Vec2> {
         match self {
-            Self::Constant(_) | Self::Checker(_) | Self::VertexColor => None,
+            Self::Constant(_) | Self::Checker(_) | Self::Attribute(..) => None,
             Self::Bitmap(bitmap) => Some(bitmap.texel()),
             Self::Product(factors) => factors.iter().filter_map(Self::texel).reduce(Vec2::min),
             Self::Step(of, _) => of.texel(),
@@ -128,7 +136,7 @@ impl Texture {
         match self {
             Self::Bitmap(bitmap) => bitmap.transform.axes(),
             Self::Step(of, _) => of.axes(),
-            Self::Constant(_) | Self::Checker(_) | Self::VertexColor | Self::Product(_) => [Vec2::X, Vec2::Y],
+            Self::Constant(_) | Self::Checker(_) | Self::Attribute(..) | Self::Product(_) => [Vec2::X, Vec2::Y],
         }
     }
 
@@ -140,12 +148,17 @@ impl Texture {
             Self::Constant(color) => of(*color),
             Self::Checker(checker) => join(of(checker.colors[0]), of(checker.colors[1])),
             Self::Bitmap(bitmap) => bitmap.range(),
-            // Of vertices as meshes are checked.
-            Self::VertexColor | Self::Step(..) => [0.0, 1.0],
+            // Of attributes as meshes are checked: for emission above 1, too.
+            Self::Attribute(..) | Self::Step(..) => [0.0, 1.0],
             Self::Product(factors) => factors.iter().map(Self::range).fold([1.0; 2], |a, b| {
                 let products = [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]];
                 products.into_iter().fold([f32::INFINITY, f32::NEG_INFINITY], |range, p| join(range, [p; 2]))
             }),
         }
     }
+}
+
+/// An attribute times a factor; white where the mesh is not known.
+fn attribute(id: AttributeId, scale: f32, footprint: &Footprint) -> Rgb {
+    footprint.attributes.and_then(|point| point.value(id)).map_or(Rgb::WHITE, |value| Rgb::from(value) * scale)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use steradian::farm::{FrameList, file_of_frame, is_scene_per_frame, scene_of_frame, with_frame_pattern};
-use steradian::import::{ImportReport, Imported};
+use steradian::import::{self, ImportReport, Imported};
 use steradian::output::FileUses;
 use steradian::render::Settings;
 use steradian::{Error, Result};
@@ -15,7 +15,7 @@ use crate::args::RenderArgs;
 use crate::interrupt::Interrupt;
 use crate::log::{self, Level};
 use crate::progress::Reporter;
-use crate::{chain, exit_code, render, scene};
+use crate::{chain, exit_code, render, scene, skipped};
 
 /// What all frames of a run share.
 pub struct Session {
@@ -123,11 +123,13 @@ struct Sequence<'a> {
     session: &'a Session,
     /// The scene, where one file has all frames.
     whole: OnceCell<Imported>,
+    /// The same, to compare frames that are there with.
+    compared: OnceCell<Option<Imported>>,
 }
 
 impl<'a> Sequence<'a> {
     fn new(arguments: &'a RenderArgs, session: &'a Session) -> Self {
-        Self { arguments, session, whole: OnceCell::new() }
+        Self { arguments, session, whole: OnceCell::new(), compared: OnceCell::new() }
     }
 
     fn run(&self, frames: &FrameList) -> Result<u8> {
@@ -137,6 +139,8 @@ impl<'a> Sequence<'a> {
             let count =
                 if skipped.len() == 1 { "1 frame exists and is".to_owned() } else { format!("{} frames exist and are", skipped.len()) };
             reporter.say(&format!("{count} skipped (--overwrite replaces files that exist)"));
+            let shares_files = !is_scene_per_frame(&self.arguments.scene) && !is_gltf(&self.arguments.scene);
+            skipped::warn(self.arguments, &skipped, self.session, shares_files, |frame| self.shot_to_compare(frame));
         }
         reporter.expect(todo.len());
         let mut failures = Vec::new();
@@ -179,11 +183,33 @@ impl<'a> Sequence<'a> {
         !overwrite && !outputs.is_empty() && outputs.iter().all(exists)
     }
 
+    /// A frame that is not rendered; none if its scene cannot be read.
+    fn shot_to_compare(&self, frame: i64) -> Option<Shot> {
+        let arguments = self.arguments;
+        let scene = scene_of_frame(&arguments.scene, frame);
+        let read = |seconds: f64| {
+            let mut options = arguments.import.options();
+            options.time += seconds;
+            let mut imported = import::read_scene(&scene, &options).ok()?;
+            if arguments.import.allow_missing {
+                imported.leave_out_missing(&scene);
+            }
+            Some(imported)
+        };
+        let imported = if is_scene_per_frame(&arguments.scene) {
+            read(0.0)?
+        } else if is_gltf(&scene) {
+            read(frame as f64 / arguments.sequence.fps)?
+        } else {
+            at_frame(self.compared.get_or_init(|| read(0.0)).as_ref()?, frame)
+        };
+        Some(Shot { scene, imported, frame: Some(frame), unchecked: Vec::new() })
+    }
+
     /// The picture of a frame; takes the frames whose files are to be compared with those of its scene.
     fn shot(&self, frame: i64, unchecked: &mut Vec<Option<i64>>) -> Result<Shot> {
         let arguments = self.arguments;
         let scene = scene_of_frame(&arguments.scene, frame);
-        let extension = scene.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let load = |seconds: f64| {
             let mut import = arguments.import.clone();
             import.time += seconds;
@@ -191,20 +217,30 @@ impl<'a> Sequence<'a> {
         };
         let imported = if is_scene_per_frame(&arguments.scene) {
             load(0.0)?
-        } else if ["gltf", "glb"].contains(&extension.as_str()) {
+        } else if is_gltf(&scene) {
             load(frame as f64 / arguments.sequence.fps)?
         } else {
             if self.whole.get().is_none() {
                 let _ = self.whole.set(load(0.0)?);
             }
             let whole = self.whole.get().ok_or_else(|| Error::Internal("no scene".to_owned()))?;
-            let (assets, places, files) = (Arc::clone(&whole.assets), Arc::clone(&whole.places), Arc::clone(&whole.files));
-            let mut desc = whole.desc.clone();
-            desc.camera.shutter = desc.camera.shutter.map(|time| time + frame as f64);
-            Imported { desc, assets, report: ImportReport::default(), files, places }
+            at_frame(whole, frame)
         };
         let unchecked =
             if is_scene_per_frame(&self.arguments.scene) && unchecked.is_empty() { vec![Some(frame)] } else { std::mem::take(unchecked) };
         Ok(Shot { scene, imported, frame: Some(frame), unchecked })
     }
+}
+
+/// Whether a file is glTF, whose animations have a time of their own.
+fn is_gltf(scene: &Path) -> bool {
+    scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
+}
+
+/// A frame of a scene whose file holds a whole sequence: its shutter opens that much later.
+fn at_frame(whole: &Imported, frame: i64) -> Imported {
+    let (assets, places, files) = (Arc::clone(&whole.assets), Arc::clone(&whole.places), Arc::clone(&whole.files));
+    let mut desc = whole.desc.clone();
+    desc.camera.shutter = desc.camera.shutter.map(|time| time + frame as f64);
+    Imported { desc, assets, report: ImportReport::default(), files, places }
 }

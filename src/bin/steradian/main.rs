@@ -26,6 +26,7 @@ mod progress;
 mod render;
 mod rerender;
 mod scene;
+mod skipped;
 mod stats;
 mod text;
 

@@ -8,7 +8,7 @@ use steradian::denoise::Denoiser;
 use steradian::farm::check_single_name;
 use steradian::film::LayerSet;
 use steradian::live::{Fan, Live};
-use steradian::output::{self, FileUses, RenderInfo, RenderStatistics};
+use steradian::output::{self, RenderInfo, RenderStatistics};
 use steradian::render::{self, DEFAULT_EXTENSIONS, Header, Progress, Recipe, RenderResult, Replayed, Settings, Stats};
 use steradian::scene::Scene;
 use steradian::{Result, compile};
@@ -20,12 +20,13 @@ use crate::interrupt::Interrupt;
 use crate::kept::{self, Kept};
 use crate::progress::Reporter;
 use crate::rerender;
+use crate::skipped::Skipped;
 use crate::stats::{self, Run};
 use crate::{files, text};
 
 /// Renders a picture and writes what was asked for; the result is the exit code. `start` is when the scene's reading began.
 pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Instant) -> Result<u8> {
-    let Some(mut plan) = Plan::new(arguments, &shot, &session.uses)? else {
+    let Some(mut plan) = Plan::new(arguments, &shot, session)? else {
         session.reporter.complete_frame();
         return Ok(0);
     };
@@ -89,7 +90,7 @@ struct Plan<'a> {
 
 impl<'a> Plan<'a> {
     /// Checks all that can be checked before the scene is made; `None` if the frame is there already.
-    fn new(arguments: &'a RenderArgs, shot: &Shot, uses: &FileUses) -> Result<Option<Self>> {
+    fn new(arguments: &'a RenderArgs, shot: &Shot, session: &Session) -> Result<Option<Self>> {
         let json = arguments.json.as_deref().map(|path| shot.file(path));
         compile::check_imported_settings(&shot.imported, &shot.scene)?;
         let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
@@ -100,7 +101,7 @@ impl<'a> Plan<'a> {
             None => Settings::new(&shot.imported.desc, &overrides)?,
         };
         if arguments.pixel.is_none() {
-            files::of_render(arguments, shot, &settings.outputs, shard_name.as_deref(), uses.clone())?;
+            files::of_render(arguments, shot, &settings.outputs, shard_name.as_deref(), session.uses.clone())?;
         }
         if arguments.repeat.is_none() {
             shot.adapt(&mut settings);
@@ -111,6 +112,11 @@ impl<'a> Plan<'a> {
             None => shot.is_there(&settings, arguments.sequence.overwrite),
         };
         if is_there {
+            if let Some(frame) = shot.frame.filter(|_| shard_file.is_none()) {
+                let mut skipped = Skipped::default();
+                skipped.compare(frame, recipe.as_ref(), &settings.outputs);
+                skipped.tell(session);
+            }
             return Ok(None);
         }
         if arguments.pixel.is_none() {
@@ -221,7 +227,7 @@ impl<'a> Plan<'a> {
 }
 
 /// Files named after the scene, in the working directory.
-fn default_outputs(scene: &Path) -> Vec<String> {
+pub fn default_outputs(scene: &Path) -> Vec<String> {
     let stem = scene.file_stem().map_or("picture".into(), |stem| stem.to_string_lossy().into_owned());
     DEFAULT_EXTENSIONS.iter().map(|extension| format!("{stem}.{extension}")).collect()
 }

@@ -10,7 +10,7 @@ use crate::args::{ImportArgs, Verbosity};
 use crate::log::{self, Level};
 use crate::text;
 
-/// Lines of the summary that are shown without `-v`.
+/// Lines of the summary that are shown without `-v`; more if more elements are ignored as a whole.
 const SUMMARY_LINES: usize = 12;
 
 /// Reads a scene and says on stderr what of it was approximated or ignored.
@@ -60,9 +60,11 @@ fn lines(path: &Path, imported: &Imported, verbose: bool) -> Vec<String> {
     if verbose {
         return std::iter::once(head).chain(report.entries.iter().map(line)).collect();
     }
-    let mut summary = report.summary();
-    let rest = summary.len().saturating_sub(SUMMARY_LINES);
-    summary.truncate(SUMMARY_LINES);
+    // What is missing from the picture as a whole is always told.
+    let (mut summary, others) = report.kinds();
+    let shown = others.len().min(SUMMARY_LINES.saturating_sub(summary.len()));
+    let rest = others.len() - shown;
+    summary.extend(others.into_iter().take(shown));
     if rest > 0 {
         summary.push(format!("... and {rest} more kinds (-v or --report FILE for all)"));
     }

@@ -12,8 +12,8 @@ use crate::desc::{
 use crate::import::{Assets, ImageData, MeshData, RgbImage};
 use crate::math::{DAffine3, DMat3, DVec3, Transform};
 
-/// What becomes of samplers of independent numbers.
-pub const SOBOL_FOR_INDEPENDENT: &str = "Sobol points: the same mean with less noise; --sampler independent for independent numbers";
+/// What becomes of samplers of independent numbers: another set of points changes no mean, so they count as mapped.
+pub const SOBOL_FOR_INDEPENDENT: &str = "Sobol points, with the same mean and less noise (--sampler independent for independent numbers)";
 
 /// A scene under construction: names are made unique, and the places where things come from are kept for messages.
 #[derive(Debug, Default)]
@@ -144,7 +144,8 @@ impl Draft {
         self.note(place, element, parameter, Outcome::Ignored, why.into());
     }
 
-    fn note(&mut self, place: &str, element: &str, parameter: &str, outcome: Outcome, note: String) {
+    /// Says what became of a parameter of an element, with a note.
+    pub fn note(&mut self, place: &str, element: &str, parameter: &str, outcome: Outcome, note: String) {
         self.report.entries.push(ReportEntry { place: place.into(), element: element.into(), parameter: parameter.into(), outcome, note });
     }
 

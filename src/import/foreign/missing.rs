@@ -37,7 +37,7 @@ impl Imported {
             let file = match light {
                 LightDesc::Environment(light) => light.file.as_deref(),
                 LightDesc::Ies(light) => Some(light.file.as_str()),
-                LightDesc::Point(_) | LightDesc::Spot(_) | LightDesc::Directional(_) => None,
+                LightDesc::Point(_) | LightDesc::Spot(_) | LightDesc::Projector(_) | LightDesc::Directional(_) => None,
             };
             file.filter(|file| is_missing(file)).inspect(|file| report(place, "light", file)).is_none()
         });

@@ -33,7 +33,7 @@ pub fn recolored(draft: &mut Draft, folder: &Path, name: &str, factor: [f32; 3],
             let color_space = ColorSpaceDesc::Linear;
             TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert }
         }
-        TextureDesc::VertexColor | TextureDesc::Product { .. } => return None,
+        TextureDesc::VertexColor | TextureDesc::MeshAttribute { .. } | TextureDesc::Product { .. } => return None,
     };
     Some(draft.add_texture(&format!("{name}_changed"), &format!("textures.{name}"), texture))
 }

@@ -1,6 +1,7 @@
 //! What became of each parameter of an imported file.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -16,6 +17,9 @@ pub enum Outcome {
     Ignored,
 }
 
+/// Why a parameter is ignored that belongs to an element which is ignored as a whole: reported, but not in the summary.
+pub(super) const PART_OF_IGNORED: &str = "its element is ignored";
+
 /// A parameter and what became of it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ReportEntry {
@@ -28,7 +32,7 @@ pub struct ReportEntry {
     pub parameter: String,
     /// What became of it.
     pub outcome: Outcome,
-    /// How it was approximated, or why it was ignored.
+    /// How it was approximated, why it was ignored, or how the scene says it.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
 }
@@ -51,22 +55,36 @@ impl ImportReport {
         self.entries.iter().all(|entry| entry.outcome == Outcome::Mapped)
     }
 
-    /// What was not mapped, a line for each kind of it: the same note about the same parameter of many elements is one line.
+    /// What was not mapped, a line for each kind of it: the same note about the same parameter of many elements is one line. Elements that are
+    /// ignored as a whole come first, then parameters that are, then approximations.
     pub fn summary(&self) -> Vec<String> {
-        let mut kinds: BTreeMap<(Outcome, String), (usize, &str)> = BTreeMap::new();
-        for entry in self.entries.iter().filter(|entry| entry.outcome != Outcome::Mapped) {
+        let (whole, rest) = self.kinds();
+        whole.into_iter().chain(rest).collect()
+    }
+
+    /// The lines of [`summary`](Self::summary) about elements that are ignored as a whole, and the others.
+    pub fn kinds(&self) -> (Vec<String>, Vec<String>) {
+        let mut kinds: BTreeMap<(Reverse<Outcome>, String), (usize, &str)> = BTreeMap::new();
+        let mut whole = BTreeSet::new();
+        let is_told = |entry: &&ReportEntry| entry.outcome != Outcome::Mapped && entry.note != PART_OF_IGNORED;
+        for entry in self.entries.iter().filter(is_told) {
             let kind: Vec<&str> = entry.element.split(" \"").take(1).collect();
             let what =
                 [&kind.concat(), entry.parameter.as_str()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(": ");
             let note = if entry.note.is_empty() { what } else { format!("{what}: {}", entry.note) };
-            kinds.entry((entry.outcome, note)).or_insert((0, &entry.place)).0 += 1;
+            if entry.outcome == Outcome::Ignored && entry.parameter.is_empty() {
+                whole.insert(note.clone());
+            }
+            kinds.entry((Reverse(entry.outcome), note)).or_insert((0, &entry.place)).0 += 1;
         }
-        let line = |((outcome, what), (count, place)): ((Outcome, String), (usize, &str))| {
+        let line = |((Reverse(outcome), what), (count, place)): ((Reverse<Outcome>, String), (usize, &str))| {
             let outcome = if outcome == Outcome::Approximated { "approximated" } else { "ignored" };
             let times = if count > 1 { format!(" ({count} times, first at {place})") } else { format!(" ({place})") };
             format!("{outcome}: {what}{times}")
         };
-        kinds.into_iter().map(line).collect()
+        let (first, second): (Vec<_>, Vec<_>) =
+            kinds.into_iter().partition(|((Reverse(outcome), note), _)| *outcome == Outcome::Ignored && whole.contains(note));
+        (first.into_iter().map(line).collect(), second.into_iter().map(line).collect())
     }
 }
 
@@ -86,12 +104,16 @@ mod tests {
         report.entries.push(entry("bsdf plastic \"b\"", Outcome::Approximated, "GGX in place of Beckmann"));
         report.entries.push(entry("bsdf plastic \"c\"", Outcome::Approximated, "GGX in place of Beckmann"));
         report.entries.push(entry("shape hair", Outcome::Ignored, "there are no curves"));
+        report.entries.push(ReportEntry { parameter: String::new(), ..entry("shape sdfgrid", Outcome::Ignored, "unsupported shape") });
+        report.entries.push(entry("shape sdfgrid", Outcome::Ignored, PART_OF_IGNORED));
         assert!(!report.is_exact());
-        assert_eq!(report.count(Outcome::Approximated), 2);
+        assert_eq!((report.count(Outcome::Approximated), report.count(Outcome::Ignored)), (2, 3));
         let expected = [
-            "approximated: bsdf plastic: alpha: GGX in place of Beckmann (2 times, first at s.xml:1:2)",
+            "ignored: shape sdfgrid: unsupported shape (s.xml:1:2)",
             "ignored: shape hair: alpha: there are no curves (s.xml:1:2)",
+            "approximated: bsdf plastic: alpha: GGX in place of Beckmann (2 times, first at s.xml:1:2)",
         ];
         assert_eq!(report.summary(), expected);
+        assert_eq!(report.kinds().0, expected[..1]);
     }
 }

@@ -17,8 +17,8 @@ use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Mesh, Placed, Shape, SpawnPoint, SurfaceInteraction};
 use crate::id::{PrimId, ShapeId, TextureId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{DVec3, Ray, Vec2, Vec3};
-use crate::texture::Texture;
+use crate::math::{DVec3, Ray, Vec3};
+use crate::texture::{Footprint, Texture};
 
 /// Light given off by a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,9 +27,9 @@ pub struct Emission {
     pub radiance: Rgb,
     /// Whether the back emits too.
     pub two_sided: bool,
-    /// A texture over the surface's uv that multiplies the radiance.
+    /// A texture of the surface that multiplies the radiance.
     pub texture: Option<TextureId>,
-    /// How much of the surface is there, by its uv, if not all of it.
+    /// How much of the surface is there, if not all of it.
     pub opacity: Option<TextureId>,
 }
 
@@ -41,17 +41,17 @@ impl Emission {
 
     /// Radiance at a point of the surface.
     #[inline]
-    fn at(&self, textures: &[Texture], uv: impl FnOnce() -> Vec2) -> Rgb {
+    fn at<'a>(&self, textures: &[Texture], point: impl FnOnce() -> Footprint<'a>) -> Rgb {
         match self.texture {
             None => self.radiance,
-            Some(id) => self.textured(&textures[id.index()], uv()),
+            Some(id) => self.textured(&textures[id.index()], &point()),
         }
     }
 
     /// Out of the way of emission without a texture.
     #[cold]
-    fn textured(&self, texture: &Texture, uv: Vec2) -> Rgb {
-        self.radiance * texture.color(uv)
+    fn textured(&self, texture: &Texture, point: &Footprint) -> Rgb {
+        self.radiance * texture.color_over(point)
     }
 
     /// Whether all points of the surface give off the same light.
@@ -61,9 +61,9 @@ impl Emission {
     }
 
     /// What a point chosen on the surface brings: rays meet it as often as its opacity says, so this is the mean over rays.
-    fn expected(&self, textures: &[Texture], uv: Vec2) -> Rgb {
-        let coverage = self.opacity.map_or(1.0, |id| textures[id.index()].scalar(uv));
-        self.at(textures, || uv) * coverage
+    fn expected(&self, textures: &[Texture], point: &Footprint) -> Rgb {
+        let coverage = self.opacity.map_or(1.0, |id| textures[id.index()].scalar_over(point));
+        self.at(textures, || *point) * coverage
     }
 }
 
@@ -152,7 +152,7 @@ impl AreaLight {
         };
         let mut luminance = emission.radiance.luminance();
         if !emission.is_even() {
-            let brightness = |uv| emission.expected(textures, uv).luminance();
+            let brightness = |point: &Footprint| emission.expected(textures, point).luminance();
             luminance = textured::mean(geometry.shape(shape), prim, brightness).max(textured::LEAST_MEAN * luminance);
             if let Form::Parallelogram(quad) = &mut form {
                 quad.texels = textured::density(brightness).map(Box::new);
@@ -178,8 +178,9 @@ impl AreaLight {
 
     /// Radiance leaving the point towards `wo` (unit, away from the surface).
     #[inline]
-    pub fn radiance(&self, textures: &[Texture], at: &SurfaceInteraction, wo: Vec3) -> Rgb {
-        if self.emission.two_sided || at.n_g.dot(wo) > 0.0 { self.emission.at(textures, || at.uv) } else { Rgb::BLACK }
+    pub fn radiance(&self, geometry: &Geometry, textures: &[Texture], at: &SurfaceInteraction, wo: Vec3) -> Rgb {
+        let point = || Footprint { attributes: geometry.attributes(at), ..Footprint::point(at.uv) };
+        if self.emission.two_sided || at.n_g.dot(wo) > 0.0 { self.emission.at(textures, point) } else { Rgb::BLACK }
     }
 
     /// Light that arrives at `p` from a chosen point of the surface; `None` where `p` sees the dark side.
@@ -199,7 +200,7 @@ impl AreaLight {
             Form::Parallelogram(quad) if self.emission.two_sided || quad.sees_front(p) => (quad.sample_textured(p, u)?, quad.error),
             _ => self.sample_surface(geometry, p, u)?,
         };
-        let radiance = self.emission.expected(textures, textured::uv(geometry.shape(self.shape), self.prim, sample.p, u));
+        let radiance = self.emission.expected(textures, &textured::point(geometry.shape(self.shape), self.prim, sample.p, u));
         Some(LightSample::at(&sample, error, radiance))
     }
 

@@ -56,7 +56,7 @@ pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p:
         hits += 1;
         let pdf = light.pdf(geometry, p, &ray, &at);
         assert!((pdf - s.pdf).abs() <= tolerance * s.pdf, "{pdf} {} at {:?}", s.pdf, at.p);
-        assert_eq!(light.radiance(&[], &at, -s.wi), s.radiance);
+        assert_eq!(light.radiance(geometry, &[], &at, -s.wi), s.radiance);
     }
     assert!(hits > n / 20, "{hits}");
 }

@@ -189,7 +189,7 @@ fn compared(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
 }
 
 /// A value under a name, or each of an object's values under a name of its own.
-fn put(found: &mut BTreeMap<String, String>, name: &str, value: &Value) {
+pub(in crate::render) fn put(found: &mut BTreeMap<String, String>, name: &str, value: &Value) {
     let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     match value {
         Value::Null => {}

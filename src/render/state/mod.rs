@@ -11,6 +11,7 @@ mod merge;
 
 pub use checkpoints::Checkpoints;
 pub use file::StateFile;
+pub(super) use header::put;
 pub use header::{Header, Shard};
 pub use merge::{Merged, merge};
 

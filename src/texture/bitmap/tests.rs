@@ -180,7 +180,7 @@ fn what_is_no_image_is_refused() {
 }
 
 /// A square of uv in which as many texels lie of an image that fills the unit square.
-fn over(uv: Vec2, texels: f32, count: usize) -> Footprint {
+fn over(uv: Vec2, texels: f32, count: usize) -> Footprint<'static> {
     Footprint { area: texels / count as f32, ..Footprint::point(uv) }
 }
 

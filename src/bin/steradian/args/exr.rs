@@ -86,7 +86,10 @@ pub struct CheckExrArgs {
     /// Warnings count as errors
     #[arg(long)]
     pub strict: bool,
-    /// As JSON
+    /// Name every place that breaks a rule, not only the first three
+    #[arg(short, long)]
+    pub verbose: bool,
+    /// As JSON, with every place
     #[arg(long)]
     pub json: bool,
 }

@@ -82,9 +82,9 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
         triangles,
         normals: normals.map(|normals| used.iter().map(|&i| normals.floats(i as usize)).collect()),
         uvs: None,
-        colors: colors.as_ref().map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect()),
-        origin: [0.0; 3],
-    };
+        ..MeshData::default()
+    }
+    .with_colors(colors.as_ref().map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect()));
     morph(source, path, primitive, deformation.weights, count, &used, &mut data)?;
     if let Some(joints) = deformation.joints {
         skin(source, path, primitive, joints, &column, &used, &mut data)?;

@@ -68,6 +68,8 @@ fn place(source: Source, path: &str, element: &str, light: &Light, world: &DAffi
                 intensity,
                 cutoff_angle_degrees: outer.to_degrees(),
                 beam_angle_degrees: Some(inner.to_degrees()),
+                texture: None,
+                up: None,
                 group: None,
             })
         }

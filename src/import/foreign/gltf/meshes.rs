@@ -188,7 +188,7 @@ impl Builder<'_, '_> {
             triangles.read_uvs(source, path, primitive, set)?;
         }
         let mut data = triangles.data;
-        data.colors = data.colors.filter(|_| look.vertex_colors);
+        data.attributes.retain(|_, _| look.vertex_colors);
         if look.uv_set.is_some() && data.uvs.is_none() {
             self.draft.approximated(path, "primitive", "TEXCOORD", "there is no uv for the textures: they show the colour of one corner");
             data.uvs = Some(vec![[0.0, 1.0]; data.positions.len()]);

@@ -158,8 +158,8 @@ impl<'a> Reader<'a> {
                 (MaterialDesc::Plastic(Box::new(plastic)), true)
             }
             "principled" => self.principled(element, uv)?,
-            other => {
-                element.ignored("", format!("there is no bsdf {other}: a grey diffuse surface"));
+            _ => {
+                element.ignored("", "unsupported BSDF: a grey diffuse surface in its place");
                 (MaterialDesc::Diffuse { albedo: ColorDesc::Grey(0.5), roughness: ScalarDesc::Constant(0.0) }, true)
             }
         })
@@ -262,10 +262,6 @@ impl<'a> Reader<'a> {
         let inner = self.one_part(element, uv)?;
         let opacity = match self.scalar(element, "opacity", 0.5, 1.0, uv)? {
             ScalarDesc::Constant(v) => OpacityDesc::Number(v),
-            ScalarDesc::Texture { texture } if self.has_vertex_colors(&texture) => {
-                element.ignored("opacity", "opacity has no colours of vertices: 1");
-                OpacityDesc::Number(1.0)
-            }
             ScalarDesc::Texture { texture } => OpacityDesc::Texture { texture: self.without_alpha(&texture, element), threshold: None },
         };
         if inner.opacity.is_some() {

@@ -3,6 +3,7 @@
 use super::names;
 use super::tree::{Document, Place, Plugin, PluginId, Property, Value};
 use crate::error::Result;
+use crate::import::foreign::report::PART_OF_IGNORED;
 use crate::import::{Draft, Outcome};
 use crate::math::DAffine3;
 
@@ -141,6 +142,11 @@ impl<'a> Element<'a> {
         }
     }
 
+    /// Says how the scene says a parameter, or the plugin as a whole.
+    pub fn mapped(&mut self, name: &str, how: impl Into<String>) {
+        self.set(name, Outcome::Mapped, how.into());
+    }
+
     /// Says how a parameter (or, if there is none of that name, the plugin's default) was approximated.
     pub fn approximated(&mut self, name: &str, how: impl Into<String>) {
         self.set(name, Outcome::Approximated, how.into());
@@ -173,16 +179,12 @@ impl<'a> Element<'a> {
     /// Reports what became of the parameters; of the plugin as a whole, too, unless it has any.
     pub fn finish(self, draft: &mut Draft) {
         let title = self.plugin.title();
+        let is_ignored = self.notes.iter().any(|(outcome, _)| *outcome == Outcome::Ignored);
         if self.notes.is_empty() && self.plugin.properties.is_empty() {
             draft.mapped(&self.plugin.place.to_string(), &title, "");
         }
         for (outcome, note) in self.notes {
-            let place = self.plugin.place.to_string();
-            if outcome == Outcome::Approximated {
-                draft.approximated(&place, &title, "", note);
-            } else {
-                draft.ignored(&place, &title, "", note);
-            }
+            draft.note(&self.plugin.place.to_string(), &title, "", outcome, note);
         }
         for (property, outcome) in self.plugin.properties.iter().zip(self.outcomes) {
             let place = property.place.to_string();
@@ -192,9 +194,8 @@ impl<'a> Element<'a> {
                 _ => property.name.clone(),
             };
             match outcome {
-                Some((Outcome::Mapped, _)) => draft.mapped(&place, &title, &name),
-                Some((Outcome::Approximated, how)) => draft.approximated(&place, &title, &name, how),
-                Some((Outcome::Ignored, why)) => draft.ignored(&place, &title, &name, why),
+                Some((outcome, note)) => draft.note(&place, &title, &name, outcome, note),
+                None if is_ignored => draft.ignored(&place, &title, &name, PART_OF_IGNORED),
                 None => draft.ignored(&place, &title, &name, format!("not a parameter that this reader knows of a {}", self.plugin.kind)),
             }
         }

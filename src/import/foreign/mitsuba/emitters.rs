@@ -1,12 +1,16 @@
 //! Emitters to lights.
 
+use std::f32::consts::PI;
+
 use super::Reader;
 use super::element::Element;
+use super::sensor::fov;
 use super::textures::{Role, TextureValue, UvOrigin};
 use super::tree::{PluginId, Value};
 use super::values;
 use crate::desc::{
-    DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc, TransformDesc, TransformStepDesc,
+    DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc, SpotLightDesc, TextureDesc,
+    TransformDesc, TransformStepDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::recolor::linear;
@@ -17,12 +21,13 @@ impl<'a> Reader<'a> {
     /// Reads an emitter that is no shape.
     pub(super) fn emitter(&mut self, id: PluginId) -> Result<()> {
         let mut element = Element::new(self.document, id);
-        element.ignored_plugins("medium", "there are no participating media")?;
+        element.ignored_plugins("medium", "participating media are unsupported: left out")?;
         // Which light is sampled how often does not change the picture.
         element.float("sampling_weight")?;
         let light = match element.kind() {
             "point" => self.point(&mut element)?,
             "spot" => self.spot(&mut element)?,
+            "projector" => self.projector(&mut element)?,
             "directional" => self.directional(&mut element)?,
             "constant" => {
                 let radiance = self.emitted(&mut element, "radiance")?;
@@ -44,8 +49,8 @@ impl<'a> Reader<'a> {
                 return Ok(());
             }
             "area" => return Err(element.place().error("an area emitter can only stand in a shape")),
-            other => {
-                self.whole(id, &format!("there is no emitter {other}"));
+            _ => {
+                self.whole(id, "unsupported emitter: its light is left out");
                 return Ok(());
             }
         };
@@ -59,7 +64,7 @@ impl<'a> Reader<'a> {
     pub(super) fn emission(&mut self, id: PluginId, uv: UvOrigin) -> Result<Option<EmissionDesc>> {
         let mut element = Element::new(self.document, id);
         if element.kind() != "area" {
-            self.whole(id, "only an area emitter can stand in a shape");
+            self.whole(id, "unsupported emitter of a shape: its light is left out");
             return Ok(None);
         }
         element.float("sampling_weight")?;
@@ -69,11 +74,6 @@ impl<'a> Reader<'a> {
             _ => None,
         };
         let emission = match texture.map(|id| self.texture(id, Role::Color, uv)).transpose()? {
-            Some(TextureValue::Named(texture)) if self.has_vertex_colors(&texture) => {
-                element.approximated("radiance", "white in place of the colours of vertices");
-                element.take("radiance");
-                EmissionDesc { radiance: [1.0; 3], texture: None, two_sided: false, group: None }
-            }
             Some(TextureValue::Named(texture)) => {
                 element.take("radiance");
                 EmissionDesc { radiance: [1.0; 3], texture: Some(texture), two_sided: false, group: None }
@@ -122,8 +122,15 @@ impl<'a> Reader<'a> {
         let map = element.transform("to_world")?;
         let cutoff = element.float("cutoff_angle")?.unwrap_or(20.0);
         let beam = element.float("beam_width")?.unwrap_or(0.75 * cutoff);
-        if element.take("texture").is_some() {
-            element.ignored("texture", "a spot light has one colour");
+        let (mut intensity, mut picture) = (intensity, None);
+        if let Some(property) = element.take("texture") {
+            match self.texture_value(property, Role::Color, UvOrigin::Upward)? {
+                TextureValue::Constant(color) => intensity = [0, 1, 2].map(|i| intensity[i] * color[i]),
+                TextureValue::Named(texture) => picture = Some(texture),
+            }
+            if picture.is_some() && map.matrix3.determinant() < 0.0 {
+                element.approximated("to_world", "the light's picture is not mirrored");
+            }
         }
         Ok(LightDesc::Spot(SpotLightDesc {
             position: map.translation.to_array(),
@@ -131,8 +138,53 @@ impl<'a> Reader<'a> {
             intensity,
             cutoff_angle_degrees: cutoff,
             beam_angle_degrees: Some(beam),
+            // Mitsuba's u grows to the left and its v, downward in images, upward: the picture stands on its head.
+            up: picture.as_ref().map(|_| (-map.matrix3.y_axis).to_array()),
+            texture: picture,
             group: None,
         }))
+    }
+
+    fn projector(&mut self, element: &mut Element<'a>) -> Result<LightDesc> {
+        let map = element.transform("to_world")?;
+        // What Mitsuba calls irradiance is the radiance of a white diffuse plane.
+        let scale = element.float("scale")?.unwrap_or(1.0) as f32 * PI;
+        let picture = match element.take("irradiance") {
+            None => TextureValue::Constant([1.0; 3]),
+            Some(property) => match (&property.value, self.document.plugin_of(property)?) {
+                (_, Some(id)) if self.document.plugins[id.0].class == "texture" => self.texture(id, Role::Color, UvOrigin::Upward)?,
+                _ => TextureValue::Constant(self.emitted(element, "irradiance")?),
+            },
+        };
+        let (irradiance, texture) = match picture {
+            TextureValue::Constant(color) => (color.map(|c| c * scale), None),
+            TextureValue::Named(texture) => ([scale; 3], Some(texture)),
+        };
+        let aspect = texture.as_ref().map_or(1.0, |texture| self.aspect(texture));
+        if map.matrix3.determinant() < 0.0 {
+            element.approximated("to_world", "the projector's picture is not mirrored");
+        }
+        Ok(LightDesc::Projector(ProjectorLightDesc {
+            position: map.translation.to_array(),
+            look_at: (map.translation + map.matrix3.z_axis.normalize_or_zero()).to_array(),
+            up: Some(map.matrix3.y_axis.to_array()),
+            texture,
+            irradiance,
+            vertical_fov_degrees: fov(element, aspect)?,
+            aspect: Some(aspect),
+            group: None,
+        }))
+    }
+
+    /// The width over the height of the image that a texture is; 1 for what is none, or cannot be read, which is found when the scene is
+    /// compiled.
+    fn aspect(&self, texture: &str) -> f64 {
+        let Some(TextureDesc::Image { file, .. }) = self.draft.desc.textures.get(texture) else { return 1.0 };
+        let ratio = |image: &ImageData| image.width as f64 / image.height as f64;
+        match self.draft.assets.images.get(file) {
+            Some(image) => ratio(image),
+            None => read_image(&self.scene.parent().unwrap_or(std::path::Path::new("")).join(file)).map_or(1.0, |image| ratio(&image)),
+        }
     }
 
     fn directional(&mut self, element: &mut Element<'a>) -> Result<LightDesc> {

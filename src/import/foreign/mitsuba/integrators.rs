@@ -80,7 +80,7 @@ impl Reader<'_> {
                 self.draft.desc.integrator = IntegratorDesc::Depth;
                 element.approximated("", "depth along the view axis in place of the length of the ray");
             }
-            other => element.ignored("", format!("there is no integrator {other}: path tracing")),
+            other => element.ignored("", format!("unsupported integrator {other}: path tracing in its place")),
         }
         if element.boolean("hide_emitters", false)? {
             match &mut self.draft.desc.integrator {

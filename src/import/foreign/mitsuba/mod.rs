@@ -99,7 +99,7 @@ impl Reader<'_> {
                     has_sensor = true;
                     self.sensor(id)?;
                 }
-                ("sensor", kind) => self.whole(id, &format!("there is no sensor {kind}")),
+                ("sensor", _) => self.whole(id, "unsupported sensor: it is left out"),
                 ("integrator", _) if has_integrator => self.whole(id, "only the first integrator is used"),
                 ("integrator", _) => {
                     has_integrator = true;
@@ -107,7 +107,7 @@ impl Reader<'_> {
                 }
                 ("shape", _) => self.world_shape(id)?,
                 ("emitter", _) => self.emitter(id)?,
-                ("medium" | "phase" | "volume", _) => self.whole(id, "there are no participating media"),
+                ("medium" | "phase" | "volume", _) => self.whole(id, "participating media are unsupported: left out"),
                 // What others refer to is read when they do.
                 _ => {}
             }

@@ -76,7 +76,7 @@ impl Reader<'_> {
             element.ignored("srf", "the camera sees red, green and blue");
         }
         camera.transform = Some(placement(&mut element, &map)?);
-        element.ignored_plugins("medium", "there are no participating media")?;
+        element.ignored_plugins("medium", "participating media are unsupported: left out")?;
         let place = element.place().to_string();
         element.finish(&mut self.draft);
         self.draft.set_camera(&place, camera);
@@ -86,6 +86,9 @@ impl Reader<'_> {
     /// Reads a film; the result is the picture's width over its height.
     fn film(&mut self, id: PluginId) -> Result<f64> {
         let mut element = Element::new(self.document, id);
+        if element.kind() == "specfilm" {
+            element.approximated("", "a film of red, green and blue in place of one of bands of wavelengths");
+        }
         let mut film = self.draft.desc.film.clone();
         film.width = element.count("width", 1)?.unwrap_or(768);
         film.height = element.count("height", 1)?.unwrap_or(576);
@@ -162,7 +165,7 @@ impl Reader<'_> {
         // What stratifies the samples in other ways has the same mean: Sobol points do it here.
         element.boolean("jitter", true)?;
         if element.kind() == "independent" {
-            element.approximated("", SOBOL_FOR_INDEPENDENT);
+            element.mapped("", SOBOL_FOR_INDEPENDENT);
         }
         let sampler = &mut self.draft.desc.sampler;
         (sampler.spp, sampler.seed) = (spp, seed.unsigned_abs());
@@ -172,7 +175,7 @@ impl Reader<'_> {
 }
 
 /// The vertical angle of view in degrees.
-fn fov(element: &mut Element, aspect: f64) -> Result<f64> {
+pub(super) fn fov(element: &mut Element, aspect: f64) -> Result<f64> {
     let focal_length = element.text("focal_length")?;
     let (fov, axis) = match (element.float("fov")?, focal_length) {
         (Some(_), Some(_)) => return Err(element.place_of("focal_length").error("give either \"fov\" or \"focal_length\"")),

@@ -86,7 +86,8 @@ fn decode(stream: &mut impl Read, version: u64) -> Result<MeshData, String> {
     let mut corners = Vec::new();
     let count = triangles.checked_mul(3).ok_or("too many triangles")?;
     values::<4>(stream, count, |bytes| corners.push(u32::from_le_bytes(bytes)))?;
-    Ok(MeshData { positions, triangles: corners.as_chunks::<3>().0.to_vec(), normals, uvs, colors, origin })
+    Ok(MeshData { positions, triangles: corners.as_chunks::<3>().0.to_vec(), normals, uvs, origin, ..MeshData::default() }
+        .with_colors(colors))
 }
 
 /// `count` tuples of floats or doubles.

@@ -108,10 +108,10 @@ impl<'a> Reader<'a> {
         let place = element.place().to_string();
         let Some(Form { mut shape, map, uv, reversed }) = self.form(&mut element)? else {
             let why = match element.kind() {
-                "sphere" | "cylinder" => "it has no area".into(),
-                kind => format!("there is no shape {kind}"),
+                "sphere" | "cylinder" => "it has no area",
+                _ => "unsupported shape: it is left out of the picture",
             };
-            self.whole(id, &why);
+            self.whole(id, why);
             return Ok(None);
         };
         let flipped = element.boolean("flip_normals", false)?;
@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
         if emission.is_some() && opacity.take().is_some() {
             element.ignored("", "what gives off light has no holes");
         }
-        element.ignored_plugins("medium", "there are no participating media")?;
+        element.ignored_plugins("medium", "participating media are unsupported: left out")?;
         element.ignored_plugins("sensor", "a sensor on a shape is no camera")?;
         // How often silhouettes are sampled for derivatives.
         element.float("silhouette_sampling_weight")?;

@@ -64,7 +64,7 @@ impl<'a> Reader<'a> {
                 return Ok(color(&spectrum::Spectrum::Blackbody(kelvin), emitted).map(|c| (f64::from(c) * peak) as f32));
             }
             other => {
-                element.ignored("", format!("there is no spectrum {other}: 1"));
+                element.ignored("", format!("unsupported spectrum {other}: 1 in its place"));
                 spectrum::Spectrum::Constant(1.0)
             }
         };

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::Reader;
 use super::element::Element;
 use super::tree::{PluginId, Property, Value};
+use crate::attribute::is_of_faces;
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, RangedDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
 use crate::import::{ImageData, Samples};
@@ -154,8 +155,8 @@ impl<'a> Reader<'a> {
             ("texture", "mesh_attribute") => self.mesh_attribute(&mut element)?,
             ("texture" | "spectrum", "rawconstant") => TextureValue::Constant(raw_constant(&mut element)?),
             ("spectrum", _) => TextureValue::Constant(self.spectrum_plugin(&mut element, false)?),
-            ("texture", kind) => {
-                element.ignored("", format!("there is no texture {kind}: a grey of 0.5"));
+            ("texture", _) => {
+                element.ignored("", "unsupported texture: a grey of 0.5 in its place");
                 TextureValue::Constant([0.5; 3])
             }
             (class, _) => return Err(element.place().error(format!("a {class} is no texture"))),
@@ -166,36 +167,21 @@ impl<'a> Reader<'a> {
         Ok(value)
     }
 
-    /// Colours of vertices; there are no other attributes.
+    /// An attribute of meshes. Whether a mesh has it is found when the scene is compiled.
     fn mesh_attribute(&mut self, element: &mut Element<'a>) -> Result<TextureValue> {
         let attribute = element.text("name")?.ok_or_else(|| element.place().error("a mesh_attribute needs \"name\""))?;
-        if attribute != "vertex_color" {
-            element.ignored("name", format!("meshes have no attribute {attribute}: a grey of 0.5"));
-            return Ok(TextureValue::Constant([0.5; 3]));
+        if is_of_faces(attribute).is_none() {
+            return Err(element
+                .place_of("name")
+                .error(format!("\"{attribute}\" is no name of an attribute: it begins with vertex_ or face_")));
         }
-        let given = element.float("scale")?.unwrap_or(1.0) as f32;
-        let scale = given.clamp(0.0, 1.0);
-        if scale != given {
-            element.approximated("scale", "the nearest number from 0 to 1");
+        let scale = element.float("scale")?.unwrap_or(1.0) as f32;
+        if !(scale.is_finite() && scale >= 0.0) {
+            return Err(element.place_of("scale").error(format!("\"scale\" must be finite and not below 0, not {scale}")));
         }
-        let place = element.place().to_string();
-        let name = if element.plugin.id.is_empty() { "vertex_color" } else { &element.plugin.id };
-        let colors = self.draft.add_texture(name, &place, TextureDesc::VertexColor);
-        if scale == 1.0 {
-            return Ok(TextureValue::Named(colors));
-        }
-        let factors = vec![ColorDesc::Texture { texture: colors }, ColorDesc::Grey(scale)];
-        Ok(TextureValue::Named(self.draft.add_texture(name, &place, TextureDesc::Product { factors })))
-    }
-
-    /// Whether a texture is one of colours of vertices, which only parameters of materials have.
-    pub(super) fn has_vertex_colors(&self, texture: &str) -> bool {
-        let is_color = |factor: &ColorDesc| matches!(factor, ColorDesc::Texture { texture } if self.has_vertex_colors(texture));
-        match self.draft.desc.textures.get(texture) {
-            Some(TextureDesc::VertexColor) => true,
-            Some(TextureDesc::Product { factors }) => factors.iter().any(is_color),
-            _ => false,
-        }
+        let name = if element.plugin.id.is_empty() { attribute } else { &element.plugin.id };
+        let texture = TextureDesc::MeshAttribute { name: attribute.into(), scale };
+        Ok(TextureValue::Named(self.draft.add_texture(name, &element.place().to_string(), texture)))
     }
 
     fn bitmap(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<String> {

@@ -56,6 +56,8 @@ impl Lights<'_> {
                     intensity: self.emitted(params, "I", whole)?,
                     cutoff_angle_degrees: cutoff,
                     beam_angle_degrees: Some(beam),
+                    texture: None,
+                    up: None,
                     group: None,
                 })
             }

@@ -3,8 +3,8 @@
 use super::params::Params;
 use crate::desc::{FilterDesc, IntegratorDesc, OutputDesc, PixelTypeDesc};
 use crate::error::Result;
-use crate::import::foreign::Draft;
 use crate::import::foreign::draft::SOBOL_FOR_INDEPENDENT;
+use crate::import::foreign::{Draft, Outcome};
 
 /// A directive with a type: `Film "rgb" ...`.
 #[derive(Clone, Debug)]
@@ -136,12 +136,11 @@ pub fn set_sampler(draft: &mut Draft, sampler: Option<&Typed>) -> Result<()> {
     }
     draft.desc.sampler.spp = spp as u32;
     if kind == "independent" {
-        draft.approximated(&params.place, &params.element, "", SOBOL_FOR_INDEPENDENT);
+        draft.note(&params.place, &params.element, "", Outcome::Mapped, SOBOL_FOR_INDEPENDENT.into());
     }
     draft.desc.sampler.seed = params.integer_or("seed", 0)?.unsigned_abs();
-    // Another order of random numbers gives the same picture.
-    params.ignore("randomization", "points are Owen-scrambled");
-    params.ignore("jitter", "points are always jittered");
+    params.map_as("randomization", "points are Owen-scrambled, with the same mean");
+    params.map_as("jitter", "points are always jittered, with the same mean");
     params.report(draft);
     Ok(())
 }
@@ -167,8 +166,11 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
                 draft.approximated(&params.place, &params.element, "", format!("path tracing in place of \"{other}\""));
             }
         }
-        for name in ["lightsampler", "rrthreshold", "samplelights", "samplebsdf", "visualizestrategies", "visualizeweights"] {
-            params.ignore(name, "it changes the noise only");
+        for name in ["lightsampler", "rrthreshold", "samplelights", "samplebsdf"] {
+            params.map_as(name, "it changes the noise only");
+        }
+        for name in ["visualizestrategies", "visualizeweights"] {
+            params.ignore(name, "the picture is rendered, not how it is sampled");
         }
         params.ignore("regularize", "paths are not regularised");
         params.report(draft);

@@ -229,6 +229,13 @@ impl Params {
         }
     }
 
+    /// Says how the scene says a parameter, if it is given.
+    pub fn map_as(&self, name: &str, how: impl Into<String>) {
+        if let Some(param) = self.list.iter().find(|param| param.name == name) {
+            param.settle(Outcome::Mapped, how.into());
+        }
+    }
+
     /// Says that a parameter, if it is given, was approximated.
     pub fn approximate(&self, name: &str, how: impl Into<String>) {
         if let Some(param) = self.get(name) {
@@ -247,9 +254,7 @@ impl Params {
     pub fn report(&self, draft: &mut Draft) {
         for param in &self.list {
             match param.outcome.borrow().as_ref() {
-                Some((Outcome::Mapped, _)) => draft.mapped(&self.place, &self.element, &param.name),
-                Some((Outcome::Approximated, how)) => draft.approximated(&self.place, &self.element, &param.name, how),
-                Some((Outcome::Ignored, why)) => draft.ignored(&self.place, &self.element, &param.name, why),
+                Some((outcome, note)) => draft.note(&self.place, &self.element, &param.name, *outcome, note.clone()),
                 None => draft.ignored(&self.place, &self.element, &param.name, "not known here"),
             }
         }

@@ -1,5 +1,6 @@
 //! Shapes.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::area_light::{AreaLight, Extent};
@@ -13,7 +14,7 @@ use super::triangles;
 use crate::desc::{CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SmoothByDesc, SphereDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
-use crate::import::{MeshData, read_ply};
+use crate::import::{MeshData, read_ply_attributes};
 use crate::math::{DAffine3, DVec3};
 
 /// Meshes of more triangles are kept apart from the scene's text.
@@ -124,7 +125,8 @@ impl Shapes<'_> {
             Some(mesh.triangles),
             mesh.normals,
             mesh.uvs,
-            mesh.colors,
+            None,
+            BTreeMap::new(),
             Vec::new(),
             Vec::new(),
             shading,
@@ -189,7 +191,8 @@ impl Shapes<'_> {
             return Ok(Form::File(file.into()));
         }
         let asset = self.colors.folder.join(file);
-        let mut mesh = read_ply(&asset).map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
+        let mut mesh = read_ply_attributes(&asset, Some(&BTreeSet::new()))
+            .map_err(|error| error.at(self.scene, &format!("{}: {}", params.place, params.element), &asset))?;
         let mut changed = needs.sides && triangles::orient(&mut mesh);
         if needs.uvs && mesh.uvs.is_none() {
             triangles::give_uvs(&mut mesh);

@@ -199,7 +199,7 @@ fn colours_of_vertices_multiply_the_base_colour() {
     let imported = colored(json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 1, 1, 1] } }), &colors);
     let [ColorDesc::Texture { texture }, ColorDesc::Rgb([0.5, 1.0, 1.0])] = &factors(&imported)[..] else { panic!() };
     assert!(matches!(imported.desc.textures[texture], TextureDesc::VertexColor));
-    assert_eq!(mesh(&imported, 0).colors, Some(colors.map(|c| c.map(|c| c.min(1.0))).to_vec()));
+    assert_eq!(mesh(&imported, 0).colors(), Some(&colors.map(|c| c.map(|c| c.min(1.0)))[..]));
     assert_eq!(outcome(&imported, "COLOR_0"), Some(Outcome::Mapped));
 
     let textured = colored(json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }), &colors);
@@ -210,10 +210,10 @@ fn colours_of_vertices_multiply_the_base_colour() {
     // One colour for all is a factor.
     let even = colored(json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 1, 1, 1] } }), &[[0.5, 0.25, 1.0]; 4]);
     assert!(matches!(principled(&even, "m").base_color, ColorDesc::Rgb([0.25, 0.25, 1.0])));
-    assert_eq!((&mesh(&even, 0).colors, outcome(&even, "COLOR_0")), (&None, Some(Outcome::Mapped)));
+    assert_eq!((mesh(&even, 0).colors(), outcome(&even, "COLOR_0")), (None, Some(Outcome::Mapped)));
 
     let unlit = colored(json!({ "extensions": { "KHR_materials_unlit": {} } }), &colors);
-    assert_eq!((&mesh(&unlit, 0).colors, outcome(&unlit, "COLOR_0")), (&None, Some(Outcome::Approximated)));
+    assert_eq!((mesh(&unlit, 0).colors(), outcome(&unlit, "COLOR_0")), (None, Some(Outcome::Approximated)));
     assert_eq!(unlit.desc.shapes[0].common().emission.unwrap().radiance, [0.5, 0.75, 0.25]);
 }
 

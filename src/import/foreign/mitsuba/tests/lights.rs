@@ -108,3 +108,63 @@ fn a_sky_is_an_image_and_a_sun_and_says_so() {
     assert_point(sun.direction, [0.0, -0.6, -0.8]);
     assert!(notes(text).iter().any(|(outcome, _, note)| *outcome == Outcome::Approximated && note.contains("Preetham")));
 }
+
+#[test]
+fn spots_and_projectors_throw_pictures() {
+    let picture = |name: &str| format!(r#"<texture type="bitmap" name="{name}"><string name="filename" value="a.png"/></texture>"#);
+    let place = r#"<transform name="to_world"><lookat origin="0,3,0" target="0,0,0" up="0,0,1"/></transform>"#;
+    let spot = format!(r#"<emitter type="spot">{place}{}</emitter>"#, picture("texture"));
+    let LightDesc::Spot(thrown) = light(&spot) else { panic!() };
+    // Mitsuba's pictures of spots stand on their heads.
+    assert_eq!(thrown.texture.as_deref(), Some("a"));
+    assert_point(thrown.up.unwrap(), [0.0, 0.0, -1.0]);
+    assert!(notes(&spot).is_empty());
+    let grey = r#"<emitter type="spot"><rgb name="intensity" value="2 4 6"/><rgb name="texture" value="0.5"/></emitter>"#;
+    let LightDesc::Spot(tinted) = light(grey) else { panic!() };
+    assert_eq!((tinted.texture, tinted.intensity), (None, [1.0, 2.0, 3.0]));
+
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbImage::new(30, 20).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let read = |more: &str| {
+        let text = format!(
+            r#"<scene version="3.0.0">{SENSOR}<emitter type="projector">{place}{}{more}<float name="scale" value="3"/></emitter></scene>"#,
+            picture("irradiance")
+        );
+        let imported = read_with(&text, &[], &[("a.png", png.get_ref())]).unwrap();
+        assert!(imported.report.is_exact());
+        match imported.desc.lights.into_iter().next() {
+            Some(LightDesc::Projector(projector)) => projector,
+            other => panic!("{other:?}"),
+        }
+    };
+    let across = read(r#"<float name="fov" value="90"/>"#);
+    assert_eq!((across.texture.as_deref(), across.irradiance, across.aspect), (Some("a"), [3.0 * std::f32::consts::PI; 3], Some(1.5)));
+    assert_point(across.position, [0.0, 3.0, 0.0]);
+    assert_point(across.look_at, [0.0, 2.0, 0.0]);
+    assert_point(across.up.unwrap(), [0.0, 0.0, 1.0]);
+    assert_near((0.5 * across.vertical_fov_degrees.to_radians()).tan(), 1.0 / 1.5);
+    let down = read(r#"<float name="fov" value="90"/><string name="fov_axis" value="y"/>"#);
+    assert_near(down.vertical_fov_degrees, 90.0);
+    let even = r#"<emitter type="projector"><rgb name="irradiance" value="1 2 3"/><float name="scale" value="2"/><float name="fov" value="60"/></emitter>"#;
+    let LightDesc::Projector(plain) = light(even) else { panic!() };
+    assert_eq!((plain.texture, plain.irradiance), (None, [1.0, 2.0, 3.0].map(|c| c * (2.0 * std::f32::consts::PI))));
+}
+
+#[test]
+fn what_is_unsupported_is_named_with_what_becomes_of_it() {
+    let light = r#"<emitter type="timed_sunsky"><float name="end_year" value="3"/></emitter>"#;
+    assert_eq!(notes(light), [(Outcome::Ignored, String::new(), "unsupported emitter: its light is left out".to_owned())]);
+    let shape = r#"<shape type="sdfgrid"><string name="filename" value="a.vol"/><bsdf type="diffuse"/></shape>"#;
+    assert_eq!(notes(shape), [(Outcome::Ignored, String::new(), "unsupported shape: it is left out of the picture".to_owned())]);
+    for (kind, what) in [
+        (r#"<bsdf type="measured"><string name="filename" value="a.bsdf"/></bsdf>"#, "unsupported BSDF"),
+        (r#"<bsdf type="diffuse"><texture type="volume" name="reflectance"/></bsdf>"#, "unsupported texture"),
+        (r#"<emitter type="directionalarea"/>"#, "unsupported emitter of a shape"),
+        (r#"<medium type="homogeneous" name="interior"/>"#, "participating media"),
+    ] {
+        let text = format!("<shape type=\"sphere\">{kind}</shape>");
+        let report = try_scene(&text).unwrap().report;
+        let lines = report.summary();
+        assert!(lines.len() == 1 && lines[0].contains(what) && lines[0].contains("s.xml:2:"), "{lines:?}");
+    }
+}

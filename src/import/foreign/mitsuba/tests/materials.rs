@@ -159,13 +159,17 @@ fn attributes_of_meshes_are_colours_of_vertices() {
     };
     let shape = |bsdf: &str| format!(r#"<shape type="ply"><string name="filename" value="m.ply"/>{bsdf}</shape>"#);
     let desc = scene(&shape(&attribute("vertex_color", "")));
-    assert!(matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::VertexColor]));
+    let is_attribute = |desc: &SceneDesc, wanted: &str, factor: f32| matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::MeshAttribute { name, scale }] if name == wanted && *scale == factor);
+    assert!(is_attribute(&desc, "vertex_color", 1.0));
     let scaled = scene(&shape(&attribute("vertex_color", r#"<float name="scale" value="0.5"/>"#)));
-    let MaterialDesc::Diffuse { albedo: ColorDesc::Texture { texture }, .. } = material(&scaled, 0) else { panic!() };
-    assert!(matches!(&scaled.textures[&texture], TextureDesc::Product { factors } if matches!(factors[1], ColorDesc::Grey(0.5))));
-    assert!(notes(&shape(&attribute("face_color", ""))).iter().any(|(outcome, name, _)| *outcome == Outcome::Ignored && name == "name"));
+    assert!(is_attribute(&scaled, "vertex_color", 0.5));
+    assert!(is_attribute(&scene(&shape(&attribute("face_temp", ""))), "face_temp", 1.0));
+    assert!(message(&shape(&attribute("temp", ""))).contains("vertex_ or face_"));
+    let hole = r#"<bsdf type="mask"><texture type="mesh_attribute" name="opacity"><string name="name" value="vertex_a"/></texture><bsdf type="diffuse"/></bsdf>"#;
+    assert!(matches!(scene(&shape(hole)).shapes[0].common().opacity, Some(OpacityDesc::Texture { texture, .. }) if texture == "vertex_a"));
     let light = r#"<emitter type="area"><texture type="mesh_attribute" name="radiance"><string name="name" value="vertex_color"/></texture></emitter>"#;
-    assert!(notes(&shape(light)).iter().any(|(outcome, name, _)| *outcome == Outcome::Approximated && name == "radiance"));
+    assert_eq!(scene(&shape(light)).shapes[0].common().emission.unwrap().texture.as_deref(), Some("vertex_color"));
+    assert!(notes(&shape(light)).is_empty());
 }
 
 #[test]
@@ -229,6 +233,31 @@ fn blends_and_reliefs_consist_of_others() {
     assert!(flips("rectangle") && !flips("sphere"));
     // Normals are never sRGB.
     assert_eq!(notes(&format!("<shape type=\"sphere\">{normal}</shape>"))[0].1, "raw");
+}
+
+#[test]
+fn parts_and_textures_may_be_references() {
+    let shared = format!(
+        r#"{}<bsdf type="diffuse" id="d"><rgb name="reflectance" value="1 0 0"/></bsdf><bsdf type="plastic" id="p"/>"#,
+        bitmap("t", "").replace("name=", "id=").replacen("id=\"filename\"", "name=\"filename\"", 1)
+    );
+    let nested = |bsdf: &str| scene(&format!("{shared}<shape type=\"sphere\"><bsdf type=\"twosided\">{bsdf}</bsdf></shape>"));
+    let is_red = |desc: &SceneDesc, name: &str| matches!(&desc.materials[name], MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(c), .. } if *c == [1.0, 0.0, 0.0]);
+    for (bsdf, texture) in [("normalmap", "normalmap"), ("bumpmap", "arbitrary")] {
+        for part in ["<ref id=\"d\"/>", "<ref name=\"bsdf\" id=\"d\"/>", "<bsdf type=\"twosided\"><ref id=\"d\"/></bsdf>"] {
+            let desc = nested(&format!("<bsdf type=\"{bsdf}\"><ref name=\"{texture}\" id=\"t\"/>{part}</bsdf>"));
+            let MaterialDesc::Relief { material: inner, normal_map, bump_map } = material(&desc, 0) else { panic!("{bsdf} {part}") };
+            assert!(is_red(&desc, &inner), "{bsdf} {part}");
+            assert_eq!(normal_map.map(|map| map.texture).or(bump_map.map(|map| map.texture)).as_deref(), Some("t"));
+        }
+    }
+    let desc = nested("<bsdf type=\"blendbsdf\"><ref name=\"weight\" id=\"t\"/><ref id=\"p\"/><ref id=\"d\"/></bsdf>");
+    let MaterialDesc::Mix { materials, amount: ScalarDesc::Texture { texture } } = material(&desc, 0) else { panic!() };
+    assert_eq!((materials[0].as_str(), is_red(&desc, &materials[1]), texture.as_str()), ("p", true, "t"));
+    let desc = nested("<bsdf type=\"mask\"><ref name=\"opacity\" id=\"t\"/><ref id=\"d\"/></bsdf>");
+    assert!(is_red(&desc, desc.shapes[0].common().material.unwrap()));
+    assert!(matches!(desc.shapes[0].common().opacity, Some(OpacityDesc::Texture { .. })));
+    assert!(message("<shape type=\"sphere\"><bsdf type=\"bumpmap\"><ref id=\"x\"/></bsdf></shape>").contains("nothing has the id"));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::desc::{CameraDesc, CameraKindDesc, FilterDesc, IntegratorDesc, PixelTypeDesc, SamplerKindDesc};
+use crate::import::ReportEntry;
 
 /// The scene of a sensor with these parameters and a film of 200 x 100.
 #[track_caller]
@@ -111,6 +112,10 @@ fn samplers_and_integrators() {
     let with = r#"<sampler type="multijitter"><integer name="sample_count" value="9"/><integer name="seed" value="3"/></sampler>"#;
     let sampler = sensor("perspective", with).desc.sampler;
     assert_eq!((sampler.spp, sampler.seed, sampler.kind), (9, 3, SamplerKindDesc::Sobol));
+    let independent = sensor("perspective", r#"<sampler type="independent"/>"#);
+    assert_eq!((independent.desc.sampler.kind, independent.report.is_exact()), (SamplerKindDesc::Sobol, true));
+    let is_noted = |entry: &ReportEntry| entry.element == "sampler independent" && entry.note.contains("--sampler independent");
+    assert!(independent.report.entries.iter().any(is_noted));
     let integrator = |text: &str| match scene(text).integrator {
         IntegratorDesc::Path { max_depth, rr_depth, .. } => (max_depth, rr_depth),
         other => panic!("{other:?}"),

@@ -154,7 +154,7 @@ fn nothing_is_dropped_in_silence() {
         r#"<shape type="sphere"><float name="colour" value="1"/><bsdf type="diffuse"><float name="shine" value="1"/></bsdf></shape>"#;
     let names: Vec<String> = notes(unknown).into_iter().map(|(_, name, _)| name).collect();
     assert_eq!(names, ["shine", "colour"]);
-    let lacking = r#"<shape type="sdfgrid"/><medium type="homogeneous"/><emitter type="projector"/>
+    let lacking = r#"<shape type="sdfgrid"/><medium type="homogeneous"/><emitter type="timed_sunsky"/>
         <shape type="sphere"><bsdf type="hair"/></shape>"#;
     let outcomes = notes(lacking);
     assert_eq!(outcomes.len(), 4, "{outcomes:?}");

@@ -189,6 +189,19 @@ fn options_are_pbrts_defaults_and_values() {
 }
 
 #[test]
+fn samplers_and_what_changes_the_noise_alone_are_mapped_with_a_note() {
+    let imported = read(
+        "Sampler \"independent\" \"integer pixelsamples\" 7 \"string randomization\" \"none\"
+        Integrator \"path\" \"string lightsampler\" \"power\" WorldBegin",
+    );
+    assert!(imported.report.is_exact());
+    let notes: Vec<_> = imported.report.entries.iter().map(|entry| (entry.parameter.as_str(), entry.note.as_str())).collect();
+    assert!(notes.iter().any(|(name, note)| name.is_empty() && note.contains("--sampler independent")), "{notes:?}");
+    assert!(notes.contains(&("lightsampler", "it changes the noise only")), "{notes:?}");
+    assert!(notes.iter().any(|(name, note)| *name == "randomization" && note.contains("Owen")), "{notes:?}");
+}
+
+#[test]
 fn lights_stand_in_the_mirrored_world() {
     let imported = world("Translate 1 0 0 LightSource \"point\" \"point3 from\" [1 2 3] \"rgb I\" [1 2 3] \"float scale\" 2");
     let LightDesc::Point(light) = &imported.desc.lights[0] else { panic!() };

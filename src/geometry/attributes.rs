@@ -1,53 +1,49 @@
-//! Colours of meshes, one for each vertex.
+//! Attributes of meshes at points of their surfaces.
 
-use super::mesh::{Mesh, MeshError};
+use super::mesh::Mesh;
 use super::{Geometry, Shape, SurfaceInteraction};
-use crate::color::Rgb;
+use crate::attribute::{Attribute, AttributePoint};
 use crate::id::PrimId;
 use crate::math::DVec3;
 
 impl Mesh {
-    /// This mesh with a colour for each vertex.
-    ///
-    /// # Errors
-    /// If there are more or fewer than vertices, or a channel is not within `[0, 1]`.
-    pub fn with_colors(mut self, colors: Vec<[f32; 3]>) -> Result<Self, MeshError> {
-        let vertices = self.positions().len();
-        if colors.len() != vertices {
-            return Err(MeshError::Count { what: "colors", count: colors.len(), vertices });
-        }
-        if let Some(vertex) = colors.iter().position(|color| !color.iter().all(|c| (0.0..=1.0).contains(c))) {
-            return Err(MeshError::Color { vertex, color: colors[vertex] });
-        }
-        self.colors = Some(colors.into());
-        Ok(self)
+    /// This mesh with attributes: as many values as vertices or triangles.
+    #[must_use]
+    pub fn with_attributes(mut self, attributes: Vec<Attribute>) -> Self {
+        debug_assert!(
+            attributes.iter().all(|attribute| {
+                attribute.values.len() == if attribute.of_faces { self.triangles.len() } else { self.positions().len() }
+            })
+        );
+        self.attributes = attributes.into();
+        self
     }
 
-    /// Whether vertices have colours.
-    pub fn has_colors(&self) -> bool {
-        self.colors.is_some()
+    /// Whether there are any.
+    pub fn has_attributes(&self) -> bool {
+        !self.attributes.is_empty()
     }
 
-    /// The colour at a point of a triangle at a time from 0 to 1; `None` if vertices have none.
-    fn color(&self, prim: PrimId, p: DVec3, time: f32) -> Option<Rgb> {
-        let colors = self.colors.as_ref()?;
-        let points = self.triangle_points_at(prim, time);
-        let weights = weights([points.a, points.b, points.c].map(|corner| p - corner.as_dvec3()));
-        let sum: f64 = weights.iter().sum();
-        // A triangle that deforms may have no area for a moment.
-        let weights = if sum > 0.0 && sum < f64::INFINITY { weights.map(|w| (w / sum) as f32) } else { [1.0 / 3.0; 3] };
-        let [a, b, c] = self.triangles()[prim.index()].map(|i| Rgb::from(colors[i as usize]));
-        Some(a * weights[0] + b * weights[1] + c * weights[2])
+    /// The attributes at barycentric coordinates `u`, `v` of a triangle's second and third vertex; `None` if there are none.
+    pub fn attributes_at(&self, prim: PrimId, u: f32, v: f32) -> Option<AttributePoint<'_>> {
+        self.has_attributes().then(|| self.attribute_point(prim, [1.0 - u - v, u, v]))
+    }
+
+    fn attribute_point(&self, prim: PrimId, weights: [f32; 3]) -> AttributePoint<'_> {
+        AttributePoint { attributes: &self.attributes, prim, corners: self.triangles()[prim.index()], weights }
     }
 }
 
 impl Geometry {
-    /// The colour of the surface at a point, between those of the vertices; white where these have none.
+    /// The attributes of the surface at a point; `None` if it has none.
     #[inline(never)]
-    pub fn vertex_color(&self, at: &SurfaceInteraction) -> Rgb {
-        let Shape::Mesh(mesh) = self.shape(at.shape) else { return Rgb::WHITE };
+    pub fn attributes(&self, at: &SurfaceInteraction) -> Option<AttributePoint<'_>> {
+        let Shape::Mesh(mesh) = self.shape(at.shape) else { return None };
+        if !mesh.has_attributes() {
+            return None;
+        }
         let p = if at.is_instanced() { self.instance(at.instance).transform_at(at.time).inverse_point(at.p) } else { at.p };
-        mesh.color(at.prim, p, at.time).unwrap_or(Rgb::WHITE)
+        Some(mesh.attribute_point(at.prim, mesh.weights_at(at.prim, p, at.time).map(|weight| weight as f32)))
     }
 }
 
@@ -61,15 +57,17 @@ pub(super) fn weights([a, b, c]: [DVec3; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::attribute::AttributeValues;
     use crate::geometry::{Hit, Instance, MeshStep, Object};
-    use crate::id::{InstanceId, ObjectId, ShapeId};
+    use crate::id::{AttributeId, InstanceId, ObjectId, ShapeId};
     use crate::math::{DAffine3, Ray, Rng, Transform, Vec3};
 
     const CORNERS: [[f32; 3]; 3] = [[1.0, 0.5, 0.0], [4.0, 0.0, 1.0], [0.0, 3.0, -1.0]];
     const COLORS: [[f32; 3]; 3] = [[1.0, 0.25, 0.0], [0.0, 0.5, 0.0], [0.5, 0.0, 1.0]];
 
     fn triangle() -> Mesh {
-        Mesh::new(CORNERS.to_vec(), vec![[0, 1, 2]], None, None).unwrap().with_colors(COLORS.to_vec()).unwrap()
+        let colors = Attribute { id: AttributeId(3), of_faces: false, values: AttributeValues::Colors(COLORS.to_vec()) };
+        Mesh::new(CORNERS.to_vec(), vec![[0, 1, 2]], None, None).unwrap().with_attributes(vec![colors])
     }
 
     fn blend(values: &[[f32; 3]; 3], u: f32, v: f32) -> Vec3 {
@@ -90,7 +88,9 @@ mod tests {
             hit.instance = InstanceId(0);
         }
         let at = geometry.interaction(&ray, &hit).unwrap();
-        Vec3::from(geometry.vertex_color(&at).to_array())
+        let point = geometry.attributes(&at).unwrap();
+        assert!((point.weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+        Vec3::from(point.value(AttributeId(3)).unwrap())
     }
 
     #[test]
@@ -118,23 +118,5 @@ mod tests {
         let halfway = [0, 1, 2].map(|i| (0.5 * (Vec3::from(CORNERS[i]) + Vec3::from(moved[i]))).to_array());
         let found = seen(mesh, blend(&halfway, 0.25, 0.5), 0.5, None);
         assert!((found - blend(&COLORS, 0.25, 0.5)).abs().max_element() < 1e-5, "{found}");
-    }
-
-    #[test]
-    fn colours_that_make_no_sense_are_refused() {
-        let with = |colors: Vec<[f32; 3]>| triangle().with_colors(colors).map(drop);
-        assert_eq!(with(vec![[0.5; 3]; 4]), Err(MeshError::Count { what: "colors", count: 4, vertices: 3 }));
-        for (bad, part) in [(f32::NAN, "NaN"), (-0.1, "-0.1"), (1.5, "1.5"), (f32::INFINITY, "inf")] {
-            let mut colors = COLORS.to_vec();
-            colors[1][2] = bad;
-            let message = with(colors).unwrap_err().to_string();
-            assert!(message.contains("vertex 1") && message.contains(part), "{message}");
-        }
-    }
-
-    #[test]
-    fn a_surface_without_colours_is_white() {
-        let plain = Mesh::new(CORNERS.to_vec(), vec![[0, 1, 2]], None, None).unwrap();
-        assert_eq!(seen(plain, blend(&CORNERS, 0.25, 0.25), 0.0, None), Vec3::ONE);
     }
 }
