@@ -166,10 +166,10 @@ fn yard() -> Value {
         "film": {},
         "integrator": { "type": "path", "max_depth": 5 },
         "textures": { "tiles": { "type": "checker", "color0": [0.8, 0.7, 0.6], "color1": [0.1, 0.2, 0.3], "scale": [6, 6] } },
-        "materials": { "tiled": { "type": "diffuse", "albedo": { "texture": "tiles" } }, "coated": { "type": "plastic", "albedo": [0.6, 0.1, 0.1] } },
+        "materials": { "tiled": { "type": "diffuse", "albedo": { "texture": "tiles" } }, "painted": { "type": "diffuse", "albedo": [0.6, 0.1, 0.1] } },
         "shapes": [
             { "type": "quad", "material": "tiled", "origin": [-3, 0, -3], "edge_u": [0, 0, 6], "edge_v": [6, 0, 0] },
-            { "type": "sphere", "material": "coated", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] }
+            { "type": "sphere", "material": "painted", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] }
         ],
         "lights": [
             { "type": "directional", "direction": [-1, -1.5, -0.5], "irradiance": [3, 2.8, 2.5], "angular_diameter_degrees": 8 },
