@@ -79,7 +79,7 @@ impl AttributeValues {
             (Self::Numbers(values), Self::Numbers(mut others)) => values.append(&mut others),
             (Self::Colors(values), Self::Colors(mut others)) => values.append(&mut others),
             (_, other) => {
-                *self = Self::Colors((0..self.len()).map(|i| self.get(i)).chain((0..other.len()).map(|i| other.get(i))).collect())
+                *self = Self::Colors((0..self.len()).map(|i| self.get(i)).chain((0..other.len()).map(|i| other.get(i))).collect());
             }
         }
     }

@@ -240,7 +240,7 @@ impl Varying {
                 found.extend([d, s, m].into_iter().filter_map(ScalarInput::texture));
             }
             Self::ThinDielectric { ior, tints } => {
-                found.extend(ior.texture().into_iter().chain(tints.iter().filter_map(ColorInput::texture)))
+                found.extend(ior.texture().into_iter().chain(tints.iter().filter_map(ColorInput::texture)));
             }
             Self::Conductor { tint, alpha, .. } => found.extend(tint.texture().into_iter().chain(alpha.textures())),
             Self::Dielectric { alpha, tints, .. } => {

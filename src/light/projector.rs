@@ -164,18 +164,11 @@ mod tests {
     fn power_is_what_flows_out() {
         let textures = textures();
         let half = (0.5f64).tan() as f32;
-        let lights: [(f64, Box<dyn Fn(DVec3) -> Option<LightSample>>); 2] = {
-            let projector = Projector::new(DVec3::ZERO, Rgb::splat(3.0), projection(vec2(0.8, 0.3)), &textures);
-            let spot =
-                SpotLight::new(DVec3::ZERO, DVec3::NEG_Z, Rgb::splat(3.0), 0.3, 0.5).with_texture(projection(Vec2::splat(half)), &textures);
-            let textures = [textures.clone(), textures.clone()];
-            let [first, second] = textures;
-            [
-                (projector.power(), Box::new(move |p| projector.sample(&first, p))),
-                (spot.power(), Box::new(move |p| spot.sample(&second, p))),
-            ]
-        };
-        for (power, sample) in lights {
+        let projector = Projector::new(DVec3::ZERO, Rgb::splat(3.0), projection(vec2(0.8, 0.3)), &textures);
+        let spot =
+            SpotLight::new(DVec3::ZERO, DVec3::NEG_Z, Rgb::splat(3.0), 0.3, 0.5).with_texture(projection(Vec2::splat(half)), &textures);
+        for (is_spot, power) in [(false, projector.power()), (true, spot.power())] {
+            let sample = |p: DVec3| if is_spot { spot.sample(&textures, p) } else { projector.sample(&textures, p) };
             // Directions evenly in cosine and angle.
             let n = 600;
             let mut sum = 0.0;

@@ -12,7 +12,7 @@ pub(super) struct Draws {
 }
 
 impl Draws {
-    /// Draws for at most [`BATCH`] paths; numbers for lights only `with_light`.
+    /// Draws for at most [`BATCH`](crate::math::rows::BATCH) paths; numbers for lights only `with_light`.
     pub fn draw(&mut self, sampler: &Sampler, paths: &[Path], bounce: u32, with_light: bool) {
         for (path, (pixel, sample)) in paths.iter().zip(self.requests.pixels.iter_mut().zip(&mut self.requests.samples)) {
             (*pixel, *sample) = (path.seed, path.sample);
