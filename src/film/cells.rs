@@ -64,19 +64,14 @@ impl Cells {
         (cell[1] * self.count[0] + cell[0]) as usize * self.entries_of_cell() + row * self.stride() + column
     }
 
-    /// The first entry that a sample of the pixel with this entry reaches.
-    #[inline]
-    pub fn first_tap(&self, entry: usize, taps: &[Taps; 2]) -> usize {
-        (entry as isize + taps[1].first as isize * self.stride() as isize + taps[0].first as isize) as usize
-    }
-
     /// Calls `f` with every entry that a sample of the pixel with this entry reaches, and its weight there.
     #[inline]
     pub fn for_each_tap(&self, entry: usize, taps: &[Taps; 2], mut f: impl FnMut(usize, f32)) {
+        let stride = self.stride() as isize;
         for row in 0..taps[1].count {
-            let first = self.first_tap(entry, taps) + row * self.stride();
+            let first = entry as isize + (taps[1].first as isize + row as isize) * stride + taps[0].first as isize;
             for column in 0..taps[0].count {
-                f(first + column, taps[1].weights[row] * taps[0].weights[column]);
+                f((first + column as isize) as usize, taps[1].weights[row] * taps[0].weights[column]);
             }
         }
     }

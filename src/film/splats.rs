@@ -31,17 +31,11 @@ impl Splats {
         let entry = entry % cells.entries_of_cell();
         let [r, g, b, a] = values.color;
         let terms = [r, g, b, a, 1.0, 0.0, 0.0, 0.0];
-        let across = &taps[0].weights[..taps[0].count];
-        let mut first = cells.first_tap(entry, taps);
-        for down in &taps[1].weights[..taps[1].count] {
-            for (sums, across) in self.color[first..first + across.len()].iter_mut().zip(across) {
-                let weight = down * across;
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    *sum += weight * term;
-                }
+        cells.for_each_tap(entry, taps, |entry, weight| {
+            for (sum, term) in self.color[entry].iter_mut().zip(terms) {
+                *sum += weight * term;
             }
-            first += cells.stride();
-        }
+        });
         if self.channel_count > 0 {
             cells.for_each_tap(entry, taps, |entry, weight| {
                 let sums = &mut self.channels[entry * self.channel_count..(entry + 1) * self.channel_count];
