@@ -8,7 +8,7 @@ pub use principled::PrincipledInputs;
 
 use crate::bsdf::{
     Beckmann, Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
-    SeparableGgx, SingleBsdf, ThinDielectric,
+    SeparableGgx, SingleScatteringBsdf, ThinDielectric,
 };
 use crate::color::Rgb;
 use crate::id::{MaterialId, TextureId};
@@ -157,8 +157,10 @@ impl Varying {
                 match facets {
                     Facets::Ggx => Bsdf::Conductor(metal.with_surface(alpha, tint)),
                     Facets::SingleGgx => Bsdf::Conductor(metal.with_surface(alpha, tint).single_scattering()),
-                    Facets::SeparableGgx => Bsdf::SeparableGgx(SingleBsdf::Conductor(metal.with_facets(SeparableGgx::new(alpha), tint))),
-                    Facets::Beckmann => Bsdf::Beckmann(SingleBsdf::Conductor(metal.with_facets(Beckmann::new(alpha), tint))),
+                    Facets::SeparableGgx => {
+                        Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(metal.with_facets(SeparableGgx::new(alpha), tint)))
+                    }
+                    Facets::Beckmann => Bsdf::Beckmann(SingleScatteringBsdf::Conductor(metal.with_facets(Beckmann::new(alpha), tint))),
                 }
             }
             Self::Dielectric { ior, alpha, facets, tints } => {
@@ -169,11 +171,11 @@ impl Varying {
                     Facets::SingleGgx => Bsdf::Dielectric(Dielectric::new(ior, alpha).single_scattering().tinted(reflection, transmission)),
                     Facets::SeparableGgx => {
                         let glass = Dielectric::with_facets(ior, alpha, SeparableGgx::new).tinted(reflection, transmission);
-                        Bsdf::SeparableGgx(SingleBsdf::Dielectric(glass))
+                        Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(glass))
                     }
                     Facets::Beckmann => {
                         let glass = Dielectric::with_facets(ior, alpha, Beckmann::new).tinted(reflection, transmission);
-                        Bsdf::Beckmann(SingleBsdf::Dielectric(glass))
+                        Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(glass))
                     }
                 }
             }

@@ -235,7 +235,7 @@ fn regularized_caustics_vary_less_and_keep_their_light() {
     // What the camera sees at once and what is lit at once stays as it is.
     assert_eq!(picture(2, None, 1), picture(2, Some(0.3), 1));
     let [free, rougher] = [None, Some(0.3)].map(|alpha| [1, 2, 3, 4].map(|seed| picture(4, alpha, seed)));
-    // Relative to the picture, lest the mirror image of the sun counts for all.
+    // Relative to the picture: the mirror image of the sun would outweigh all else.
     let shades: Vec<f64> = rougher[0].iter().map(|pixel| f64::from(pixel[1]).powi(2) + 0.01).collect();
     let noise = |[a, b, c, d]: &[Vec<[f32; 3]>; 4]| -> f64 {
         let pixels = a.iter().zip(b).chain(c.iter().zip(d)).zip(shades.iter().cycle());

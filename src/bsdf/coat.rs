@@ -122,7 +122,7 @@ impl<D: Microfacets> Coat<D> {
     }
 
     /// The same coat with another roughness of what it reflects; how much it lets through stays.
-    pub(super) fn with_facets(&self, alpha: [f32; 2]) -> Self {
+    pub(super) fn with_alpha(&self, alpha: [f32; 2]) -> Self {
         Self { facets: D::with_alpha(alpha), ..*self }
     }
 

@@ -55,7 +55,7 @@ impl Coated {
         if coat.is_none() && base.is_none() {
             return None;
         }
-        let coat = coat.map_or(self.coat, |alpha| self.coat.with_facets(alpha));
+        let coat = coat.map_or(self.coat, |alpha| self.coat.with_alpha(alpha));
         Some(Self { coat, base: base.unwrap_or_else(|| self.base.clone()), ..*self })
     }
 

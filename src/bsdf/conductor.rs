@@ -59,8 +59,8 @@ impl Conductor<Ggx> {
 
     /// The same metal with another roughness.
     #[must_use]
-    pub(super) fn with_surface_alpha(&self, alpha: [f32; 2]) -> Self {
-        if self.share > 0.0 { self.with_surface(alpha, self.tint) } else { self.with_wider_facets(alpha) }
+    pub(super) fn with_alpha(&self, alpha: [f32; 2]) -> Self {
+        if self.share > 0.0 { self.with_surface(alpha, self.tint) } else { self.with_single_scattering_alpha(alpha) }
     }
 
     /// The same metal with other microfacets and tint, and without multiple scattering.
@@ -73,7 +73,7 @@ impl Conductor<Ggx> {
 
 impl<D: Microfacets> Conductor<D> {
     /// With another roughness, for single scattering.
-    pub(super) fn with_wider_facets(&self, alpha: [f32; 2]) -> Self {
+    pub(super) fn with_single_scattering_alpha(&self, alpha: [f32; 2]) -> Self {
         Self { facets: D::with_alpha(alpha), ..*self }
     }
 

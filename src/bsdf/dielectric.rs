@@ -92,7 +92,7 @@ impl Dielectric<Ggx> {
     }
 
     /// The same glass with another roughness.
-    pub(super) fn with_surface_alpha(&self, alpha: [f32; 2]) -> Self {
+    pub(super) fn with_alpha(&self, alpha: [f32; 2]) -> Self {
         Self { tints: self.tints, ..Self::rough(self.ior, Ggx::new(alpha), self.multiple.is_some()) }
     }
 
@@ -110,7 +110,7 @@ impl<D: Microfacets> Dielectric<D> {
     }
 
     /// With another roughness, for single scattering.
-    pub(super) fn with_wider_facets(&self, alpha: [f32; 2]) -> Self {
+    pub(super) fn with_single_scattering_alpha(&self, alpha: [f32; 2]) -> Self {
         Self { facets: D::with_alpha(alpha), ..*self }
     }
 

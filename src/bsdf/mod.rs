@@ -39,7 +39,7 @@ pub use mirror::Mirror;
 pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{Principled, PrincipledModel, PrincipledParameters};
-pub use single::SingleBsdf;
+pub use single::SingleScatteringBsdf;
 pub use thin::{DiffuseTransmission, ThinDielectric};
 
 use crate::color::Rgb;
@@ -110,9 +110,9 @@ pub enum Bsdf {
     /// A clear coat over another opaque one.
     Coated(Box<Coated>),
     /// One of the above with Beckmann's microfacets.
-    Beckmann(SingleBsdf<Beckmann>),
+    Beckmann(SingleScatteringBsdf<Beckmann>),
     /// One of the above with GGX microfacets masked on each side independently.
-    SeparableGgx(SingleBsdf<SeparableGgx>),
+    SeparableGgx(SingleScatteringBsdf<SeparableGgx>),
 }
 
 // Constructed at every hit: no kind may make the others slower to pass around.

@@ -1,17 +1,17 @@
 //! Rough surfaces made rougher, for paths whose light would come through too narrow a lobe (Kaplanyan and Dachsbacher, "Path Space Regularization for
 //! Holistic and Robust Light Transport").
 
-use super::{Bsdf, Microfacets, SingleBsdf};
+use super::{Bsdf, Microfacets, SingleScatteringBsdf};
 
 impl Bsdf {
     /// The same scattering with an alpha of at least `alpha`, within `[0, 1]`, along both tangents; what lies below a coat and how much the
     /// coat lets through stay. `None` if nothing is narrower: diffuse and ideally smooth surfaces, and Phong's own lobe, stay as they are.
     pub fn with_least_alpha(&self, alpha: f32) -> Option<Self> {
         Some(match self {
-            Self::Conductor(bsdf) => Self::Conductor(bsdf.with_surface_alpha(widened(bsdf.alpha(), alpha)?)),
-            Self::Dielectric(bsdf) => Self::Dielectric(bsdf.with_surface_alpha(widened(bsdf.alpha(), alpha)?)),
+            Self::Conductor(bsdf) => Self::Conductor(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
+            Self::Dielectric(bsdf) => Self::Dielectric(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Plastic(bsdf) => {
-                Self::Plastic(super::Plastic { coat: bsdf.coat.with_facets(widened(bsdf.coat.alpha(), alpha)?), ..*bsdf })
+                Self::Plastic(super::Plastic { coat: bsdf.coat.with_alpha(widened(bsdf.coat.alpha(), alpha)?), ..*bsdf })
             }
             Self::Principled(bsdf) => Self::Principled(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Glossy(bsdf) => Self::Glossy(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
@@ -25,13 +25,13 @@ impl Bsdf {
     }
 }
 
-impl<D: Microfacets> SingleBsdf<D> {
+impl<D: Microfacets> SingleScatteringBsdf<D> {
     fn with_least_alpha(&self, alpha: f32) -> Option<Self> {
         Some(match self {
-            Self::Conductor(bsdf) => Self::Conductor(bsdf.with_wider_facets(widened(bsdf.alpha(), alpha)?)),
-            Self::Dielectric(bsdf) => Self::Dielectric(bsdf.with_wider_facets(widened(bsdf.alpha(), alpha)?)),
+            Self::Conductor(bsdf) => Self::Conductor(bsdf.with_single_scattering_alpha(widened(bsdf.alpha(), alpha)?)),
+            Self::Dielectric(bsdf) => Self::Dielectric(bsdf.with_single_scattering_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Plastic(bsdf) => {
-                Self::Plastic(super::Plastic { coat: bsdf.coat.with_facets(widened(bsdf.coat.alpha(), alpha)?), ..*bsdf })
+                Self::Plastic(super::Plastic { coat: bsdf.coat.with_alpha(widened(bsdf.coat.alpha(), alpha)?), ..*bsdf })
             }
         })
     }

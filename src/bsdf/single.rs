@@ -8,7 +8,7 @@ use crate::math::Vec3;
 /// A material with microfacets distributed by `D`, which lose light that they scatter several times. Apart from the others, so that their code
 /// stays as it is.
 #[derive(Clone, Debug, PartialEq)]
-pub enum SingleBsdf<D> {
+pub enum SingleScatteringBsdf<D> {
     /// Metal.
     Conductor(Conductor<D>),
     /// Glass.
@@ -20,14 +20,14 @@ pub enum SingleBsdf<D> {
 macro_rules! each {
     ($self:expr, $bsdf:ident => $body:expr) => {
         match $self {
-            SingleBsdf::Conductor($bsdf) => $body,
-            SingleBsdf::Dielectric($bsdf) => $body,
-            SingleBsdf::Plastic($bsdf) => $body,
+            SingleScatteringBsdf::Conductor($bsdf) => $body,
+            SingleScatteringBsdf::Dielectric($bsdf) => $body,
+            SingleScatteringBsdf::Plastic($bsdf) => $body,
         }
     };
 }
 
-impl<D: Microfacets> SingleBsdf<D> {
+impl<D: Microfacets> SingleScatteringBsdf<D> {
     /// As [`Bsdf::eval`](super::Bsdf::eval).
     #[inline(never)]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {

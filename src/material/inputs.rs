@@ -1,6 +1,6 @@
 //! Parameters of materials that are constant or come from textures.
 
-use crate::bsdf::{Beckmann, Bsdf, Coat, Plastic, SeparableGgx, SingleBsdf};
+use crate::bsdf::{Beckmann, Bsdf, Coat, Plastic, SeparableGgx, SingleScatteringBsdf};
 use crate::color::Rgb;
 use crate::id::TextureId;
 use crate::math::Vec2;
@@ -206,8 +206,10 @@ impl PlasticCoat {
     pub(super) fn over(&self, diffuse: Rgb, tint: Rgb, nonlinear: bool, textures: &[Texture], footprint: &Footprint) -> Bsdf {
         match self {
             Self::Ggx(coat) => Bsdf::Plastic(Plastic { diffuse, coat: coat.at(textures, footprint), tint, nonlinear }),
-            Self::SeparableGgx(coat) => Bsdf::SeparableGgx(SingleBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear })),
-            Self::Beckmann(coat) => Bsdf::Beckmann(SingleBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear })),
+            Self::SeparableGgx(coat) => {
+                Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear }))
+            }
+            Self::Beckmann(coat) => Bsdf::Beckmann(SingleScatteringBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear })),
         }
     }
 

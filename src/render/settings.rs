@@ -106,7 +106,7 @@ pub struct Overrides {
     pub strategy: Option<StrategyDesc>,
     /// `--clamp`; infinity stands for no limit.
     pub clamp: Option<f32>,
-    /// `--regularize`; 0 stands for none.
+    /// `--regularize`; 0 means none.
     pub regularize: Option<f32>,
     /// `--guiding`.
     pub guiding: Option<bool>,

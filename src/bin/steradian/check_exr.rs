@@ -42,7 +42,7 @@ pub fn run(arguments: &CheckExrArgs) -> Result<u8> {
     Ok(if fails { BROKEN } else { 0 })
 }
 
-/// What is said of files that keep all rules.
+/// The lines about files that keep all rules.
 fn clean_lines(clean: &[String], arguments: &CheckExrArgs) -> Vec<String> {
     let profile = arguments.profile.name();
     match clean {
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_rule_is_told_once_with_a_count_and_examples() {
+    fn a_rule_has_one_line_with_a_count_and_examples() {
         let mut broken = vec![("a.exr".to_owned(), finding("one", Severity::Error, "Z"))];
         for file in ["a.exr", "b.exr"] {
             broken.extend((0..20).map(|i| (file.to_owned(), finding("many", Severity::Error, &format!("c{i}")))));

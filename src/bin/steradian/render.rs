@@ -115,7 +115,7 @@ impl<'a> Plan<'a> {
             if let Some(frame) = shot.frame.filter(|_| shard_file.is_none()) {
                 let mut skipped = Skipped::default();
                 skipped.compare(frame, recipe.as_ref(), &settings.outputs);
-                skipped.tell(session);
+                skipped.report(session);
             }
             return Ok(None);
         }

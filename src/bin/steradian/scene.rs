@@ -60,7 +60,7 @@ fn lines(path: &Path, imported: &Imported, verbose: bool) -> Vec<String> {
     if verbose {
         return std::iter::once(head).chain(report.entries.iter().map(line)).collect();
     }
-    // What is missing from the picture as a whole is always told.
+    // What is missing from the picture as a whole is always shown.
     let (mut summary, others) = report.kinds();
     let shown = others.len().min(SUMMARY_LINES.saturating_sub(summary.len()));
     let rest = others.len() - shown;

@@ -17,7 +17,7 @@ use crate::{kept, rerender};
 pub struct Skipped {
     /// Frames by what of their settings is not what this render has.
     changed: BTreeMap<Vec<String>, Vec<i64>>,
-    /// Frames whose files tell nothing of their settings.
+    /// Frames whose files have no settings.
     unknown: Vec<i64>,
 }
 
@@ -38,7 +38,7 @@ impl Skipped {
     }
 
     /// Warns of those that differ.
-    pub fn tell(&self, session: &Session) {
+    pub fn report(&self, session: &Session) {
         for (differences, frames) in &self.changed {
             let (noun, verb) = if frames.len() == 1 { ("frame", "is") } else { ("frames", "are") };
             let numbers = FrameList::new(frames.clone()).map_or(String::new(), |list| list.ranges('x'));
@@ -78,7 +78,7 @@ pub fn warn(arguments: &RenderArgs, frames: &[i64], session: &Session, shares_fi
         let (recipe, outputs) = expected.unzip();
         skipped.compare(frame, recipe.as_ref(), &outputs.unwrap_or_default());
     }
-    skipped.tell(session);
+    skipped.report(session);
 }
 
 /// The settings that a frame would be rendered with, as they are for all frames.

@@ -7,13 +7,13 @@ use crate::sampling::statistics::{compare_directions, random_points};
 const CLEAR: f32 = 1.5;
 
 fn metal(alpha: [f32; 2]) -> Bsdf {
-    Bsdf::Beckmann(SingleBsdf::Conductor(
+    Bsdf::Beckmann(SingleScatteringBsdf::Conductor(
         Conductor::new(Rgb::BLACK, Rgb::WHITE, [0.0; 2], Rgb::WHITE).with_facets(Beckmann::new(alpha), Rgb::WHITE),
     ))
 }
 
 fn clear(alpha: [f32; 2]) -> Bsdf {
-    Bsdf::Beckmann(SingleBsdf::Dielectric(Dielectric::with_facets(CLEAR, alpha, Beckmann::new)))
+    Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(Dielectric::with_facets(CLEAR, alpha, Beckmann::new)))
 }
 
 #[test]

@@ -18,7 +18,7 @@ fn everything_is_finite_at_every_angle_and_alpha() {
         all.push(beckmann_gold(alpha));
         all.extend(
             [1.5, 1.0, 1.001, 0.1, 10.0]
-                .map(|ior| Bsdf::Beckmann(SingleBsdf::Dielectric(Dielectric::with_facets(ior, alpha, Beckmann::new)))),
+                .map(|ior| Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(Dielectric::with_facets(ior, alpha, Beckmann::new)))),
         );
         for bsdf in all {
             for cos in cosines.iter().flat_map(|&cos| [cos, -cos]) {

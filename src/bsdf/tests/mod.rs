@@ -41,27 +41,27 @@ fn glass(alpha: [f32; 2]) -> Bsdf {
 /// The same with Beckmann's microfacets.
 fn beckmann_gold(alpha: [f32; 2]) -> Bsdf {
     let gold = Conductor::new(Rgb::new(0.18, 0.42, 1.37), Rgb::new(3.42, 2.35, 1.77), [0.0; 2], Rgb::WHITE);
-    Bsdf::Beckmann(SingleBsdf::Conductor(gold.with_facets(Beckmann::new(alpha), Rgb::WHITE)))
+    Bsdf::Beckmann(SingleScatteringBsdf::Conductor(gold.with_facets(Beckmann::new(alpha), Rgb::WHITE)))
 }
 
 fn beckmann_glass(alpha: [f32; 2]) -> Bsdf {
-    Bsdf::Beckmann(SingleBsdf::Dielectric(Dielectric::with_facets(1.5, alpha, Beckmann::new)))
+    Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(Dielectric::with_facets(1.5, alpha, Beckmann::new)))
 }
 
 fn separable_gold(alpha: [f32; 2]) -> Bsdf {
     let gold = Conductor::new(Rgb::new(0.18, 0.42, 1.37), Rgb::new(3.42, 2.35, 1.77), [0.0; 2], Rgb::WHITE);
-    Bsdf::SeparableGgx(SingleBsdf::Conductor(gold.with_facets(SeparableGgx::new(alpha), Rgb::WHITE)))
+    Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(gold.with_facets(SeparableGgx::new(alpha), Rgb::WHITE)))
 }
 
 fn separable_glass(alpha: [f32; 2]) -> Bsdf {
     let glass = Dielectric::with_facets(1.5, alpha, SeparableGgx::new);
-    Bsdf::SeparableGgx(SingleBsdf::Dielectric(glass.tinted(Rgb::new(0.9, 0.8, 1.0), Rgb::new(0.5, 0.7, 0.9))))
+    Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(glass.tinted(Rgb::new(0.9, 0.8, 1.0), Rgb::new(0.5, 0.7, 0.9))))
 }
 
 /// Plastic below a coat that loses light.
-fn lossy_plastic<D: Microfacets>(facets: D, nonlinear: bool) -> SingleBsdf<D> {
+fn lossy_plastic<D: Microfacets>(facets: D, nonlinear: bool) -> SingleScatteringBsdf<D> {
     let coat = Coat::single_scattering(1.5, facets, diffuse_mean);
-    SingleBsdf::Plastic(Plastic { diffuse: Rgb::new(0.1, 0.2, 0.7), coat, tint: Rgb::new(1.0, 0.5, 0.9), nonlinear })
+    SingleScatteringBsdf::Plastic(Plastic { diffuse: Rgb::new(0.1, 0.2, 0.7), coat, tint: Rgb::new(1.0, 0.5, 0.9), nonlinear })
 }
 
 fn white_plastic(alpha: [f32; 2]) -> Bsdf {

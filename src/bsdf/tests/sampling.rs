@@ -29,8 +29,8 @@ fn weights_are_value_over_density() {
         // So does the exponential of Beckmann's density.
         const BOTH_SIDES: &[f32] = &[1.0, 0.7, 0.3, -0.3, -0.7, -1.0];
         let (limit, cosines) = match bsdf {
-            Bsdf::Dielectric(_) | Bsdf::SeparableGgx(SingleBsdf::Dielectric(_)) => (2e-3, BOTH_SIDES),
-            Bsdf::Beckmann(SingleBsdf::Dielectric(_)) => (4e-3, BOTH_SIDES),
+            Bsdf::Dielectric(_) | Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(_)) => (2e-3, BOTH_SIDES),
+            Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(_)) => (4e-3, BOTH_SIDES),
             _ => (2e-4, [1.0, 0.7, 0.3, 0.05, -0.5].as_slice()),
         };
         let worst = worst_disagreement(&bsdf, cosines);

@@ -17,9 +17,9 @@ const MITSUBA: [(bool, f32, [f32; 3], f32); 6] = [
 fn bases_of_lossy_plastics_are_mitsubas() {
     for (is_beckmann, alpha, expected, internal) in MITSUBA {
         let value = |wo: Vec3, r: f32, nonlinear: bool| {
-            fn plastic<D: Microfacets>(facets: D, r: f32, nonlinear: bool) -> SingleBsdf<D> {
+            fn plastic<D: Microfacets>(facets: D, r: f32, nonlinear: bool) -> SingleScatteringBsdf<D> {
                 let coat = Coat::single_scattering(1.49, facets, mitsuba_diffuse_mean);
-                SingleBsdf::Plastic(Plastic { diffuse: Rgb::splat(r), coat, tint: Rgb::BLACK, nonlinear })
+                SingleScatteringBsdf::Plastic(Plastic { diffuse: Rgb::splat(r), coat, tint: Rgb::BLACK, nonlinear })
             }
             let bsdf = if is_beckmann {
                 Bsdf::Beckmann(plastic(Beckmann::new([alpha; 2]), r, nonlinear))

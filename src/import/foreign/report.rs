@@ -32,7 +32,7 @@ pub struct ReportEntry {
     pub parameter: String,
     /// What became of it.
     pub outcome: Outcome,
-    /// How it was approximated, why it was ignored, or how the scene says it.
+    /// How it was approximated, why it was ignored, or a note on how it was mapped.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
 }

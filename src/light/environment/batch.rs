@@ -32,7 +32,7 @@ impl EnvironmentMap {
         let mut chosen = [Chosen { wi: Vec3::ZERO, at: NOWHERE, pdf: 0.0 }; BATCH];
         for (us, samples) in us.chunks(BATCH).zip(samples.chunks_mut(BATCH)) {
             density.sample_cells(us, &mut cells);
-            vectorize(Turn { map: self, cells: &cells[..us.len()], chosen: &mut chosen });
+            vectorize(ChooseDirections { map: self, cells: &cells[..us.len()], chosen: &mut chosen });
             for (chosen, sample) in chosen.iter().zip(samples) {
                 *sample = Some(far_away(chosen.wi, self.lookup(chosen.at), chosen.pdf));
             }
@@ -57,13 +57,13 @@ impl Kernel for Locate<'_> {
     }
 }
 
-struct Turn<'a> {
+struct ChooseDirections<'a> {
     map: &'a EnvironmentMap,
     cells: &'a [PiecewiseCell],
     chosen: &'a mut [Chosen; BATCH],
 }
 
-impl Kernel for Turn<'_> {
+impl Kernel for ChooseDirections<'_> {
     type Output = ();
 
     #[inline(always)]

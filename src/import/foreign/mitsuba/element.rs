@@ -142,7 +142,7 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// Says how the scene says a parameter, or the plugin as a whole.
+    /// Reports a parameter, or the plugin as a whole, as mapped, with a note.
     pub fn mapped(&mut self, name: &str, how: impl Into<String>) {
         self.set(name, Outcome::Mapped, how.into());
     }

@@ -229,7 +229,7 @@ impl Params {
         }
     }
 
-    /// Says how the scene says a parameter, if it is given.
+    /// Reports a parameter as mapped, with a note, if it is given.
     pub fn map_as(&self, name: &str, how: impl Into<String>) {
         if let Some(param) = self.list.iter().find(|param| param.name == name) {
             param.settle(Outcome::Mapped, how.into());
