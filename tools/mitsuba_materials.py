@@ -72,6 +72,20 @@ def principled(changes):
     return {"type": "principled", "model": "mitsuba", "base_color": COLOR, **p}, {"type": "principled", "base_color": rgb(COLOR), **plugin}
 
 
+def pane(changes):
+    p = {"roughness": 0.5, "anisotropic": 0.0, "specular_tint": 0.0, "ior": 1.5, **changes}
+    ours = {"type": "principled", "model": "mitsuba", "base_color": COLOR, "thin": True, "transmission": 1, **p}
+    plugin = {"type": "principledthin", "base_color": rgb(COLOR), "spec_trans": 1.0, "roughness": p["roughness"], "anisotropic": p["anisotropic"]}
+    return ours, {**plugin, "spec_tint": p["specular_tint"], "eta": p["ior"]}
+
+
+def sheet(changes):
+    p = {"roughness": 0.5, "sheen": 0.0, "sheen_tint": 0.0, "subsurface": 0.0, "diffuse_transmission": 0.0, **changes}
+    ours = {"type": "principled", "model": "mitsuba", "base_color": COLOR, "thin": True, "ior": 1, **p}
+    plugin = {"type": "principledthin", "base_color": rgb(COLOR), "roughness": p["roughness"], "sheen": p["sheen"], "sheen_tint": p["sheen_tint"]}
+    return ours, {**plugin, "flatness": p["subsurface"], "diff_trans": 2 * p["diffuse_transmission"]}
+
+
 def plastic(alpha, distribution, nonlinear):
     ours = {"type": "plastic", "albedo": COLOR, "ior": 1.5, "coat_tint": [1, 0.8, 0.6], "nonlinear": nonlinear}
     plugin = {"int_ior": 1.5, "ext_ior": 1.0, "diffuse_reflectance": rgb(COLOR), "specular_reflectance": rgb([1, 0.8, 0.6]), "nonlinear": nonlinear}
@@ -104,6 +118,10 @@ def materials():
     }
     for name, changes in lobes.items():
         yield f"principled, {name}", *principled(changes)
+    for name, changes in {"": {}, ", anisotropic, tinted": {"anisotropic": 0.8, "specular_tint": 0.7}, ", rough, index 1.2": {"roughness": 0.9, "ior": 1.2}}.items():
+        yield f"thin, pane{name}", *pane(changes)
+    for name, changes in {"": {}, ", sheen": {"sheen": 1.0, "sheen_tint": 0.5}, ", flat, half passes": {"subsurface": 1.0, "diffuse_transmission": 0.25}}.items():
+        yield f"thin, sheet{name}", *sheet(changes)
     for alpha, distribution, nonlinear in itertools.product([0.05, 0.3, 0.7], DISTRIBUTIONS, [False, True]):
         yield f"plastic, {distribution} {alpha}{', nonlinear' if nonlinear else ''}", *plastic(alpha, distribution, nonlinear)
     for nonlinear in [False, True]:

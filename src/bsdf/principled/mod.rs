@@ -18,9 +18,10 @@
 //! - subsurface scattering is the flat lobe of 2012 for solids as well; glass has exact Fresnel terms, all else Schlick's;
 //! - the specular lobe that passes a thin sheet has the width of the one that it reflects.
 //!
-//! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled`: added without limit, with exact Fresnel terms for the untinted layer, G as a
+//! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled` and, for thin sheets of glass, `principledthin`: added without limit, with exact Fresnel terms for the untinted layer, G as a
 //! product, no compensation, tints over the luminance, and a clear coat that is larger by 4 cos cos.
 
+mod glass;
 mod parameters;
 pub(super) mod shapes;
 mod split;
@@ -29,8 +30,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::energy::{Energy, principled_clear_coat, principled_diffuse, principled_sheen, schlick_weight};
 use super::microfacet::{FacetReflection, MIN_COSINE, Microfacets, SeparableGgx, reflect};
-use super::thin::pane_reflectance;
-use super::{BsdfEval, BsdfSample, Dielectric, Ggx, fresnel};
+use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
@@ -157,19 +157,6 @@ impl Principled {
         mix(Rgb::WHITE, tint(self.base, self.model), self.sheen_tint) * self.sheen
     }
 
-    #[inline]
-    fn eval_glass(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        if self.is_mitsuba() {
-            return Dielectric::with_facets(self.ior, self.ggx.alpha(), SeparableGgx::new).eval(wo, wi);
-        }
-        self.glass().eval(wo, wi)
-    }
-
-    #[inline]
-    fn glass(&self) -> Dielectric {
-        Dielectric::rough(self.ior, self.ggx, self.multiscatter)
-    }
-
     /// Reflection by the microfacets of metal and layer, all but the Fresnel factor.
     #[inline]
     fn facet(&self, o: Vec3, i: Vec3) -> FacetReflection {
@@ -184,10 +171,7 @@ impl Principled {
         if !self.is_mitsuba() {
             return schlick(self.reflectance_ahead(), self.metallic + self.dielectric());
         }
-        let exact = fresnel::dielectric(cos, self.ior).reflectance;
-        let ahead = (self.ior - 1.0) / (self.ior + 1.0);
-        let tinted = schlick(tint(self.base, self.model) * (ahead * ahead), 1.0);
-        schlick(self.base, 1.0) * self.metallic + mix(Rgb::splat(exact), tinted, self.specular_tint) * self.dielectric()
+        schlick(self.base, 1.0) * self.metallic + self.mitsuba_layer(cos) * self.dielectric()
     }
 
     #[inline]
@@ -304,9 +288,8 @@ impl Principled {
 
         // Glass.
         if self.glass > 0.0 {
-            let (color, glass) =
-                if self.thin { (self.base, self.eval_sheet(o, i, reflects)) } else { (self.base.map(f32::sqrt), self.eval_glass(wo, wi)) };
-            value += if reflects { glass.value } else { glass.value * color } * self.glass;
+            let glass = if self.thin { self.eval_sheet(o, i, reflects) } else { self.eval_glass(wo, wi) };
+            value += glass.value * self.glass;
             pdf += choice.glass * glass.pdf;
         }
         if self.clearcoat > 0.0 {
@@ -334,15 +317,6 @@ impl Principled {
             value += self.sheen_color() * shapes::sheen(o, i);
         }
         value * below_layer
-    }
-
-    /// A thin sheet of glass: all reflections within it together, and what passes without a turn.
-    #[inline]
-    fn eval_sheet(&self, o: Vec3, i: Vec3, reflects: bool) -> BsdfEval {
-        let facet = self.ggx.reflection(o, i);
-        let reflectance = pane_reflectance(facet.cos, self.ior);
-        let fraction = if reflects { reflectance } else { 1.0 - reflectance };
-        BsdfEval { value: Rgb::splat(fraction * facet.value), pdf: fraction * facet.pdf }
     }
 
     /// A direction from one of the lobes.
@@ -401,11 +375,8 @@ impl Principled {
         if !self.thin {
             return self.glass().sample(wo, u_glass, u).map(|sample| sample.wi);
         }
-        let m = self.ggx.sample_visible_normal(o, u);
-        let cos = o.dot(m);
-        let reflected = above(reflect(o, m, cos))?;
-        let reflects = u_glass < pane_reflectance(cos.clamp(0.0, 1.0), self.ior);
-        Some(if reflects { reflected } else { vec3(reflected.x, reflected.y, -reflected.z) })
+        let (i, reflects) = self.sample_sheet(o, u_glass, u);
+        above(i).map(|i| if reflects { i } else { vec3(i.x, i.y, -i.z) })
     }
 
     /// The share of what is below a layer that is left for a pair of directions: the layer's albedos for both, and those of what is below.

@@ -80,7 +80,6 @@ impl<'a> Reader<'a> {
         if matches!(amount, ScalarDesc::Constant(t) if t == 0.0) {
             return Ok(self.add(element, MaterialDesc::Principled(Box::new(sheet)), false));
         }
-        element.approximated("spec_trans", "a pane whose colours are ours after several reflections within");
         let pane = PrincipledDesc {
             thin: true,
             transmission: ScalarDesc::Constant(1.0),
