@@ -12,6 +12,9 @@ use crate::math::Vec2;
 /// Cells of a table. With them the sampled distribution differs from the filter's by less than `1e-6` (a test measures it).
 const CELLS: usize = 1024;
 
+/// Cells of the offsets within a pixel, an even number: usual filters have their kinks at ends of cells.
+const OFFSETS: usize = 256;
+
 /// Steps of the integration that makes a table.
 const STEPS: usize = 1 << 15;
 
@@ -29,15 +32,17 @@ pub struct Filter {
     shared: Option<Box<Shared>>,
 }
 
-/// How shared samples are weighted.
+/// The weights of shared samples by offset from their pixel's centre, along one axis.
 #[derive(Clone, Debug)]
 struct Shared {
-    /// As of the filter.
-    radius: f32,
     /// As [`Filter::border`].
     border: i32,
-    /// One axis of the filter over its integral, at distances of `i * radius / CELLS`.
-    table: [f32; CELLS + 2],
+    /// How many pixels have weights: 2, 3, 4 or [`MAX_TAPS`].
+    count: usize,
+    /// By cell of offsets: the first pixel.
+    first: [i8; OFFSETS],
+    /// By cell: the weights at its lower end, then what they grow by up to the upper one.
+    weights: Vec<f32>,
 }
 
 /// An offset from the pixel's centre and the weight of a sample there.
@@ -113,10 +118,7 @@ impl Filter {
         // Samples within a pixel reach another from a radius of 0.5 on.
         let can_share = desc.radius() > 0.5 && desc.radius() <= MAX_TAPS as f32 / 2.0;
         let shared = can_share && *desc.samples_mut() != Some(FilterSamplesDesc::Importance);
-        let shared = shared.then(|| {
-            let radius = desc.radius();
-            Box::new(Shared { radius, border: (radius - 0.5).ceil() as i32, table: tabulate(&desc) })
-        });
+        let shared = shared.then(|| Box::new(Shared::new(&desc)));
         Self { desc, kernel, shared }
     }
 
@@ -169,21 +171,16 @@ impl Filter {
     /// The weights along one axis of a shared sample at this offset from its pixel's centre, from -0.5 to 0.5.
     #[inline]
     pub(super) fn taps(&self, offset: f32) -> Taps {
-        let mut weights = [0.0; MAX_TAPS];
-        let Some(shared) = &self.shared else { return Taps { first: 0, count: 1, weights: [1.0; MAX_TAPS] } };
-        let Shared { radius, border, table } = &**shared;
-        let (low, high) = (offset - radius, offset + radius);
-        // floor(low) + 1 and ceil(high) - 1.
-        let first = (low as i32 + i32::from(low >= (low as i32) as f32)).max(-border);
-        let last = (high as i32 - i32::from(high <= (high as i32) as f32)).min(*border);
-        let count = ((last - first + 1).max(0) as usize).min(MAX_TAPS);
-        let scale = CELLS as f32 / radius;
-        for (k, weight) in weights[..count].iter_mut().enumerate() {
-            let at = ((first + k as i32) as f32 - offset).abs() * scale;
-            let cell = (at as usize).min(CELLS);
-            *weight = table[cell] + (at - cell as f32) * (table[cell + 1] - table[cell]);
+        match &self.shared {
+            None => Taps { first: 0, count: 1, weights: [1.0; MAX_TAPS] },
+            // As many as are usual are known to the compiler.
+            Some(shared) => match shared.count {
+                2 => shared.taps::<2>(offset),
+                3 => shared.taps::<3>(offset),
+                4 => shared.taps::<4>(offset),
+                _ => shared.taps::<MAX_TAPS>(offset),
+            },
         }
-        Taps { first, count, weights }
     }
 
     /// How noise of pixels becomes that of the filtered picture.
@@ -237,13 +234,41 @@ impl VarianceKernel {
     }
 }
 
-/// One axis over its integral at `i * radius / CELLS`, and once more the last value.
-fn tabulate(desc: &FilterDesc) -> [f32; CELLS + 2] {
-    let radius = f64::from(desc.radius());
-    let at = |i: usize| evaluate(desc, (i as f64 / CELLS as f64).min(1.0) * radius);
-    let h = radius / STEPS as f64;
-    let half: f64 = (0..STEPS).map(|i| evaluate(desc, (i as f64 + 0.5) * h) * h).sum();
-    std::array::from_fn(|i| (at(i) / (2.0 * half)) as f32)
+impl Shared {
+    fn new(desc: &FilterDesc) -> Self {
+        let radius = f64::from(desc.radius());
+        let half: f64 =
+            (0..STEPS).map(|i| (i as f64 + 0.5) * radius / STEPS as f64).map(|x| evaluate(desc, x) * radius / STEPS as f64).sum();
+        let border = (radius - 0.5).ceil() as i32;
+        let count = Some((2.0 * radius).ceil() as usize).filter(|count| *count <= 4).unwrap_or(MAX_TAPS);
+        let (mut first, mut weights) = ([0; OFFSETS], Vec::with_capacity(2 * OFFSETS * count));
+        for (cell, first) in first.iter_mut().enumerate() {
+            let ends = [cell, cell + 1].map(|end| end as f64 / OFFSETS as f64 - 0.5);
+            let pixel = ((ends[0] - radius).floor() as i32 + 1).min(border + 1 - count as i32).max(-border);
+            *first = pixel as i8;
+            let weight = |k: usize, end: f64| {
+                if pixel + k as i32 > border { 0.0 } else { evaluate(desc, f64::from(pixel + k as i32) - end) / (2.0 * half) }
+            };
+            weights.extend((0..count).map(|k| weight(k, ends[0]) as f32));
+            weights.extend((0..count).map(|k| (weight(k, ends[1]) - weight(k, ends[0])) as f32));
+        }
+        Self { border, count, first, weights }
+    }
+
+    #[inline(always)]
+    fn taps<const N: usize>(&self, offset: f32) -> Taps {
+        let at = (offset + 0.5) * OFFSETS as f32;
+        let cell = (at as i32).clamp(0, OFFSETS as i32 - 1);
+        let within = at - cell as f32;
+        let cell = cell as usize;
+        let (low, growth) = self.weights[2 * N * cell..2 * N * (cell + 1)].split_at(N);
+        let mut weights = [0.0; MAX_TAPS];
+        for k in 0..N {
+            weights[k] = low[k] + within * growth[k];
+        }
+        let first = i32::from(self.first[cell]);
+        Taps { first, count: N.min((self.border + 1 - first) as usize), weights }
+    }
 }
 
 /// Inverts the distribution of a tent on `[-1, 1]`.

@@ -83,3 +83,34 @@ fn extreme_random_numbers_stay_within_the_radius() {
         }
     }
 }
+
+#[test]
+fn weights_of_shared_samples_are_the_filters() {
+    for desc in Filter::examples(FilterSamplesDesc::Shared) {
+        let filter = Filter::new(&desc);
+        if !filter.is_shared() {
+            continue;
+        }
+        let (r, border) = (f64::from(desc.radius()), filter.border() as i32);
+        let total = integral(&desc, -r, r, |f| f);
+        let (count, mut sum) = (40_000, 0.0);
+        for i in 0..count {
+            let offset = (i as f32 + 0.5) / count as f32 - 0.5;
+            let taps = filter.taps(offset);
+            assert!(taps.first >= -border && taps.first + taps.count as i32 <= border + 1, "{desc:?} {offset}: {taps:?}");
+            for pixel in -border..=border {
+                let k = (pixel - taps.first) as usize;
+                let weight = if k < taps.count { taps.weights[k] } else { 0.0 };
+                let x = (f64::from(pixel) - f64::from(offset)).abs();
+                // Within a cell of the support's end, kinks are smoothed.
+                if (x - r).abs() > 1.0 / OFFSETS as f64 {
+                    assert!((f64::from(weight) - evaluate(&desc, x) / total).abs() < 3e-5, "{desc:?} {offset} {pixel}: {weight}");
+                }
+                sum += f64::from(weight) / f64::from(count);
+            }
+        }
+        // Both ends of a box are off by up to half of a cell.
+        let tolerance = if matches!(desc, FilterDesc::Box { .. }) { 1.0 / OFFSETS as f64 } else { 1e-5 };
+        assert!((sum - 1.0).abs() < tolerance, "{desc:?}: {sum}");
+    }
+}

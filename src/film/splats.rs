@@ -48,13 +48,15 @@ impl Splats {
     pub(super) fn flush(&mut self, cells: &Cells, cell: usize, filtered: &mut Accumulator, weights: &mut [Sums<1>]) {
         let first = cell * cells.entries_of_cell();
         let stride = 2 * self.channel_count;
-        for (i, sums) in self.color.iter().enumerate().filter(|(_, sums)| sums[4] != 0.0) {
-            let [r, g, b, a, weight, ..] = sums.map(f64::from);
-            filtered.color[first + i].add([r, g, b, a]);
-            weights[first + i].add([weight]);
-            if stride > 0 {
-                let channels = &self.channels[i * self.channel_count..(i + 1) * self.channel_count];
-                let to = &mut filtered.channels[(first + i) * stride..(first + i + 1) * stride];
+        let (colors, weights) = (&mut filtered.color[first..], &mut weights[first..]);
+        for ((sums, color), weight) in self.color.iter().zip(colors).zip(weights) {
+            let [r, g, b, a, w, ..] = sums.map(f64::from);
+            color.add([r, g, b, a]);
+            weight.add([w]);
+        }
+        if stride > 0 {
+            let channels = self.channels.chunks_exact(self.channel_count);
+            for (channels, to) in channels.zip(filtered.channels[first * stride..].chunks_exact_mut(stride)) {
                 slice::add(to, channels.iter().map(|&value| f64::from(value)));
             }
         }

@@ -85,6 +85,38 @@ fn no_corner_reflects_more_than_it_receives_by_quadrature() {
 }
 
 #[test]
+fn thin_sheets_of_mitsuba_are_sampled_as_they_are_evaluated() {
+    for (ior, anisotropic, specular_tint) in [(1.5, 0.0, 0.0), (1.5, 0.8, 0.7), (1.2, 0.0, 1.0), (2.5, 0.5, 0.0)] {
+        let glass =
+            PrincipledParameters { ior, anisotropic, specular_tint, transmission: 1.0, thin: true, ..PrincipledParameters::default() };
+        let parameters = PrincipledParameters { base_color: Rgb::new(0.9, 0.5, 0.25), model: PrincipledModel::Mitsuba, ..glass };
+        let bsdf = Bsdf::Principled(Principled::new(&parameters));
+        let disagreement = sampling::worst_disagreement(&bsdf, &[1.0, 0.7, 0.3, 0.05, -0.5]);
+        assert!(disagreement < 2e-4, "{ior} {anisotropic}: {disagreement}");
+        // What samples weigh on average is the integral of the values, on either side.
+        let wo = direction(0.6, 0.13);
+        let (mut sampled, mut integral) = ([0.0f64; 2], [0.0f64; 2]);
+        let count = 1 << 16;
+        for u in random_points(5, count) {
+            if let Some(sample) = bsdf.sample(wo, u[0], [u[1], u[2]]) {
+                sampled[usize::from(sample.is_transmission)] += f64::from(sample.weight.r) / count as f64;
+            }
+        }
+        let side = 1000;
+        for i in 0..side * side {
+            let [row, column] = [i / side, i % side].map(|k| (k as f32 + 0.5) / side as f32);
+            let wi = direction(2.0 * row - 1.0, column);
+            integral[usize::from(wi.z < 0.0)] +=
+                f64::from(bsdf.eval(wo, wi).value.r) * 2.0 * std::f64::consts::TAU / f64::from(side * side);
+        }
+        // Of 65,536 weights with a deviation of at most 0.6: more than five deviations of their mean.
+        for (a, b) in sampled.iter().zip(integral) {
+            assert!((a - b).abs() < 0.0125, "{ior} {anisotropic}: {sampled:?} {integral:?}");
+        }
+    }
+}
+
+#[test]
 fn a_white_metal_loses_nothing_and_black_keeps_only_its_layers() {
     for roughness in [0.0, 0.3, 0.7, 1.0] {
         let metal = PrincipledParameters { base_color: Rgb::WHITE, metallic: 1.0, roughness, ..PrincipledParameters::default() };

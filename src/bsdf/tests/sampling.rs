@@ -4,7 +4,7 @@ use super::*;
 use crate::sampling::statistics::random_points;
 
 /// Largest relative difference between a sample and the evaluation of its direction, over the samples of some directions.
-fn worst_disagreement(bsdf: &Bsdf, cosines: &[f32]) -> f32 {
+pub(super) fn worst_disagreement(bsdf: &Bsdf, cosines: &[f32]) -> f32 {
     let mut worst = 0f32;
     for &cos in cosines {
         let wo = direction(cos, 0.2);
