@@ -48,18 +48,34 @@ static void user_bounds(const struct RTCBoundsFunctionArguments *args) {
     set_bounds(args->bounds_o, shape->lower, shape->upper);
 }
 
+/* Fewer rays are intersected one by one. */
+enum { LEAST_ROWS = 3 };
+
+/* The distances at which valid lanes hit a shape, negative on a miss. */
+static void user_distances(const struct StUserShape *shape, const float *rays, unsigned n, const int *valid, unsigned instance, float *t) {
+    unsigned count = 0;
+    for (unsigned lane = 0; lane < n; lane++) count += valid[lane] == -1;
+    if (shape->intersect_rows && count >= LEAST_ROWS && n <= 16) {
+        shape->intersect_rows(shape->shape, rays, n, valid, t);
+        return;
+    }
+    for (unsigned lane = 0; lane < n; lane++) {
+        if (valid[lane] != -1) continue;
+        const struct StRay ray = ray_of_lane(rays, n, lane);
+        t[lane] = shape->intersect(shape->shape, &ray, key_of_lane(rays, n, lane), instance);
+    }
+}
+
 static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
-    const struct StUserShape *shape = args->geometryUserPtr;
     const unsigned n = args->N;
     float *rays = (float *)args->rayhit;
     float *reals = rays + HIT * n;
     unsigned *ids = (unsigned *)reals;
+    float t[16];
+    user_distances(args->geometryUserPtr, rays, n, args->valid, args->context->instID[0], t);
     for (unsigned lane = 0; lane < n; lane++) {
-        if (args->valid[lane] != -1) continue;
-        const struct StRay ray = ray_of_lane(rays, n, lane);
-        const float t = shape->intersect(shape->shape, &ray, key_of_lane(rays, n, lane), args->context->instID[0]);
-        if (!(t >= 0.0f)) continue;
-        rays[TFAR * n + lane] = t;
+        if (args->valid[lane] != -1 || !(t[lane] >= 0.0f)) continue;
+        rays[TFAR * n + lane] = t[lane];
         reals[NG_X * n + lane] = 0.0f;
         reals[NG_Y * n + lane] = 0.0f;
         reals[NG_Z * n + lane] = 0.0f;
@@ -72,14 +88,12 @@ static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
 }
 
 static void user_occluded(const struct RTCOccludedFunctionNArguments *args) {
-    const struct StUserShape *shape = args->geometryUserPtr;
     const unsigned n = args->N;
     float *rays = (float *)args->ray;
+    float t[16];
+    user_distances(args->geometryUserPtr, rays, n, args->valid, args->context->instID[0], t);
     for (unsigned lane = 0; lane < n; lane++) {
-        if (args->valid[lane] != -1) continue;
-        const struct StRay ray = ray_of_lane(rays, n, lane);
-        const float t = shape->intersect(shape->shape, &ray, key_of_lane(rays, n, lane), args->context->instID[0]);
-        if (t >= 0.0f) rays[TFAR * n + lane] = -INFINITY;
+        if (args->valid[lane] == -1 && t[lane] >= 0.0f) rays[TFAR * n + lane] = -INFINITY;
     }
 }
 

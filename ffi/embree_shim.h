@@ -33,6 +33,12 @@ struct StHit {
 /* The distance at which `ray` hits `shape`, within the ray's interval; negative on a miss. `key` is the ray's id, `instance` Embree's. */
 typedef float (*StIntersect)(const void *shape, const struct StRay *ray, uint32_t key, uint32_t instance);
 
+/*
+ * The distances at which `n` (at most 16) rays hit `shape`, negative on a miss: `t` has room for 16. `rays` are the rows of Embree's packets; lanes
+ * with `valid` 0 may be anything, and so may their distances.
+ */
+typedef void (*StIntersectRows)(const void *shape, const float *rays, uint32_t n, const int *valid, float *t);
+
 /* Whether a hit of `ray` (in the space of `instance`) with the shape behind `user` counts. */
 typedef bool (*StCounts)(const void *user, const struct StRay *ray, uint32_t key, const struct StHit *hit);
 
@@ -40,6 +46,8 @@ typedef bool (*StCounts)(const void *user, const struct StRay *ray, uint32_t key
 struct StUserShape {
     const void *shape;
     StIntersect intersect;
+    /* For several rays at once; may be null. */
+    StIntersectRows intersect_rows;
     float lower[3];
     float upper[3];
 };

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use super::{Hit, Shape};
+use super::{Detail, Hit, Shape};
 use crate::id::ShapeId;
 use crate::math::Ray;
 
@@ -65,7 +65,7 @@ impl Cutouts {
 fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
     match shape {
         Shape::Mesh(_) => 0,
-        Shape::Analytic(placed) => placed.interaction(ray, hit).is_some_and(|at| at.n_g.dot(ray.direction) > 0.0).into(),
+        Shape::Analytic(placed) => placed.interaction_with(Detail::Place, ray, hit).is_some_and(|at| at.n_g.dot(ray.direction) > 0.0).into(),
     }
 }
 

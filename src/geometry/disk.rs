@@ -7,7 +7,7 @@
 
 use super::sector::{Sector, direction_from_axis};
 use super::shape_error::{not_negative, positive};
-use super::{LocalHit, LocalSurface, ShapeError, ShapeSample};
+use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
 use crate::math::{Bounds, DVec3, RayF64, dvec3};
 
 /// A ring sector; a full disk has no inner radius and a full sector.
@@ -45,25 +45,26 @@ impl Disk {
         self.sector.is_full()
     }
 
-    /// The hit within the ray's interval.
-    #[inline]
-    pub fn intersect(&self, ray: &RayF64) -> Option<LocalHit> {
+    /// Distance of the hit within the ray's interval; NaN on a miss.
+    #[inline(always)]
+    pub fn distance(&self, ray: &RayF64) -> f64 {
         // A parallel ray gives an infinity or a NaN.
         let t = -ray.origin.z / ray.direction.z;
-        if !(ray.contains(t) && t.is_finite()) {
-            return None;
-        }
         let (x, y) = (ray.origin.x + ray.direction.x * t, ray.origin.y + ray.direction.y * t);
         let rho_squared = x * x + y * y;
-        let in_ring = self.inner_radius * self.inner_radius <= rho_squared && rho_squared <= self.radius * self.radius;
-        (in_ring && self.sector.contains(x, y)).then_some(LocalHit { t, profile: 0.0 })
+        let in_ring = (self.inner_radius * self.inner_radius <= rho_squared) & (rho_squared <= self.radius * self.radius);
+        let counts = ray.contains(t) & t.is_finite() & in_ring & self.sector.contains(x, y);
+        if counts { t } else { f64::NAN }
     }
 
     /// The surface at a hit of `ray`.
     #[inline]
-    pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
+    pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
         let (x, y) = (raw.x, raw.y);
+        if detail == Detail::Place {
+            return LocalSurface { p: dvec3(x, y, 0.0), n: DVec3::Z, pdf_area: 1.0 / self.area, ..LocalSurface::default() };
+        }
         let width = self.radius - self.inner_radius;
         let v = ((x * x + y * y).sqrt() - self.inner_radius) / width;
         LocalSurface {
@@ -115,10 +116,10 @@ mod tests {
     fn v_runs_from_the_inner_to_the_outer_radius() {
         let ring = Disk::new(2.0, 0.5, 5.0).unwrap();
         for (x, v) in [(0.5, 0.0), (1.25, 0.5), (2.0, 1.0)] {
-            let hit = ring.intersect(&down(0.0, x)).unwrap();
-            assert!((ring.surface(&down(0.0, x), &hit).uv[1] - v).abs() < 1e-15, "{x}");
+            let hit = LocalHit { t: ring.distance(&down(0.0, x)), profile: 0.0 };
+            assert!((ring.surface(Detail::Full, &down(0.0, x), &hit).uv[1] - v).abs() < 1e-15, "{x}");
         }
-        assert!(ring.intersect(&down(0.4999, 0.0)).is_none() && ring.intersect(&down(2.0001, 0.0)).is_none());
+        assert!(ring.distance(&down(0.4999, 0.0)).is_nan() && ring.distance(&down(2.0001, 0.0)).is_nan());
     }
 
     #[test]
@@ -127,7 +128,7 @@ mod tests {
         for z in [0.0, -0.0, 0.5] {
             for dz in [0.0, -0.0] {
                 let ray = RayF64 { origin: dvec3(-2.0, 0.0, z), direction: dvec3(1.0, 0.0, dz), t_min: 0.0, t_max: f64::INFINITY };
-                assert_eq!(disk.intersect(&ray), None);
+                assert!(disk.distance(&ray).is_nan());
             }
         }
     }

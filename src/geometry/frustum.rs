@@ -7,9 +7,10 @@
 
 use super::sector::{Sector, direction_from_axis};
 use super::shape_error::{not_negative, positive};
-use super::{LocalHit, LocalSurface, ShapeError, ShapeSample};
+use super::placed::first_of;
+use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
 use crate::math::float::F64_CHAIN_ERROR;
-use crate::math::{Bounds, DVec3, Quadratic, RayF64, dvec3, quadratic_roots, solve_quadratic};
+use crate::math::{Bounds, DVec3, Quadratic, RayF64, difference_of_products, dvec3, quadratic_roots};
 
 /// The side of a cylinder, a cone or a frustum.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,25 +84,23 @@ impl Frustum {
         self.sector.is_full()
     }
 
-    /// The first hit within the ray's interval.
-    #[inline]
-    pub fn intersect(&self, ray: &RayF64) -> Option<LocalHit> {
-        let roots = self.roots(ray)?;
-
-        // The clip in z also removes the other half of the double cone.
-        let accept = |t: f64| {
-            let p = ray.at(t);
-            ray.contains(t) && t.is_finite() && self.z_min <= p.z && p.z <= self.z_max && self.sector.contains(p.x, p.y)
-        };
-        if accept(roots.near) {
-            return Some(LocalHit { t: roots.near, profile: 0.0 });
-        }
-        accept(roots.far).then_some(LocalHit { t: roots.far, profile: 0.0 })
+    /// Distance of the first hit within the ray's interval; NaN on a miss.
+    #[inline(always)]
+    pub fn distance(&self, ray: &RayF64) -> f64 {
+        let roots = self.roots(ray);
+        first_of([roots.near, roots.far], [self.accepts(ray, roots.near), self.accepts(ray, roots.far)])
     }
 
-    /// Where the ray meets the whole double cone or cylinder.
-    #[inline]
-    fn roots(&self, ray: &RayF64) -> Option<Quadratic> {
+    /// The clip in z also removes the other half of the double cone.
+    #[inline(always)]
+    fn accepts(&self, ray: &RayF64, t: f64) -> bool {
+        let p = ray.at(t);
+        ray.contains(t) & t.is_finite() & (self.z_min <= p.z) & (p.z <= self.z_max) & self.sector.contains(p.x, p.y)
+    }
+
+    /// Where the ray meets the whole double cone or cylinder; NaN where it does not.
+    #[inline(always)]
+    fn roots(&self, ray: &RayF64) -> Quadratic {
         // height² (x² + y²) = (radius * height + (top_radius - radius) z)², homogeneous in the height: nothing is divided by.
         let (o, d) = (ray.origin, ray.direction);
         let spread = self.top_radius - self.radius;
@@ -111,7 +110,7 @@ impl Frustum {
             let q = self.radius * self.height + spread * o.z;
             let half_b = squared * (o.x * d.x + o.y * d.y) - spread * q * d.z;
             let c = squared * (o.x * o.x + o.y * o.y) - q * q;
-            return solve_quadratic(a, half_b, c);
+            return quadratic_roots(a, half_b, c, difference_of_products(half_b, half_b, a, c));
         };
 
         // About the apex the discriminant is a form of the ray's moments. Of the coefficients only the last digits would be left there, and
@@ -126,26 +125,30 @@ impl Frustum {
         let p = o + d * t_closest;
         let half_b = squared * (p.x * d.x + p.y * d.y) - spread_squared * p.z * d.z;
         let c = squared * (p.x * p.x + p.y * p.y) - spread_squared * p.z * p.z;
-        let roots = quadratic_roots(a, half_b, c, discriminant)?;
-        Some(Quadratic { near: roots.near + t_closest, far: roots.far + t_closest })
+        let roots = quadratic_roots(a, half_b, c, discriminant);
+        Quadratic { near: roots.near + t_closest, far: roots.far + t_closest }
     }
 
     /// The surface at a hit of `ray`. At an apex the normal is that of the line on the cone at the ray's own angle, or at phi = 0.
     #[inline]
-    pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
+    pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
         let toward = direction_from_axis(raw.x, raw.y);
         let z = raw.z.clamp(0.0, self.height);
         let v = z / self.height;
         let spread = self.top_radius - self.radius;
         let p = (toward * (self.radius + spread * v)).extend(z);
+        let (n, pdf_area) = (self.normal(toward.x, toward.y), 1.0 / self.area);
+        if detail == Detail::Place {
+            return LocalSurface { p, n, pdf_area, ..LocalSurface::default() };
+        }
         LocalSurface {
             p,
-            n: self.normal(toward.x, toward.y),
+            n,
             dp_du: dvec3(-p.y, p.x, 0.0) * self.sector.phi_max(),
             dp_dv: (toward * spread).extend(self.height),
             uv: [self.sector.fraction(raw.x, raw.y), v],
-            pdf_area: 1.0 / self.area,
+            pdf_area,
         }
     }
 
@@ -204,10 +207,10 @@ mod tests {
         let cylinder = Frustum::cylinder(1.0, 2.0, 6.0).unwrap();
         for x in [0.0, -0.0, 0.3, 1.0, 2.0] {
             for dx in [0.0, -0.0] {
-                assert_eq!(cylinder.intersect(&ray(dvec3(x, 0.0, -1.0), dvec3(dx, -dx, 1.0))), None, "{x}");
+                assert!(cylinder.distance(&ray(dvec3(x, 0.0, -1.0), dvec3(dx, -dx, 1.0))).is_nan(), "{x}");
             }
         }
-        assert_eq!(cylinder.intersect(&ray(DVec3::ZERO, DVec3::ZERO)), None);
+        assert!(cylinder.distance(&ray(DVec3::ZERO, DVec3::ZERO)).is_nan());
     }
 
     #[test]
@@ -216,7 +219,7 @@ mod tests {
         for direction in [DVec3::X, DVec3::Y, dvec3(1.0, 0.2, -0.1)] {
             let r = ray(dvec3(0.0, 0.0, 2.0) - 3.0 * direction, direction);
             let hit = LocalHit { t: 3.0, profile: 0.0 };
-            let s = cone.surface(&r, &hit);
+            let s = cone.surface(Detail::Full, &r, &hit);
             assert!((s.n.length() - 1.0).abs() < 1e-15 && s.p.is_finite() && s.dp_dv.is_finite(), "{s:?}");
             assert!((0.0..=1.0).contains(&s.uv[0]) && s.uv[1] > 1.0 - 1e-14);
         }
@@ -225,11 +228,11 @@ mod tests {
     #[test]
     fn the_other_half_of_the_double_cone_is_not_hit() {
         let cone = Frustum::new(1.0, 0.0, 1.0, 6.2).unwrap();
-        assert_eq!(cone.intersect(&ray(dvec3(-3.0, 0.1, 1.5), DVec3::X)), None);
-        let hit = cone.intersect(&ray(dvec3(-3.0, 0.0, 0.5), DVec3::X)).unwrap();
-        assert!((hit.t - 2.5).abs() < 1e-15);
+        assert!(cone.distance(&ray(dvec3(-3.0, 0.1, 1.5), DVec3::X)).is_nan());
+        let t = cone.distance(&ray(dvec3(-3.0, 0.0, 0.5), DVec3::X));
+        assert!((t - 2.5).abs() < 1e-15);
         // Parallel to a line on the cone: one root is infinite.
-        let hit = cone.intersect(&ray(dvec3(2.0, 0.0, -2.0), dvec3(-1.0, 0.0, 1.0))).unwrap();
-        assert!((hit.t - 2.5).abs() < 1e-15);
+        let t = cone.distance(&ray(dvec3(2.0, 0.0, -2.0), dvec3(-1.0, 0.0, 1.0)));
+        assert!((t - 2.5).abs() < 1e-15);
     }
 }

@@ -29,7 +29,7 @@ pub use instance::{Instance, InverseReach, Object};
 pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
 pub(crate) use mesh::interpolated_normal;
 pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
-pub use placed::{Analytic, LocalHit, LocalSurface, Placed, PlacedPoint, ShapeSample};
+pub use placed::{Analytic, FirstHits, LocalHit, LocalSurface, PACKET, Placed, PlacedPoint, RayRows, ShapeSample};
 pub use profile::Profile;
 pub use quad::Quad;
 pub use revolution::{ProfileParameter, Revolution};
@@ -84,7 +84,7 @@ impl Shape {
     fn interaction(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         match self {
             Self::Mesh(mesh) => mesh.interaction(detail, ray, hit),
-            Self::Analytic(placed) => placed.interaction(ray, hit),
+            Self::Analytic(placed) => placed.interaction_with(detail, ray, hit),
         }
     }
 
@@ -219,7 +219,7 @@ impl Geometry {
         let local = |ray: &Ray| {
             let found = match self.shape(hit.shape) {
                 Shape::Mesh(mesh) => mesh.interaction_and_dp_dv(Detail::Full, ray, hit),
-                Shape::Analytic(placed) => placed.interaction_and_dp_dv(ray, hit),
+                Shape::Analytic(placed) => placed.interaction_and_dp_dv(Detail::Full, ray, hit),
             };
             found.map_or(Vec3::ZERO, |(_, dp_dv)| dp_dv)
         };
@@ -237,7 +237,7 @@ impl Geometry {
     pub fn uv_derivatives(&self, ray: &Ray, hit: &Hit) -> [Vec3; 2] {
         let local = |ray: &Ray| match self.shape(hit.shape) {
             Shape::Mesh(mesh) => mesh.uv_derivatives(hit, ray.time),
-            Shape::Analytic(placed) => placed.interaction_and_dp_dv(ray, hit).map_or([Vec3::ZERO; 2], |(at, dp_dv)| [at.dp_du, dp_dv]),
+            Shape::Analytic(placed) => placed.interaction_and_dp_dv(Detail::Full, ray, hit).map_or([Vec3::ZERO; 2], |(at, dp_dv)| [at.dp_du, dp_dv]),
         };
         if hit.instance == Hit::NO_INSTANCE {
             return local(ray);

@@ -7,8 +7,9 @@
 //! Errors of an intersection are those of `f64` relative to the coordinates of the ray's origin in the shape's space. [`Placed`] therefore
 //! moves the origin along the ray to the shape before it asks, so that they are relative to the shape's size.
 
-use super::{Disk, Frustum, Hit, Quad, Revolution, Sphere, SurfaceInteraction};
+use super::{Detail, Disk, Frustum, Hit, Quad, Revolution, Sphere, SurfaceInteraction};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
+use crate::math::vectorize::{Kernel, vectorize};
 use crate::math::{Bounds, DAffine3, DVec3, Ray, RayF64, Transform, Vec2, Vec3};
 
 /// A surface given by a formula.
@@ -36,7 +37,7 @@ pub struct LocalHit {
 }
 
 /// A point of a shape in the shape's own space.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LocalSurface {
     /// The point, moved exactly onto the surface.
     pub p: DVec3,
@@ -79,13 +80,32 @@ impl Analytic {
     /// The first hit within the ray's interval.
     #[inline]
     pub fn intersect(&self, ray: &RayF64) -> Option<LocalHit> {
-        each!(self, shape => shape.intersect(ray))
+        let t = match self {
+            Self::Sphere(sphere) => sphere.distance(ray),
+            Self::Quad(quad) => quad.distance(ray),
+            Self::Disk(disk) => disk.distance(ray),
+            Self::Frustum(frustum) => frustum.distance(ray),
+            Self::Revolution(revolution) => return revolution.intersect(ray),
+        };
+        (!t.is_nan()).then_some(LocalHit { t, profile: 0.0 })
     }
 
     /// The surface at a hit of `ray`.
     #[inline]
     pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
-        each!(self, shape => shape.surface(ray, hit))
+        self.surface_with(Detail::Full, ray, hit)
+    }
+
+    /// [`surface`](Self::surface), where [`Detail::Place`] may leave parameters and derivatives zero.
+    #[inline]
+    pub fn surface_with(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
+        match self {
+            Self::Sphere(sphere) => sphere.surface(detail, ray, hit),
+            Self::Quad(quad) => quad.surface(ray, hit),
+            Self::Disk(disk) => disk.surface(detail, ray, hit),
+            Self::Frustum(frustum) => frustum.surface(detail, ray, hit),
+            Self::Revolution(revolution) => revolution.surface(ray, hit),
+        }
     }
 
     /// Exact bounds.
@@ -150,7 +170,7 @@ impl Placed {
     }
 
     /// `ray` in the shape's own space, accurate relative to the size of the shape however far away the ray starts.
-    #[inline]
+    #[inline(always)]
     fn centered_ray(&self, ray: &Ray) -> CenteredRay {
         let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
         let from_center = origin - self.placed_center;
@@ -170,6 +190,22 @@ impl Placed {
             t_max: f64::from(ray.t_max) - shift,
         };
         CenteredRay { ray, shift }
+    }
+
+    /// Whether [`first_hits`](Self::first_hits) finds anything: surfaces of revolution take one ray after the other.
+    pub fn meets_packets(&self) -> bool {
+        !matches!(self.shape, Analytic::Revolution(_))
+    }
+
+    /// The first hits of the rays of a packet in the space the shape is placed in.
+    pub fn first_hits(&self, rays: &RayRows) -> FirstHits {
+        match &self.shape {
+            Analytic::Sphere(sphere) => vectorize(Packet { placed: self, shape: sphere, rays }),
+            Analytic::Quad(quad) => vectorize(Packet { placed: self, shape: quad, rays }),
+            Analytic::Disk(disk) => vectorize(Packet { placed: self, shape: disk, rays }),
+            Analytic::Frustum(frustum) => vectorize(Packet { placed: self, shape: frustum, rays }),
+            Analytic::Revolution(_) => FirstHits { t: [-1.0; PACKET], is_open: [1; PACKET] },
+        }
     }
 
     /// The first hit of a ray in the space the shape is placed in.
@@ -215,19 +251,25 @@ impl Placed {
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
-        self.interaction_and_dp_dv(ray, hit).map(|(at, _)| at)
+        self.interaction_with(Detail::Full, ray, hit)
+    }
+
+    /// [`interaction`](Self::interaction), or only the part of it that is asked for.
+    #[inline]
+    pub fn interaction_with(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
+        self.interaction_and_dp_dv(detail, ray, hit).map(|(at, _)| at)
     }
 
     /// The interaction with the change of the point with v.
     #[inline(always)]
-    pub(super) fn interaction_and_dp_dv(&self, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
+    pub(super) fn interaction_and_dp_dv(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
         let centered = self.centered_ray(&Ray { t_max: f32::INFINITY, ..*ray });
         let local_hit = self.hit_near(hit.t, &centered)?;
         let t = local_hit.t + centered.shift;
         if t <= 0.0 {
             return None;
         }
-        let surface = self.shape.surface(&centered.ray, &local_hit);
+        let surface = self.shape.surface_with(detail, &centered.ray, &local_hit);
         let placed = self.place(surface.p, surface.n, surface.pdf_area);
         let at = SurfaceInteraction {
             p: placed.p,
@@ -280,7 +322,7 @@ impl Placed {
     pub fn pdf_area(&self, ray: &Ray) -> Option<f64> {
         let centered = self.centered_ray(ray);
         let hit = self.shape.intersect(&centered.ray)?;
-        let surface = self.shape.surface(&centered.ray, &hit);
+        let surface = self.shape.surface_with(Detail::Place, &centered.ray, &hit);
         Some(self.place(surface.p, surface.n, surface.pdf_area).pdf_area)
     }
 
@@ -308,6 +350,92 @@ impl Placed {
             pdf_area: pdf_area / (self.transform.determinant().abs() * length),
         }
     }
+}
+
+/// How many rays are met by a shape at once.
+pub const PACKET: usize = 16;
+
+/// Rays of a packet, one number of each ray side by side.
+#[derive(Clone, Debug)]
+pub struct RayRows {
+    /// Origins by coordinate.
+    pub origin: [[f32; PACKET]; 3],
+    /// Smallest distances.
+    pub t_min: [f32; PACKET],
+    /// Directions by coordinate.
+    pub direction: [[f32; PACKET]; 3],
+    /// Largest distances.
+    pub t_max: [f32; PACKET],
+}
+
+impl RayRows {
+    /// One of the rays.
+    #[inline(always)]
+    pub fn get(&self, i: usize) -> Ray {
+        let vector = |rows: &[[f32; PACKET]; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
+        Ray { t_min: self.t_min[i], t_max: self.t_max[i], ..Ray::new(vector(&self.origin), vector(&self.direction)) }
+    }
+}
+
+/// First hits of the rays of a packet.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstHits {
+    /// Distances; negative on a miss.
+    pub t: [f32; PACKET],
+    /// Other than 0 where [`Placed::intersect`] is to decide.
+    pub is_open: [u32; PACKET],
+}
+
+/// Meets a placed shape with the rays of a packet side by side.
+struct Packet<'a, S> {
+    placed: &'a Placed,
+    shape: &'a S,
+    rays: &'a RayRows,
+}
+
+/// A surface whose first hit is found without branches.
+trait Distance {
+    /// The distance of the first hit within the ray's interval; NaN on a miss.
+    fn distance(&self, ray: &RayF64) -> f64;
+}
+
+macro_rules! distances {
+    ($($shape:ty),*) => {
+        $(impl Distance for $shape {
+            #[inline(always)]
+            fn distance(&self, ray: &RayF64) -> f64 {
+                <$shape>::distance(self, ray)
+            }
+        })*
+    };
+}
+distances!(Sphere, Quad, Disk, Frustum);
+
+impl<S: Distance> Kernel for Packet<'_, S> {
+    type Output = FirstHits;
+
+    #[inline(always)]
+    fn call(self) -> FirstHits {
+        let Self { placed, shape, rays } = self;
+        let (mut t, mut is_open) = ([0.0; PACKET], [0; PACKET]);
+        for i in 0..PACKET {
+            let ray = rays.get(i);
+            let CenteredRay { ray: local, shift } = placed.centered_ray(&ray);
+            let found = shape.distance(&local) + shift;
+            // NaN is less than nothing.
+            t[i] = if found >= 0.0 { found as f32 } else { -1.0 };
+            // The start of the interval is lost in the shift.
+            is_open[i] = u32::from(found < f64::from(ray.t_min));
+        }
+        FirstHits { t, is_open }
+    }
+}
+
+/// The first of two distances in ascending order that is accepted; NaN if neither is.
+#[inline(always)]
+pub(super) fn first_of([near, far]: [f64; 2], [is_near, is_far]: [bool; 2]) -> f64 {
+    let far = if is_far { far } else { f64::NAN };
+    if is_near { near } else { far }
 }
 
 /// Exact bounds of a circle, given by its centre and two perpendicular radii, after an affine map.

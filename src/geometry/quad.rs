@@ -70,18 +70,17 @@ impl Quad {
         self.edge_v
     }
 
-    /// The hit within the ray's interval.
-    #[inline]
-    pub fn intersect(&self, ray: &RayF64) -> Option<LocalHit> {
+    /// Distance of the hit within the ray's interval; NaN on a miss.
+    #[inline(always)]
+    pub fn distance(&self, ray: &RayF64) -> f64 {
         // A parallel ray gives an infinity or a NaN: then u and v are no finite numbers either, and fail their tests.
         let from_corner = ray.origin - self.origin;
         let t = -self.n.dot(from_corner) / self.n.dot(ray.direction);
-        if !(ray.contains(t) && t.is_finite()) {
-            return None;
-        }
         let q = from_corner + ray.direction * t;
         let (u, v) = (q.dot(self.dual_u), q.dot(self.dual_v));
-        ((0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v)).then_some(LocalHit { t, profile: 0.0 })
+        let within = |x: f64| (0.0 <= x) & (x <= 1.0);
+        let counts = ray.contains(t) & t.is_finite() & within(u) & within(v);
+        if counts { t } else { f64::NAN }
     }
 
     /// The surface at a hit of `ray`.
@@ -140,13 +139,13 @@ mod tests {
         let quad = Quad::new(dvec3(1.0, 2.0, 3.0), dvec3(2.0, 0.0, 0.0), dvec3(1.0, 3.0, 0.0)).unwrap();
         let target = dvec3(1.0, 2.0, 3.0) + quad.edge_u() * 0.25 + quad.edge_v() * 0.75;
         let ray = RayF64 { origin: target + dvec3(1.0, -2.0, 4.0), direction: dvec3(-0.5, 1.0, -2.0), t_min: 0.0, t_max: f64::INFINITY };
-        let hit = quad.intersect(&ray).unwrap();
+        let hit = LocalHit { t: quad.distance(&ray), profile: 0.0 };
         let s = quad.surface(&ray, &hit);
         assert!((hit.t - 2.0).abs() < 1e-14 && (s.uv[0] - 0.25).abs() < 1e-14 && (s.uv[1] - 0.75).abs() < 1e-14);
         assert_eq!(s.n, DVec3::Z);
         // Within the plane, and parallel to it.
         for origin in [dvec3(-5.0, 3.0, 3.0), dvec3(-5.0, 3.0, 3.5)] {
-            assert_eq!(quad.intersect(&RayF64 { origin, direction: DVec3::X, t_min: 0.0, t_max: f64::INFINITY }), None);
+            assert!(quad.distance(&RayF64 { origin, direction: DVec3::X, t_min: 0.0, t_max: f64::INFINITY }).is_nan());
         }
     }
 }

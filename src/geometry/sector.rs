@@ -56,13 +56,10 @@ impl Sector {
     }
 
     /// Whether the point is in the sector; the origin always is. Two half-planes decide, without an arctangent.
-    #[inline]
+    #[inline(always)]
     pub fn contains(&self, x: f64, y: f64) -> bool {
-        if self.is_full {
-            return true;
-        }
-        let before_end = x * self.sin - y * self.cos >= 0.0;
-        if self.phi_max <= PI { y >= 0.0 && before_end } else { y >= 0.0 || before_end }
+        let (after_start, before_end) = (y >= 0.0, x * self.sin - y * self.cos >= 0.0);
+        self.is_full | if self.phi_max <= PI { after_start & before_end } else { after_start | before_end }
     }
 
     /// The angle of a point of the sector over `phi_max`, in `[0, 1]`; zero at the origin.

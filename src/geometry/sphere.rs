@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 
 use super::sector::{Sector, direction_from_axis};
 use super::shape_error::positive;
-use super::{LocalHit, LocalSurface, ShapeError, ShapeSample};
+use super::placed::first_of;
+use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
 use crate::math::{Bounds, DVec3, RayF64, dvec3};
 
 /// A sphere about the origin, or a part of it.
@@ -69,40 +70,40 @@ impl Sphere {
         self.radius
     }
 
-    /// The first hit within the ray's interval.
-    #[inline]
-    pub fn intersect(&self, ray: &RayF64) -> Option<LocalHit> {
+    /// Distance of the first hit within the ray's interval; NaN on a miss.
+    #[inline(always)]
+    pub fn distance(&self, ray: &RayF64) -> f64 {
         // The point of the ray closest to the centre, then half the chord (Haines et al., "Precision Improvements for Ray/Sphere
-        // Intersection"). A zero direction gives a NaN, which fails the test.
+        // Intersection"). A zero direction gives a NaN, as the root of a negative number does, which fails every test.
         let d = ray.direction;
         let inverse = 1.0 / d.length_squared();
         let t_middle = -ray.origin.dot(d) * inverse;
         let foot = ray.origin + d * t_middle;
         let half_chord_squared = self.radius * self.radius - foot.length_squared();
-        if half_chord_squared.is_nan() || half_chord_squared < 0.0 {
-            return None;
-        }
         let t_half = (half_chord_squared * inverse).sqrt();
-        let accept = |t: f64| ray.contains(t) && self.keeps(ray.at(t));
-        let near = t_middle - t_half;
-        if accept(near) {
-            return Some(LocalHit { t: near, profile: 0.0 });
-        }
-        let far = t_middle + t_half;
-        accept(far).then_some(LocalHit { t: far, profile: 0.0 })
+        let (near, far) = (t_middle - t_half, t_middle + t_half);
+        first_of([near, far], [self.accepts(ray, near), self.accepts(ray, far)])
     }
 
-    #[inline]
+    #[inline(always)]
+    fn accepts(&self, ray: &RayF64, t: f64) -> bool {
+        ray.contains(t) & self.keeps(ray.at(t))
+    }
+
+    #[inline(always)]
     fn keeps(&self, p: DVec3) -> bool {
-        (!self.cuts_z || (self.z_min <= p.z && p.z <= self.z_max)) && self.sector.contains(p.x, p.y)
+        (!self.cuts_z | ((self.z_min <= p.z) & (p.z <= self.z_max))) & self.sector.contains(p.x, p.y)
     }
 
     /// The surface at a hit of `ray`.
     #[inline]
-    pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
+    pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
         let n = raw / raw.length();
         let p = n * self.radius;
+        if detail == Detail::Place {
+            return LocalSurface { p, n, pdf_area: 1.0 / self.area, ..LocalSurface::default() };
+        }
         let rho = (p.x * p.x + p.y * p.y).sqrt();
         let toward = direction_from_axis(p.x, p.y);
         let theta_range = self.theta_max - self.theta_min;
@@ -162,7 +163,7 @@ mod tests {
     #[test]
     fn the_root_is_chosen_by_the_interval_and_the_clips() {
         let sphere = Sphere::full(2.0).unwrap();
-        let t = |r: &RayF64| sphere.intersect(r).map(|h| h.t);
+        let t = |r: &RayF64| Some(sphere.distance(r)).filter(|t| !t.is_nan());
         assert_eq!(t(&ray(dvec3(0.0, 0.0, -5.0), DVec3::Z)), Some(3.0));
         assert_eq!(t(&ray(DVec3::ZERO, DVec3::Z * 0.5)), Some(4.0));
         assert_eq!(t(&ray(dvec3(0.0, 0.0, 5.0), DVec3::Z)), None);
@@ -172,8 +173,7 @@ mod tests {
         assert_eq!(t(&ray(DVec3::ZERO, DVec3::ZERO)), None);
 
         let bottom = Sphere::new(2.0, -2.0, 0.0, 6.0).unwrap();
-        let hit = bottom.intersect(&ray(dvec3(0.5, 0.5, 5.0), -DVec3::Z)).unwrap();
-        assert!(hit.t > 5.0);
+        assert!(bottom.distance(&ray(dvec3(0.5, 0.5, 5.0), -DVec3::Z)) > 5.0);
     }
 
     #[test]
@@ -181,8 +181,8 @@ mod tests {
         let sphere = Sphere::new(1.0, -0.6, 0.8, 3.0).unwrap();
         for (z, v) in [(0.8f64, 1.0), (-0.6, 0.0)] {
             let r = ray(dvec3(0.0, 3.0, z * 0.999_999_9), -DVec3::Y);
-            let hit = sphere.intersect(&r).unwrap();
-            assert!((sphere.surface(&r, &hit).uv[1] - v).abs() < 1e-6);
+            let hit = LocalHit { t: sphere.distance(&r), profile: 0.0 };
+            assert!((sphere.surface(Detail::Full, &r, &hit).uv[1] - v).abs() < 1e-6);
         }
     }
 }

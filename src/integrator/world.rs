@@ -4,11 +4,13 @@ use super::cancel::Cancel;
 use super::cones::Division;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
-use crate::geometry::{Detail, Hit, SurfaceInteraction};
+use crate::geometry::{Detail, Hit, Shape, SurfaceInteraction};
+use crate::id::MaterialId;
 use crate::light::{FoundBy, Light};
+use crate::material::Material;
 use crate::math::float::step_past;
 use crate::math::{Aabb, Ray, Vec3};
-use crate::scene::Scene;
+use crate::scene::{Scene, Surface};
 
 /// How often a ray looks again behind hits that turn out to be rounding artefacts. Stacks of so many coplanar surfaces do not occur.
 const MAX_RETRACES: u32 = 64;
@@ -23,7 +25,11 @@ pub struct World<'a> {
     /// The accelerator.
     pub accel: &'a dyn Accelerator,
     bounds: Aabb,
+    /// Squared distance from the bounds up to which rays may start.
+    reach_squared: f32,
     detail: Detail,
+    /// By shape, analytic ones alone in a scene with parameters: whether a place suffices. Empty without them.
+    needs_place_only: Vec<bool>,
     /// Of pictures of scenes with [filtered textures](crate::scene::Features::filtered_textures).
     pub(super) division: Option<Division>,
     /// Around all surfaces of media.
@@ -39,11 +45,14 @@ impl<'a> World<'a> {
     /// A scene with its accelerator.
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator) -> Self {
         let detail = if scene.features.parameters { Detail::Full } else { Detail::Place };
+        let bounds = accel.bounds();
         Self {
             scene,
             accel,
-            bounds: accel.bounds(),
+            bounds,
+            reach_squared: bounds.size().max_element().powi(2),
             detail,
+            needs_place_only: if scene.features.parameters { places_suffice(scene) } else { Vec::new() },
             division: None,
             media_bounds: super::media::bounds(scene),
             picture: None,
@@ -88,7 +97,7 @@ impl<'a> World<'a> {
 
     /// With the parametrisation of every surface, whether or not the scene needs it.
     pub fn in_full(self) -> Self {
-        Self { detail: Detail::Full, ..self }
+        Self { detail: Detail::Full, needs_place_only: Vec::new(), ..self }
     }
 
     /// The surface that a ray meets first.
@@ -101,7 +110,8 @@ impl<'a> World<'a> {
     #[inline]
     pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
         let hit = hit?;
-        let mut at = self.scene.geometry.interaction_with(self.detail, ray, &hit);
+        let detail = if self.needs_place_only.get(hit.shape.index()) == Some(&true) { Detail::Place } else { self.detail };
+        let mut at = self.scene.geometry.interaction_with(detail, ray, &hit);
         if at.is_none() {
             at = self.retrace(ray, hit);
         } else if self.scene.features.reliefs {
@@ -174,9 +184,17 @@ impl<'a> World<'a> {
     #[inline]
     pub fn approach(&self, ray: Ray) -> Ray {
         let nearest = ray.origin.clamp(self.bounds.min, self.bounds.max);
-        let gap = (nearest - ray.origin).length();
-        let extent = self.bounds.size().max_element();
+        let gap_squared = (nearest - ray.origin).length_squared();
         // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
+        if gap_squared <= self.reach_squared {
+            return ray;
+        }
+        self.approach_from_afar(ray, gap_squared.sqrt())
+    }
+
+    #[inline(never)]
+    fn approach_from_afar(&self, ray: Ray, gap: f32) -> Ray {
+        let extent = self.bounds.size().max_element();
         if !(gap > extent && gap < f32::INFINITY) {
             return ray;
         }
@@ -184,5 +202,29 @@ impl<'a> World<'a> {
         let direction = ray.direction.as_dvec3();
         let distance = f64::from(gap - 0.5 * extent) / direction.length();
         Ray { origin: (origin + direction * distance).as_vec3(), ..ray }
+    }
+}
+
+/// By shape, whether nothing about it depends on parameters; only of analytic shapes, whose parameters cost arctangents. Empty if there are none.
+fn places_suffice(scene: &Scene) -> Vec<bool> {
+    if !scene.features.analytic_shapes || scene.features.anisotropic || !scene.part_reliefs.is_empty() {
+        return Vec::new();
+    }
+    let suffices = |(surface, shape): (&Surface, &Shape)| {
+        let shines_evenly = surface.first_light.is_none_or(|id| match scene.lights.get(id) {
+            Light::Area(light) => light.emission.texture.is_none() && light.emission.opacity.is_none(),
+            _ => false,
+        });
+        matches!(shape, Shape::Analytic(_)) && surface.relief.is_none() && shines_evenly && is_same_everywhere(scene, surface.material)
+    };
+    scene.surfaces.iter().zip(&scene.geometry.shapes).map(suffices).collect()
+}
+
+/// Whether a material scatters alike at all points and in all directions of the tangent plane.
+fn is_same_everywhere(scene: &Scene, id: MaterialId) -> bool {
+    match &scene.materials[id.index()] {
+        Material::Constant(bsdf) => !bsdf.is_anisotropic(),
+        Material::TwoSided { front, back } => [*front, *back].into_iter().all(|id| is_same_everywhere(scene, id)),
+        Material::Varying(_) | Material::Mix { .. } => false,
     }
 }

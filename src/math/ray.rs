@@ -68,13 +68,13 @@ pub struct RayF64 {
 
 impl RayF64 {
     /// The point at `t`, with one rounding for each coordinate where the machine has a fused multiply-add.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, t: f64) -> DVec3 {
         self.origin + self.direction * t
     }
 
     /// Whether `t` lies in the ray's interval; false for a NaN.
-    #[inline]
+    #[inline(always)]
     pub fn contains(&self, t: f64) -> bool {
         self.t_min <= t && t <= self.t_max
     }

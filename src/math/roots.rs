@@ -1,7 +1,7 @@
 //! Roots of quadratics without cancellation, and roots of functions within an interval at whose ends the sign differs.
 
 /// `a * b - c * d` with one rounding error at most (Kahan; Jeannerod, Louvet, Muller, "Further analysis of Kahan's algorithm").
-#[inline]
+#[inline(always)]
 pub fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let cd = c * d;
     let error = (-c).mul_add(d, cd);
@@ -22,26 +22,19 @@ pub struct Quadratic {
 /// NaN, the other finite.
 #[inline]
 pub fn solve_quadratic(a: f64, half_b: f64, c: f64) -> Option<Quadratic> {
-    quadratic_roots(a, half_b, c, difference_of_products(half_b, half_b, a, c))
+    let roots = quadratic_roots(a, half_b, c, difference_of_products(half_b, half_b, a, c));
+    (!(roots.near.is_nan() && roots.far.is_nan())).then_some(roots)
 }
 
-/// [`solve_quadratic`] where `half_b² - a c` is known better than from the coefficients.
-#[inline]
-pub fn quadratic_roots(a: f64, half_b: f64, c: f64, discriminant: f64) -> Option<Quadratic> {
-    if discriminant.is_nan() || discriminant < 0.0 {
-        return None;
-    }
+/// [`solve_quadratic`] where `half_b² - a c` is known better than from the coefficients; both roots are NaN if there are none. Without branches.
+#[inline(always)]
+pub fn quadratic_roots(a: f64, half_b: f64, c: f64, discriminant: f64) -> Quadratic {
+    // The root of a negative number is NaN.
     let q = -(half_b + discriminant.sqrt().copysign(half_b));
-    let (t0, t1) = if q == 0.0 {
-        // half_b = 0 and a c = 0: a double root at zero, unless a = 0 too.
-        if a == 0.0 {
-            return None;
-        }
-        (0.0, 0.0)
-    } else {
-        (q / a, c / q)
-    };
-    Some(if t0 <= t1 { Quadratic { near: t0, far: t1 } } else { Quadratic { near: t1, far: t0 } })
+    // half_b = 0 and a c = 0: a double root at zero, unless a = 0 too.
+    let double = if a == 0.0 { f64::NAN } else { 0.0 };
+    let (t0, t1) = if q == 0.0 { (double, double) } else { (q / a, c / q) };
+    if t0 <= t1 { Quadratic { near: t0, far: t1 } } else { Quadratic { near: t1, far: t0 } }
 }
 
 /// An interval at whose ends a function has different signs; zero counts as positive.

@@ -80,7 +80,7 @@ impl Transform {
     }
 
     /// A vector from world to object.
-    #[inline]
+    #[inline(always)]
     pub fn inverse_vector(&self, v: DVec3) -> DVec3 {
         self.object_from_world.transform_vector3(v)
     }

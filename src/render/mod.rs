@@ -155,8 +155,10 @@ impl<'a> Job<'a> {
         let setup = Setup { sampler, needs, parts, side_by_side: settings.side_by_side, guide: None };
         let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
         let world = if settings.transparent { world.without_background() } else { world };
+        // Parameters of analytic shapes come with their places alone.
+        let in_full = settings.integrator == IntegratorDesc::Uv || (needs.uv && scene.features.analytic_shapes);
         Self {
-            world: if settings.integrator == IntegratorDesc::Uv { world.in_full() } else { world },
+            world: if in_full { world.in_full() } else { world },
             integrator: integrator::build(&settings.integrator, setup.clone()),
             setup,
             grid: FilmGrid::new(&shape, &filter, TILE_SIZE),

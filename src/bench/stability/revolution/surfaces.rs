@@ -23,7 +23,7 @@ pub(super) fn d3_equals_quadrics(effort: Effort) -> Outcome {
         for phi_max in [TAU, 2.0, 4.5] {
             let profile = Profile::bezier(&line([bottom, 0.0], [top, height])).expect(VALID);
             let shape = Revolution::new(&profile, phi_max).expect(VALID);
-            let frustum = Frustum::new(bottom, top, height, phi_max).expect(VALID);
+            let frustum = Analytic::Frustum(Frustum::new(bottom, top, height, phi_max).expect(VALID));
             for i in 0..effort.pick(2_000, 100_000) {
                 let ray = test_ray(&mut rng, &shape, i % KINDS.len());
                 let cycled = |v: DVec3| dvec3(v.z, v.x, v.y);
