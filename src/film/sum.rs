@@ -21,11 +21,9 @@ impl<const N: usize> Sums<N> {
     /// Adds to each sum.
     #[inline(always)]
     pub fn add(&mut self, terms: [f64; N]) {
-        for ((high, low), term) in self.high.iter_mut().zip(&mut self.low).zip(terms) {
-            let (sum, error) = two_sum(*high, term);
-            *high = sum;
-            *low += error;
-        }
+        let sums: [(f64, f64); N] = std::array::from_fn(|k| two_sum(self.high[k], terms[k]));
+        self.high = std::array::from_fn(|k| sums[k].0);
+        self.low = std::array::from_fn(|k| self.low[k] + sums[k].1);
     }
 
     /// Adds the sums of other terms.

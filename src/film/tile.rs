@@ -208,6 +208,9 @@ impl FilmTile {
     #[inline]
     pub fn add<'a>(&mut self, pixel: usize, sample: u32, value: impl Into<Sample<'a>>, weight: f32) -> bool {
         let value = value.into();
+        if !self.layout.beside_color() && self.weights.is_empty() {
+            return self.add_color(pixel, sample, value.pixel, weight);
+        }
         let Some(values) = self.take(pixel, sample, value, weight) else { return false };
         let entry = self.cells.entry_of(pixel);
         self.filtered.add(entry, &values, weight);
@@ -217,6 +220,20 @@ impl FilmTile {
         if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
             coverage.add(entry, surface.shown, 1);
         }
+        true
+    }
+
+    /// [`add`](Self::add) where nothing but the colour is kept, and all samples weigh the same.
+    #[inline(always)]
+    fn add_color(&mut self, pixel: usize, sample: u32, PixelSample { radiance, alpha }: &PixelSample, weight: f32) -> bool {
+        if !is_finite(weight, *radiance, *alpha) {
+            self.drop_sample(pixel, sample);
+            return false;
+        }
+        let weight = f64::from(weight);
+        let color = [radiance.r, radiance.g, radiance.b, *alpha].map(|value| weight * f64::from(value));
+        self.filtered.color[self.cells.entry_of(pixel)].add(color);
+        self.samples[pixel] += 1;
         true
     }
 
@@ -256,8 +273,7 @@ impl FilmTile {
         let Sample { pixel: PixelSample { radiance, alpha }, surface, parts } = value;
         let mut values =
             Values { color: [radiance.r, radiance.g, radiance.b, *alpha], parts: &[], means: [0.0; MAX_MEANS], counts: [0; 2] };
-        // A sum is finite only if every term is, save for an overflow, which is no use either.
-        let mut finite = (weight * (radiance.r.abs() + radiance.g.abs() + radiance.b.abs() + alpha.abs())).is_finite();
+        let mut finite = is_finite(weight, *radiance, *alpha);
         if self.layout.beside_color() {
             values.parts = &parts[..self.layout.parts.count().min(parts.len())];
             values.counts = [3 * self.layout.parts.count(), self.layout.mean_channels];
@@ -385,6 +401,12 @@ impl FilmTile {
             self.dropped.push(DroppedSample { x: self.area.x + column, y: self.area.y + row, sample });
         }
     }
+}
+
+/// Whether a weighted sample is finite. A sum is only if every term is, save for an overflow, which is no use either.
+#[inline(always)]
+fn is_finite(weight: f32, radiance: Rgb, alpha: f32) -> bool {
+    (weight * (radiance.r.abs() + radiance.g.abs() + radiance.b.abs() + alpha.abs())).is_finite()
 }
 
 /// Units of coverage of a shared sample of weight 1.

@@ -5,9 +5,9 @@
 //!
 //! `uv = (phi / phi_max, z / height)`.
 
+use super::placed::first_of;
 use super::sector::{Sector, direction_from_axis};
 use super::shape_error::{not_negative, positive};
-use super::placed::first_of;
 use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
 use crate::math::float::F64_CHAIN_ERROR;
 use crate::math::{Bounds, DVec3, Quadratic, RayF64, difference_of_products, dvec3, quadratic_roots};

@@ -237,7 +237,9 @@ impl Geometry {
     pub fn uv_derivatives(&self, ray: &Ray, hit: &Hit) -> [Vec3; 2] {
         let local = |ray: &Ray| match self.shape(hit.shape) {
             Shape::Mesh(mesh) => mesh.uv_derivatives(hit, ray.time),
-            Shape::Analytic(placed) => placed.interaction_and_dp_dv(Detail::Full, ray, hit).map_or([Vec3::ZERO; 2], |(at, dp_dv)| [at.dp_du, dp_dv]),
+            Shape::Analytic(placed) => {
+                placed.interaction_and_dp_dv(Detail::Full, ray, hit).map_or([Vec3::ZERO; 2], |(at, dp_dv)| [at.dp_du, dp_dv])
+            }
         };
         if hit.instance == Hit::NO_INSTANCE {
             return local(ray);

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::ShapeError;
-use crate::math::{DVec2, dvec2};
+use crate::math::{DVec2, dvec2, unit_circle};
 
 /// A sector of the plane about the origin, closed on both sides; `0 < phi_max <= 2 pi`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +80,10 @@ impl Sector {
     /// Cosine and sine of the angle `fraction * phi_max`.
     #[inline]
     pub(super) fn direction(&self, fraction: f64) -> DVec2 {
+        if self.is_full {
+            // The choice of an angle may round.
+            return unit_circle(fraction as f32);
+        }
         let (sin, cos) = (fraction * self.phi_max).sin_cos();
         dvec2(cos, sin)
     }

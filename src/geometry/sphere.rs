@@ -7,9 +7,9 @@
 
 use std::f64::consts::PI;
 
+use super::placed::first_of;
 use super::sector::{Sector, direction_from_axis};
 use super::shape_error::positive;
-use super::placed::first_of;
 use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
 use crate::math::{Bounds, DVec3, RayF64, dvec3};
 

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::{InfinityEval, LightSample, ShadowTarget, unit_circle};
+use super::{InfinityEval, LightSample, ShadowTarget};
 use crate::color::Rgb;
-use crate::math::{DVec3, Frame, Vec3};
+use crate::math::{DVec3, Frame, Vec3, unit_circle};
 
 /// Light that arrives from one direction, or from a cone of directions around it with the same radiance along each.
 #[derive(Clone, Debug)]

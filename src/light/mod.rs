@@ -27,7 +27,7 @@ pub use tree::Receiver;
 
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint, SurfaceInteraction};
-use crate::math::{DVec2, DVec3, Ray, Vec3, sin_cos_turns};
+use crate::math::{DVec3, Ray, Vec3};
 use crate::texture::Texture;
 use bounds::LightBounds;
 
@@ -102,15 +102,6 @@ impl LightSample {
             ShadowTarget::Infinity => from.spawn(self.wi),
         }
     }
-}
-
-/// The point of the unit circle at `u` of a turn, of unit length in `f64`, within `f32` rounding of that angle.
-#[inline]
-fn unit_circle(u: f32) -> DVec2 {
-    let (sin, cos) = sin_cos_turns(u);
-    let v = DVec2::new(f64::from(cos), f64::from(sin));
-    // One Newton step of the inverse square root: from an error of 1e-7 to below 1e-14.
-    v * (1.5 - 0.5 * v.length_squared())
 }
 
 impl Light {

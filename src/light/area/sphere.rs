@@ -3,8 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::SurfaceSample;
-use crate::light::unit_circle;
-use crate::math::DVec3;
+use crate::math::{DVec3, unit_circle};
 
 /// A whole sphere in the world.
 #[derive(Clone, Debug)]

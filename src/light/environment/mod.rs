@@ -14,9 +14,9 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-use super::{FoundBy, InfinityEval, LightSample, ShadowTarget, unit_circle};
+use super::{FoundBy, InfinityEval, LightSample, ShadowTarget};
 use crate::color::Rgb;
-use crate::math::{DMat3, Vec3, angle_of};
+use crate::math::{DMat3, Vec3, angle_of, unit_circle};
 use crate::sampling::{Piecewise2d, PiecewiseCell};
 
 const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
