@@ -31,7 +31,7 @@ fn scene_of(shapes: Value, rest: Value) -> Value {
 /// The surface that a ray from `origin` towards `target` meets first.
 fn look(scene: &Scene, origin: DVec3, target: DVec3) -> Option<SurfaceInteraction> {
     let accel = accel::build(AccelKind::EMBREE, &scene.geometry, 1).unwrap();
-    World::new(scene, &*accel).closest(&Ray::new(origin.as_vec3(), (target - origin).normalize().as_vec3()))
+    World::new(scene, &*accel).in_full().closest(&Ray::new(origin.as_vec3(), (target - origin).normalize().as_vec3()))
 }
 
 /// The colour of the texture on the diffuse shape that a ray meets.

@@ -38,7 +38,7 @@ pub struct SurfaceInteraction {
 /// How much of an interaction is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// All but what follows a mesh's parametrisation: there `uv` and `dp_du` may be zero.
+    /// All but the parametrisation: `uv` and `dp_du` may be zero.
     Place,
     /// Everything.
     Full,

@@ -4,6 +4,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::*;
 use crate::geometry::ProfileParameter;
+use crate::math::vectorize::with_each;
 
 fn vase() -> Profile {
     Profile::bezier(&[[0.0, -1.0], [0.9, -1.0], [1.2, -0.3], [0.5, 0.2], [0.2, 0.4], [0.3, 0.9], [0.6, 1.0]]).unwrap()
@@ -233,4 +234,57 @@ fn hits_whose_distance_was_rounded_otherwise_are_found_again() {
     assert_eq!(placed.interaction(&ray, &Hit { t: 4.000_01, ..hit }).map(|at| at.t), Some(4.0));
     // The end of the ray may be the hit itself.
     assert!(placed.interaction(&Ray { t_max: 2.0, ..ray }, &Hit { t: 2.0, ..NO_HIT }).is_some());
+}
+
+#[test]
+fn packets_meet_what_single_rays_meet() {
+    let mut random = Rng::new(23);
+    let [mut met, mut open] = [0usize; 2];
+    for shape in shapes() {
+        for scale in [1.0, 1e-3] {
+            let matrix = DMat3::from_cols(dvec3(0.6, 0.8, 0.1), dvec3(-0.8, 0.5, 0.0), dvec3(0.1, 0.2, 1.3)) * scale;
+            let transform = Transform::new(DAffine3 { matrix3: matrix, translation: dvec3(0.3, -2.0, 1.0) * scale }).unwrap();
+            let placed = Placed::new(shape.clone(), transform);
+            for round in 0..40 {
+                let mut vector =
+                    |size: f64| dvec3(random.range(-size, size), random.range(-size, size), random.range(-size, size)).as_vec3();
+                let rays: [Ray; PACKET] = std::array::from_fn(|i| {
+                    let origin = vector(3.0 * scale) + transform.point(DVec3::ZERO).as_vec3();
+                    let t_max = if i % 5 == 4 { 1.0 } else { f32::INFINITY };
+                    let ray = Ray { t_max, ..Ray::new(origin, transform.point(DVec3::ZERO).as_vec3() - origin + vector(scale)) };
+                    // On, or steps past, what it has met: the start of the interval decides.
+                    let t_min = if round % 4 == 3 { placed.intersect(&ray).map_or(0.0, |hit| hit.t as f32) } else { 0.0 };
+                    Ray { t_min, ..ray }
+                });
+                let row = |of: fn(&Ray) -> f32| rays.each_ref().map(of);
+                let rows = RayRows {
+                    origin: [row(|r| r.origin.x), row(|r| r.origin.y), row(|r| r.origin.z)],
+                    t_min: row(|r| r.t_min),
+                    direction: [row(|r| r.direction.x), row(|r| r.direction.y), row(|r| r.direction.z)],
+                    t_max: row(|r| r.t_max),
+                };
+                if !placed.meets_packets() {
+                    assert!(placed.first_hits(&rows).is_open.iter().all(|&open| open != 0));
+                    continue;
+                }
+                let with = |hits: FirstHits| {
+                    for (i, ray) in rays.iter().enumerate().filter(|(i, _)| hits.is_open[*i] == 0) {
+                        let single = placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32);
+                        assert_eq!(hits.t[i].to_bits(), single.to_bits(), "{placed:?} {ray:?}");
+                    }
+                };
+                match &placed.shape {
+                    Analytic::Sphere(shape) => with_each(|| Packet { placed: &placed, shape, rays: &rows }).into_iter().for_each(with),
+                    Analytic::Quad(shape) => with_each(|| Packet { placed: &placed, shape, rays: &rows }).into_iter().for_each(with),
+                    Analytic::Disk(shape) => with_each(|| Packet { placed: &placed, shape, rays: &rows }).into_iter().for_each(with),
+                    Analytic::Frustum(shape) => with_each(|| Packet { placed: &placed, shape, rays: &rows }).into_iter().for_each(with),
+                    Analytic::Revolution(_) => {}
+                }
+                let hits = placed.first_hits(&rows);
+                met += hits.t.iter().filter(|t| **t >= 0.0).count();
+                open += hits.is_open.iter().filter(|open| **open != 0).count();
+            }
+        }
+    }
+    assert!(met > 5_000 && open < met / 10, "{met} {open}");
 }
