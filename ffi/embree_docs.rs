@@ -489,6 +489,9 @@ const _: () = {
 };
 pub type StIntersect =
     ::std::option::Option<unsafe extern "C" fn(shape: *const ::std::os::raw::c_void, ray: *const StRay, key: u32, instance: u32) -> f32>;
+pub type StIntersectRows = ::std::option::Option<
+    unsafe extern "C" fn(shape: *const ::std::os::raw::c_void, rays: *const f32, n: u32, valid: *const ::std::os::raw::c_int, t: *mut f32),
+>;
 pub type StCounts = ::std::option::Option<
     unsafe extern "C" fn(user: *const ::std::os::raw::c_void, ray: *const StRay, key: u32, hit: *const StHit) -> bool,
 >;
@@ -497,17 +500,19 @@ pub type StCounts = ::std::option::Option<
 pub struct StUserShape {
     pub shape: *const ::std::os::raw::c_void,
     pub intersect: StIntersect,
+    pub intersect_rows: StIntersectRows,
     pub lower: [f32; 3usize],
     pub upper: [f32; 3usize],
 }
 #[allow(clippy::unnecessary_operation, clippy::identity_op)]
 const _: () = {
-    ["Size of StUserShape"][::std::mem::size_of::<StUserShape>() - 40usize];
+    ["Size of StUserShape"][::std::mem::size_of::<StUserShape>() - 48usize];
     ["Alignment of StUserShape"][::std::mem::align_of::<StUserShape>() - 8usize];
     ["Offset of field: StUserShape::shape"][::std::mem::offset_of!(StUserShape, shape) - 0usize];
     ["Offset of field: StUserShape::intersect"][::std::mem::offset_of!(StUserShape, intersect) - 8usize];
-    ["Offset of field: StUserShape::lower"][::std::mem::offset_of!(StUserShape, lower) - 16usize];
-    ["Offset of field: StUserShape::upper"][::std::mem::offset_of!(StUserShape, upper) - 28usize];
+    ["Offset of field: StUserShape::intersect_rows"][::std::mem::offset_of!(StUserShape, intersect_rows) - 16usize];
+    ["Offset of field: StUserShape::lower"][::std::mem::offset_of!(StUserShape, lower) - 24usize];
+    ["Offset of field: StUserShape::upper"][::std::mem::offset_of!(StUserShape, upper) - 36usize];
 };
 impl Default for StUserShape {
     fn default() -> Self {
@@ -592,6 +597,7 @@ impl Default for StQuery {
         }
     }
 }
+pub type StUncaught = ::std::option::Option<unsafe extern "C" fn(out_of_memory: bool, what: *const ::std::os::raw::c_char)>;
 unsafe extern "C" {
     pub fn rtcNewDevice(config: *const ::std::os::raw::c_char) -> RTCDevice;
     pub fn rtcReleaseDevice(device: RTCDevice);
@@ -642,4 +648,5 @@ unsafe extern "C" {
     pub fn st_fill16(packet: *mut RTCRay16, rays: *const StRay);
     pub fn st_intersect16(scene: RTCScene, valid: *const i32, rayhits: *mut RTCRayHit16, coherent: bool);
     pub fn st_occluded16(scene: RTCScene, valid: *const i32, rays: *mut RTCRay16, coherent: bool);
+    pub fn st_on_uncaught(report: StUncaught);
 }
