@@ -54,7 +54,7 @@ fn build() -> Result<(), String> {
     Ok(())
 }
 
-/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3.
+/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3, without the checks of layouts.
 fn use_checked_in_bindings() -> Result<(), String> {
     let file = "ffi/embree_docs.rs";
     std::fs::copy(file, bindings_file()?).map(drop).map_err(|error| format!("cannot copy {file}: {error}"))

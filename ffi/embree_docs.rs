@@ -88,19 +88,6 @@ pub struct RTCBounds {
     pub upper_z: f32,
     pub align1: f32,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCBounds"][::std::mem::size_of::<RTCBounds>() - 32usize];
-    ["Alignment of RTCBounds"][::std::mem::align_of::<RTCBounds>() - 16usize];
-    ["Offset of field: RTCBounds::lower_x"][::std::mem::offset_of!(RTCBounds, lower_x) - 0usize];
-    ["Offset of field: RTCBounds::lower_y"][::std::mem::offset_of!(RTCBounds, lower_y) - 4usize];
-    ["Offset of field: RTCBounds::lower_z"][::std::mem::offset_of!(RTCBounds, lower_z) - 8usize];
-    ["Offset of field: RTCBounds::align0"][::std::mem::offset_of!(RTCBounds, align0) - 12usize];
-    ["Offset of field: RTCBounds::upper_x"][::std::mem::offset_of!(RTCBounds, upper_x) - 16usize];
-    ["Offset of field: RTCBounds::upper_y"][::std::mem::offset_of!(RTCBounds, upper_y) - 20usize];
-    ["Offset of field: RTCBounds::upper_z"][::std::mem::offset_of!(RTCBounds, upper_z) - 24usize];
-    ["Offset of field: RTCBounds::align1"][::std::mem::offset_of!(RTCBounds, align1) - 28usize];
-};
 pub const RTC_INTERSECT_CONTEXT_FLAG_NONE: RTCIntersectContextFlags = 0;
 pub const RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT: RTCIntersectContextFlags = 0;
 pub const RTC_INTERSECT_CONTEXT_FLAG_COHERENT: RTCIntersectContextFlags = 1;
@@ -115,18 +102,6 @@ pub struct RTCFilterFunctionNArguments {
     pub hit: *mut RTCHitN,
     pub N: ::std::os::raw::c_uint,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCFilterFunctionNArguments"][::std::mem::size_of::<RTCFilterFunctionNArguments>() - 48usize];
-    ["Alignment of RTCFilterFunctionNArguments"][::std::mem::align_of::<RTCFilterFunctionNArguments>() - 8usize];
-    ["Offset of field: RTCFilterFunctionNArguments::valid"][::std::mem::offset_of!(RTCFilterFunctionNArguments, valid) - 0usize];
-    ["Offset of field: RTCFilterFunctionNArguments::geometryUserPtr"]
-        [::std::mem::offset_of!(RTCFilterFunctionNArguments, geometryUserPtr) - 8usize];
-    ["Offset of field: RTCFilterFunctionNArguments::context"][::std::mem::offset_of!(RTCFilterFunctionNArguments, context) - 16usize];
-    ["Offset of field: RTCFilterFunctionNArguments::ray"][::std::mem::offset_of!(RTCFilterFunctionNArguments, ray) - 24usize];
-    ["Offset of field: RTCFilterFunctionNArguments::hit"][::std::mem::offset_of!(RTCFilterFunctionNArguments, hit) - 32usize];
-    ["Offset of field: RTCFilterFunctionNArguments::N"][::std::mem::offset_of!(RTCFilterFunctionNArguments, N) - 40usize];
-};
 impl Default for RTCFilterFunctionNArguments {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
@@ -144,14 +119,6 @@ pub struct RTCIntersectContext {
     pub filter: RTCFilterFunctionN,
     pub instID: [::std::os::raw::c_uint; 1usize],
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCIntersectContext"][::std::mem::size_of::<RTCIntersectContext>() - 24usize];
-    ["Alignment of RTCIntersectContext"][::std::mem::align_of::<RTCIntersectContext>() - 8usize];
-    ["Offset of field: RTCIntersectContext::flags"][::std::mem::offset_of!(RTCIntersectContext, flags) - 0usize];
-    ["Offset of field: RTCIntersectContext::filter"][::std::mem::offset_of!(RTCIntersectContext, filter) - 8usize];
-    ["Offset of field: RTCIntersectContext::instID"][::std::mem::offset_of!(RTCIntersectContext, instID) - 16usize];
-};
 impl Default for RTCIntersectContext {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
@@ -236,23 +203,6 @@ pub struct RTCRay {
     pub id: ::std::os::raw::c_uint,
     pub flags: ::std::os::raw::c_uint,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCRay"][::std::mem::size_of::<RTCRay>() - 48usize];
-    ["Alignment of RTCRay"][::std::mem::align_of::<RTCRay>() - 16usize];
-    ["Offset of field: RTCRay::org_x"][::std::mem::offset_of!(RTCRay, org_x) - 0usize];
-    ["Offset of field: RTCRay::org_y"][::std::mem::offset_of!(RTCRay, org_y) - 4usize];
-    ["Offset of field: RTCRay::org_z"][::std::mem::offset_of!(RTCRay, org_z) - 8usize];
-    ["Offset of field: RTCRay::tnear"][::std::mem::offset_of!(RTCRay, tnear) - 12usize];
-    ["Offset of field: RTCRay::dir_x"][::std::mem::offset_of!(RTCRay, dir_x) - 16usize];
-    ["Offset of field: RTCRay::dir_y"][::std::mem::offset_of!(RTCRay, dir_y) - 20usize];
-    ["Offset of field: RTCRay::dir_z"][::std::mem::offset_of!(RTCRay, dir_z) - 24usize];
-    ["Offset of field: RTCRay::time"][::std::mem::offset_of!(RTCRay, time) - 28usize];
-    ["Offset of field: RTCRay::tfar"][::std::mem::offset_of!(RTCRay, tfar) - 32usize];
-    ["Offset of field: RTCRay::mask"][::std::mem::offset_of!(RTCRay, mask) - 36usize];
-    ["Offset of field: RTCRay::id"][::std::mem::offset_of!(RTCRay, id) - 40usize];
-    ["Offset of field: RTCRay::flags"][::std::mem::offset_of!(RTCRay, flags) - 44usize];
-};
 #[repr(C)]
 #[repr(align(16))]
 #[derive(Debug, Default, Copy, Clone)]
@@ -266,19 +216,6 @@ pub struct RTCHit {
     pub geomID: ::std::os::raw::c_uint,
     pub instID: [::std::os::raw::c_uint; 1usize],
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCHit"][::std::mem::size_of::<RTCHit>() - 32usize];
-    ["Alignment of RTCHit"][::std::mem::align_of::<RTCHit>() - 16usize];
-    ["Offset of field: RTCHit::Ng_x"][::std::mem::offset_of!(RTCHit, Ng_x) - 0usize];
-    ["Offset of field: RTCHit::Ng_y"][::std::mem::offset_of!(RTCHit, Ng_y) - 4usize];
-    ["Offset of field: RTCHit::Ng_z"][::std::mem::offset_of!(RTCHit, Ng_z) - 8usize];
-    ["Offset of field: RTCHit::u"][::std::mem::offset_of!(RTCHit, u) - 12usize];
-    ["Offset of field: RTCHit::v"][::std::mem::offset_of!(RTCHit, v) - 16usize];
-    ["Offset of field: RTCHit::primID"][::std::mem::offset_of!(RTCHit, primID) - 20usize];
-    ["Offset of field: RTCHit::geomID"][::std::mem::offset_of!(RTCHit, geomID) - 24usize];
-    ["Offset of field: RTCHit::instID"][::std::mem::offset_of!(RTCHit, instID) - 28usize];
-};
 #[repr(C)]
 #[repr(align(16))]
 #[derive(Debug, Default, Copy, Clone)]
@@ -286,13 +223,6 @@ pub struct RTCRayHit {
     pub ray: RTCRay,
     pub hit: RTCHit,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCRayHit"][::std::mem::size_of::<RTCRayHit>() - 80usize];
-    ["Alignment of RTCRayHit"][::std::mem::align_of::<RTCRayHit>() - 16usize];
-    ["Offset of field: RTCRayHit::ray"][::std::mem::offset_of!(RTCRayHit, ray) - 0usize];
-    ["Offset of field: RTCRayHit::hit"][::std::mem::offset_of!(RTCRayHit, hit) - 48usize];
-};
 #[repr(C)]
 #[repr(align(64))]
 #[derive(Debug, Copy, Clone)]
@@ -310,23 +240,6 @@ pub struct RTCRay16 {
     pub id: [::std::os::raw::c_uint; 16usize],
     pub flags: [::std::os::raw::c_uint; 16usize],
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCRay16"][::std::mem::size_of::<RTCRay16>() - 768usize];
-    ["Alignment of RTCRay16"][::std::mem::align_of::<RTCRay16>() - 64usize];
-    ["Offset of field: RTCRay16::org_x"][::std::mem::offset_of!(RTCRay16, org_x) - 0usize];
-    ["Offset of field: RTCRay16::org_y"][::std::mem::offset_of!(RTCRay16, org_y) - 64usize];
-    ["Offset of field: RTCRay16::org_z"][::std::mem::offset_of!(RTCRay16, org_z) - 128usize];
-    ["Offset of field: RTCRay16::tnear"][::std::mem::offset_of!(RTCRay16, tnear) - 192usize];
-    ["Offset of field: RTCRay16::dir_x"][::std::mem::offset_of!(RTCRay16, dir_x) - 256usize];
-    ["Offset of field: RTCRay16::dir_y"][::std::mem::offset_of!(RTCRay16, dir_y) - 320usize];
-    ["Offset of field: RTCRay16::dir_z"][::std::mem::offset_of!(RTCRay16, dir_z) - 384usize];
-    ["Offset of field: RTCRay16::time"][::std::mem::offset_of!(RTCRay16, time) - 448usize];
-    ["Offset of field: RTCRay16::tfar"][::std::mem::offset_of!(RTCRay16, tfar) - 512usize];
-    ["Offset of field: RTCRay16::mask"][::std::mem::offset_of!(RTCRay16, mask) - 576usize];
-    ["Offset of field: RTCRay16::id"][::std::mem::offset_of!(RTCRay16, id) - 640usize];
-    ["Offset of field: RTCRay16::flags"][::std::mem::offset_of!(RTCRay16, flags) - 704usize];
-};
 impl Default for RTCRay16 {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
@@ -349,19 +262,6 @@ pub struct RTCHit16 {
     pub geomID: [::std::os::raw::c_uint; 16usize],
     pub instID: [[::std::os::raw::c_uint; 16usize]; 1usize],
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCHit16"][::std::mem::size_of::<RTCHit16>() - 512usize];
-    ["Alignment of RTCHit16"][::std::mem::align_of::<RTCHit16>() - 64usize];
-    ["Offset of field: RTCHit16::Ng_x"][::std::mem::offset_of!(RTCHit16, Ng_x) - 0usize];
-    ["Offset of field: RTCHit16::Ng_y"][::std::mem::offset_of!(RTCHit16, Ng_y) - 64usize];
-    ["Offset of field: RTCHit16::Ng_z"][::std::mem::offset_of!(RTCHit16, Ng_z) - 128usize];
-    ["Offset of field: RTCHit16::u"][::std::mem::offset_of!(RTCHit16, u) - 192usize];
-    ["Offset of field: RTCHit16::v"][::std::mem::offset_of!(RTCHit16, v) - 256usize];
-    ["Offset of field: RTCHit16::primID"][::std::mem::offset_of!(RTCHit16, primID) - 320usize];
-    ["Offset of field: RTCHit16::geomID"][::std::mem::offset_of!(RTCHit16, geomID) - 384usize];
-    ["Offset of field: RTCHit16::instID"][::std::mem::offset_of!(RTCHit16, instID) - 448usize];
-};
 impl Default for RTCHit16 {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
@@ -378,13 +278,6 @@ pub struct RTCRayHit16 {
     pub ray: RTCRay16,
     pub hit: RTCHit16,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of RTCRayHit16"][::std::mem::size_of::<RTCRayHit16>() - 1280usize];
-    ["Alignment of RTCRayHit16"][::std::mem::align_of::<RTCRayHit16>() - 64usize];
-    ["Offset of field: RTCRayHit16::ray"][::std::mem::offset_of!(RTCRayHit16, ray) - 0usize];
-    ["Offset of field: RTCRayHit16::hit"][::std::mem::offset_of!(RTCRayHit16, hit) - 768usize];
-};
 impl Default for RTCRayHit16 {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
@@ -456,16 +349,6 @@ pub struct StRay {
     pub t_max: f32,
     pub time: f32,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of StRay"][::std::mem::size_of::<StRay>() - 36usize];
-    ["Alignment of StRay"][::std::mem::align_of::<StRay>() - 4usize];
-    ["Offset of field: StRay::origin"][::std::mem::offset_of!(StRay, origin) - 0usize];
-    ["Offset of field: StRay::t_min"][::std::mem::offset_of!(StRay, t_min) - 12usize];
-    ["Offset of field: StRay::direction"][::std::mem::offset_of!(StRay, direction) - 16usize];
-    ["Offset of field: StRay::t_max"][::std::mem::offset_of!(StRay, t_max) - 28usize];
-    ["Offset of field: StRay::time"][::std::mem::offset_of!(StRay, time) - 32usize];
-};
 #[repr(C)]
 #[derive(Debug, Default, Copy, Clone)]
 pub struct StHit {
@@ -476,20 +359,9 @@ pub struct StHit {
     pub geometry: u32,
     pub instance: u32,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of StHit"][::std::mem::size_of::<StHit>() - 24usize];
-    ["Alignment of StHit"][::std::mem::align_of::<StHit>() - 4usize];
-    ["Offset of field: StHit::t"][::std::mem::offset_of!(StHit, t) - 0usize];
-    ["Offset of field: StHit::u"][::std::mem::offset_of!(StHit, u) - 4usize];
-    ["Offset of field: StHit::v"][::std::mem::offset_of!(StHit, v) - 8usize];
-    ["Offset of field: StHit::prim"][::std::mem::offset_of!(StHit, prim) - 12usize];
-    ["Offset of field: StHit::geometry"][::std::mem::offset_of!(StHit, geometry) - 16usize];
-    ["Offset of field: StHit::instance"][::std::mem::offset_of!(StHit, instance) - 20usize];
-};
 pub type StIntersect =
     ::std::option::Option<unsafe extern "C" fn(shape: *const ::std::os::raw::c_void, ray: *const StRay, key: u32, instance: u32) -> f32>;
-pub type StIntersectRows = ::std::option::Option<
+pub type StIntersectPacket = ::std::option::Option<
     unsafe extern "C" fn(shape: *const ::std::os::raw::c_void, rays: *const f32, n: u32, valid: *const ::std::os::raw::c_int, t: *mut f32),
 >;
 pub type StCounts = ::std::option::Option<
@@ -500,20 +372,10 @@ pub type StCounts = ::std::option::Option<
 pub struct StUserShape {
     pub shape: *const ::std::os::raw::c_void,
     pub intersect: StIntersect,
-    pub intersect_rows: StIntersectRows,
+    pub intersect_packet: StIntersectPacket,
     pub lower: [f32; 3usize],
     pub upper: [f32; 3usize],
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of StUserShape"][::std::mem::size_of::<StUserShape>() - 48usize];
-    ["Alignment of StUserShape"][::std::mem::align_of::<StUserShape>() - 8usize];
-    ["Offset of field: StUserShape::shape"][::std::mem::offset_of!(StUserShape, shape) - 0usize];
-    ["Offset of field: StUserShape::intersect"][::std::mem::offset_of!(StUserShape, intersect) - 8usize];
-    ["Offset of field: StUserShape::intersect_rows"][::std::mem::offset_of!(StUserShape, intersect_rows) - 16usize];
-    ["Offset of field: StUserShape::lower"][::std::mem::offset_of!(StUserShape, lower) - 24usize];
-    ["Offset of field: StUserShape::upper"][::std::mem::offset_of!(StUserShape, upper) - 36usize];
-};
 impl Default for StUserShape {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
@@ -534,16 +396,6 @@ pub struct StEnteredInstance {
     pub lower: [f32; 3usize],
     pub upper: [f32; 3usize],
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of StEnteredInstance"][::std::mem::size_of::<StEnteredInstance>() - 48usize];
-    ["Alignment of StEnteredInstance"][::std::mem::align_of::<StEnteredInstance>() - 8usize];
-    ["Offset of field: StEnteredInstance::instance"][::std::mem::offset_of!(StEnteredInstance, instance) - 0usize];
-    ["Offset of field: StEnteredInstance::enter"][::std::mem::offset_of!(StEnteredInstance, enter) - 8usize];
-    ["Offset of field: StEnteredInstance::object"][::std::mem::offset_of!(StEnteredInstance, object) - 16usize];
-    ["Offset of field: StEnteredInstance::lower"][::std::mem::offset_of!(StEnteredInstance, lower) - 24usize];
-    ["Offset of field: StEnteredInstance::upper"][::std::mem::offset_of!(StEnteredInstance, upper) - 36usize];
-};
 impl Default for StEnteredInstance {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
@@ -560,14 +412,6 @@ pub struct StFilter {
     pub counts: StCounts,
     pub any_hit_only: bool,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of StFilter"][::std::mem::size_of::<StFilter>() - 24usize];
-    ["Alignment of StFilter"][::std::mem::align_of::<StFilter>() - 8usize];
-    ["Offset of field: StFilter::user"][::std::mem::offset_of!(StFilter, user) - 0usize];
-    ["Offset of field: StFilter::counts"][::std::mem::offset_of!(StFilter, counts) - 8usize];
-    ["Offset of field: StFilter::any_hit_only"][::std::mem::offset_of!(StFilter, any_hit_only) - 16usize];
-};
 impl Default for StFilter {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();
@@ -582,12 +426,6 @@ impl Default for StFilter {
 pub struct StQuery {
     pub context: RTCIntersectContext,
 }
-#[allow(clippy::unnecessary_operation, clippy::identity_op)]
-const _: () = {
-    ["Size of StQuery"][::std::mem::size_of::<StQuery>() - 24usize];
-    ["Alignment of StQuery"][::std::mem::align_of::<StQuery>() - 8usize];
-    ["Offset of field: StQuery::context"][::std::mem::offset_of!(StQuery, context) - 0usize];
-};
 impl Default for StQuery {
     fn default() -> Self {
         let mut s = ::std::mem::MaybeUninit::<Self>::uninit();

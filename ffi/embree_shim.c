@@ -49,14 +49,14 @@ static void user_bounds(const struct RTCBoundsFunctionArguments *args) {
 }
 
 /* Fewer rays are intersected one by one. */
-enum { LEAST_ROWS = 3 };
+enum { MIN_PACKET_RAYS = 3 };
 
-/* The distances at which valid lanes hit a shape, negative on a miss. */
-static void user_distances(const struct StUserShape *shape, const float *rays, unsigned n, const int *valid, unsigned instance, float *t) {
+/* The distances at which valid lanes hit a shape, negative on a miss; Embree's packets have at most 16 lanes. */
+static void intersect_lanes(const struct StUserShape *shape, const float *rays, unsigned n, const int *valid, unsigned instance, float *t) {
     unsigned count = 0;
     for (unsigned lane = 0; lane < n; lane++) count += valid[lane] == -1;
-    if (shape->intersect_rows && count >= LEAST_ROWS && n <= 16) {
-        shape->intersect_rows(shape->shape, rays, n, valid, t);
+    if (shape->intersect_packet && count >= MIN_PACKET_RAYS) {
+        shape->intersect_packet(shape->shape, rays, n, valid, t);
         return;
     }
     for (unsigned lane = 0; lane < n; lane++) {
@@ -72,7 +72,7 @@ static void user_intersect(const struct RTCIntersectFunctionNArguments *args) {
     float *reals = rays + HIT * n;
     unsigned *ids = (unsigned *)reals;
     float t[16];
-    user_distances(args->geometryUserPtr, rays, n, args->valid, args->context->instID[0], t);
+    intersect_lanes(args->geometryUserPtr, rays, n, args->valid, args->context->instID[0], t);
     for (unsigned lane = 0; lane < n; lane++) {
         if (args->valid[lane] != -1 || !(t[lane] >= 0.0f)) continue;
         rays[TFAR * n + lane] = t[lane];
@@ -91,7 +91,7 @@ static void user_occluded(const struct RTCOccludedFunctionNArguments *args) {
     const unsigned n = args->N;
     float *rays = (float *)args->ray;
     float t[16];
-    user_distances(args->geometryUserPtr, rays, n, args->valid, args->context->instID[0], t);
+    intersect_lanes(args->geometryUserPtr, rays, n, args->valid, args->context->instID[0], t);
     for (unsigned lane = 0; lane < n; lane++) {
         if (args->valid[lane] == -1 && t[lane] >= 0.0f) rays[TFAR * n + lane] = -INFINITY;
     }

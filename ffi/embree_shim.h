@@ -37,7 +37,7 @@ typedef float (*StIntersect)(const void *shape, const struct StRay *ray, uint32_
  * The distances at which `n` (at most 16) rays hit `shape`, negative on a miss: `t` has room for 16. `rays` are the rows of Embree's packets; lanes
  * with `valid` 0 may be anything, and so may their distances.
  */
-typedef void (*StIntersectRows)(const void *shape, const float *rays, uint32_t n, const int *valid, float *t);
+typedef void (*StIntersectPacket)(const void *shape, const float *rays, uint32_t n, const int *valid, float *t);
 
 /* Whether a hit of `ray` (in the space of `instance`) with the shape behind `user` counts. */
 typedef bool (*StCounts)(const void *user, const struct StRay *ray, uint32_t key, const struct StHit *hit);
@@ -47,7 +47,7 @@ struct StUserShape {
     const void *shape;
     StIntersect intersect;
     /* For several rays at once; may be null. */
-    StIntersectRows intersect_rows;
+    StIntersectPacket intersect_packet;
     float lower[3];
     float upper[3];
 };

@@ -15,7 +15,7 @@
 
 use super::fresnel;
 use super::microfacet::MIN_COSINE;
-use super::rougher::widened;
+use super::regularize::widened;
 use super::split::share;
 use super::{Bsdf, BsdfEval, BsdfSample, Coat, Eon};
 use crate::color::Rgb;
@@ -49,9 +49,9 @@ impl Coated {
         Self { coat, tint: (tint != Rgb::WHITE).then_some(tint), diffuse, base }
     }
 
-    /// As [`Bsdf::with_least_alpha`], of coat and base.
-    pub(super) fn with_least_alpha(&self, alpha: f32) -> Option<Self> {
-        let (coat, base) = (widened(self.coat.alpha(), alpha), self.base.with_least_alpha(alpha));
+    /// As [`Bsdf::with_min_alpha`], of coat and base.
+    pub(super) fn with_min_alpha(&self, alpha: f32) -> Option<Self> {
+        let (coat, base) = (widened(self.coat.alpha(), alpha), self.base.with_min_alpha(alpha));
         if coat.is_none() && base.is_none() {
             return None;
         }

@@ -18,7 +18,7 @@ mod mirror;
 mod phong;
 mod plastic;
 mod principled;
-mod rougher;
+mod regularize;
 mod single;
 mod split;
 #[cfg(test)]

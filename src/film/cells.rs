@@ -67,16 +67,16 @@ impl Cells {
     /// Calls `f` with every entry that a sample of the pixel with this entry reaches, and its weight there.
     #[inline]
     pub fn for_each_tap(&self, entry: usize, taps: &[Taps; 2], f: impl FnMut(usize, f32)) {
-        // Filters reach as many pixels along both axes; as many as are usual are known to the compiler.
+        // The usual counts are constants, for unrolled loops.
         match [taps[0].count, taps[1].count] {
-            [2, 2] => self.for_each_of(entry, taps, [2, 2], f),
-            [3, 3] => self.for_each_of(entry, taps, [3, 3], f),
-            counts => self.for_each_of(entry, taps, counts, f),
+            [2, 2] => self.for_each_tap_counted(entry, taps, [2, 2], f),
+            [3, 3] => self.for_each_tap_counted(entry, taps, [3, 3], f),
+            counts => self.for_each_tap_counted(entry, taps, counts, f),
         }
     }
 
     #[inline(always)]
-    fn for_each_of(&self, entry: usize, taps: &[Taps; 2], counts: [usize; 2], mut f: impl FnMut(usize, f32)) {
+    fn for_each_tap_counted(&self, entry: usize, taps: &[Taps; 2], counts: [usize; 2], mut f: impl FnMut(usize, f32)) {
         let stride = self.stride() as isize;
         for row in 0..counts[1] {
             let first = entry as isize + (taps[1].first as isize + row as isize) * stride + taps[0].first as isize;

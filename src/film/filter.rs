@@ -13,7 +13,7 @@ use crate::math::Vec2;
 const CELLS: usize = 1024;
 
 /// Cells of the offsets within a pixel, an even number: usual filters have their kinks at ends of cells.
-const OFFSETS: usize = 256;
+const OFFSET_CELLS: usize = 256;
 
 /// Steps of the integration that makes a table.
 const STEPS: usize = 1 << 15;
@@ -29,18 +29,19 @@ const KERNEL_STEPS: u32 = 1000;
 pub struct Filter {
     desc: FilterDesc,
     kernel: Kernel,
-    shared: Option<Box<Shared>>,
+    shared: Option<Box<SharedWeights>>,
 }
 
-/// The weights of shared samples by offset from their pixel's centre, along one axis.
+/// The weights of shared samples by offset from their pixel's centre, along one axis; linear within a cell of offsets, so that kinks and ends of
+/// the filter within a cell (none at the usual radii) are smoothed.
 #[derive(Clone, Debug)]
-struct Shared {
+struct SharedWeights {
     /// As [`Filter::border`].
     border: i32,
     /// How many pixels have weights: 2, 3, 4 or [`MAX_TAPS`].
     count: usize,
     /// By cell of offsets: the first pixel.
-    first: [i8; OFFSETS],
+    first: [i8; OFFSET_CELLS],
     /// By cell: the weights at its lower end, then what they grow by up to the upper one.
     weights: Vec<f32>,
 }
@@ -118,7 +119,7 @@ impl Filter {
         // Samples within a pixel reach another from a radius of 0.5 on.
         let can_share = desc.radius() > 0.5 && desc.radius() <= MAX_TAPS as f32 / 2.0;
         let shared = can_share && *desc.samples_mut() != Some(FilterSamplesDesc::Importance);
-        let shared = shared.then(|| Box::new(Shared::new(&desc)));
+        let shared = shared.then(|| Box::new(SharedWeights::new(&desc)));
         Self { desc, kernel, shared }
     }
 
@@ -173,7 +174,7 @@ impl Filter {
     pub(super) fn taps(&self, offset: f32) -> Taps {
         match &self.shared {
             None => Taps { first: 0, count: 1, weights: [1.0; MAX_TAPS] },
-            // As many as are usual are known to the compiler.
+            // The usual counts are constants, for unrolled loops.
             Some(shared) => match shared.count {
                 2 => shared.taps::<2>(offset),
                 3 => shared.taps::<3>(offset),
@@ -234,16 +235,16 @@ impl VarianceKernel {
     }
 }
 
-impl Shared {
+impl SharedWeights {
     fn new(desc: &FilterDesc) -> Self {
         let radius = f64::from(desc.radius());
         let half: f64 =
             (0..STEPS).map(|i| (i as f64 + 0.5) * radius / STEPS as f64).map(|x| evaluate(desc, x) * radius / STEPS as f64).sum();
         let border = (radius - 0.5).ceil() as i32;
         let count = Some((2.0 * radius).ceil() as usize).filter(|count| *count <= 4).unwrap_or(MAX_TAPS);
-        let (mut first, mut weights) = ([0; OFFSETS], Vec::with_capacity(2 * OFFSETS * count));
+        let (mut first, mut weights) = ([0; OFFSET_CELLS], Vec::with_capacity(2 * OFFSET_CELLS * count));
         for (cell, first) in first.iter_mut().enumerate() {
-            let ends = [cell, cell + 1].map(|end| end as f64 / OFFSETS as f64 - 0.5);
+            let ends = [cell, cell + 1].map(|end| end as f64 / OFFSET_CELLS as f64 - 0.5);
             let pixel = ((ends[0] - radius).floor() as i32 + 1).min(border + 1 - count as i32).max(-border);
             *first = pixel as i8;
             let weight = |k: usize, end: f64| {
@@ -257,8 +258,8 @@ impl Shared {
 
     #[inline(always)]
     fn taps<const N: usize>(&self, offset: f32) -> Taps {
-        let at = (offset + 0.5) * OFFSETS as f32;
-        let cell = (at as i32).clamp(0, OFFSETS as i32 - 1);
+        let at = (offset + 0.5) * OFFSET_CELLS as f32;
+        let cell = (at as i32).clamp(0, OFFSET_CELLS as i32 - 1);
         let within = at - cell as f32;
         let cell = cell as usize;
         let (low, growth) = self.weights[2 * N * cell..2 * N * (cell + 1)].split_at(N);

@@ -103,14 +103,14 @@ fn weights_of_shared_samples_are_the_filters() {
                 let weight = if k < taps.count { taps.weights[k] } else { 0.0 };
                 let x = (f64::from(pixel) - f64::from(offset)).abs();
                 // Within a cell of the support's end, kinks are smoothed.
-                if (x - r).abs() > 1.0 / OFFSETS as f64 {
+                if (x - r).abs() > 1.0 / OFFSET_CELLS as f64 {
                     assert!((f64::from(weight) - evaluate(&desc, x) / total).abs() < 3e-5, "{desc:?} {offset} {pixel}: {weight}");
                 }
                 sum += f64::from(weight) / f64::from(count);
             }
         }
         // Both ends of a box are off by up to half of a cell.
-        let tolerance = if matches!(desc, FilterDesc::Box { .. }) { 1.0 / OFFSETS as f64 } else { 1e-5 };
+        let tolerance = if matches!(desc, FilterDesc::Box { .. }) { 1.0 / OFFSET_CELLS as f64 } else { 1e-5 };
         assert!((sum - 1.0).abs() < tolerance, "{desc:?}: {sum}");
     }
 }

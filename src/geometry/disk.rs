@@ -53,8 +53,8 @@ impl Disk {
         let (x, y) = (ray.origin.x + ray.direction.x * t, ray.origin.y + ray.direction.y * t);
         let rho_squared = x * x + y * y;
         let in_ring = (self.inner_radius * self.inner_radius <= rho_squared) & (rho_squared <= self.radius * self.radius);
-        let counts = ray.contains(t) & t.is_finite() & in_ring & self.sector.contains(x, y);
-        if counts { t } else { f64::NAN }
+        let is_hit = ray.contains(t) & t.is_finite() & in_ring & self.sector.contains(x, y);
+        if is_hit { t } else { f64::NAN }
     }
 
     /// The surface at a hit of `ray`.

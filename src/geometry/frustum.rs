@@ -5,7 +5,7 @@
 //!
 //! `uv = (phi / phi_max, z / height)`.
 
-use super::placed::first_of;
+use super::placed::first_accepted;
 use super::sector::{Sector, direction_from_axis};
 use super::shape_error::{not_negative, positive};
 use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
@@ -88,7 +88,7 @@ impl Frustum {
     #[inline(always)]
     pub fn distance(&self, ray: &RayF64) -> f64 {
         let roots = self.roots(ray);
-        first_of([roots.near, roots.far], [self.accepts(ray, roots.near), self.accepts(ray, roots.far)])
+        first_accepted([roots.near, roots.far], [self.accepts(ray, roots.near), self.accepts(ray, roots.far)])
     }
 
     /// The clip in z also removes the other half of the double cone.

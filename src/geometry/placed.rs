@@ -192,20 +192,14 @@ impl Placed {
         CenteredRay { ray, shift }
     }
 
-    /// Whether [`first_hits`](Self::first_hits) finds anything: surfaces of revolution take one ray after the other.
-    pub fn meets_packets(&self) -> bool {
+    /// Whether [`intersect_packet`](Self::intersect_packet) decides anything: surfaces of revolution are intersected with one ray at a time.
+    pub fn intersects_packets(&self) -> bool {
         !matches!(self.shape, Analytic::Revolution(_))
     }
 
-    /// The first hits of the rays of a packet in the space the shape is placed in.
-    pub fn first_hits(&self, rays: &RayRows) -> FirstHits {
-        match &self.shape {
-            Analytic::Sphere(sphere) => vectorize(Packet { placed: self, shape: sphere, rays }),
-            Analytic::Quad(quad) => vectorize(Packet { placed: self, shape: quad, rays }),
-            Analytic::Disk(disk) => vectorize(Packet { placed: self, shape: disk, rays }),
-            Analytic::Frustum(frustum) => vectorize(Packet { placed: self, shape: frustum, rays }),
-            Analytic::Revolution(_) => FirstHits { t: [-1.0; PACKET], is_open: [1; PACKET] },
-        }
+    /// [`intersect`](Self::intersect) for the rays of a packet, side by side.
+    pub fn intersect_packet(&self, rays: &RayPacket) -> PacketHits {
+        vectorize(IntersectPacket { placed: self, rays })
     }
 
     /// The first hit of a ray in the space the shape is placed in.
@@ -352,88 +346,80 @@ impl Placed {
     }
 }
 
-/// How many rays are met by a shape at once.
-pub const PACKET: usize = 16;
+/// Rays that a shape is intersected with at once.
+pub const PACKET_SIZE: usize = 16;
 
 /// Rays of a packet, one number of each ray side by side.
 #[derive(Clone, Debug)]
-pub struct RayRows {
+pub struct RayPacket {
     /// Origins by coordinate.
-    pub origin: [[f32; PACKET]; 3],
+    pub origin: [[f32; PACKET_SIZE]; 3],
     /// Smallest distances.
-    pub t_min: [f32; PACKET],
+    pub t_min: [f32; PACKET_SIZE],
     /// Directions by coordinate.
-    pub direction: [[f32; PACKET]; 3],
+    pub direction: [[f32; PACKET_SIZE]; 3],
     /// Largest distances.
-    pub t_max: [f32; PACKET],
+    pub t_max: [f32; PACKET_SIZE],
 }
 
-impl RayRows {
+impl RayPacket {
     /// One of the rays.
     #[inline(always)]
     pub fn get(&self, i: usize) -> Ray {
-        let vector = |rows: &[[f32; PACKET]; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
+        let vector = |rows: &[[f32; PACKET_SIZE]; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
         Ray { t_min: self.t_min[i], t_max: self.t_max[i], ..Ray::new(vector(&self.origin), vector(&self.direction)) }
     }
 }
 
 /// First hits of the rays of a packet.
 #[derive(Clone, Copy, Debug)]
-pub struct FirstHits {
+pub struct PacketHits {
     /// Distances; negative on a miss.
-    pub t: [f32; PACKET],
-    /// Other than 0 where [`Placed::intersect`] is to decide.
-    pub is_open: [u32; PACKET],
+    pub t: [f32; PACKET_SIZE],
+    /// 1 where [`Placed::intersect`] has to be called, else 0.
+    pub is_undecided: [u32; PACKET_SIZE],
 }
 
-/// Meets a placed shape with the rays of a packet side by side.
-struct Packet<'a, S> {
+struct IntersectPacket<'a> {
     placed: &'a Placed,
-    shape: &'a S,
-    rays: &'a RayRows,
+    rays: &'a RayPacket,
 }
 
-/// A surface whose first hit is found without branches.
-trait Distance {
-    /// The distance of the first hit within the ray's interval; NaN on a miss.
-    fn distance(&self, ray: &RayF64) -> f64;
-}
-
-macro_rules! distances {
-    ($($shape:ty),*) => {
-        $(impl Distance for $shape {
-            #[inline(always)]
-            fn distance(&self, ray: &RayF64) -> f64 {
-                <$shape>::distance(self, ray)
-            }
-        })*
-    };
-}
-distances!(Sphere, Quad, Disk, Frustum);
-
-impl<S: Distance> Kernel for Packet<'_, S> {
-    type Output = FirstHits;
+impl Kernel for IntersectPacket<'_> {
+    type Output = PacketHits;
 
     #[inline(always)]
-    fn call(self) -> FirstHits {
-        let Self { placed, shape, rays } = self;
-        let (mut t, mut is_open) = ([0.0; PACKET], [0; PACKET]);
-        for i in 0..PACKET {
-            let ray = rays.get(i);
-            let CenteredRay { ray: local, shift } = placed.centered_ray(&ray);
-            let found = shape.distance(&local) + shift;
-            // NaN is less than nothing.
-            t[i] = if found >= 0.0 { found as f32 } else { -1.0 };
-            // The start of the interval is lost in the shift.
-            is_open[i] = u32::from(found < f64::from(ray.t_min));
+    fn call(self) -> PacketHits {
+        let Self { placed, rays } = self;
+        let mut hits = PacketHits { t: [-1.0; PACKET_SIZE], is_undecided: [1; PACKET_SIZE] };
+        // A macro: closures are not always inlined.
+        macro_rules! intersect {
+            ($shape:ident) => {
+                for i in 0..PACKET_SIZE {
+                    let ray = rays.get(i);
+                    let CenteredRay { ray: local, shift } = placed.centered_ray(&ray);
+                    let t = $shape.distance(&local) + shift;
+                    // False for a NaN.
+                    hits.t[i] = if t >= 0.0 { t as f32 } else { -1.0 };
+                    // The start of the interval is lost in the shift.
+                    hits.is_undecided[i] = u32::from(t < f64::from(ray.t_min));
+                }
+            };
         }
-        FirstHits { t, is_open }
+        match &placed.shape {
+            Analytic::Sphere(sphere) => intersect!(sphere),
+            Analytic::Quad(quad) => intersect!(quad),
+            Analytic::Disk(disk) => intersect!(disk),
+            Analytic::Frustum(frustum) => intersect!(frustum),
+            Analytic::Revolution(_) => {}
+        }
+        hits
     }
 }
 
 /// The first of two distances in ascending order that is accepted; NaN if neither is.
 #[inline(always)]
-pub(super) fn first_of([near, far]: [f64; 2], [is_near, is_far]: [bool; 2]) -> f64 {
+pub(super) fn first_accepted([near, far]: [f64; 2], [is_near, is_far]: [bool; 2]) -> f64 {
     let far = if is_far { far } else { f64::NAN };
     if is_near { near } else { far }
 }

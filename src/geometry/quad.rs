@@ -78,8 +78,8 @@ impl Quad {
         let t = -self.n.dot(from_corner) / self.n.dot(ray.direction);
         let q = from_corner + ray.direction * t;
         let (u, v) = (q.dot(self.dual_u), q.dot(self.dual_v));
-        let counts = ray.contains(t) & t.is_finite() & (0.0..=1.0).contains(&u) & (0.0..=1.0).contains(&v);
-        if counts { t } else { f64::NAN }
+        let is_hit = ray.contains(t) & t.is_finite() & (0.0..=1.0).contains(&u) & (0.0..=1.0).contains(&v);
+        if is_hit { t } else { f64::NAN }
     }
 
     /// The surface at a hit of `ray`.

@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use super::placed::first_of;
+use super::placed::first_accepted;
 use super::sector::{Sector, direction_from_axis};
 use super::shape_error::positive;
 use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
@@ -82,7 +82,7 @@ impl Sphere {
         let half_chord_squared = self.radius * self.radius - foot.length_squared();
         let t_half = (half_chord_squared * inverse).sqrt();
         let (near, far) = (t_middle - t_half, t_middle + t_half);
-        first_of([near, far], [self.accepts(ray, near), self.accepts(ray, far)])
+        first_accepted([near, far], [self.accepts(ray, near), self.accepts(ray, far)])
     }
 
     #[inline(always)]

@@ -48,7 +48,7 @@ pub struct PathIntegrator {
     pub strategy: Strategy,
     /// Largest channel that a single contribution of indirect light keeps: less noise for too little light. Infinite for no bias.
     pub clamp: f32,
-    /// How surfaces are made rougher for light that comes by narrow lobes, if they are.
+    /// Path space regularization, if it is enabled.
     pub regularization: Option<Regularization>,
     /// Whether the camera does not see what gives off light.
     pub hide_emitters: bool,
@@ -74,8 +74,8 @@ struct Path {
     /// What roulette multiplies the throughput by, lest it mistakes for absorption what is none: the squares of the relative indices of refraction
     /// passed, which scale radiance, and how far a guide has raised densities above those of the surfaces.
     roulette_scale: f32,
-    /// Whether a surface that is not ideally smooth has scattered it.
-    is_blurred: bool,
+    /// Whether any vertex so far has scattered it by a lobe that is no delta.
+    any_non_specular_bounce: bool,
     /// Its place in the batch.
     slot: u32,
     seed: PixelSeed,
@@ -131,7 +131,7 @@ impl PathIntegrator {
             throughput: Rgb::WHITE,
             pdf: f32::INFINITY,
             roulette_scale: 1.0,
-            is_blurred: false,
+            any_non_specular_bounce: false,
             slot,
             seed: sample.seed,
             sample: sample.sample,
@@ -325,7 +325,8 @@ impl PathIntegrator {
         if let Some(boundary) = &boundary {
             vertex.bsdf = boundary;
         }
-        let rougher = self.regularization.filter(|_| path.is_blurred).and_then(|r| vertex.bsdf.with_least_alpha(r.alpha(path.sample)));
+        let rougher =
+            self.regularization.filter(|_| path.any_non_specular_bounce).and_then(|r| vertex.bsdf.with_min_alpha(r.alpha(path.sample)));
         if let Some(rougher) = &rougher {
             vertex.bsdf = rougher;
         }
@@ -476,8 +477,8 @@ impl PathIntegrator {
         let light_sampling = !sample.is_delta && !world.scene.lights.is_empty();
         let pdf = if light_sampling { sample.pdf } else { f32::INFINITY };
         note(sample);
-        let is_blurred = path.is_blurred || !sample.is_delta;
-        Some((Path { throughput, pdf, roulette_scale, is_blurred, from: vertex.receiver(), ..*path }, *ray))
+        let any_non_specular_bounce = path.any_non_specular_bounce || !sample.is_delta;
+        Some((Path { throughput, pdf, roulette_scale, any_non_specular_bounce, from: vertex.receiver(), ..*path }, *ray))
     }
 }
 

@@ -28,8 +28,8 @@ pub struct World<'a> {
     /// Squared distance from the bounds up to which rays may start.
     reach_squared: f32,
     detail: Detail,
-    /// By shape, analytic ones alone in a scene with parameters: whether a place suffices. Empty without them.
-    needs_place_only: Vec<bool>,
+    /// By shape: whether nothing depends on its uv and tangents, though the scene has shapes where something does.
+    skips_parameters: Vec<bool>,
     /// Of pictures of scenes with [filtered textures](crate::scene::Features::filtered_textures).
     pub(super) division: Option<Division>,
     /// Around all surfaces of media.
@@ -52,7 +52,7 @@ impl<'a> World<'a> {
             bounds,
             reach_squared: bounds.size().max_element().powi(2),
             detail,
-            needs_place_only: if scene.features.parameters { places_suffice(scene) } else { Vec::new() },
+            skips_parameters: if scene.features.parameters { shapes_without_parameters(scene) } else { Vec::new() },
             division: None,
             media_bounds: super::media::bounds(scene),
             picture: None,
@@ -97,7 +97,7 @@ impl<'a> World<'a> {
 
     /// With the parametrisation of every surface, whether or not the scene needs it.
     pub fn in_full(self) -> Self {
-        Self { detail: Detail::Full, needs_place_only: Vec::new(), ..self }
+        Self { detail: Detail::Full, skips_parameters: Vec::new(), ..self }
     }
 
     /// The surface that a ray meets first.
@@ -110,7 +110,7 @@ impl<'a> World<'a> {
     #[inline]
     pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
         let hit = hit?;
-        let detail = if self.needs_place_only.get(hit.shape.index()) == Some(&true) { Detail::Place } else { self.detail };
+        let detail = if self.skips_parameters.get(hit.shape.index()) == Some(&true) { Detail::Place } else { self.detail };
         let mut at = self.scene.geometry.interaction_with(detail, ray, &hit);
         if at.is_none() {
             at = self.retrace(ray, hit);
@@ -189,11 +189,11 @@ impl<'a> World<'a> {
         if gap_squared <= self.reach_squared {
             return ray;
         }
-        self.approach_from_afar(ray, gap_squared.sqrt())
+        self.approach_distant(ray, gap_squared.sqrt())
     }
 
     #[inline(never)]
-    fn approach_from_afar(&self, ray: Ray, gap: f32) -> Ray {
+    fn approach_distant(&self, ray: Ray, gap: f32) -> Ray {
         let extent = self.bounds.size().max_element();
         if !(gap > extent && gap < f32::INFINITY) {
             return ray;
@@ -205,8 +205,8 @@ impl<'a> World<'a> {
     }
 }
 
-/// By shape, whether nothing about it depends on parameters; only of analytic shapes, whose parameters cost arctangents. Empty if there are none.
-fn places_suffice(scene: &Scene) -> Vec<bool> {
+/// By shape, whether nothing depends on its uv and tangents; only analytic shapes, whose uv cost arctangents. Empty if there are none.
+fn shapes_without_parameters(scene: &Scene) -> Vec<bool> {
     if !scene.features.analytic_shapes || scene.features.anisotropic || !scene.part_reliefs.is_empty() {
         return Vec::new();
     }
@@ -215,16 +215,16 @@ fn places_suffice(scene: &Scene) -> Vec<bool> {
             Light::Area(light) => light.emission.texture.is_none() && light.emission.opacity.is_none(),
             _ => false,
         });
-        matches!(shape, Shape::Analytic(_)) && surface.relief.is_none() && shines_evenly && is_same_everywhere(scene, surface.material)
+        matches!(shape, Shape::Analytic(_)) && surface.relief.is_none() && shines_evenly && is_uniform(scene, surface.material)
     };
     scene.surfaces.iter().zip(&scene.geometry.shapes).map(suffices).collect()
 }
 
 /// Whether a material scatters alike at all points and in all directions of the tangent plane.
-fn is_same_everywhere(scene: &Scene, id: MaterialId) -> bool {
+fn is_uniform(scene: &Scene, id: MaterialId) -> bool {
     match &scene.materials[id.index()] {
         Material::Constant(bsdf) => !bsdf.is_anisotropic(),
-        Material::TwoSided { front, back } => [*front, *back].into_iter().all(|id| is_same_everywhere(scene, id)),
+        Material::TwoSided { front, back } => [*front, *back].into_iter().all(|id| is_uniform(scene, id)),
         Material::Varying(_) | Material::Mix { .. } => false,
     }
 }

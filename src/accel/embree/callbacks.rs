@@ -7,7 +7,7 @@ use super::device::Monitor;
 use super::gate::{Gate, RayWords};
 use super::packet::INVALID;
 use super::sys;
-use crate::geometry::{Geometry, Hit, Instance, PACKET, Placed, RayRows, Shape};
+use crate::geometry::{Geometry, Hit, Instance, PACKET_SIZE, Placed, RayPacket, Shape};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::Ray;
 
@@ -51,24 +51,24 @@ pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *con
     placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32)
 }
 
-/// As [`intersect_placed`] for rays side by side.
-pub(super) unsafe extern "C" fn intersect_placed_rows(shape: *const c_void, rays: *const f32, n: u32, valid: *const i32, t: *mut f32) {
+/// [`intersect_placed`] for the rays of a packet.
+pub(super) unsafe extern "C" fn intersect_placed_packet(shape: *const c_void, rays: *const f32, n: u32, valid: *const i32, t: *mut f32) {
     let n = n as usize;
     // SAFETY: the shape as in `intersect_placed`; the shim passes `n` lanes, at most a packet's, of rays in nine rows and more, and of `valid`, and
     // room for the distances of a packet. Every bit pattern is a number.
     let (placed, words, valid, t) = unsafe {
         let words = std::slice::from_raw_parts(rays, ROWS * n);
-        (&*shape.cast::<Placed>(), words, std::slice::from_raw_parts(valid, n), &mut *t.cast::<[f32; PACKET]>())
+        (&*shape.cast::<Placed>(), words, std::slice::from_raw_parts(valid, n), &mut *t.cast::<[f32; PACKET_SIZE]>())
     };
     let row = |k: usize| {
-        let mut row = [0.0; PACKET];
+        let mut row = [0.0; PACKET_SIZE];
         row[..n].copy_from_slice(&words[k * n..(k + 1) * n]);
         row
     };
-    let rays = RayRows { origin: [row(0), row(1), row(2)], t_min: row(3), direction: [row(4), row(5), row(6)], t_max: row(8) };
-    let hits = placed.first_hits(&rays);
+    let rays = RayPacket { origin: [row(0), row(1), row(2)], t_min: row(3), direction: [row(4), row(5), row(6)], t_max: row(8) };
+    let hits = placed.intersect_packet(&rays);
     *t = hits.t;
-    for lane in (0..n).filter(|&lane| valid[lane] != 0 && hits.is_open[lane] != 0) {
+    for lane in (0..n).filter(|&lane| valid[lane] != 0 && hits.is_undecided[lane] != 0) {
         t[lane] = placed.intersect(&rays.get(lane)).map_or(-1.0, |hit| hit.t as f32);
     }
 }

@@ -4,7 +4,7 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use super::callbacks::{Filter, counts, enter_instance, intersect_cutout, intersect_placed, intersect_placed_rows};
+use super::callbacks::{Filter, counts, enter_instance, intersect_cutout, intersect_placed, intersect_placed_packet};
 use super::device::Device;
 use super::{EmbreeOptions, EmbreeQuality, sys};
 use crate::error::{Error, Result};
@@ -52,12 +52,12 @@ impl UserShapes {
                     let raw = match &filter {
                         None => {
                             let shape = std::ptr::from_ref(placed).cast::<c_void>();
-                            let intersect_rows = placed.meets_packets().then_some(intersect_placed_rows as _);
-                            sys::StUserShape { shape, intersect: Some(intersect_placed), intersect_rows, lower, upper }
+                            let intersect_packet = placed.intersects_packets().then_some(intersect_placed_packet as _);
+                            sys::StUserShape { shape, intersect: Some(intersect_placed), intersect_packet, lower, upper }
                         }
                         Some(filter) => {
                             let shape = std::ptr::from_ref(&**filter).cast::<c_void>();
-                            sys::StUserShape { shape, intersect: Some(intersect_cutout), intersect_rows: None, lower, upper }
+                            sys::StUserShape { shape, intersect: Some(intersect_cutout), intersect_packet: None, lower, upper }
                         }
                     };
                     UserData::Analytic(raw, filter)

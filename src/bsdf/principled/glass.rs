@@ -22,9 +22,9 @@ impl Principled {
         Dielectric::rough(self.ior, self.ggx, self.multiscatter)
     }
 
-    /// Mitsuba's reflectance of the dielectric layer at a cosine: exact where it is untinted.
+    /// Mitsuba's specular reflectance of the dielectric layer at a cosine: exact Fresnel, mixed with Schlick's by the tint.
     #[inline]
-    pub(super) fn mitsuba_layer(&self, cos: f32) -> Rgb {
+    pub(super) fn mitsuba_specular(&self, cos: f32) -> Rgb {
         let exact = fresnel::dielectric(cos, self.ior).reflectance;
         if self.specular_tint == 0.0 {
             return Rgb::splat(exact);
@@ -37,9 +37,9 @@ impl Principled {
     /// A thin sheet, for the direction to the viewer and that of the light mirrored to its side. All reflections within the sheet count together,
     /// and light that passes does not turn. In Mitsuba the first reflection alone counts, and what passes has a lobe of its own.
     #[inline]
-    pub(super) fn eval_sheet(&self, o: Vec3, i: Vec3, reflects: bool) -> BsdfEval {
+    pub(super) fn eval_thin(&self, o: Vec3, i: Vec3, reflects: bool) -> BsdfEval {
         if self.is_mitsuba() {
-            return self.eval_mitsuba_sheet(o, i, reflects);
+            return self.eval_mitsuba_thin(o, i, reflects);
         }
         let facet = self.ggx.reflection(o, i);
         let reflectance = pane_reflectance(facet.cos, self.ior);
@@ -47,32 +47,32 @@ impl Principled {
         BsdfEval { value: color * (fraction * facet.value), pdf: fraction * facet.pdf }
     }
 
-    fn eval_mitsuba_sheet(&self, o: Vec3, i: Vec3, reflects: bool) -> BsdfEval {
+    fn eval_mitsuba_thin(&self, o: Vec3, i: Vec3, reflects: bool) -> BsdfEval {
         let reflection = fresnel::dielectric(o.z, self.ior).reflectance;
         if reflects {
             let facet = SeparableGgx::from(self.ggx).reflection(o, i);
-            return BsdfEval { value: self.mitsuba_layer(facet.cos) * facet.value, pdf: reflection * facet.pdf };
+            return BsdfEval { value: self.mitsuba_specular(facet.cos) * facet.value, pdf: reflection * facet.pdf };
         }
-        let facet = self.passing_facets().reflection(o, i);
-        // Mitsuba compares the mirrored half vector with the direction itself: light that turns far does not pass.
+        let facet = self.transmission_facets().reflection(o, i);
+        // Mitsuba tests the half vector of the mirrored direction against the direction itself, which cuts wide transmission off.
         let passes = (o + i).dot(Vec3::new(i.x, i.y, -i.z)) < 0.0;
         let fraction = if passes { 1.0 - fresnel::dielectric(facet.cos, self.ior).reflectance } else { 0.0 };
         BsdfEval { value: self.base * (fraction * facet.value), pdf: (1.0 - reflection) * facet.pdf }
     }
 
-    /// The facets of what passes a thin sheet in Mitsuba: the roughness of refraction at both faces together
+    /// The microfacets of transmission through a thin sheet in Mitsuba: the roughness of refraction at both faces together
     /// (Burley, "Extending the Disney BRDF to a BSDF with Integrated Subsurface Scattering").
-    fn passing_facets(&self) -> SeparableGgx {
+    fn transmission_facets(&self) -> SeparableGgx {
         let scale = (0.65 * self.ior - 0.35).max(0.0);
         SeparableGgx::new(self.ggx.alpha().map(|alpha| (alpha * scale * scale).clamp(super::MIN_ALPHA, 1.0)))
     }
 
     /// The direction of the light mirrored to the viewer's side, which may be below, and whether the light is reflected.
     #[inline]
-    pub(super) fn sample_sheet(&self, o: Vec3, u_side: f32, u: [f32; 2]) -> (Vec3, bool) {
+    pub(super) fn sample_thin(&self, o: Vec3, u_side: f32, u: [f32; 2]) -> (Vec3, bool) {
         if self.is_mitsuba() {
             let reflects = u_side < fresnel::dielectric(o.z, self.ior).reflectance;
-            let facets = if reflects { SeparableGgx::from(self.ggx) } else { self.passing_facets() };
+            let facets = if reflects { SeparableGgx::from(self.ggx) } else { self.transmission_facets() };
             let m = facets.sample_visible_normal(o, u);
             return (reflect(o, m, o.dot(m)), reflects);
         }

@@ -18,8 +18,9 @@
 //! - subsurface scattering is the flat lobe of 2012 for solids as well; glass has exact Fresnel terms, all else Schlick's;
 //! - the specular lobe that passes a thin sheet has the width of the one that it reflects.
 //!
-//! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled` and, for thin sheets of glass, `principledthin`: added without limit, with exact Fresnel terms for the untinted layer, G as a
-//! product, no compensation, tints over the luminance, and a clear coat that is larger by 4 cos cos.
+//! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled` and, for thin sheets of glass, `principledthin`: added without limit,
+//! with exact Fresnel terms for the untinted layer, G as a product, no compensation, tints over the luminance, and a clear coat that is larger by
+//! 4 cos cos.
 
 mod glass;
 mod parameters;
@@ -171,7 +172,7 @@ impl Principled {
         if !self.is_mitsuba() {
             return schlick(self.reflectance_ahead(), self.metallic + self.dielectric());
         }
-        schlick(self.base, 1.0) * self.metallic + self.mitsuba_layer(cos) * self.dielectric()
+        schlick(self.base, 1.0) * self.metallic + self.mitsuba_specular(cos) * self.dielectric()
     }
 
     #[inline]
@@ -288,7 +289,7 @@ impl Principled {
 
         // Glass.
         if self.glass > 0.0 {
-            let glass = if self.thin { self.eval_sheet(o, i, reflects) } else { self.eval_glass(wo, wi) };
+            let glass = if self.thin { self.eval_thin(o, i, reflects) } else { self.eval_glass(wo, wi) };
             value += glass.value * self.glass;
             pdf += choice.glass * glass.pdf;
         }
@@ -375,7 +376,7 @@ impl Principled {
         if !self.thin {
             return self.glass().sample(wo, u_glass, u).map(|sample| sample.wi);
         }
-        let (i, reflects) = self.sample_sheet(o, u_glass, u);
+        let (i, reflects) = self.sample_thin(o, u_glass, u);
         above(i).map(|i| if reflects { i } else { vec3(i.x, i.y, -i.z) })
     }
 

@@ -80,12 +80,12 @@ fn least_alphas_widen_rough_surfaces_alone() {
         other => panic!("{other:?}"),
     };
     for make in [gold, glass] {
-        assert_eq!(alpha_of(&make([0.01, 0.3]).with_least_alpha(0.2).unwrap()), [0.2, 0.3]);
-        assert!(make([0.2; 2]).with_least_alpha(0.2).is_none() && make([0.0; 2]).with_least_alpha(0.2).is_none());
+        assert_eq!(alpha_of(&make([0.01, 0.3]).with_min_alpha(0.2).unwrap()), [0.2, 0.3]);
+        assert!(make([0.2; 2]).with_min_alpha(0.2).is_none() && make([0.0; 2]).with_min_alpha(0.2).is_none());
     }
     for (name, bsdf) in rough_bsdfs() {
-        let Some(rougher) = bsdf.with_least_alpha(0.6) else { continue };
-        assert!(rougher.with_least_alpha(0.6).is_none(), "{name}");
+        let Some(rougher) = bsdf.with_min_alpha(0.6) else { continue };
+        assert!(rougher.with_min_alpha(0.6).is_none(), "{name}");
         // A wider lobe is lower at its peak.
         let (o, i) = (direction(0.8, 0.1), direction(0.8, 0.6));
         assert!(rougher.eval(o, i).value.g < bsdf.eval(o, i).value.g, "{name}");

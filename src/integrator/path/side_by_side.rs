@@ -289,7 +289,8 @@ impl PathIntegrator {
         let next = match (next, &vertex) {
             (Found::Ray, _) => {
                 let pdf = if world.scene.lights.is_empty() { f32::INFINITY } else { lanes.next_pdf(lane) };
-                let path = Path { throughput: lanes.throughput(lane), pdf, is_blurred: true, from: lanes.receiver(lane), ..path };
+                let path =
+                    Path { throughput: lanes.throughput(lane), pdf, any_non_specular_bounce: true, from: lanes.receiver(lane), ..path };
                 Some((path, Ray { time, ..next_ray }))
             }
             (Found::Hidden, Some(vertex)) => self.scatter(world, &path, vertex, bounce, (None, turns), draws.bsdf.of(i - first), |_| ()),

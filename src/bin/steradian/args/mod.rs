@@ -224,7 +224,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "LIMIT", help_heading = "Algorithm")]
     pub clamp: Option<f32>,
     /// Make surfaces that a path meets after a rough one at least as rough as this alpha, falling with the samples: less noise of caustics, but biased.
-    /// Off unless given; 0 for off
+    /// Off by default; 0 for off
     #[arg(long, value_name = "ALPHA", help_heading = "Algorithm")]
     pub regularize: Option<f32>,
     /// Whether paths learn from earlier ones where light comes from: on or off

@@ -237,7 +237,7 @@ fn hits_whose_distance_was_rounded_otherwise_are_found_again() {
 }
 
 #[test]
-fn packets_meet_what_single_rays_meet() {
+fn packets_hit_what_single_rays_hit() {
     let mut random = Rng::new(23);
     let [mut met, mut open] = [0usize; 2];
     for shape in shapes() {
@@ -248,7 +248,7 @@ fn packets_meet_what_single_rays_meet() {
             for round in 0..40 {
                 let mut vector =
                     |size: f64| dvec3(random.range(-size, size), random.range(-size, size), random.range(-size, size)).as_vec3();
-                let rays: [Ray; PACKET] = std::array::from_fn(|i| {
+                let rays: [Ray; PACKET_SIZE] = std::array::from_fn(|i| {
                     let origin = vector(3.0 * scale) + transform.point(DVec3::ZERO).as_vec3();
                     let t_max = if i % 5 == 4 { 1.0 } else { f32::INFINITY };
                     let ray = Ray { t_max, ..Ray::new(origin, transform.point(DVec3::ZERO).as_vec3() - origin + vector(scale)) };
@@ -257,32 +257,25 @@ fn packets_meet_what_single_rays_meet() {
                     Ray { t_min, ..ray }
                 });
                 let row = |of: fn(&Ray) -> f32| rays.each_ref().map(of);
-                let rows = RayRows {
+                let rows = RayPacket {
                     origin: [row(|r| r.origin.x), row(|r| r.origin.y), row(|r| r.origin.z)],
                     t_min: row(|r| r.t_min),
                     direction: [row(|r| r.direction.x), row(|r| r.direction.y), row(|r| r.direction.z)],
                     t_max: row(|r| r.t_max),
                 };
-                if !placed.meets_packets() {
-                    assert!(placed.first_hits(&rows).is_open.iter().all(|&open| open != 0));
+                if !placed.intersects_packets() {
+                    assert!(placed.intersect_packet(&rows).is_undecided.iter().all(|&open| open != 0));
                     continue;
                 }
-                let with = |hits: FirstHits| {
-                    for (i, ray) in rays.iter().enumerate().filter(|(i, _)| hits.is_open[*i] == 0) {
+                for hits in with_each(|| IntersectPacket { placed: &placed, rays: &rows }) {
+                    for (i, ray) in rays.iter().enumerate().filter(|(i, _)| hits.is_undecided[*i] == 0) {
                         let single = placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32);
                         assert_eq!(hits.t[i].to_bits(), single.to_bits(), "{placed:?} {ray:?}");
                     }
-                };
-                match &placed.shape {
-                    Analytic::Sphere(shape) => with_each(|| Packet { placed: &placed, shape, rays: &rows }).into_iter().for_each(with),
-                    Analytic::Quad(shape) => with_each(|| Packet { placed: &placed, shape, rays: &rows }).into_iter().for_each(with),
-                    Analytic::Disk(shape) => with_each(|| Packet { placed: &placed, shape, rays: &rows }).into_iter().for_each(with),
-                    Analytic::Frustum(shape) => with_each(|| Packet { placed: &placed, shape, rays: &rows }).into_iter().for_each(with),
-                    Analytic::Revolution(_) => {}
                 }
-                let hits = placed.first_hits(&rows);
+                let hits = placed.intersect_packet(&rows);
                 met += hits.t.iter().filter(|t| **t >= 0.0).count();
-                open += hits.is_open.iter().filter(|open| **open != 0).count();
+                open += hits.is_undecided.iter().filter(|open| **open != 0).count();
             }
         }
     }

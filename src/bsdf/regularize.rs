@@ -6,7 +6,7 @@ use super::{Bsdf, Microfacets, SingleScatteringBsdf};
 impl Bsdf {
     /// The same scattering with an alpha of at least `alpha`, within `[0, 1]`, along both tangents; what lies below a coat and how much the
     /// coat lets through stay. `None` if nothing is narrower: diffuse and ideally smooth surfaces, and Phong's own lobe, stay as they are.
-    pub fn with_least_alpha(&self, alpha: f32) -> Option<Self> {
+    pub fn with_min_alpha(&self, alpha: f32) -> Option<Self> {
         Some(match self {
             Self::Conductor(bsdf) => Self::Conductor(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Dielectric(bsdf) => Self::Dielectric(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
@@ -15,9 +15,9 @@ impl Bsdf {
             }
             Self::Principled(bsdf) => Self::Principled(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Glossy(bsdf) => Self::Glossy(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
-            Self::Coated(bsdf) => Self::Coated(Box::new(bsdf.with_least_alpha(alpha)?)),
-            Self::Beckmann(bsdf) => Self::Beckmann(bsdf.with_least_alpha(alpha)?),
-            Self::SeparableGgx(bsdf) => Self::SeparableGgx(bsdf.with_least_alpha(alpha)?),
+            Self::Coated(bsdf) => Self::Coated(Box::new(bsdf.with_min_alpha(alpha)?)),
+            Self::Beckmann(bsdf) => Self::Beckmann(bsdf.with_min_alpha(alpha)?),
+            Self::SeparableGgx(bsdf) => Self::SeparableGgx(bsdf.with_min_alpha(alpha)?),
             Self::Lambert(_) | Self::Eon(_) | Self::DiffuseTransmission(_) | Self::Mirror(_) | Self::ThinDielectric(_) | Self::Phong(_) => {
                 return None;
             }
@@ -26,7 +26,7 @@ impl Bsdf {
 }
 
 impl<D: Microfacets> SingleScatteringBsdf<D> {
-    fn with_least_alpha(&self, alpha: f32) -> Option<Self> {
+    fn with_min_alpha(&self, alpha: f32) -> Option<Self> {
         Some(match self {
             Self::Conductor(bsdf) => Self::Conductor(bsdf.with_single_scattering_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Dielectric(bsdf) => Self::Dielectric(bsdf.with_single_scattering_alpha(widened(bsdf.alpha(), alpha)?)),
