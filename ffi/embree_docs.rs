@@ -483,7 +483,6 @@ unsafe extern "C" {
     pub fn st_set_filter(triangles: RTCGeometry, filter_data: *const StFilter);
     pub fn st_intersect1(scene: RTCScene, query: *mut StQuery, rayhit: *mut RTCRayHit);
     pub fn st_occluded1(scene: RTCScene, query: *mut StQuery, ray: *mut RTCRay);
-    pub fn st_fill16(packet: *mut RTCRay16, rays: *const StRay);
     pub fn st_intersect16(scene: RTCScene, valid: *const i32, rayhits: *mut RTCRayHit16, coherent: bool);
     pub fn st_occluded16(scene: RTCScene, valid: *const i32, rays: *mut RTCRay16, coherent: bool);
     pub fn st_on_uncaught(report: StUncaught);

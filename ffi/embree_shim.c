@@ -153,33 +153,6 @@ static inline void set_ray(struct RTCRay *out, const struct StRay *ray, uint32_t
     out->flags = 0;
 }
 
-/* Four floats from each of four rays, written to four rows of a packet. */
-static inline void transpose(const float *const in[4], float *row0, float *row1, float *row2, float *row3) {
-    Float4 a, b, c, d;
-    memcpy(&a, in[0], sizeof a);
-    memcpy(&b, in[1], sizeof b);
-    memcpy(&c, in[2], sizeof c);
-    memcpy(&d, in[3], sizeof d);
-    const Float4 ab01 = __builtin_shufflevector(a, b, 0, 4, 1, 5), ab23 = __builtin_shufflevector(a, b, 2, 6, 3, 7);
-    const Float4 cd01 = __builtin_shufflevector(c, d, 0, 4, 1, 5), cd23 = __builtin_shufflevector(c, d, 2, 6, 3, 7);
-    *(Float4 *)row0 = __builtin_shufflevector(ab01, cd01, 0, 1, 4, 5);
-    *(Float4 *)row1 = __builtin_shufflevector(ab01, cd01, 2, 3, 6, 7);
-    *(Float4 *)row2 = __builtin_shufflevector(ab23, cd23, 0, 1, 4, 5);
-    *(Float4 *)row3 = __builtin_shufflevector(ab23, cd23, 2, 3, 6, 7);
-}
-
-void st_fill16(struct RTCRay16 *packet, const struct StRay *rays) {
-    for (int first = 0; first < 16; first += 4) {
-        const struct StRay *r = rays + first;
-        const float *const origins[4] = {r[0].origin, r[1].origin, r[2].origin, r[3].origin};
-        const float *const directions[4] = {r[0].direction, r[1].direction, r[2].direction, r[3].direction};
-        transpose(origins, packet->org_x + first, packet->org_y + first, packet->org_z + first, packet->tnear + first);
-        transpose(directions, packet->dir_x + first, packet->dir_y + first, packet->dir_z + first, packet->tfar + first);
-        const Float4 times = {r[0].time, r[1].time, r[2].time, r[3].time};
-        *(Float4 *)(packet->time + first) = times;
-    }
-}
-
 /* Through `instance`, whose number hits then have; RTC_INVALID_GEOMETRY_ID in the world. */
 static void trace_closest(RTCScene scene, struct RTCRayHit *rayhit, unsigned instance);
 static void trace_any(RTCScene scene, struct RTCRay *ray, unsigned instance);

@@ -99,9 +99,6 @@ void st_intersect1(RTCScene scene, struct StQuery *query, struct RTCRayHit *rayh
 /* Whether there is any hit: then `tfar` is negative infinity. */
 void st_occluded1(RTCScene scene, struct StQuery *query, struct RTCRay *ray);
 
-/* Writes sixteen rays into the lanes of a packet; mask, id and flags stay as they are. */
-void st_fill16(struct RTCRay16 *packet, const struct StRay *rays);
-
 /*
  * Closest hits of the lanes whose `valid` is -1; lanes of 0 are left alone. `valid` is aligned to 64 bytes. With `coherent` the packet is
  * traced as a frustum; no direction of a valid lane may then have a component between zero and 1e-18 in magnitude, in the space of an

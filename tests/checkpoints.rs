@@ -270,7 +270,7 @@ fn every_setting_that_differs_is_named() {
     }
     // Some of the changes make sense for every field.
     assert_eq!(found.iter().collect::<Vec<_>>(), serialized.as_object().unwrap().keys().collect::<Vec<_>>());
-    let skipped = ["outputs", "side_by_side", "threads", "time_limit"];
+    let skipped = ["outputs", "threads", "time_limit"];
     assert!(skipped.iter().all(|name| !found.contains(*name)));
 }
 

@@ -7,6 +7,7 @@ mod kdtree;
 mod kind;
 mod linear;
 mod octree;
+mod rows;
 mod tree;
 
 pub use bvh::BvhOptions;
@@ -15,9 +16,11 @@ pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality, EmbreeRe
 pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};
 pub use linear::LinearAccel;
+pub use rows::HitRows;
 
 use crate::geometry::Hit;
-use crate::math::{Aabb, Ray};
+use crate::math::rows::BATCH;
+use crate::math::{Aabb, Ray, RayRows};
 use inspect::Inspect;
 
 /// Which rays of a batch belong together, so that an accelerator may trace them side by side.
@@ -42,19 +45,39 @@ pub trait Accelerator: Send + Sync {
     /// Whether there is any hit within the ray's interval.
     fn occluded(&self, ray: &Ray) -> bool;
 
-    /// [`intersect`](Self::intersect) for each ray, in order. `hits` is as long as `rays`.
-    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
+    /// [`intersect`](Self::intersect) for the first `count` rays, at most [`BATCH`].
+    fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
         let _ = coherence;
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.intersect(ray);
+        for lane in 0..count.min(BATCH) {
+            hits.set(lane, self.intersect(&rays.get(lane)));
         }
     }
 
-    /// [`occluded`](Self::occluded) for each ray, in order. `occluded` is as long as `rays`.
-    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
+    /// [`occluded`](Self::occluded) for the first `count` rays, at most [`BATCH`].
+    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
         let _ = coherence;
-        for (ray, occluded) in rays.iter().zip(occluded) {
-            *occluded = self.occluded(ray);
+        for (lane, occluded) in occluded.iter_mut().enumerate().take(count) {
+            *occluded = self.occluded(&rays.get(lane));
+        }
+    }
+
+    /// [`intersect`](Self::intersect) for each ray, in order, in rows. `hits` is as long as `rays`.
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
+        let (mut rows, mut found) = (RayRows::default(), HitRows::default());
+        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            rays.iter().enumerate().for_each(|(lane, ray)| rows.set(lane, ray));
+            self.intersect_rows(&rows, rays.len(), &mut found, coherence);
+            hits.iter_mut().enumerate().for_each(|(lane, hit)| *hit = found.get(lane));
+        }
+    }
+
+    /// [`occluded`](Self::occluded) for each ray, in order, in rows. `occluded` is as long as `rays`.
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
+        let (mut rows, mut found) = (RayRows::default(), [false; BATCH]);
+        for (rays, occluded) in rays.chunks(BATCH).zip(occluded.chunks_mut(BATCH)) {
+            rays.iter().enumerate().for_each(|(lane, ray)| rows.set(lane, ray));
+            self.occluded_rows(&rows, rays.len(), &mut found, coherence);
+            occluded.copy_from_slice(&found[..occluded.len()]);
         }
     }
 

@@ -1,8 +1,9 @@
 //! An accelerator whose calls are observed.
 
-use crate::accel::{Accelerator, Coherence};
+use crate::accel::{Accelerator, Coherence, HitRows};
 use crate::geometry::Hit;
-use crate::math::{Aabb, Ray};
+use crate::math::rows::BATCH;
+use crate::math::{Aabb, Ray, RayRows};
 
 /// The rays of one call.
 pub struct Call<'a> {
@@ -45,16 +46,18 @@ impl<O: Observer> Accelerator for Observed<'_, O> {
         hit
     }
 
-    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
-        let call = Call { rays, any_hit: false, coherence: Some(coherence) };
-        self.observer.observe(&call, &mut || self.inner.intersect_batch(rays, hits, coherence));
-        self.observer.count(hits.iter().take(rays.len()).flatten().count());
+    fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
+        let listed: Vec<Ray> = (0..count).map(|lane| rays.get(lane)).collect();
+        let call = Call { rays: &listed, any_hit: false, coherence: Some(coherence) };
+        self.observer.observe(&call, &mut || self.inner.intersect_rows(rays, count, hits, coherence));
+        self.observer.count(hits.shape[..count].iter().filter(|shape| **shape != HitRows::MISS).count());
     }
 
-    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
-        let call = Call { rays, any_hit: true, coherence: Some(coherence) };
-        self.observer.observe(&call, &mut || self.inner.occluded_batch(rays, occluded, coherence));
-        self.observer.count(occluded.iter().take(rays.len()).filter(|hit| **hit).count());
+    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        let listed: Vec<Ray> = (0..count).map(|lane| rays.get(lane)).collect();
+        let call = Call { rays: &listed, any_hit: true, coherence: Some(coherence) };
+        self.observer.observe(&call, &mut || self.inner.occluded_rows(rays, count, occluded, coherence));
+        self.observer.count(occluded[..count].iter().filter(|hit| **hit).count());
     }
 
     fn bounds(&self) -> Aabb {

@@ -6,6 +6,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use super::energy::{Energy, multiple_color};
 use super::fresnel::ComplexIndex;
 use super::microfacet::{MIN_COSINE, Microfacets, reflect};
+use super::rows::LaneBsdf;
 use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
@@ -77,9 +78,10 @@ impl<D: Microfacets> Conductor<D> {
         Self { facets: D::with_alpha(alpha), ..*self }
     }
 
-    #[inline]
+    #[inline(always)]
     fn reflectance(&self, cos: f32) -> Rgb {
-        self.tint * Rgb::from(self.index.map(|index| index.reflectance(cos)))
+        let [r, g, b] = &self.index;
+        self.tint * Rgb::new(r.reflectance(cos), g.reflectance(cos), b.reflectance(cos))
     }
 
     /// What perfect mirrors would scatter at once, where multiple scattering is known.
@@ -103,10 +105,16 @@ impl<D: Microfacets> Conductor<D> {
         }
         let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
         if self.share == 0.0 {
-            let facet = self.facets.reflection(o, i);
-            return BsdfEval { value: self.reflectance(facet.cos) * facet.value, pdf: facet.pdf };
+            return self.eval_once(o, i);
         }
         self.eval_upper(o, i, self.at_once(o))
+    }
+
+    /// One encounter with a microfacet, for directions on the upper side.
+    #[inline(always)]
+    fn eval_once(&self, o: Vec3, i: Vec3) -> BsdfEval {
+        let facet = self.facets.reflection(o, i);
+        BsdfEval { value: self.reflectance(facet.cos) * facet.value, pdf: facet.pdf }
     }
 
     /// With multiple scattering, for what microfacets scatter at once of the light from `o`.
@@ -131,23 +139,36 @@ impl<D: Microfacets> Conductor<D> {
             return Some(BsdfSample::mirrored(wo, self.reflectance(wo.z.abs().min(1.0)), 1.0));
         }
         let o = vec3(wo.x, wo.y, wo.z.abs());
-        let at_once = if self.share == 0.0 { 1.0 } else { self.at_once(o) };
-        if self.share > 0.0 && u_lobe < self.multiple_probability(at_once) {
+        if self.share == 0.0 {
+            return self.sample_once(wo, u);
+        }
+        let at_once = self.at_once(o);
+        if u_lobe < self.multiple_probability(at_once) {
             return self.weigh(wo, o, warp::cosine_hemisphere(u), at_once);
         }
         let m = self.facets.sample_visible_normal(o, u);
         let cos = o.dot(m);
+        let wi = reflect(o, m, cos);
+        if cos > 0.0 && wi.z > 0.0 { self.weigh(wo, o, wi, at_once) } else { None }
+    }
+
+    /// One encounter with a microfacet.
+    #[inline(always)]
+    fn sample_once(&self, wo: Vec3, u: [f32; 2]) -> Option<BsdfSample> {
+        let o = vec3(wo.x, wo.y, wo.z.abs());
+        let m = self.facets.sample_visible_normal(o, u);
+        let cos = o.dot(m);
         let mut wi = reflect(o, m, cos);
-        if !(cos > 0.0 && wi.z > 0.0) {
-            return None;
-        }
-        if self.share > 0.0 {
-            return self.weigh(wo, o, wi, at_once);
-        }
+        let is_valid = (o.z > MIN_COSINE) & (cos > 0.0) & (wi.z > 0.0);
         let weight = self.reflectance(cos.min(1.0)) * self.facets.sampled_shadowing(o, wi);
         let pdf = self.facets.reflection_pdf(o, m);
         wi.z = wi.z.copysign(wo.z);
-        Some(BsdfSample { wi, weight, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+        is_valid.then_some(BsdfSample { wi, weight, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
+    }
+
+    /// Whether the metal is rough, and light that its microfacets scatter several times is left out.
+    pub(super) fn is_rough_single(&self) -> bool {
+        !self.facets.is_smooth() && self.share == 0.0
     }
 
     /// The sample for a direction of the upper side, all lobes counted.
@@ -175,5 +196,21 @@ impl<D: Microfacets> Conductor<D> {
     /// The reflectance of the plane.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         self.reflectance(wo.z.abs().min(1.0))
+    }
+}
+
+/// A rough metal without multiple scattering, for vector code.
+pub(super) struct SingleScattering<'a, D>(pub &'a Conductor<D>);
+
+impl<D: Microfacets> LaneBsdf for SingleScattering<'_, D> {
+    #[inline(always)]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        let eval = self.0.eval_once(vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
+        if wo.z * wi.z > 0.0 { eval } else { BsdfEval::default() }
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, _u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        self.0.sample_once(wo, u)
     }
 }

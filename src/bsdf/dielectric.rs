@@ -22,6 +22,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::energy::Energy;
 use super::fresnel;
 use super::microfacet::{MIN_COSINE, Microfacets, reflect, usable};
+use super::rows::LaneBsdf;
 use super::{BsdfEval, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::float::ONE_MINUS_EPSILON;
@@ -126,9 +127,10 @@ impl<D: Microfacets> Dielectric<D> {
     }
 
     /// The factor on what is reflected, or on what crosses.
-    #[inline]
+    #[inline(always)]
     fn tint(&self, is_transmission: bool) -> Rgb {
-        self.tints[usize::from(is_transmission)]
+        let [reflection, transmission] = self.tints;
+        if is_transmission { transmission } else { reflection }
     }
 
     /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over that on its side.
@@ -138,7 +140,7 @@ impl<D: Microfacets> Dielectric<D> {
     }
 
     /// Index of refraction beyond the surface over that on the side of `wo`.
-    #[inline]
+    #[inline(always)]
     fn eta(&self, wo: Vec3) -> f32 {
         if wo.z > 0.0 { self.ior } else { 1.0 / self.ior }
     }
@@ -180,34 +182,32 @@ impl<D: Microfacets> Dielectric<D> {
     /// One encounter with a microfacet, without the tints; `o` on the upper side.
     #[inline]
     fn eval_once(&self, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
-        if i.z > 0.0 {
-            let facet = self.facets.reflection(o, i);
-            let reflectance = fresnel::dielectric(facet.cos, eta).reflectance;
-            return BsdfEval { value: Rgb::splat(reflectance * facet.value), pdf: reflectance * facet.pdf };
-        }
-        self.eval_refraction(o, i, eta)
+        if i.z > 0.0 { self.eval_reflection(o, i, eta) } else { self.eval_refraction(o, i, eta) }
+    }
+
+    /// Reflection of `i` towards `o`, both on the upper side.
+    #[inline(always)]
+    fn eval_reflection(&self, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
+        let facet = self.facets.reflection(o, i);
+        let reflectance = fresnel::dielectric(facet.cos, eta).reflectance;
+        BsdfEval { value: Rgb::splat(reflectance * facet.value), pdf: reflectance * facet.pdf }
     }
 
     /// Refraction from `i`, on the lower side, towards `o`, on the upper one.
-    #[inline]
+    #[inline(always)]
     fn eval_refraction(&self, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
         let half = o + i * eta;
         let half = if half.z < 0.0 { -half } else { half };
         let length_squared = half.length_squared();
-        if length_squared == 0.0 {
-            return BsdfEval::default();
-        }
         // The microfacet must be seen from above by `o` and from below by `i`.
         let scale = 1.0 / length_squared.sqrt();
         let (cos_o, cos_i) = (o.dot(half) * scale, -i.dot(half) * scale);
-        if !(cos_o > 0.0 && cos_i > 0.0) {
-            return BsdfEval::default();
-        }
+        let is_valid = (length_squared > 0.0) & (cos_o > 0.0) & (cos_i > 0.0);
         // The cosine of refraction is known: recomputing it by Snell's law would lose its digits near the critical angle.
         let transmittance = 1.0 - fresnel::dielectric_reflectance(cos_o, cos_i, eta);
         let common = 2.0 * transmittance * self.facets.normal_density(half) * cos_o * cos_i / length_squared;
         let (value, pdf) = self.facets.refraction(o, vec3(i.x, i.y, -i.z), common);
-        BsdfEval { value: Rgb::splat(value), pdf: pdf * eta * eta }
+        if is_valid { BsdfEval { value: Rgb::splat(value), pdf: pdf * eta * eta } } else { BsdfEval::default() }
     }
 
     /// Reflection if `u_lobe` is below the reflectance, else refraction.
@@ -224,7 +224,7 @@ impl<D: Microfacets> Dielectric<D> {
                 Some(multiple) => self.sample_all(multiple, wo, u_lobe, u),
             }?
         };
-        Some(BsdfSample { weight: sample.weight * self.tint(sample.is_transmission), ..sample })
+        Some(self.tinted_sample(sample))
     }
 
     /// With multiple scattering.
@@ -251,55 +251,60 @@ impl<D: Microfacets> Dielectric<D> {
     }
 
     /// One encounter with a microfacet.
-    #[inline]
+    #[inline(always)]
     fn sample_once(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let eta = self.eta(wo);
         let o = vec3(wo.x, wo.y, wo.z.abs());
         let m = self.facets.sample_visible_normal(o, u);
         let cos = o.dot(m).min(1.0);
-        if cos <= 0.0 {
-            return None;
-        }
         let refraction = fresnel::dielectric(cos, eta);
-        let (mut wi, weight, pdf, is_transmission) = if u_lobe < refraction.reflectance {
-            let i = reflect(o, m, cos);
-            if i.z <= 0.0 {
-                return None;
-            }
-            (i, self.facets.sampled_shadowing(o, i), refraction.reflectance * self.facets.reflection_pdf(o, m), false)
+        let is_transmission = u_lobe >= refraction.reflectance;
+        let (reflected, refracted) = (reflect(o, m, cos), refract(o, m, cos, refraction.cos_t, eta));
+        let mut wi = if is_transmission { refracted } else { reflected };
+        let is_valid = (cos > 0.0) & if is_transmission { wi.z < 0.0 } else { wi.z > 0.0 };
+        let shadowing = self.facets.sampled_shadowing(o, vec3(wi.x, wi.y, wi.z.abs()));
+        // |h| = |cos - eta cos_t|; the reflection's density holds 1 / (4 cos), which the Jacobian of refraction replaces.
+        let across = cos - eta * refraction.cos_t;
+        let jacobian = eta * eta * refraction.cos_t / (across * across);
+        let facet_pdf = self.facets.reflection_pdf(o, m);
+        let pdf = if is_transmission {
+            (1.0 - refraction.reflectance) * 4.0 * cos * facet_pdf * jacobian
         } else {
-            let i = refract(o, m, cos, refraction.cos_t, eta);
-            if i.z >= 0.0 {
-                return None;
-            }
-            let shadowing = self.facets.sampled_shadowing(o, vec3(i.x, i.y, -i.z));
-            // |h| = |cos - eta cos_t|; the reflection's density holds 1 / (4 cos), which the Jacobian of refraction replaces.
-            let jacobian = eta * eta * refraction.cos_t / (cos - eta * refraction.cos_t).powi(2);
-            let pdf = (1.0 - refraction.reflectance) * 4.0 * cos * self.facets.reflection_pdf(o, m) * jacobian;
-            (i, shadowing / (eta * eta), pdf, true)
+            refraction.reflectance * facet_pdf
         };
+        let weight = if is_transmission { shadowing / (eta * eta) } else { shadowing };
         wi.z *= 1f32.copysign(wo.z);
         let eta = if is_transmission { eta } else { 1.0 };
-        Some(BsdfSample { wi, weight: Rgb::splat(weight), pdf, is_delta: false, is_transmission, eta })
+        is_valid.then_some(BsdfSample { wi, weight: Rgb::splat(weight), pdf, is_delta: false, is_transmission, eta })
     }
 
-    #[inline]
+    #[inline(always)]
     fn sample_smooth(&self, wo: Vec3, u_lobe: f32) -> BsdfSample {
         let eta = self.eta(wo);
         let refraction = fresnel::dielectric(wo.z.abs().min(1.0), eta);
-        // The choice is made with the reflectance itself, so that it cancels from the weight.
-        if u_lobe < refraction.reflectance {
-            return BsdfSample::mirrored(wo, Rgb::WHITE, refraction.reflectance);
-        }
         let scale = 1.0 / eta;
-        BsdfSample {
+        let refracted = BsdfSample {
             wi: vec3(-wo.x * scale, -wo.y * scale, -refraction.cos_t.copysign(wo.z)),
             weight: Rgb::splat(scale * scale),
             pdf: 1.0 - refraction.reflectance,
             is_delta: true,
             is_transmission: true,
             eta,
-        }
+        };
+        // The choice is made with the reflectance itself, so that it cancels from the weight.
+        let reflected = BsdfSample::mirrored(wo, Rgb::WHITE, refraction.reflectance);
+        if u_lobe < refraction.reflectance { reflected } else { refracted }
+    }
+
+    /// A sample with the factor on what is reflected or crosses.
+    #[inline(always)]
+    fn tinted_sample(&self, sample: BsdfSample) -> BsdfSample {
+        BsdfSample { weight: sample.weight * self.tint(sample.is_transmission), ..sample }
+    }
+
+    /// Whether the boundary is rough, and light that its microfacets scatter several times is left out.
+    pub(super) fn is_rough_single(&self) -> bool {
+        !self.facets.is_smooth() && self.multiple.is_none()
     }
 
     /// Whether the surface is rougher along one tangent than along the other.
@@ -321,8 +326,46 @@ impl<D: Microfacets> Dielectric<D> {
 }
 
 /// The unit direction that `o` refracts to at the unit normal `m`, for the cosines on both sides.
-#[inline]
+#[inline(always)]
 pub(super) fn refract(o: Vec3, m: Vec3, cos_o: f32, cos_t: f32, eta: f32) -> Vec3 {
     let scale = 1.0 / eta;
     m * (cos_o * scale - cos_t) - o * scale
+}
+
+/// A smooth boundary, for vector code.
+pub(super) struct Smooth<'a, D>(pub &'a Dielectric<D>);
+
+impl<D: Microfacets> LaneBsdf for Smooth<'_, D> {
+    #[inline(always)]
+    fn eval(&self, _wo: Vec3, _wi: Vec3) -> BsdfEval {
+        BsdfEval::default()
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u_lobe: f32, _u: [f32; 2]) -> Option<BsdfSample> {
+        let sample = self.0.tinted_sample(self.0.sample_smooth(wo, u_lobe));
+        (wo.z.abs() > MIN_COSINE).then_some(sample)
+    }
+}
+
+/// A rough boundary without multiple scattering, for vector code.
+pub(super) struct SingleScattering<'a, D>(pub &'a Dielectric<D>);
+
+impl<D: Microfacets> LaneBsdf for SingleScattering<'_, D> {
+    #[inline(always)]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        let eta = self.0.eta(wo);
+        let o = vec3(wo.x, wo.y, wo.z.abs());
+        let i = vec3(wi.x, wi.y, wi.z * 1f32.copysign(wo.z));
+        let (reflection, refraction) = (self.0.eval_reflection(o, i, eta), self.0.eval_refraction(o, i, eta));
+        let BsdfEval { value, pdf } = if i.z > 0.0 { reflection } else { refraction };
+        let eval = BsdfEval { value: value * self.0.tint(i.z < 0.0), pdf };
+        if wo.z.abs().min(wi.z.abs()) > MIN_COSINE { eval } else { BsdfEval::default() }
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let sample = self.0.sample_once(wo, u_lobe, u).map(|sample| self.0.tinted_sample(sample));
+        sample.filter(|_| wo.z.abs() > MIN_COSINE)
+    }
 }

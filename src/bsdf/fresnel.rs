@@ -10,20 +10,19 @@ pub struct Refraction {
 }
 
 /// A dielectric seen at `cos_i`, within `[0, 1]`; `eta` is the index of refraction on the far side over that on the near side.
-#[inline]
+#[inline(always)]
 pub fn dielectric(cos_i: f32, eta: f32) -> Refraction {
     // Snell's law; `1 - sin²` is written so that it keeps its digits near the critical angle.
     let eta2 = eta * eta;
     let cos2_t = ((eta2 - 1.0) + cos_i * cos_i) / eta2;
-    if cos2_t <= 0.0 {
-        return Refraction { reflectance: 1.0, cos_t: 0.0 };
-    }
-    let cos_t = cos2_t.sqrt();
-    Refraction { reflectance: dielectric_reflectance(cos_i, cos_t, eta), cos_t }
+    let is_total = cos2_t <= 0.0;
+    let cos_t = if is_total { 0.0 } else { cos2_t.sqrt() };
+    let reflectance = dielectric_reflectance(cos_i, cos_t, eta);
+    Refraction { reflectance: if is_total { 1.0 } else { reflectance }, cos_t }
 }
 
 /// Reflectance of a dielectric for the cosines of incidence and refraction, not both zero.
-#[inline]
+#[inline(always)]
 pub fn dielectric_reflectance(cos_i: f32, cos_t: f32, eta: f32) -> f32 {
     let parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     let across = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
@@ -75,7 +74,7 @@ impl ComplexIndex {
     }
 
     /// Reflectance at `cos`, within `[0, 1]`, exact for any complex index.
-    #[inline]
+    #[inline(always)]
     pub fn reflectance(&self, cos: f32) -> f32 {
         let cos2 = cos * cos;
         let sin2 = 1.0 - cos2;

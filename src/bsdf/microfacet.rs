@@ -46,7 +46,7 @@ pub trait Microfacets: Copy {
     fn energy(&self) -> Option<Energy>;
 
     /// Whether the surface is a plane mirror; no other method may then be called.
-    #[inline]
+    #[inline(always)]
     fn is_smooth(&self) -> bool {
         self.alpha()[0] == 0.0
     }
@@ -90,25 +90,25 @@ impl Ggx {
     }
 
     /// Length of `w` stretched by alpha.
-    #[inline]
+    #[inline(always)]
     pub fn stretched_length(&self, w: Vec3) -> f32 {
         vec3(self.alpha[0] * w.x, self.alpha[1] * w.y, w.z).length()
     }
 
     /// Fraction of the microfacets facing `w` that are not masked.
-    #[inline]
+    #[inline(always)]
     pub fn g1(&self, w: Vec3) -> f32 {
         2.0 * w.z / (w.z + self.stretched_length(w))
     }
 
     /// Fraction of the microfacets that both directions see; both on the upper side.
-    #[inline]
+    #[inline(always)]
     pub fn g2(&self, o: Vec3, i: Vec3) -> f32 {
         2.0 * o.z * i.z / (self.stretched_length(o) * i.z + self.stretched_length(i) * o.z)
     }
 
     /// Density per solid angle of [`Microfacets::sample_visible_normal`]; `m` unit.
-    #[inline]
+    #[inline(always)]
     pub fn visible_normal_pdf(&self, o: Vec3, m: Vec3) -> f32 {
         if m.z <= 0.0 {
             return 0.0;
@@ -122,26 +122,23 @@ impl Microfacets for Ggx {
         Self::new(alpha)
     }
 
-    #[inline]
+    #[inline(always)]
     fn alpha(&self) -> [f32; 2] {
         self.alpha
     }
 
-    #[inline]
+    #[inline(always)]
     fn normal_density(&self, m: Vec3) -> f32 {
         let [ax, ay] = self.alpha;
         let a = ax * ay;
         let stretched = vec3(m.x * ay, m.y * ax, m.z * a).length_squared();
-        // Zero only where the squares underflow.
-        if stretched == 0.0 {
-            return 0.0;
-        }
         let ratio = a * m.length_squared() / stretched;
-        FRAC_1_PI * a * ratio * ratio
+        // Zero only where the squares underflow.
+        if stretched == 0.0 { 0.0 } else { FRAC_1_PI * a * ratio * ratio }
     }
 
     /// With density [`Ggx::visible_normal_pdf`] (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps").
-    #[inline]
+    #[inline(always)]
     fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
         let [ax, ay] = self.alpha;
         // The hemisphere's configuration: there a reflected direction is uniform on the cap z > -w.z.
@@ -153,13 +150,13 @@ impl Microfacets for Ggx {
         vec3(ax * (radius * cos + w.x), ay * (radius * sin + w.y), above).normalize()
     }
 
-    #[inline]
+    #[inline(always)]
     fn sampled_shadowing(&self, o: Vec3, i: Vec3) -> f32 {
         let length = self.stretched_length(o);
         i.z * (o.z + length) / (length * i.z + self.stretched_length(i) * o.z)
     }
 
-    #[inline]
+    #[inline(always)]
     fn reflection(&self, o: Vec3, i: Vec3) -> FacetReflection {
         let half = o + i;
         let density = self.normal_density(half);
@@ -173,18 +170,18 @@ impl Microfacets for Ggx {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn reflection_pdf(&self, o: Vec3, m: Vec3) -> f32 {
         0.5 * self.normal_density(m) / (o.z + self.stretched_length(o))
     }
 
-    #[inline]
+    #[inline(always)]
     fn refraction(&self, o: Vec3, i: Vec3, x: f32) -> (f32, f32) {
         let (length_o, length_i) = (self.stretched_length(o), self.stretched_length(i));
         (x * i.z / (length_o * i.z + length_i * o.z), x / (o.z + length_o))
     }
 
-    #[inline]
+    #[inline(always)]
     fn energy(&self) -> Option<Energy> {
         Some(Energy::new(self))
     }
@@ -213,51 +210,51 @@ impl Microfacets for SeparableGgx {
         Self::new(alpha)
     }
 
-    #[inline]
+    #[inline(always)]
     fn alpha(&self) -> [f32; 2] {
         self.0.alpha
     }
 
-    #[inline]
+    #[inline(always)]
     fn normal_density(&self, m: Vec3) -> f32 {
         self.0.normal_density(m)
     }
 
-    #[inline]
+    #[inline(always)]
     fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
         self.0.sample_visible_normal(o, u)
     }
 
-    #[inline]
+    #[inline(always)]
     fn sampled_shadowing(&self, _o: Vec3, i: Vec3) -> f32 {
         self.0.g1(i)
     }
 
-    #[inline]
+    #[inline(always)]
     fn reflection(&self, o: Vec3, i: Vec3) -> FacetReflection {
         let facet = self.0.reflection(o, i);
         FacetReflection { value: facet.pdf * self.0.g1(i), ..facet }
     }
 
-    #[inline]
+    #[inline(always)]
     fn reflection_pdf(&self, o: Vec3, m: Vec3) -> f32 {
         self.0.reflection_pdf(o, m)
     }
 
-    #[inline]
+    #[inline(always)]
     fn refraction(&self, o: Vec3, i: Vec3, x: f32) -> (f32, f32) {
         let (_, pdf) = self.0.refraction(o, i, x);
         (pdf * self.0.g1(i), pdf)
     }
 
-    #[inline]
+    #[inline(always)]
     fn energy(&self) -> Option<Energy> {
         None
     }
 }
 
 /// `w` reflected at the plane with unit normal `m`, where `cos = w·m`.
-#[inline]
+#[inline(always)]
 pub(super) fn reflect(w: Vec3, m: Vec3, cos: f32) -> Vec3 {
     m * (2.0 * cos) - w
 }

@@ -19,6 +19,7 @@ mod phong;
 mod plastic;
 mod principled;
 mod regularize;
+mod rows;
 mod single;
 mod split;
 #[cfg(test)]
@@ -39,6 +40,7 @@ pub use mirror::Mirror;
 pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{Principled, PrincipledModel, PrincipledParameters};
+pub use rows::{BsdfEvalRows, BsdfQueryRows, BsdfSampleRows};
 pub use single::SingleScatteringBsdf;
 pub use thin::{DiffuseTransmission, ThinDielectric};
 

@@ -1,26 +1,9 @@
 //! Rays through many points of the film at once.
 
 use super::{Camera, Projection};
-use crate::math::Vec2;
-use crate::math::rows::{BATCH, Row, Vectors};
+use crate::math::rows::{BATCH, Row};
 use crate::math::vectorize::{Kernel, vectorize};
-
-/// Points of the film and the rays through them.
-#[derive(Clone, Debug)]
-pub struct FilmRows {
-    /// The points, in pixels from the upper left corner.
-    pub film: [Row; 2],
-    /// Where the rays start.
-    pub origin: Vectors,
-    /// Their unit directions.
-    pub direction: Vectors,
-}
-
-impl Default for FilmRows {
-    fn default() -> Self {
-        Self { film: [[0.0; BATCH]; 2], origin: Vectors::ZERO, direction: Vectors::ZERO }
-    }
-}
+use crate::math::{RayRows, Vec2};
 
 impl Camera {
     /// Whether [`pinhole_rays`](Self::pinhole_rays) finds the rays: of a pinhole camera at rest.
@@ -29,10 +12,11 @@ impl Camera {
         matches!(self.projection, Projection::Perspective { lens: None, .. }) && !self.is_moving()
     }
 
-    /// The [rays](Camera::ray) through the first `count` points.
-    pub fn pinhole_rays(&self, size: [u32; 2], rows: &mut FilmRows, count: usize) {
+    /// The [rays](Camera::ray) through the first `count` points of the `film`, in pixels from the upper left corner of a picture of `size` pixels.
+    /// Their times stay as they are.
+    pub fn pinhole_rays(&self, size: [u32; 2], film: &[Row; 2], rays: &mut RayRows, count: usize) {
         if let Projection::Perspective { half_height, .. } = self.projection {
-            vectorize(PinholeRays { camera: self, half_height, size, rows, count });
+            vectorize(PinholeRays { camera: self, half_height, size, film, rays, count });
         }
     }
 }
@@ -41,7 +25,8 @@ struct PinholeRays<'a> {
     camera: &'a Camera,
     half_height: f64,
     size: [u32; 2],
-    rows: &'a mut FilmRows,
+    film: &'a [Row; 2],
+    rays: &'a mut RayRows,
     count: usize,
 }
 
@@ -50,12 +35,13 @@ impl Kernel for PinholeRays<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { camera, half_height, size, rows, count } = self;
+        let Self { camera, half_height, size, film, rays, count } = self;
         for i in 0..count.min(BATCH) {
-            let toward = camera.on_picture(Vec2::new(rows.film[0][i], rows.film[1][i]), size, half_height);
+            let toward = camera.on_picture(Vec2::new(film[0][i], film[1][i]), size, half_height);
             let start = camera.pinhole_start(toward);
-            rows.origin.set(i, camera.world_from_camera.point(start).as_vec3());
-            rows.direction.set(i, camera.world_from_camera.vector(toward).normalize().as_vec3());
+            rays.origin.set(i, camera.world_from_camera.point(start).as_vec3());
+            rays.direction.set(i, camera.world_from_camera.vector(toward).normalize().as_vec3());
+            (rays.t_min[i], rays.t_max[i]) = (0.0, f32::INFINITY);
         }
     }
 }

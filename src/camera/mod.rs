@@ -7,7 +7,6 @@ mod project;
 #[cfg(test)]
 mod tests;
 
-pub use batch::FilmRows;
 pub use lens::{Blades, Lens, lens_equation};
 
 use std::f64::consts::{PI, TAU};

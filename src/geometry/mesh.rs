@@ -208,12 +208,12 @@ impl Mesh {
     /// The normals of a triangle's corners at a time from 0 to 1, if normals are interpolated.
     #[inline]
     pub(crate) fn corner_normals(&self, prim: PrimId, time: f32) -> Option<[Vec3; 3]> {
-        let normals = self.normals.as_ref()?;
         let corners = self.triangles[prim.index()];
-        let of = |normals: &[[f32; 3]]| corners.map(|i| Vec3::from(normals[i as usize]));
         if !self.is_deforming() {
-            return Some(of(normals));
+            return self.vertex_normals(corners);
         }
+        let normals = self.normals.as_ref()?;
+        let of = |normals: &[[f32; 3]]| corners.map(|i| Vec3::from(normals[i as usize]));
         let ([first, second], s) = self.steps_around(time);
         let step = |step: usize| if step == 0 { Some(normals) } else { self.later[step - 1].normals.as_ref() };
         let (from, to) = (of(step(first)?), of(step(second)?));
@@ -263,9 +263,21 @@ impl Mesh {
     /// The corners of one triangle.
     #[inline]
     pub fn triangle_points(&self, prim: PrimId) -> TrianglePoints {
-        let [a, b, c] = self.triangles[prim.index()];
+        self.points(self.triangles[prim.index()])
+    }
+
+    /// The positions of three vertices.
+    #[inline(always)]
+    pub(crate) fn points(&self, [a, b, c]: [u32; 3]) -> TrianglePoints {
         let at = |i: u32| Vec3::from(self.positions[i as usize]);
         TrianglePoints { a: at(a), b: at(b), c: at(c) }
+    }
+
+    /// The normals of three vertices of a mesh at rest, if normals are interpolated.
+    #[inline(always)]
+    pub(crate) fn vertex_normals(&self, corners: [u32; 3]) -> Option<[Vec3; 3]> {
+        let normals = self.normals.as_ref()?;
+        Some(corners.map(|i| Vec3::from(normals[i as usize])))
     }
 
     /// The uv at barycentric coordinates `u`, `v` of a triangle's second and third vertex; without uvs these coordinates themselves.

@@ -2,7 +2,7 @@
 
 use super::parts::add_undivided;
 use super::surface::surface_sample;
-use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
+use super::{CameraBatch, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
 use crate::accel::Coherence;
 use crate::color::Rgb;
 use crate::film::{PartNeeds, PixelSample, SampleBatch};
@@ -62,7 +62,7 @@ pub struct DebugView {
 }
 
 impl Integrator for DebugView {
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts) {
+    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts) {
         for_each_first_surface(world, samples, (self.needs, self.parts), out, counts, |_, _, at| self.view.color(world, at));
     }
 }
@@ -80,7 +80,7 @@ pub struct AmbientOcclusion {
 }
 
 impl Integrator for AmbientOcclusion {
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts) {
+    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts) {
         let mut shadow_rays = 0;
         let distance = (f64::from(self.distance) * world.scene.camera.render_space().scale()) as f32;
         for_each_first_surface(world, samples, (self.needs, self.parts), out, counts, |sample, ray, at| {
@@ -100,7 +100,7 @@ impl Integrator for AmbientOcclusion {
 /// Traces all camera rays side by side and fills `out` from `shade`, with nothing where a ray leaves the scene.
 fn for_each_first_surface(
     world: &World,
-    samples: &[CameraSample],
+    samples: &CameraBatch,
     (needs, parts): (SurfaceNeeds, PartNeeds),
     out: &mut SampleBatch,
     counts: &mut RayCounts,
@@ -113,6 +113,7 @@ fn for_each_first_surface(
     let wants_surface = needs != SurfaceNeeds::default();
     out.reset(samples.len(), wants_surface, parts);
     for (i, ((sample, ray), hit)) in samples.iter().zip(&rays).zip(hits).enumerate() {
+        let sample = &sample;
         let Some(at) = world.resolve(ray, hit) else {
             if needs.motion {
                 out.surfaces[i].motion = world.motion_at_infinity(ray.direction).to_array();

@@ -7,7 +7,6 @@
 mod cancel;
 mod cones;
 mod debug;
-mod guided;
 mod media;
 mod parts;
 mod path;
@@ -34,8 +33,9 @@ use std::sync::Arc;
 use crate::desc::IntegratorDesc;
 use crate::film::{PartNeeds, SampleBatch};
 use crate::guiding::Guide;
-use crate::math::Ray;
-use crate::sampling::{PixelSeed, Sampler};
+use crate::math::rows::BATCH;
+use crate::math::{Ray, RayRows};
+use crate::sampling::{PixelSeed, Requests, Sampler};
 
 /// Sets of four dimensions of the sampler, by purpose.
 pub mod dimensions {
@@ -70,6 +70,75 @@ pub struct CameraSample {
     pub sample: u32,
 }
 
+/// Samples of pixels on their way into the scene, in blocks of [`BATCH`], all but the last of which are full.
+#[derive(Debug, Default)]
+pub struct CameraBatch {
+    count: usize,
+    blocks: Vec<CameraBlock>,
+}
+
+/// At most [`BATCH`] samples.
+#[derive(Clone, Debug, Default)]
+pub struct CameraBlock {
+    /// The camera rays.
+    pub rays: RayRows,
+    /// Pixels and indices of the samples.
+    pub requests: Requests,
+}
+
+impl CameraBatch {
+    /// Removes all samples.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// The place for up to [`BATCH`] more samples, which [`extend`](Self::extend) adds; the batch has full blocks so far.
+    pub fn next_block(&mut self) -> &mut CameraBlock {
+        let block = self.count.div_ceil(BATCH);
+        if block == self.blocks.len() {
+            self.blocks.push(CameraBlock::default());
+        }
+        &mut self.blocks[block]
+    }
+
+    /// Adds the first `count` samples of the [next block](Self::next_block).
+    pub fn extend(&mut self, count: usize) {
+        self.count += count;
+    }
+
+    /// Adds one sample.
+    pub fn push(&mut self, sample: &CameraSample) {
+        let lane = self.count % BATCH;
+        let block = if lane == 0 { self.next_block() } else { &mut self.blocks[self.count / BATCH] };
+        block.rays.set(lane, &sample.ray);
+        (block.requests.pixels[lane], block.requests.samples[lane]) = (sample.seed, sample.sample);
+        self.count += 1;
+    }
+
+    /// How many samples there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// All blocks that have samples.
+    pub fn blocks(&self) -> &[CameraBlock] {
+        &self.blocks[..self.count.div_ceil(BATCH)]
+    }
+
+    /// One sample after the other.
+    pub fn iter(&self) -> impl Iterator<Item = CameraSample> {
+        (0..self.count).map(|i| {
+            let (CameraBlock { rays, requests }, lane) = (&self.blocks[i / BATCH], i % BATCH);
+            CameraSample { ray: rays.get(lane), seed: requests.pixels[lane], sample: requests.samples[lane] }
+        })
+    }
+}
+
 /// Rays traced, by purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayCounts {
@@ -98,7 +167,7 @@ impl RayCounts {
 /// Computes what each camera sample brings.
 pub trait Integrator: Send + Sync {
     /// Fills `out` with one entry for each of `samples`, and counts rays.
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts);
+    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts);
 }
 
 /// What integrators need to know beside their parameters.
@@ -110,15 +179,13 @@ pub struct Setup {
     pub needs: SurfaceNeeds,
     /// Which parts of the radiance layers need.
     pub parts: PartNeeds,
-    /// As in [`PathIntegrator`].
-    pub side_by_side: bool,
     /// What a path tracer follows beside the surfaces.
     pub guide: Option<Arc<Guide>>,
 }
 
 /// The integrator with these parameters.
 pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
-    let Setup { sampler, needs, parts, side_by_side, guide } = setup;
+    let Setup { sampler, needs, parts, guide } = setup;
     let view = |view| Box::new(DebugView { view, needs, parts }) as Box<dyn Integrator>;
     match *desc {
         IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => Box::new(PathIntegrator {
@@ -131,7 +198,6 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
             sampler,
             needs,
             parts,
-            side_by_side,
             guide,
         }),
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {

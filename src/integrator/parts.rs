@@ -12,7 +12,7 @@ use crate::scene::Scene;
 
 /// How light leaves the first surface towards the camera.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Way {
+pub(super) enum LobeWeights {
     /// Reflected, with this share of diffuse reflection; the rest is specular.
     Reflected {
         /// By channel.
@@ -22,7 +22,7 @@ pub(super) enum Way {
     Transmitted,
 }
 
-impl Way {
+impl LobeWeights {
     /// All by diffuse reflection.
     pub const DIFFUSE: Self = Self::Reflected { diffuse: Rgb::WHITE };
 
@@ -43,15 +43,15 @@ impl Way {
 
 /// How light came from its source to the camera.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Course {
+pub(super) enum LightEvent {
     /// Straight from a surface.
     Emission,
     /// Straight from infinity.
-    Background,
+    Environment,
     /// Scattered once.
-    Direct(Way),
+    Direct(LobeWeights),
     /// Scattered more than once, at last so.
-    Indirect(Way),
+    Indirect(LobeWeights),
 }
 
 /// The place of a light's group among the groups.
@@ -60,20 +60,20 @@ pub(super) fn group_of(scene: &Scene, light: LightId) -> usize {
 }
 
 /// Adds light to the parts of its sample by the course it took.
-pub(super) fn add_by_scattering(needs: PartNeeds, parts: &mut [Rgb], light: Rgb, course: Course) {
+pub(super) fn add_by_scattering(needs: PartNeeds, parts: &mut [Rgb], light: Rgb, course: LightEvent) {
     if !needs.by_scattering {
         return;
     }
     let mut add = |part: Part, light: Rgb| parts[part as usize] += light;
     let (way, [diffuse, specular, transmission]) = match course {
-        Course::Emission => return add(Part::Emission, light),
-        Course::Background => return add(Part::Background, light),
-        Course::Direct(way) => (way, [Part::DiffuseDirect, Part::SpecularDirect, Part::TransmissionDirect]),
-        Course::Indirect(way) => (way, [Part::DiffuseIndirect, Part::SpecularIndirect, Part::TransmissionIndirect]),
+        LightEvent::Emission => return add(Part::Emission, light),
+        LightEvent::Environment => return add(Part::Background, light),
+        LightEvent::Direct(way) => (way, [Part::DiffuseDirect, Part::SpecularDirect, Part::TransmissionDirect]),
+        LightEvent::Indirect(way) => (way, [Part::DiffuseIndirect, Part::SpecularIndirect, Part::TransmissionIndirect]),
     };
     match way {
-        Way::Transmitted => add(transmission, light),
-        Way::Reflected { diffuse: share } => {
+        LobeWeights::Transmitted => add(transmission, light),
+        LobeWeights::Reflected { diffuse: share } => {
             let part = light * share;
             add(diffuse, part);
             add(specular, light - part);
@@ -90,6 +90,6 @@ pub(super) fn add_by_group(needs: PartNeeds, parts: &mut [Rgb], light: Rgb, grou
 
 /// Adds all light of a sample whose course and source are not told apart.
 pub(super) fn add_undivided(needs: PartNeeds, parts: &mut [Rgb], light: Rgb) {
-    add_by_scattering(needs, parts, light, Course::Emission);
+    add_by_scattering(needs, parts, light, LightEvent::Emission);
     add_by_group(needs, parts, light, needs.light_groups.saturating_sub(1) as usize);
 }

@@ -3,8 +3,8 @@
 
 use super::World;
 use crate::geometry::{SpawnPoint, SurfaceInteraction};
-use crate::math::Vec3;
 use crate::math::float::UNIT_ROUNDOFF;
+use crate::math::{Ray, Vec3};
 
 /// The least cosine to the surface that a mirror reflection keeps, unless the incoming direction itself is shallower.
 const LEAST_REFLECTION: f32 = 0.01;
@@ -14,12 +14,12 @@ const LEAST_REFLECTION: f32 = 0.01;
 /// the surface, `n_s` lies in the hemisphere of `n_g`, and so does the result, which `back` sees from the same side as `n_g`.
 #[inline]
 pub fn facing_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
-    if faces(back, n_s, n_g) { n_s } else { turned_normal(back, n_s, n_g) }
+    if is_consistent(back, n_s, n_g) { n_s } else { adapted_normal(back, n_s, n_g) }
 }
 
 /// Whether the shading normal is to be used as it is.
 #[inline(always)]
-pub fn faces(back: Vec3, n_s: Vec3, n_g: Vec3) -> bool {
+pub fn is_consistent(back: Vec3, n_s: Vec3, n_g: Vec3) -> bool {
     let cos = back.dot(n_g);
     let reflected_cos = 2.0 * back.dot(n_s) * n_s.dot(n_g) - cos;
     let least = LEAST_REFLECTION.min(0.9 * cos.abs());
@@ -28,7 +28,7 @@ pub fn faces(back: Vec3, n_s: Vec3, n_g: Vec3) -> bool {
 
 /// In `f64`: at grazing angles the two directions nearly cancel.
 #[cold]
-pub fn turned_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
+pub fn adapted_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
     let (back, n_s, normal) = (back.as_dvec3().normalize_or_zero(), n_s.as_dvec3(), n_g.as_dvec3());
     let cos = back.dot(normal);
     let side = 1f64.copysign(cos);
@@ -56,28 +56,28 @@ pub fn terminator_factor(cos_geometric: f32, cos_shading: f32, cos_normals: f32)
 }
 
 /// How far above a facet a ray may start at least, in roundings of its place: a multiple of the distances that rays keep from surfaces.
-const LEAST_RAISE: f64 = 256.0;
+const MIN_TERMINATOR_OFFSET: f64 = 256.0;
 
-/// Where rays start that see more than the facet `at` does: above it on the side of the shading normal `n`, on the smooth surface that the
-/// facet stands for. There the shadow of a coarse mesh has no edges but its own. `None` if that surface is not above the facet, or if
-/// something is in between: such a ray gets nowhere that rays from the facet cannot get, in one step or two. Scenes with media have no raised
-/// rays, for the side of the facet says what a ray is in.
+/// Where rays start that see more than the facet `at` does: above it on the side of the shading normal `n`, on the smooth surface that the facet
+/// stands for, so that the shadow of a coarse mesh has no edges but its own. The second is a ray from the facet to there: if anything occludes it, the
+/// start is not to be used, so that rays get nowhere that rays from the facet cannot get in one step or two. `None` if that surface is not above the
+/// facet, and in scenes with media, for the side of the facet determines the medium.
 #[cold]
 #[inline(never)]
-pub fn raised_start(world: &World, at: &SurfaceInteraction, n: Vec3) -> Option<SurfaceInteraction> {
+pub fn terminator_start(world: &World, at: &SurfaceInteraction, n: Vec3) -> Option<(SurfaceInteraction, Ray)> {
     if world.scene.features.media {
         return None;
     }
     let p = world.scene.geometry.raised(at, n)?;
-    let raise = p - at.p;
+    let offset = p - at.p;
     let rounding = UNIT_ROUNDOFF * at.p.abs().max_element() + f64::from(at.error);
-    let on_lit_side = raise.dot(at.n_g.as_dvec3()) * f64::from(n.dot(at.n_g)) > 0.0;
-    if !(on_lit_side && raise.length() > LEAST_RAISE * rounding) {
+    let on_lit_side = offset.dot(at.n_g.as_dvec3()) * f64::from(n.dot(at.n_g)) > 0.0;
+    if !(on_lit_side && offset.length() > MIN_TERMINATOR_OFFSET * rounding) {
         return None;
     }
     // A little further, so that the distance which rays keep from surfaces is free too.
-    let way = at.spawn_to(&SpawnPoint { p: p + raise * (16.0 / LEAST_RAISE), n: Vec3::ZERO, error: 0.0 });
-    (!world.accel.occluded(&way)).then_some(SurfaceInteraction { p, n_g: n, ..*at })
+    let way = at.spawn_to(&SpawnPoint { p: p + offset * (16.0 / MIN_TERMINATOR_OFFSET), n: Vec3::ZERO, error: 0.0 });
+    Some((SurfaceInteraction { p, n_g: n, ..*at }, way))
 }
 
 #[cfg(test)]

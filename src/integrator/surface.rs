@@ -3,7 +3,7 @@
 use super::World;
 use crate::color::Rgb;
 use crate::film::{ShapeKey, SurfaceSample};
-use crate::geometry::{Hit, SurfaceInteraction};
+use crate::geometry::{Detail, Hit, SurfaceInteraction};
 use crate::math::{Frame, Ray, Vec2, Vec3};
 use crate::texture::Footprint;
 
@@ -76,7 +76,7 @@ pub(super) fn set_features(sample: &mut SurfaceSample, throughput: Rgb, albedo: 
 impl World<'_> {
     /// Surface parameters at the point of a hit.
     fn uv(&self, at: &SurfaceInteraction, hit: Option<&Hit>) -> Vec2 {
-        if self.finds_places_only() { self.scene.geometry.uv(at, hit) } else { at.uv }
+        if self.detail(at.shape) == Detail::Place { self.scene.geometry.uv(at, hit) } else { at.uv }
     }
 
     /// How far a point of a surface moves in the picture while the shutter is open.

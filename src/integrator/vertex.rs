@@ -1,8 +1,8 @@
 //! A surface point with its scattering, as one path sees it.
 
 use super::World;
-use super::shading::{facing_normal, raised_start, terminator_factor};
-use crate::bsdf::{Bsdf, BsdfEval, BsdfSample};
+use super::shading::{facing_normal, terminator_factor, terminator_start};
+use crate::bsdf::{Bsdf, BsdfEval};
 use crate::geometry::SurfaceInteraction;
 use crate::light::Receiver;
 use crate::math::{Frame, Ray, Vec3};
@@ -17,27 +17,27 @@ pub(super) struct RaisedEval {
 
 /// Whether two directions are on the same side of a surface: of its shading normal, and of its geometric one.
 #[derive(Clone, Copy)]
-pub(super) struct Sides {
+pub(super) struct HemisphereTest {
     pub in_frame: bool,
     pub in_geometry: bool,
 }
 
-impl Sides {
+impl HemisphereTest {
     /// From the cosines of both directions with the shading normal and with the geometric one.
     #[inline(always)]
     pub fn new(shading: [f32; 2], geometric: [f32; 2]) -> Self {
         Self { in_frame: shading[0] * shading[1] > 0.0, in_geometry: geometric[0] * geometric[1] > 0.0 }
     }
 
-    /// Whether both normals tell the same.
+    /// Whether both normals agree.
     #[inline(always)]
-    pub fn agree(self) -> bool {
+    pub fn agrees(self) -> bool {
         self.in_frame == self.in_geometry
     }
 
     /// Whether the shading normal sees a reflection that the facet hides.
     #[inline(always)]
-    pub fn hidden(self) -> bool {
+    pub fn is_below_facet(self) -> bool {
         self.in_frame && !self.in_geometry
     }
 }
@@ -89,8 +89,8 @@ impl<'a> Vertex<'a> {
     #[inline]
     pub fn shadowing(&self, local: Vec3, world: Vec3) -> f32 {
         let cos = world.dot(self.at.n_g);
-        let sides = Sides::new([self.wo.z, local.z], [self.cos_geometric, cos]);
-        if !sides.agree() {
+        let sides = HemisphereTest::new([self.wo.z, local.z], [self.cos_geometric, cos]);
+        if !sides.agrees() {
             return 0.0;
         }
         match self.cos_normals {
@@ -126,7 +126,7 @@ impl<'a> Vertex<'a> {
     }
 
     /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other directions, and where
-    /// [`raised_start`] finds no start.
+    /// [`terminator_start`] finds no start.
     #[inline]
     fn eval_raised(&self, world: &World, direction: Vec3) -> Option<RaisedEval> {
         let start = self.raised(world, direction)?;
@@ -136,24 +136,12 @@ impl<'a> Vertex<'a> {
     /// Where a ray starts in a direction that the shading normal sees and the facet does not.
     #[inline]
     fn raised(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
-        let sides = Sides::new([self.wo.z, direction.dot(self.frame.z)], [self.cos_geometric, direction.dot(self.at.n_g)]);
+        let sides = HemisphereTest::new([self.wo.z, direction.dot(self.frame.z)], [self.cos_geometric, direction.dot(self.at.n_g)]);
         // Under a relief, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
-        if !sides.hidden() || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.transmits() {
+        if !sides.is_below_facet() || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.transmits() {
             return None;
         }
-        raised_start(world, self.at, self.receiver().n)
-    }
-
-    /// A scattered direction and the ray that follows it.
-    #[inline(always)]
-    pub fn sample(&self, world: &World, u_lobe: f32, u: [f32; 2]) -> Option<(BsdfSample, Ray)> {
-        let mut sample = self.bsdf.sample(self.wo, u_lobe, u)?;
-        let direction = self.frame.to_world(sample.wi);
-        let shadowing = self.shadowing(sample.wi, direction);
-        if !sample.is_delta && shadowing > 0.0 {
-            sample.weight *= shadowing;
-        }
-        let ray = if shadowing > 0.0 { self.at.spawn(direction) } else { self.raised(world, direction)?.spawn(direction) };
-        Some((sample, ray))
+        let (start, way) = terminator_start(world, self.at, self.receiver().n)?;
+        (!world.accel.occluded(&way)).then_some(start)
     }
 }

@@ -2,10 +2,10 @@
 //! for Shaded Display").
 
 use super::media::MediaState;
-use super::parts::{Course, Way, add_by_group, add_by_scattering, group_of};
+use super::parts::{LightEvent, LobeWeights, add_by_group, add_by_scattering, group_of};
 use super::surface::surface_sample;
 use super::vertex::Vertex;
-use super::{CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
+use super::{CameraBatch, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
 use crate::color::Rgb;
 use crate::film::{PartNeeds, PixelSample, SampleBatch, SurfaceSample};
 use crate::geometry::{Hit, SurfaceInteraction};
@@ -36,11 +36,12 @@ pub struct Whitted {
 }
 
 impl Integrator for Whitted {
-    fn render_batch(&self, world: &World, samples: &[CameraSample], out: &mut SampleBatch, counts: &mut RayCounts) {
+    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts) {
         counts.camera += samples.len() as u64;
         let wants_surface = self.needs != SurfaceNeeds::default();
         out.reset(samples.len(), wants_surface, self.parts);
         for (i, sample) in samples.iter().enumerate() {
+            let sample = &sample;
             let in_media = world.scene.features.media;
             let here = if in_media { world.media_at_start(&sample.ray) } else { Interior::default() };
             let mut ray = sample.ray;
@@ -83,15 +84,15 @@ struct View {
     /// What is left at the camera of the light that leaves its end.
     throughput: Rgb,
     /// How light left the first surface, if this is behind it.
-    way: Option<Way>,
+    way: Option<LobeWeights>,
 }
 
 impl View {
     /// The course of light that comes along the segment, after `scatterings` at its end.
-    fn course(self, scatterings: u32, straight: Course) -> Course {
+    fn course(self, scatterings: u32, straight: LightEvent) -> LightEvent {
         match (self.way, self.depth - 1 + scatterings) {
-            (Some(way), 1) => Course::Direct(way),
-            (Some(way), _) => Course::Indirect(way),
+            (Some(way), 1) => LightEvent::Direct(way),
+            (Some(way), _) => LightEvent::Indirect(way),
             (None, _) => straight,
         }
     }
@@ -113,7 +114,7 @@ impl Tally<'_> {
     }
 
     /// Adds light at the camera; that of no light is in the last group.
-    fn add(&mut self, world: &World, light: Rgb, course: Course, source: Option<LightId>) {
+    fn add(&mut self, world: &World, light: Rgb, course: LightEvent, source: Option<LightId>) {
         add_by_scattering(self.needs, self.parts, light, course);
         let group = source.map_or(self.needs.light_groups.saturating_sub(1) as usize, |id| group_of(world.scene, id));
         add_by_group(self.needs, self.parts, light, group);
@@ -161,7 +162,7 @@ impl Segment {
         if tally.sorts() {
             for &id in world.scene.lights.at_infinity() {
                 let light = world.scene.lights.get(id).eval_at_infinity(self.ray.direction, FoundBy::Lights).radiance;
-                let course = view.course(0, Course::Background);
+                let course = view.course(0, LightEvent::Environment);
                 tally.add(world, view.throughput * light * self.transmittance, course, Some(id));
             }
         }
@@ -176,7 +177,7 @@ impl Whitted {
         let mut radiance = world.emitted(at, -ray.direction);
         if tally.sorts() {
             let source = world.scene.surface(at.shape).light(at.prim);
-            tally.add(world, view.throughput * radiance, view.course(0, Course::Emission), source);
+            tally.add(world, view.throughput * radiance, view.course(0, LightEvent::Emission), source);
         }
         if view.depth >= self.max_depth || world.gives_up() {
             return radiance;
@@ -191,7 +192,7 @@ impl Whitted {
             let ambient = self.ambient * vertex.bsdf.albedo(vertex.wo);
             radiance += ambient;
             if tally.sorts() {
-                tally.add(world, view.throughput * ambient, view.course(2, Course::Indirect(Way::DIFFUSE)), None);
+                tally.add(world, view.throughput * ambient, view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE)), None);
             }
             for id in (0..world.scene.lights.lights().len()).map(LightId::new) {
                 radiance += self.direct_light(world, segment, &vertex, id, view, tally);
@@ -210,7 +211,7 @@ impl Whitted {
             tally.rays.indirect += 1;
             let here = world.media_toward(at, ray.direction, direction, &media.here);
             let next = Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), here, tally.rays);
-            let way = view.way.unwrap_or_else(|| Way::of_sample(vertex.bsdf, vertex.wo, &lobe));
+            let way = view.way.unwrap_or_else(|| LobeWeights::of_sample(vertex.bsdf, vertex.wo, &lobe));
             let behind = View { depth: view.depth + 1, throughput: view.throughput * lobe.weight * lobe.pdf, way: Some(way) };
             let arriving = match &next.end {
                 Some(end) => {
@@ -249,8 +250,8 @@ impl Whitted {
         let here = world.media_toward(at, segment.ray.direction, shadow.direction, &segment.media.here);
         let light = scattered * world.transmittance(&here, &shadow);
         if tally.sorts() {
-            let way = Way::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(sample.wi));
-            tally.add(world, view.throughput * light, view.course(1, Course::Direct(way)), Some(id));
+            let way = LobeWeights::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(sample.wi));
+            tally.add(world, view.throughput * light, view.course(1, LightEvent::Direct(way)), Some(id));
         }
         light
     }

@@ -5,11 +5,13 @@ use super::cones::Division;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
 use crate::geometry::{Detail, Hit, Shape, SurfaceInteraction};
-use crate::id::MaterialId;
+use crate::id::{MaterialId, ShapeId};
 use crate::light::{FoundBy, Light};
 use crate::material::Material;
 use crate::math::float::step_past;
-use crate::math::{Aabb, Ray, Vec3};
+use crate::math::rows::BATCH;
+use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::{Aabb, Ray, RayRows, Vec3};
 use crate::scene::{Scene, Surface};
 
 /// How often a ray looks again behind hits that turn out to be rounding artefacts. Stacks of so many coplanar surfaces do not occur.
@@ -27,8 +29,7 @@ pub struct World<'a> {
     bounds: Aabb,
     /// Squared distance from the bounds up to which rays may start.
     reach_squared: f32,
-    detail: Detail,
-    /// By shape: whether nothing depends on its uv and tangents, though the scene has shapes where something does.
+    /// By shape: whether nothing depends on its uv and tangents.
     skips_parameters: Vec<bool>,
     /// Of pictures of scenes with [filtered textures](crate::scene::Features::filtered_textures).
     pub(super) division: Option<Division>,
@@ -44,15 +45,13 @@ pub struct World<'a> {
 impl<'a> World<'a> {
     /// A scene with its accelerator.
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator) -> Self {
-        let detail = if scene.features.parameters { Detail::Full } else { Detail::Place };
         let bounds = accel.bounds();
         Self {
             scene,
             accel,
             bounds,
             reach_squared: bounds.size().max_element().powi(2),
-            detail,
-            skips_parameters: if scene.features.parameters { shapes_without_parameters(scene) } else { Vec::new() },
+            skips_parameters: shapes_without_parameters(scene),
             division: None,
             media_bounds: super::media::bounds(scene),
             picture: None,
@@ -89,15 +88,21 @@ impl<'a> World<'a> {
         self.cancel.is_some_and(Cancel::given_up)
     }
 
-    /// Whether places are all that is found of surfaces, without parameters.
+    /// How much of interactions with a shape is computed.
     #[inline]
-    pub(super) fn finds_places_only(&self) -> bool {
-        self.detail == Detail::Place
+    pub(super) fn detail(&self, shape: ShapeId) -> Detail {
+        if self.skips_parameters[shape.index()] { Detail::Place } else { Detail::Full }
+    }
+
+    /// Whether a shape is a mesh at rest of whose hits nothing but the point and the normals is needed.
+    #[inline]
+    pub(super) fn is_plain_mesh(&self, shape: ShapeId) -> bool {
+        self.skips_parameters[shape.index()] && matches!(self.scene.geometry.shape(shape), Shape::Mesh(mesh) if !mesh.is_deforming())
     }
 
     /// With the parametrisation of every surface, whether or not the scene needs it.
     pub fn in_full(self) -> Self {
-        Self { detail: Detail::Full, skips_parameters: Vec::new(), ..self }
+        Self { skips_parameters: vec![false; self.skips_parameters.len()], ..self }
     }
 
     /// The surface that a ray meets first.
@@ -110,20 +115,13 @@ impl<'a> World<'a> {
     #[inline]
     pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
         let hit = hit?;
-        let detail = if self.skips_parameters.get(hit.shape.index()) == Some(&true) { Detail::Place } else { self.detail };
-        let mut at = self.scene.geometry.interaction_with(detail, ray, &hit);
+        let mut at = self.scene.geometry.interaction_with(self.detail(hit.shape), ray, &hit);
         if at.is_none() {
             at = self.retrace(ray, hit);
         } else if self.scene.features.reliefs {
             at = at.map(|at| self.with_relief(ray, &hit, at));
         }
         at
-    }
-
-    /// Lets camera rays, which have found `hits`, pass all that gives off light; says how many rays that took.
-    #[cold]
-    pub(super) fn pass_all_emitters(&self, rays: &mut [Ray], hits: &mut [Option<Hit>]) -> u64 {
-        rays.iter_mut().zip(hits).map(|(ray, hit)| self.pass_emitters(ray, hit)).sum()
     }
 
     /// Lets `ray`, which has found `hit`, start behind the emitters that it meets first; says how many rays that took.
@@ -154,7 +152,7 @@ impl<'a> World<'a> {
         for _ in 0..MAX_RETRACES {
             ray.t_min = step_past(hit.t);
             hit = self.accel.intersect(&ray)?;
-            if let Some(at) = self.scene.geometry.interaction_with(self.detail, &ray, &hit) {
+            if let Some(at) = self.scene.geometry.interaction_with(self.detail(hit.shape), &ray, &hit) {
                 return Some(self.with_relief(&ray, &hit, at));
             }
         }
@@ -179,45 +177,53 @@ impl<'a> World<'a> {
             .fold(Rgb::BLACK, |sum, &id| sum + self.scene.lights.get(id).eval_at_infinity(direction, FoundBy::Lights).radiance)
     }
 
-    /// A camera ray that starts far outside the scene, moved along itself (in `f64`) to just before the scene's box: accelerators compute
-    /// in `f32` and lose as many digits as the origin is far away.
-    #[inline]
-    pub fn approach(&self, ray: Ray) -> Ray {
-        let nearest = ray.origin.clamp(self.bounds.min, self.bounds.max);
-        let gap_squared = (nearest - ray.origin).length_squared();
-        // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
-        if gap_squared <= self.reach_squared {
-            return ray;
-        }
-        self.approach_distant(ray, gap_squared.sqrt())
-    }
-
-    #[inline(never)]
-    fn approach_distant(&self, ray: Ray, gap: f32) -> Ray {
-        let extent = self.bounds.size().max_element();
-        if !(gap > extent && gap < f32::INFINITY) {
-            return ray;
-        }
-        let origin = ray.origin.as_dvec3();
-        let direction = ray.direction.as_dvec3();
-        let distance = f64::from(gap - 0.5 * extent) / direction.length();
-        Ray { origin: (origin + direction * distance).as_vec3(), ..ray }
+    /// Moves camera rays that start far outside the scene along themselves (in `f64`) to just before the scene's box: accelerators compute in `f32` and
+    /// lose as many digits as the origin is far away.
+    pub fn approach(&self, rays: &mut RayRows, count: usize) {
+        vectorize(Approach { bounds: self.bounds, reach_squared: self.reach_squared, rays, count });
     }
 }
 
-/// By shape, whether nothing depends on its uv and tangents; only analytic shapes, whose uv cost arctangents. Empty if there are none.
-fn shapes_without_parameters(scene: &Scene) -> Vec<bool> {
-    if !scene.features.analytic_shapes || scene.features.anisotropic || !scene.part_reliefs.is_empty() {
-        return Vec::new();
+struct Approach<'a> {
+    bounds: Aabb,
+    reach_squared: f32,
+    rays: &'a mut RayRows,
+    count: usize,
+}
+
+impl Kernel for Approach<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { bounds, reach_squared, rays, count } = self;
+        let extent = bounds.size().max_element();
+        for i in 0..count.min(BATCH) {
+            let origin = rays.origin.get(i);
+            let nearest = origin.max(bounds.min).min(bounds.max);
+            let gap_squared = (nearest - origin).length_squared();
+            let gap = gap_squared.sqrt();
+            // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
+            let is_far = (gap_squared > reach_squared) & (gap > extent) & (gap < f32::INFINITY);
+            let (o, d) = (origin.as_dvec3(), rays.direction.get(i).as_dvec3());
+            let moved = (o + d * (f64::from(gap - 0.5 * extent) / d.length())).as_vec3();
+            let choose = |a: f32, b: f32| if is_far { a } else { b };
+            rays.origin.set(i, Vec3::new(choose(moved.x, origin.x), choose(moved.y, origin.y), choose(moved.z, origin.z)));
+        }
     }
-    let suffices = |(surface, shape): (&Surface, &Shape)| {
-        let shines_evenly = surface.first_light.is_none_or(|id| match scene.lights.get(id) {
+}
+
+/// By shape, whether nothing depends on its uv and tangents.
+fn shapes_without_parameters(scene: &Scene) -> Vec<bool> {
+    let suffices = |surface: &Surface| {
+        let emits_evenly = surface.first_light.is_none_or(|id| match scene.lights.get(id) {
             Light::Area(light) => light.emission.texture.is_none() && light.emission.opacity.is_none(),
             _ => false,
         });
-        matches!(shape, Shape::Analytic(_)) && surface.relief.is_none() && shines_evenly && is_uniform(scene, surface.material)
+        let has_relief = surface.relief.is_some() || !scene.part_reliefs.is_empty();
+        !has_relief && emits_evenly && is_uniform(scene, surface.material)
     };
-    scene.surfaces.iter().zip(&scene.geometry.shapes).map(suffices).collect()
+    scene.surfaces.iter().map(|surface| !scene.features.parameters || suffices(surface)).collect()
 }
 
 /// Whether a material scatters alike at all points and in all directions of the tangent plane.

@@ -8,6 +8,7 @@ mod groups;
 mod ies;
 mod point;
 mod projector;
+mod queue;
 mod set;
 mod spot;
 #[cfg(test)]
@@ -21,6 +22,7 @@ pub use groups::LightGroups;
 pub use ies::{IesLight, IesProfile};
 pub use point::PointLight;
 pub use projector::{Projection, Projector};
+pub use queue::{LightContext, LightQueue};
 pub use set::{LightChoice, LightSelection, LightSet};
 pub use spot::SpotLight;
 pub use tree::Receiver;

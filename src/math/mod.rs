@@ -21,7 +21,7 @@ pub use frame::Frame;
 pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec2, Vec3, Vec4, dvec2, dvec3, vec2, vec3};
 pub use motion::Motion;
 pub use random::Rng;
-pub use ray::{Ray, RayF64};
+pub use ray::{Ray, RayF64, RayRows};
 pub use render_space::RenderSpace;
 pub use roots::{Bracket, Quadratic, bisect, difference_of_products, newton_in_bracket, quadratic_roots, solve_quadratic};
 pub use transform::Transform;

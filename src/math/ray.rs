@@ -1,6 +1,7 @@
 //! Rays in world space (`f32`, what accelerators take) and in a shape's own space (`f64`, what shapes solve in).
 
 use super::float::EMBREE_LARGE;
+use super::rows::soa;
 use super::{DVec3, Vec3};
 
 /// A ray segment: the points `origin + t * direction` with `t_min <= t <= t_max`. The direction need not be unit.
@@ -50,6 +51,44 @@ impl Ray {
             & (self.t_min < f32::INFINITY)
             & (self.time >= 0.0)
             & (self.time <= 1.0)
+    }
+}
+
+soa! {
+    /// Rays, as [`Ray`].
+    pub struct RayRows {
+        /// Where `t = 0`.
+        origin: Vec3,
+        /// Smallest accepted `t`.
+        t_min: f32,
+        /// The change of the point per unit of `t`.
+        direction: Vec3,
+        /// Largest accepted `t`.
+        t_max: f32,
+        /// Time in the shutter interval.
+        time: f32,
+    }
+}
+
+impl RayRows {
+    /// The ray of one lane.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Ray {
+        Ray {
+            origin: self.origin.get(lane),
+            t_min: self.t_min[lane],
+            direction: self.direction.get(lane),
+            t_max: self.t_max[lane],
+            time: self.time[lane],
+        }
+    }
+
+    /// Sets the ray of one lane.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, ray: &Ray) {
+        self.origin.set(lane, ray.origin);
+        self.direction.set(lane, ray.direction);
+        (self.t_min[lane], self.t_max[lane], self.time[lane]) = (ray.t_min, ray.t_max, ray.time);
     }
 }
 

@@ -1,16 +1,52 @@
-//! Rows of numbers for loops that work on many things [side by side](super::vectorize).
+//! Structures of arrays: rows of numbers for loops that work on many things [at once](super::vectorize).
 
 use super::{DVec3, Vec3};
 
-/// Things that are worked on side by side at most: their rows stay in the nearest caches.
+/// Things in one row: few enough that their rows stay in the nearest caches.
 pub const BATCH: usize = 128;
 
 /// One number for each of many things.
 pub type Row<T = f32> = [T; BATCH];
 
+/// What [`soa!`](crate::math::rows::soa) can store by component.
+pub trait Element: Copy {
+    /// One for each of many things.
+    type Rows: Clone + std::fmt::Debug;
+
+    /// All zero.
+    const ZERO: Self::Rows;
+
+    /// That of one.
+    fn get(rows: &Self::Rows, i: usize) -> Self;
+
+    /// Sets that of one.
+    fn set(rows: &mut Self::Rows, i: usize, value: Self);
+}
+
+macro_rules! number {
+    ($($number:ident $zero:literal),*) => {$(
+        impl Element for $number {
+            type Rows = Row<Self>;
+            const ZERO: Row<Self> = [$zero; BATCH];
+
+            #[inline(always)]
+            fn get(rows: &Row<Self>, i: usize) -> Self {
+                rows[i]
+            }
+
+            #[inline(always)]
+            fn set(rows: &mut Row<Self>, i: usize, value: Self) {
+                rows[i] = value;
+            }
+        }
+    )*};
+}
+
+number!(f32 0.0, f64 0.0, u32 0);
+
 /// A vector for each, by component.
 #[derive(Clone, Debug)]
-pub struct Vectors([Row; 3]);
+pub struct Vectors(pub [Row; 3]);
 
 impl Vectors {
     /// All zero.
@@ -29,9 +65,24 @@ impl Vectors {
     }
 }
 
+impl Element for Vec3 {
+    type Rows = Vectors;
+    const ZERO: Vectors = Vectors::ZERO;
+
+    #[inline(always)]
+    fn get(rows: &Vectors, i: usize) -> Self {
+        rows.get(i)
+    }
+
+    #[inline(always)]
+    fn set(rows: &mut Vectors, i: usize, value: Self) {
+        rows.set(i, value);
+    }
+}
+
 /// A point for each, by coordinate.
 #[derive(Clone, Debug)]
-pub struct Points([Row<f64>; 3]);
+pub struct Points(pub [Row<f64>; 3]);
 
 impl Points {
     /// All zero.
@@ -49,3 +100,58 @@ impl Points {
         (self.0[0][i], self.0[1][i], self.0[2][i]) = (v.x, v.y, v.z);
     }
 }
+
+impl Element for DVec3 {
+    type Rows = Points;
+    const ZERO: Points = Points::ZERO;
+
+    #[inline(always)]
+    fn get(rows: &Points, i: usize) -> Self {
+        rows.get(i)
+    }
+
+    #[inline(always)]
+    fn set(rows: &mut Points, i: usize, value: Self) {
+        rows.set(i, value);
+    }
+}
+
+/// Declares a structure of rows, one for each field: `soa! { pub struct PathRows { pdf: f32, throughput: Rgb } }`. With `of Path` the structure
+/// `Path` of one of them is declared too, and `get` and `set`. Rows of 32 and of 64 bits that one loop writes belong into different structures:
+/// where all rows are alike, the compiler sees that they do not overlap.
+macro_rules! soa {
+    ($(#[$meta:meta])* $vis:vis struct $rows:ident of $item:ident { $($(#[$field_meta:meta])* $field:ident: $type:ty,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug)]
+        $vis struct $item { $($(#[$field_meta])* pub $field: $type,)* }
+
+        $crate::math::rows::soa! { $(#[$meta])* $vis struct $rows { $($(#[$field_meta])* $field: $type,)* } }
+
+        #[allow(dead_code)]
+        impl $rows {
+            #[inline(always)]
+            $vis fn get(&self, i: usize) -> $item {
+                $item { $($field: <$type as $crate::math::rows::Element>::get(&self.$field, i),)* }
+            }
+
+            #[inline(always)]
+            $vis fn set(&mut self, i: usize, item: &$item) {
+                $(<$type as $crate::math::rows::Element>::set(&mut self.$field, i, item.$field);)*
+            }
+        }
+    };
+    ($(#[$meta:meta])* $vis:vis struct $rows:ident { $($(#[$field_meta:meta])* $field:ident: $type:ty,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug)]
+        #[repr(align(64))]
+        $vis struct $rows { $($(#[$field_meta])* pub $field: <$type as $crate::math::rows::Element>::Rows,)* }
+
+        impl Default for $rows {
+            fn default() -> Self {
+                Self { $($field: <$type as $crate::math::rows::Element>::ZERO,)* }
+            }
+        }
+    };
+}
+
+pub(crate) use soa;

@@ -25,17 +25,16 @@ use std::sync::atomic::AtomicBool;
 use run::Run;
 
 use crate::accel::Accelerator;
-use crate::camera::FilmRows;
 use crate::desc::IntegratorDesc;
 use crate::error::{Error, Result};
 use crate::film::{
     Crop, DroppedSample, Film, FilmGrid, FilmShape, FilmTile, Filter, FilterSample, Filtering, Image, LayerKind, LayerSet, PartNeeds,
     PixelSample, SampleBatch, Splats, SurfaceSample,
 };
-use crate::integrator::{self, CameraSample, Cancel, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
+use crate::integrator::{self, CameraBatch, CameraBlock, Cancel, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::light::LightGroups;
-use crate::math::rows::BATCH;
-use crate::math::{Ray, Vec2};
+use crate::math::Vec2;
+use crate::math::rows::{BATCH, Row};
 use crate::sampling::{Numbers, Requests, Sampler};
 use crate::scene::Scene;
 
@@ -152,7 +151,7 @@ impl<'a> Job<'a> {
             by_scattering: settings.layers.needs_parts(),
             light_groups: if wanted(LayerKind::LightGroups) { shape.light_groups.len() as u32 } else { 0 },
         };
-        let setup = Setup { sampler, needs, parts, side_by_side: settings.side_by_side, guide: None };
+        let setup = Setup { sampler, needs, parts, guide: None };
         let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
         let world = if settings.transparent { world.without_background() } else { world };
         // Parameters of analytic shapes come with their places alone.
@@ -187,61 +186,67 @@ impl<'a> Job<'a> {
         batch.samples.clear();
         loop {
             let start = batch.samples.len();
-            let count = self.request(&mut samples, batch);
+            let Batch { samples: camera_batch, places, film, pixels, numbers, .. } = batch;
+            let block = camera_batch.next_block();
+            let count = self.request(&mut samples, pixels, &mut block.requests);
             if count == 0 {
                 break;
             }
-            self.setup.sampler.sample_4d_batch(&batch.requests, count, dimensions::CAMERA, &mut batch.numbers);
+            self.setup.sampler.sample_4d_batch(&block.requests, count, dimensions::CAMERA, numbers);
             for i in 0..count {
-                let u = batch.numbers.of(i);
+                let u = numbers.of(i);
                 let filter = self.filter.sample([u[0], u[1]]);
-                batch.places[start + i] = filter;
+                places[start + i] = filter;
                 for (k, offset) in filter.offset.to_array().into_iter().enumerate() {
-                    batch.film.film[k][i] = batch.pixels[i][k] as i32 as f32 + 0.5 + offset;
+                    film[k][i] = pixels[i][k] as i32 as f32 + 0.5 + offset;
                 }
             }
-            self.camera_rays(count, batch);
+            self.camera_rays(count, film, numbers, block);
+            camera_batch.extend(count);
         }
         self.integrator.render_batch(&self.world, &batch.samples, &mut batch.out, counts);
     }
 
-    /// Takes up the next samples of pixels, and says how many.
+    /// Takes up the next samples of pixels; the result is how many.
     #[inline]
-    fn request(&self, samples: &mut impl Iterator<Item = ([u32; 2], u32)>, batch: &mut Batch) -> usize {
+    fn request(
+        &self,
+        samples: &mut impl Iterator<Item = ([u32; 2], u32)>,
+        pixels: &mut [[u32; 2]; BATCH],
+        requests: &mut Requests,
+    ) -> usize {
         let mut count = 0;
         for ([x, y], sample) in samples.take(BATCH) {
             // Of what the camera shows; beyond its left and upper edge coordinates wrap.
             let [x, y] = [x, y].map(|x| x.wrapping_sub(self.grid.offset + self.overscan));
-            batch.pixels[count] = [x, y];
-            batch.requests.pixels[count] = self.setup.sampler.pixel(x, y);
-            batch.requests.samples[count] = sample;
+            pixels[count] = [x, y];
+            requests.pixels[count] = self.setup.sampler.pixel(x, y);
+            requests.samples[count] = sample;
             count += 1;
         }
         count
     }
 
-    /// Adds the rays through the points of the film.
+    /// Sets the rays through the points of the film.
     #[inline]
-    fn camera_rays(&self, count: usize, batch: &mut Batch) {
-        let Batch { samples, film, requests, numbers, .. } = batch;
+    fn camera_rays(&self, count: usize, film: &[Row; 2], numbers: &Numbers, block: &mut CameraBlock) {
+        let CameraBlock { rays, requests } = block;
         let (camera, moves) = (&self.world.scene.camera, self.world.scene.features.motion);
-        let sample = |i: usize, ray: Ray| CameraSample { ray, seed: requests.pixels[i], sample: requests.samples[i] };
-        let time = |i: usize| {
-            let u = || self.setup.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0];
-            if moves { camera.time(u()) } else { 0.0 }
-        };
-        if camera.is_pinhole() {
-            camera.pinhole_rays(self.view, film, count);
-            samples.extend((0..count).map(|i| {
-                let ray = Ray { time: time(i), ..Ray::new(film.origin.get(i), film.direction.get(i)) };
-                sample(i, self.world.approach(ray))
-            }));
-        } else {
-            samples.extend((0..count).map(|i| {
-                let (u, at) = (numbers.of(i), Vec2::new(film.film[0][i], film.film[1][i]));
-                sample(i, self.world.approach(camera.ray(at, self.view, [u[2], u[3]], time(i))))
-            }));
+        rays.time = [0.0; BATCH];
+        if moves {
+            for i in 0..count {
+                rays.time[i] = camera.time(self.setup.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0]);
+            }
         }
+        if camera.is_pinhole() {
+            camera.pinhole_rays(self.view, film, rays, count);
+        } else {
+            for i in 0..count {
+                let (u, at) = (numbers.of(i), Vec2::new(film[0][i], film[1][i]));
+                rays.set(i, &camera.ray(at, self.view, [u[2], u[3]], rays.time[i]));
+            }
+        }
+        self.world.approach(rays, count);
     }
 
     /// Renders the samples `first .. first + count` of every pixel of a tile.
@@ -289,14 +294,14 @@ fn radiance(sample: &PixelSample) -> [f64; 3] {
 
 /// Buffers of one batch.
 struct Batch {
-    samples: Vec<CameraSample>,
+    samples: CameraBatch,
     /// Of each sample, its place in the pixel and its weight.
     places: Vec<FilterSample>,
     out: SampleBatch,
     splats: Splats,
     pixels: [[u32; 2]; BATCH],
-    film: FilmRows,
-    requests: Requests,
+    /// Points of the film.
+    film: [Row; 2],
     numbers: Numbers,
 }
 
@@ -304,13 +309,12 @@ impl Batch {
     fn new() -> Self {
         let count = (TILE_SIZE * TILE_SIZE) as usize;
         Self {
-            samples: Vec::with_capacity(count),
+            samples: CameraBatch::default(),
             places: vec![FilterSample { offset: Vec2::ZERO, weight: 1.0 }; count],
             out: SampleBatch::default(),
             splats: Splats::default(),
             pixels: [[0; 2]; BATCH],
-            film: FilmRows::default(),
-            requests: Requests::default(),
+            film: [[0.0; BATCH]; 2],
             numbers: Numbers::default(),
         }
     }

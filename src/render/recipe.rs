@@ -183,7 +183,7 @@ impl Recipe {
     pub fn settings(&self, threads: usize) -> Settings {
         let layers = self.output.iter().flat_map(|output| &output.layers).collect();
         let outputs = self.output.iter().cloned().collect();
-        Settings { layers, outputs, threads, side_by_side: true, time_limit: None, ..self.settings.clone() }
+        Settings { layers, outputs, threads, time_limit: None, ..self.settings.clone() }
     }
 }
 

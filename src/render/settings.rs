@@ -57,9 +57,6 @@ pub struct Settings {
     /// Whether the camera's lens blurs what is out of focus; if not, [`Camera::remove_lens`](crate::camera::Camera::remove_lens) belongs before the
     /// render.
     pub depth_of_field: bool,
-    /// Whether paths shade diffuse surfaces side by side: faster, with the same picture bit for bit.
-    #[serde(skip)]
-    pub side_by_side: bool,
     /// Number of threads, at least 1.
     #[serde(skip)]
     pub threads: usize,
@@ -155,7 +152,6 @@ impl Settings {
             integrator,
             accel: overrides.accel.unwrap_or_default(),
             depth_of_field: !overrides.no_depth_of_field,
-            side_by_side: true,
             threads: threads(overrides.threads)?,
             time_limit: time_limit(overrides)?,
             outputs,

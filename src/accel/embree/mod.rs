@@ -17,11 +17,12 @@ pub use replay::EmbreeReplay;
 
 use std::ffi::c_char;
 
-use super::{Accelerator, Coherence};
+use super::{Accelerator, Coherence, HitRows};
 use crate::error::Result;
 use crate::geometry::{Geometry, Hit, Shape};
 use crate::id::{InstanceId, PrimId, ShapeId};
-use crate::math::{Aabb, Ray};
+use crate::math::rows::BATCH;
+use crate::math::{Aabb, Ray, RayRows};
 use device::Device;
 use gate::Gate;
 use packet::{HitPacket, INVALID, ShadowPacket, Tracer, WIDTH};
@@ -135,14 +136,27 @@ impl<'g> EmbreeAccel<'g> {
     /// shape's place there.
     #[inline(always)]
     fn hit(&self, raw: StHit) -> Hit {
-        let (shape, instance) = if raw.instance == INVALID {
-            (ShapeId(raw.geometry), Hit::NO_INSTANCE)
-        } else {
-            let instance = InstanceId(raw.instance - self.geometry.shapes.len() as u32);
-            let object = self.geometry.object(self.geometry.instance(instance).object);
-            (object.shapes[raw.geometry as usize], instance)
-        };
+        let (shape, instance) =
+            if raw.instance == INVALID { (ShapeId(raw.geometry), Hit::NO_INSTANCE) } else { self.instanced(raw.geometry, raw.instance) };
         Hit { t: raw.t, u: raw.u, v: raw.v, shape, prim: PrimId(raw.prim), instance }
+    }
+
+    /// The shape and the instance of a geometry and an instance as Embree numbers them.
+    #[inline]
+    fn instanced(&self, geometry: u32, instance: u32) -> (ShapeId, InstanceId) {
+        let instance = InstanceId(instance - self.geometry.shapes.len() as u32);
+        let object = self.geometry.object(self.geometry.instance(instance).object);
+        (object.shapes[geometry as usize], instance)
+    }
+
+    /// Replaces Embree's numbers by our ids where a hit is within an instance.
+    fn resolve_instances(&self, hits: &mut HitRows, count: usize) {
+        for lane in 0..count {
+            if hits.shape[lane] != HitRows::MISS && hits.instance[lane] != INVALID {
+                let (shape, instance) = self.instanced(hits.shape[lane], hits.instance[lane]);
+                (hits.shape[lane], hits.instance[lane]) = (shape.0, instance.0);
+            }
+        }
     }
 }
 
@@ -203,35 +217,23 @@ impl Accelerator for EmbreeAccel<'_> {
         self.tracer.occluded(ray)
     }
 
-    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
+    fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
         let mut packet = HitPacket::new();
-        let (full, rest) = rays.as_chunks::<WIDTH>();
-        let mut hits = hits.chunks_mut(WIDTH);
-        for (run, hits) in full.iter().zip(&mut hits) {
-            packet.intersect(&self.tracer, run, coherence);
-            for (lane, hit) in hits.iter_mut().enumerate() {
-                *hit = packet.hit(lane).map(|raw| self.hit(raw));
-            }
+        for first in (0..count.min(BATCH)).step_by(WIDTH) {
+            packet.intersect(&self.tracer, rays, first..count.min(first + WIDTH), coherence);
+            packet.read(hits, first);
         }
-        if let (false, Some(hits)) = (rest.is_empty(), hits.next()) {
-            packet.intersect(&self.tracer, &padded_run(rest), coherence);
-            for (lane, hit) in hits.iter_mut().enumerate() {
-                *hit = packet.hit(lane).map(|raw| self.hit(raw));
-            }
+        if !self.geometry.instances.is_empty() {
+            self.resolve_instances(hits, count);
         }
     }
 
-    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
+    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
         let mut packet = ShadowPacket::new();
-        let (full, rest) = rays.as_chunks::<WIDTH>();
-        let mut occluded = occluded.chunks_mut(WIDTH);
-        for (run, occluded) in full.iter().zip(&mut occluded) {
-            let found = packet.occluded(&self.tracer, run, coherence);
-            occluded.copy_from_slice(&found[..occluded.len()]);
-        }
-        if let (false, Some(occluded)) = (rest.is_empty(), occluded.next()) {
-            let found = packet.occluded(&self.tracer, &padded_run(rest), coherence);
-            occluded.copy_from_slice(&found[..occluded.len()]);
+        for first in (0..count.min(BATCH)).step_by(WIDTH) {
+            let lanes = first..count.min(first + WIDTH);
+            let found = packet.occluded(&self.tracer, rays, lanes.clone(), coherence);
+            occluded[lanes.clone()].copy_from_slice(&found[..lanes.len()]);
         }
     }
 
@@ -247,11 +249,4 @@ impl Accelerator for EmbreeAccel<'_> {
         let EmbreeInfo { version, isa } = self.device.info();
         format!("Embree {version} ({isa})")
     }
-}
-
-/// A short run with inactive rays behind it.
-fn padded_run(rays: &[Ray]) -> [Ray; WIDTH] {
-    let mut run = [Ray::INACTIVE; WIDTH];
-    run[..rays.len()].copy_from_slice(rays);
-    run
 }

@@ -1,15 +1,17 @@
 //! Rays and hits as Embree lays them out: one at a time, and sixteen side by side.
 //!
-//! A packet is filled lane by lane; the gate then runs over whole rows, which the compiler turns into vector code.
+//! A packet is filled row by row; the gate then runs over whole rows, which the compiler turns into vector code.
 
 use std::mem::MaybeUninit;
+use std::ops::Range;
 
 use super::gate::{Gate, RayWords};
 use super::scene::Scene;
 use super::sys::{self, RTCHit16, RTCRay, RTCRay16, RTCRayHit, RTCRayHit16, StHit};
-use crate::accel::Coherence;
+use crate::accel::{Coherence, HitRows};
 use crate::geometry::Cutouts;
-use crate::math::{Ray, Vec3, Vec4};
+use crate::math::rows::Row;
+use crate::math::{Ray, RayRows, Vec3, Vec4};
 
 /// Rays of one packet.
 pub(super) const WIDTH: usize = 16;
@@ -103,11 +105,6 @@ unsafe fn set_ray(out: *mut RTCRay, words: &RayWords, key: u32) {
     }
 }
 
-#[inline(always)]
-fn c_ray(ray: &Ray) -> *const sys::StRay {
-    std::ptr::from_ref(ray).cast()
-}
-
 /// Which lanes Embree may look at: -1, others 0.
 #[repr(C, align(64))]
 pub(super) struct Lanes(pub(super) [i32; WIDTH]);
@@ -131,42 +128,41 @@ impl HitPacket {
         Self { valid: Lanes([0; WIDTH]), rayhits: RTCRayHit16 { ray, hit: RTCHit16::default() } }
     }
 
-    /// Traces `rays` side by side; [`hit`](Self::hit) tells the results.
+    /// Traces at most sixteen `lanes` of `rays`, the first of which is a multiple of 16; [`read`](Self::read) gives the results.
     #[inline]
-    pub(super) fn intersect(&mut self, tracer: &Tracer, rays: &[Ray; WIDTH], coherence: Coherence) {
-        fill(&mut self.rayhits.ray, &mut self.valid, tracer, rays);
+    pub(super) fn intersect(&mut self, tracer: &Tracer, rays: &RayRows, lanes: Range<usize>, coherence: Coherence) {
+        fill(&mut self.rayhits.ray, &mut self.valid, tracer, rays, lanes.clone());
         self.rayhits.hit.geomID = [INVALID; WIDTH];
         self.rayhits.hit.instID = [[INVALID; WIDTH]];
         // SAFETY: the scene is committed, both structs are aligned by their types, and every valid lane has passed the gate.
         unsafe { sys::st_intersect16(tracer.scene.handle(), self.valid.0.as_ptr(), &mut self.rayhits, tracer.as_frustum(coherence)) };
         if !self.valid.is_full() {
-            self.intersect_left_out(tracer, rays);
+            self.intersect_left_out(tracer, rays, lanes);
         }
     }
 
     /// Traces the rays that were not fit for the packet, one by one.
     #[cold]
-    fn intersect_left_out(&mut self, tracer: &Tracer, rays: &[Ray; WIDTH]) {
-        for lane in (0..WIDTH).filter(|&lane| self.valid.0[lane] == 0) {
-            let Some(found) = tracer.intersect(&rays[lane]) else { continue };
+    fn intersect_left_out(&mut self, tracer: &Tracer, rays: &RayRows, lanes: Range<usize>) {
+        for (lane, ray) in lanes.enumerate().filter(|&(lane, _)| self.valid.0[lane] == 0) {
+            let Some(found) = tracer.intersect(&rays.get(ray)) else { continue };
             let hit = &mut self.rayhits.hit;
             (hit.u[lane], hit.v[lane], self.rayhits.ray.tfar[lane]) = (found.u, found.v, found.t);
             (hit.primID[lane], hit.geomID[lane], hit.instID[0][lane]) = (found.prim, found.geometry, found.instance);
         }
     }
 
-    /// The hit of one lane.
+    /// Writes the hits to sixteen lanes from `first` on, with Embree's numbers: a miss is [`INVALID`] as a shape, which is [`HitRows::MISS`].
     #[inline(always)]
-    pub(super) fn hit(&self, lane: usize) -> Option<StHit> {
+    pub(super) fn read(&self, hits: &mut HitRows, first: usize) {
+        const { assert!(INVALID == HitRows::MISS) };
         let hit = &self.rayhits.hit;
-        (hit.geomID[lane] != INVALID).then(|| StHit {
-            t: self.rayhits.ray.tfar[lane],
-            u: hit.u[lane],
-            v: hit.v[lane],
-            prim: hit.primID[lane],
-            geometry: hit.geomID[lane],
-            instance: hit.instID[0][lane],
-        })
+        *lanes_mut(&mut hits.t, first) = self.rayhits.ray.tfar;
+        *lanes_mut(&mut hits.u, first) = hit.u;
+        *lanes_mut(&mut hits.v, first) = hit.v;
+        *lanes_mut(&mut hits.prim, first) = hit.primID;
+        *lanes_mut(&mut hits.shape, first) = hit.geomID;
+        *lanes_mut(&mut hits.instance, first) = hit.instID[0];
     }
 }
 
@@ -181,43 +177,56 @@ impl ShadowPacket {
         Self { valid: Lanes([0; WIDTH]), rays: RTCRay16 { mask: [ALL_GEOMETRIES; WIDTH], ..RTCRay16::default() } }
     }
 
-    /// Traces `rays` side by side and tells which of them hit anything.
+    /// Traces at most sixteen `lanes` of `rays`, the first of which is a multiple of 16: which of them hit anything.
     #[inline]
-    pub(super) fn occluded(&mut self, tracer: &Tracer, rays: &[Ray; WIDTH], coherence: Coherence) -> [bool; WIDTH] {
-        fill(&mut self.rays, &mut self.valid, tracer, rays);
+    pub(super) fn occluded(&mut self, tracer: &Tracer, rays: &RayRows, lanes: Range<usize>, coherence: Coherence) -> [bool; WIDTH] {
+        fill(&mut self.rays, &mut self.valid, tracer, rays, lanes.clone());
         // SAFETY: as in `HitPacket::intersect`.
         unsafe { sys::st_occluded16(tracer.scene.handle(), self.valid.0.as_ptr(), &mut self.rays, tracer.as_frustum(coherence)) };
         // A lane that was not traced keeps the finite end of an inactive ray.
         let mut found = self.rays.tfar.map(|t_far| t_far == f32::NEG_INFINITY);
         if !self.valid.is_full() {
-            for lane in (0..WIDTH).filter(|&lane| self.valid.0[lane] == 0) {
-                found[lane] = tracer.occluded(&rays[lane]);
+            for (lane, ray) in lanes.enumerate().filter(|&(lane, _)| self.valid.0[lane] == 0) {
+                found[lane] = tracer.occluded(&rays.get(ray));
             }
         }
         found
     }
 }
 
-/// Writes `rays` into the lanes, and for those that are not fit for a packet harmless numbers and `valid = 0`.
 #[inline(always)]
-pub(super) fn fill(packet: &mut RTCRay16, valid: &mut Lanes, tracer: &Tracer, rays: &[Ray; WIDTH]) {
-    // SAFETY: both hold sixteen rays, and `StRay` is `Ray` under its C name.
-    unsafe { sys::st_fill16(packet, c_ray(&rays[0])) };
+fn lanes<T>(row: &Row<T>, first: usize) -> &[T; WIDTH] {
+    &row.as_chunks::<WIDTH>().0[first / WIDTH]
+}
+
+#[inline(always)]
+fn lanes_mut<T>(row: &mut Row<T>, first: usize) -> &mut [T; WIDTH] {
+    &mut row.as_chunks_mut::<WIDTH>().0[first / WIDTH]
+}
+
+/// Writes `rays` into the packet, and for those that are not fit for one harmless numbers and `valid = 0`.
+#[inline(always)]
+pub(super) fn fill(packet: &mut RTCRay16, valid: &mut Lanes, tracer: &Tracer, rays: &RayRows, range: Range<usize>) {
+    let first = range.start;
+    let (o, d) = (&rays.origin.0, &rays.direction.0);
+    (packet.org_x, packet.org_y, packet.org_z) = (*lanes(&o[0], first), *lanes(&o[1], first), *lanes(&o[2], first));
+    (packet.dir_x, packet.dir_y, packet.dir_z) = (*lanes(&d[0], first), *lanes(&d[1], first), *lanes(&d[2], first));
+    (packet.tnear, packet.tfar, packet.time) = (*lanes(&rays.t_min, first), *lanes(&rays.t_max, first), *lanes(&rays.time, first));
     for lane in 0..WIDTH {
-        valid.0[lane] = -i32::from(tracer.gate.admits_to_packet(&get(packet, lane)));
+        valid.0[lane] = -i32::from(tracer.gate.admits_to_packet(&get(packet, lane)) & (lane < range.len()));
     }
     if !valid.is_full() {
-        disarm(packet, valid);
+        deactivate(packet, valid);
     }
     if !tracer.cutouts.is_empty() {
-        for (id, ray) in packet.id.iter_mut().zip(rays) {
-            *id = tracer.cutouts.key(ray);
+        for (id, ray) in packet.id.iter_mut().zip(range) {
+            *id = tracer.cutouts.key(&rays.get(ray));
         }
     }
 }
 
 #[cold]
-fn disarm(packet: &mut RTCRay16, valid: &Lanes) {
+fn deactivate(packet: &mut RTCRay16, valid: &Lanes) {
     for lane in (0..WIDTH).filter(|&lane| valid.0[lane] == 0) {
         put(packet, lane, &Ray::INACTIVE);
     }

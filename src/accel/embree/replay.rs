@@ -4,12 +4,12 @@ use std::mem::MaybeUninit;
 
 use rayon::prelude::*;
 
+use super::EmbreeAccel;
 use super::gate::RayWords;
 use super::packet::{ALL_GEOMETRIES, INVALID, Lanes, Tracer, WIDTH, fill};
 use super::sys::{self, RTCHit, RTCHit16, RTCRay, RTCRay16, RTCRayHit, RTCRayHit16};
-use super::{EmbreeAccel, padded_run};
 use crate::accel::Coherence;
-use crate::math::Ray;
+use crate::math::{Ray, RayRows};
 
 /// Rays of a task of one thread, about: as many as a tile has.
 const CHUNK: usize = 4096;
@@ -53,7 +53,7 @@ impl<'a, 'g> EmbreeReplay<'a, 'g> {
             None => rays.iter().for_each(|ray| chunk.push_single(tracer, ray, any_hit)),
             Some(coherence) => {
                 for run in rays.chunks(WIDTH) {
-                    chunk.push_packet(tracer, &padded_run(run), any_hit, coherence);
+                    chunk.push_packet(tracer, run, any_hit, coherence);
                 }
             }
         }
@@ -94,11 +94,13 @@ impl Chunk {
         self.rays += 1;
     }
 
-    fn push_packet(&mut self, tracer: &Tracer, run: &[Ray; WIDTH], any_hit: bool, coherence: Coherence) {
+    fn push_packet(&mut self, tracer: &Tracer, run: &[Ray], any_hit: bool, coherence: Coherence) {
         let mut valid = Lanes([0; WIDTH]);
         let mut rays = RTCRay16 { mask: [ALL_GEOMETRIES; WIDTH], ..RTCRay16::default() };
-        fill(&mut rays, &mut valid, tracer, run);
-        let (inside, outside): (Vec<usize>, Vec<usize>) = (0..WIDTH).partition(|&lane| valid.0[lane] != 0);
+        let mut rows = RayRows::default();
+        run.iter().enumerate().for_each(|(lane, ray)| rows.set(lane, ray));
+        fill(&mut rays, &mut valid, tracer, &rows, 0..run.len());
+        let (inside, outside): (Vec<usize>, Vec<usize>) = (0..run.len()).partition(|&lane| valid.0[lane] != 0);
         if !inside.is_empty() {
             self.packets.push((valid, rays));
             self.steps.push(Step::Packet { any_hit, frustum: tracer.as_frustum(coherence) });

@@ -7,6 +7,7 @@ mod energy;
 mod limits;
 mod microfacet;
 mod principled;
+mod rows;
 mod sampling;
 mod single;
 mod split;

@@ -1,6 +1,7 @@
 //! Light from surfaces.
 
 mod parallelogram;
+mod queue;
 mod sphere;
 mod textured;
 mod triangle;
@@ -8,6 +9,7 @@ mod triangle;
 use std::f64::consts::PI;
 
 use parallelogram::ParallelogramEmitter;
+pub(super) use queue::AreaQueue;
 use sphere::SphereEmitter;
 use triangle::{TriangleEmitter, triangle_error};
 
@@ -197,7 +199,7 @@ impl AreaLight {
     #[inline(never)]
     fn sample_textured(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2]) -> Option<LightSample> {
         let (sample, error) = match &self.form {
-            Form::Parallelogram(quad) if self.emission.two_sided || quad.sees_front(p) => (quad.sample_textured(p, u)?, quad.error),
+            Form::Parallelogram(quad) => (quad.sample_textured(p, u, self.emission.two_sided)?, quad.error),
             _ => self.sample_surface(geometry, p, u)?,
         };
         let radiance = self.emission.expected(textures, &textured::point(geometry.shape(self.shape), self.prim, sample.p, u));
@@ -210,7 +212,7 @@ impl AreaLight {
         let both = self.emission.two_sided;
         Some(match &self.form {
             Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
-            Form::Parallelogram(quad) if both || quad.sees_front(p) => (quad.sample(p, u)?, quad.error),
+            Form::Parallelogram(quad) => (quad.sample(p, u, both)?, quad.error),
             Form::Triangle { .. } => self.sample_triangle(geometry, p, u)?,
             Form::Placed { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
@@ -239,6 +241,15 @@ impl AreaLight {
         match geometry.shape(self.shape) {
             Shape::Mesh(mesh) => Some(TriangleEmitter::new(&mesh.triangle_points(self.prim))),
             Shape::Analytic(_) => None,
+        }
+    }
+
+    /// The parallelogram, if the light is an even one.
+    #[inline]
+    fn even_parallelogram(&self) -> Option<&ParallelogramEmitter> {
+        match &self.form {
+            Form::Parallelogram(quad) if self.emission.is_even() => Some(quad),
+            _ => None,
         }
     }
 
@@ -312,7 +323,8 @@ impl Form {
         let Analytic::Quad(quad) = &placed.shape else { return Self::Placed { area: placed_area(placed) } };
         let map = &placed.transform;
         let front = placed.sample_area([0.5; 2]).n.as_dvec3();
-        ParallelogramEmitter::new(map.point(quad.origin()), map.vector(quad.edge_u()), map.vector(quad.edge_v()), front, 0.0)
+        let edges = [quad.edge_u(), quad.edge_v()].map(|edge| map.vector(edge));
+        ParallelogramEmitter::new(map.point(quad.origin()), edges, front, 0.0)
             .map_or(Self::Placed { area: 0.0 }, |quad| Self::Parallelogram(Box::new(quad)))
     }
 
@@ -339,7 +351,7 @@ impl Form {
             return None;
         }
         let error = triangle_error(&first).max(triangle_error(&second)) + gap as f32;
-        ParallelogramEmitter::new(origin, edge_u, edge_v, first.cross(), error).map(|quad| Self::Parallelogram(Box::new(quad)))
+        ParallelogramEmitter::new(origin, [edge_u, edge_v], first.cross(), error).map(|quad| Self::Parallelogram(Box::new(quad)))
     }
 }
 

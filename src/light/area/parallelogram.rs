@@ -1,35 +1,58 @@
 //! Parallelograms: rectangles are sampled by the solid angle they fill (Ureña, Fajardo, King, "An Area-Preserving Parametrization for
 //! Spherical Rectangles"), all others by area.
 
+use std::f32::consts::TAU;
+
 use super::SurfaceSample;
 use crate::math::float::F64_CHAIN_ERROR;
-use crate::math::{DVec3, Vec3};
+use crate::math::rows::soa;
+use crate::math::{DVec3, Vec3, angle_of, sin_cos_turns};
 use crate::sampling::Piecewise2d;
 
-/// A parallelogram in the world.
+soa! {
+    /// A parallelogram in the world.
+    pub(super) struct ParallelogramRows of Parallelogram {
+        corner: DVec3,
+        /// Unit vectors along the edges.
+        axis_u: DVec3,
+        axis_v: DVec3,
+        length_u: f64,
+        length_v: f64,
+        /// Unit normal, towards the front.
+        normal: DVec3,
+        /// 1 over the area.
+        pdf_area: f64,
+        /// 1 for rectangles, which are sampled by solid angle, else 0.
+        is_rectangle: f64,
+    }
+}
+
+/// A parallelogram that emits.
 #[derive(Clone, Debug)]
 pub(super) struct ParallelogramEmitter {
-    corner: DVec3,
-    /// Unit vectors along the edges.
-    axis_u: DVec3,
-    axis_v: DVec3,
-    length_u: f64,
-    length_v: f64,
-    /// Unit normal, towards the front.
-    normal: DVec3,
-    area: f64,
+    pub shape: Parallelogram,
     /// Bound on the error of the surface's position as an accelerator sees it.
     pub error: f32,
-    is_rectangle: bool,
     /// Density over the edges by the brightness of a texture; half of the samples are chosen by it.
     pub texels: Option<Box<Piecewise2d>>,
+}
+
+/// A point of a parallelogram as seen from another point.
+#[derive(Clone, Copy)]
+pub(super) struct ParallelogramSample {
+    /// The point.
+    pub q: DVec3,
+    /// Unit direction to it.
+    pub wi: DVec3,
+    /// Density per solid angle; 0 if nothing is seen from there.
+    pub pdf: f64,
 }
 
 /// Cosine between edges up to which a parallelogram counts as a rectangle; densities are off by about as much.
 const RIGHT_ANGLE: f64 = 1e-5;
 
 /// Below this solid angle the parametrisation loses digits.
-const SMALLEST_SOLID_ANGLE: f64 = 1e-6;
+const MIN_SOLID_ANGLE: f64 = 1e-6;
 
 /// Up to this ratio of the largest and the smallest squared distance, sampling by area is used: it costs an eighth, and on a Cornell box
 /// the error at equal samples grows by 1.3 % while the whole render takes 15 % less time.
@@ -47,9 +70,71 @@ struct View {
     corners: [f64; 4],
 }
 
+impl Parallelogram {
+    /// Whether `p` sees the front.
+    #[inline(always)]
+    fn sees_front(&self, p: DVec3) -> bool {
+        self.normal.dot(p - self.corner) > 0.0
+    }
+
+    #[inline(always)]
+    fn view(&self, p: DVec3) -> View {
+        let d = self.corner - p;
+        let (x0, y0) = (d.dot(self.axis_u), d.dot(self.axis_v));
+        let (x1, y1, height) = (x0 + self.length_u, y0 + self.length_v, d.dot(self.normal).abs());
+        let h2 = height * height;
+        let corners = [product(x0, x0, y0, y0, h2), product(x1, x1, y0, y0, h2), product(x1, x1, y1, y1, h2), product(x0, x0, y1, y1, h2)];
+        View { x0, x1, y0, y1, height, corners }
+    }
+
+    /// The point at distances from the corner along the edges.
+    #[inline(always)]
+    fn point(&self, along_u: f64, along_v: f64) -> DVec3 {
+        self.corner + self.axis_u * along_u + self.axis_v * along_v
+    }
+
+    /// A point as seen from `p`, by solid angle or by area, on emitters that are `two_sided` or not. Without branches, for loops over many vertices.
+    #[inline(always)]
+    pub fn sample(&self, p: DVec3, u: [f32; 2], two_sided: bool) -> ParallelogramSample {
+        let view = self.view(p);
+        let solid_angle = view.solid_angle();
+        let by_solid_angle = (self.is_rectangle != 0.0) & view.is_near() & (solid_angle > MIN_SOLID_ANGLE);
+        let [x, y] = view.sample(solid_angle, u);
+        let [x, y] =
+            if by_solid_angle { [x - view.x0, y - view.y0] } else { [f64::from(u[0]) * self.length_u, f64::from(u[1]) * self.length_v] };
+        let q = self.point(x, y);
+        let toward = q - p;
+        let distance_squared = toward.length_squared();
+        let distance = distance_squared.sqrt();
+        let by_area = self.pdf_area * distance_squared * distance / self.normal.dot(toward).abs();
+        let pdf = if by_solid_angle { 1.0 / solid_angle } else { by_area };
+        let is_seen = !view.is_edge_on(self.corner) & (two_sided | self.sees_front(p));
+        // A NaN, where both points are one, is no sample either.
+        let is_seen = is_seen & (pdf > 0.0) & (pdf < f64::from(f32::MAX));
+        ParallelogramSample { q, wi: toward * (1.0 / distance), pdf: if is_seen { pdf } else { 0.0 } }
+    }
+
+    /// Density per solid angle with which `sample` from `p` finds the point `q`.
+    #[inline]
+    fn pdf(&self, p: DVec3, q: DVec3) -> f32 {
+        let view = self.view(p);
+        if view.is_edge_on(self.corner) {
+            return 0.0;
+        }
+        if self.is_rectangle != 0.0 && view.is_near() {
+            let solid_angle = view.solid_angle();
+            if solid_angle > MIN_SOLID_ANGLE {
+                return (1.0 / solid_angle) as f32;
+            }
+        }
+        SurfaceSample::pdf_from_area(p, q, self.normal, self.pdf_area)
+    }
+}
+
 impl ParallelogramEmitter {
     /// From a corner, two edges and a vector on the front side; `None` if there is no area.
-    pub fn new(corner: DVec3, edge_u: DVec3, edge_v: DVec3, front: DVec3, error: f32) -> Option<Self> {
+    pub fn new(corner: DVec3, edges: [DVec3; 2], front: DVec3, error: f32) -> Option<Self> {
+        let [edge_u, edge_v] = edges;
         let cross = edge_u.cross(edge_v);
         let area = cross.length();
         let (length_u, length_v) = (edge_u.length(), edge_v.length());
@@ -57,119 +142,83 @@ impl ParallelogramEmitter {
             return None;
         }
         let normal = cross / area;
-        Some(Self {
+        let is_rectangle = edge_u.dot(edge_v).abs() <= RIGHT_ANGLE * length_u * length_v;
+        let shape = Parallelogram {
             corner,
             axis_u: edge_u / length_u,
             axis_v: edge_v / length_v,
             length_u,
             length_v,
             normal: if normal.dot(front) < 0.0 { -normal } else { normal },
-            area,
-            error,
-            is_rectangle: edge_u.dot(edge_v).abs() <= RIGHT_ANGLE * length_u * length_v,
-            texels: None,
-        })
+            pdf_area: 1.0 / area,
+            is_rectangle: f64::from(u8::from(is_rectangle)),
+        };
+        Some(Self { shape, error, texels: None })
     }
 
     pub fn area(&self) -> f64 {
-        self.area
+        1.0 / self.shape.pdf_area
     }
 
     /// Unit normal, towards the front.
     pub fn normal(&self) -> Vec3 {
-        self.normal.as_vec3()
+        self.shape.normal.as_vec3()
     }
 
-    /// Whether `p` sees the front.
-    #[inline]
-    pub fn sees_front(&self, p: DVec3) -> bool {
-        self.normal.dot(p - self.corner) > 0.0
-    }
-
-    #[inline]
-    fn view(&self, p: DVec3) -> View {
-        let d = self.corner - p;
-        let (x0, y0) = (d.dot(self.axis_u), d.dot(self.axis_v));
-        let (x1, y1, height) = (x0 + self.length_u, y0 + self.length_v, d.dot(self.normal).abs());
-        let squared = |x: f64, y: f64| x * x + y * y + height * height;
-        View { x0, x1, y0, y1, height, corners: [squared(x0, y0), squared(x1, y0), squared(x1, y1), squared(x0, y1)] }
+    /// A point as seen from `p`, whatever the texture; `None` if nothing is seen from there.
+    pub fn sample(&self, p: DVec3, u: [f32; 2], two_sided: bool) -> Option<SurfaceSample> {
+        let ParallelogramSample { q, wi, pdf } = self.shape.sample(p, u, two_sided);
+        (pdf > 0.0).then(|| SurfaceSample { p: q, n: self.normal(), wi: wi.as_vec3(), pdf: pdf as f32 })
     }
 
     /// A point chosen by the brightness of its texel in half of the cases, by what `p` sees of the surface in the others.
-    pub fn sample_textured(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
-        let Some(texels) = &self.texels else { return self.sample(p, u) };
+    pub fn sample_textured(&self, p: DVec3, u: [f32; 2], two_sided: bool) -> Option<SurfaceSample> {
+        let Some(texels) = &self.texels else { return self.sample(p, u, two_sided) };
+        let shape = &self.shape;
+        if !two_sided && !shape.sees_front(p) {
+            return None;
+        }
         let mut sample = if u[0] < 0.5 {
-            self.sample(p, [2.0 * u[0], u[1]])?
+            self.sample(p, [2.0 * u[0], u[1]], two_sided)?
         } else {
             let [x, y] = texels.sample([2.0 * u[0] - 1.0, u[1]]).uv;
-            let q = self.point(f64::from(x) * self.length_u, f64::from(y) * self.length_v);
-            SurfaceSample::from_area(p, q, self.normal, 1.0 / self.area)?
+            let q = shape.point(f64::from(x) * shape.length_u, f64::from(y) * shape.length_v);
+            SurfaceSample::from_area(p, q, shape.normal, shape.pdf_area)?
         };
         sample.pdf = self.pdf(p, sample.p);
         (sample.pdf > 0.0).then_some(sample)
     }
 
-    /// A point as seen from `p`, whatever the texture; `None` in the plane.
-    #[inline(always)]
-    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
-        let view = self.view(p);
-        if view.is_edge_on(self.corner) {
-            return None;
-        }
-        let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };
-        let Some(solid_angle) = by_solid_angle else {
-            let q = self.point(f64::from(u[0]) * self.length_u, f64::from(u[1]) * self.length_v);
-            return SurfaceSample::from_area(p, q, self.normal, 1.0 / self.area);
-        };
-        let [x, y] = view.sample(solid_angle, u);
-        let q = self.point(x - view.x0, y - view.y0);
-        let toward = q - p;
-        let wi = (toward * (1.0 / toward.length())).as_vec3();
-        Some(SurfaceSample { p: q, n: self.normal.as_vec3(), wi, pdf: (1.0 / solid_angle) as f32 })
-    }
-
-    /// The point at distances from the corner along the edges.
-    #[inline]
-    fn point(&self, along_u: f64, along_v: f64) -> DVec3 {
-        self.corner + self.axis_u * along_u + self.axis_v * along_v
-    }
-
     /// Density per solid angle with which `sample` from `p` finds the point `q`.
     #[inline]
     pub fn pdf(&self, p: DVec3, q: DVec3) -> f32 {
-        let by_size = self.pdf_by_size(p, q);
+        let by_size = self.shape.pdf(p, q);
         let Some(texels) = &self.texels else { return by_size };
-        let by_texel = f64::from(texels.pdf(self.uv(q))) / self.area;
-        0.5 * (by_size + SurfaceSample::pdf_from_area(p, q, self.normal, by_texel))
+        let by_texel = f64::from(texels.pdf(self.uv(q))) * self.shape.pdf_area;
+        0.5 * (by_size + SurfaceSample::pdf_from_area(p, q, self.shape.normal, by_texel))
     }
 
     /// Shares of the edges at the point `q` of the surface.
     fn uv(&self, q: DVec3) -> [f32; 2] {
+        let Parallelogram { corner, axis_u, axis_v, length_u, length_v, .. } = self.shape;
         // With non-perpendicular edges, each coordinate is the area opposite to it.
-        let d = q - self.corner;
-        let whole = self.axis_u.cross(self.axis_v);
-        let (u, v) = (d.cross(self.axis_v).dot(whole), self.axis_u.cross(d).dot(whole));
+        let d = q - corner;
+        let whole = axis_u.cross(axis_v);
+        let (u, v) = (d.cross(axis_v).dot(whole), axis_u.cross(d).dot(whole));
         let scale = 1.0 / whole.length_squared();
-        [(u * scale / self.length_u) as f32, (v * scale / self.length_v) as f32]
+        [(u * scale / length_u) as f32, (v * scale / length_v) as f32]
     }
+}
 
-    #[inline]
-    fn pdf_by_size(&self, p: DVec3, q: DVec3) -> f32 {
-        let view = self.view(p);
-        if view.is_edge_on(self.corner) {
-            return 0.0;
-        }
-        let by_solid_angle = if self.is_rectangle { view.usable_solid_angle() } else { None };
-        match by_solid_angle {
-            Some(solid_angle) => (1.0 / solid_angle) as f32,
-            None => SurfaceSample::pdf_from_area(p, q, self.normal, 1.0 / self.area),
-        }
-    }
+/// Product of two vectors to the plane, by coordinates and the squared distance of the plane.
+#[inline(always)]
+fn product(xa: f64, xb: f64, ya: f64, yb: f64, h2: f64) -> f64 {
+    xa * xb + ya * yb + h2
 }
 
 impl View {
     /// Whether the point is in the plane, within the rounding of itself and of the rectangle, whose corner is `corner`: the surface does not shine on itself, and nothing is seen of it from there.
-    #[inline]
+    #[inline(always)]
     fn is_edge_on(&self, corner: DVec3) -> bool {
         let reach = self.x1.max(-self.x0) + self.y1.max(-self.y0);
         self.height <= F64_CHAIN_ERROR * (reach + corner.abs().max_element())
@@ -177,48 +226,42 @@ impl View {
 
     /// Solid angle of the rectangle, to `f32` precision at any size: Van Oosterom and Strackee's formula for both of its triangles, whose
     /// half-angles add up as the arguments of complex numbers, so that nothing cancels.
-    #[inline]
+    #[inline(always)]
     fn solid_angle(&self) -> f64 {
         let View { x0, x1, y0, y1, height, corners } = *self;
         let h2 = height * height;
-        let [l00, l10, l11, l01] = corners.map(f64::sqrt);
-        let dot = |xa: f64, ya: f64, xb: f64, yb: f64| xa * xb + ya * yb + h2;
+        let [l00, l10, l11, l01] = [corners[0].sqrt(), corners[1].sqrt(), corners[2].sqrt(), corners[3].sqrt()];
         // Both triangles have the same volume with the point; they share the diagonal from 00 to 11.
         let volume = height * (x1 - x0) * (y1 - y0);
-        let diagonal = dot(x0, y0, x1, y1);
-        let lower = l00 * l10 * l11 + dot(x0, y0, x1, y0) * l11 + diagonal * l10 + dot(x1, y0, x1, y1) * l00;
-        let upper = l00 * l11 * l01 + diagonal * l01 + dot(x0, y0, x0, y1) * l11 + dot(x1, y1, x0, y1) * l00;
+        let diagonal = product(x0, x1, y0, y1, h2);
+        let lower = l00 * l10 * l11 + product(x0, x1, y0, y0, h2) * l11 + diagonal * l10 + product(x1, x1, y0, y1, h2) * l00;
+        let upper = l00 * l11 * l01 + diagonal * l01 + product(x0, x0, y0, y1, h2) * l11 + product(x1, x0, y1, y1, h2) * l00;
         let imaginary = volume * (lower + upper);
         let real = lower * upper - volume * volume;
         // Scaled into the range of f32.
         let scale = 1.0 / imaginary.abs().max(real.abs());
-        2.0 * f64::from(((imaginary * scale) as f32).atan2((real * scale) as f32))
+        2.0 * f64::from(angle_of((imaginary * scale) as f32, (real * scale) as f32))
     }
 
-    /// The solid angle if the parametrisation is to be used.
-    #[inline(never)]
-    fn usable_solid_angle(&self) -> Option<f64> {
+    /// Whether the rectangle is near enough to be sampled by solid angle.
+    #[inline(always)]
+    fn is_near(&self) -> bool {
         // Along each axis the rectangle reaches from 0 or the nearer side to the farther side.
         let (near_x, near_y) = (self.x0.max(-self.x1).max(0.0), self.y0.max(-self.y1).max(0.0));
         let nearest = near_x * near_x + near_y * near_y + self.height * self.height;
         let [a, b, c, d] = self.corners;
-        if a.max(b).max(c.max(d)) < FAR_RATIO * nearest {
-            return None;
-        }
-        let solid_angle = self.solid_angle();
-        (solid_angle > SMALLEST_SOLID_ANGLE).then_some(solid_angle)
+        a.max(b).max(c.max(d)) >= FAR_RATIO * nearest
     }
 
     /// A point distributed uniformly by solid angle.
-    #[inline]
+    #[inline(always)]
     fn sample(&self, solid_angle: f64, u: [f32; 2]) -> [f64; 2] {
         let View { x0, x1, y0, y1, height, corners } = *self;
         let h2 = height * height;
         let (l00, l01) = (corners[0].sqrt(), corners[3].sqrt());
 
         // Cosines of the side planes' normals with the plane's normal; the sines are the height times the reciprocals.
-        let reciprocal = |a: f64| 1.0 / (a * a + h2).sqrt();
-        let (r_x0, r_y0, r_y1) = (reciprocal(x0), reciprocal(y0), reciprocal(y1));
+        let (r_x0, r_y0, r_y1) = (1.0 / (x0 * x0 + h2).sqrt(), 1.0 / (y0 * y0 + h2).sqrt(), 1.0 / (y1 * y1 + h2).sqrt());
         let (b_x0, b_y0, b_y1) = (x0 * r_x0, y0 * r_y0, y1 * r_y1);
 
         // The inner angles at the corners (x0, y1) and (x0, y0), between the planes of the sides that meet there.
@@ -229,7 +272,7 @@ impl View {
         let sin_k = -(sin_2 * cos_3 + cos_2 * sin_3);
 
         // The angle a = k + u S, by half-angles so that small ones keep their digits.
-        let (s, c) = (0.5 * u[0] * solid_angle as f32).sin_cos();
+        let (s, c) = sin_cos_turns(u[0] * solid_angle as f32 * (0.5 / TAU));
         let (s, c) = (f64::from(s), f64::from(c));
         let norm = 1.5 - 0.5 * (s * s + c * c);
         let (s, c) = (s * norm, c * norm);
@@ -242,7 +285,7 @@ impl View {
         let s_y0 = height * r_y0;
         let excess = f * f - s_y0 * s_y0;
         let x = if excess > 0.0 { (height / excess.sqrt()).copysign(f) } else { f64::INFINITY.copysign(f) };
-        let x = x.clamp(x0, x1);
+        let x = x.max(x0).min(x1);
 
         // y: uniform in the sine of the elevation. In f32: it rounds the choice of the point, not the point.
         let (d2, y0, y1) = ((x * x + h2) as f32, y0 as f32, y1 as f32);

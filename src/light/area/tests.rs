@@ -1,8 +1,11 @@
 use std::f64::consts::{PI, TAU};
 
 use super::*;
+use crate::id::LightId;
+use crate::light::LightChoice;
 use crate::light::test_support::assert_chi_squared;
 use crate::math::Rng;
+use crate::math::rows::BATCH;
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
 
@@ -148,6 +151,37 @@ fn hits_have_the_density_of_samples() {
 }
 
 #[test]
+fn queued_samples_have_the_bits_of_single_ones() {
+    let geometry = ceiling();
+    let skewed = scene(&[[0.0, 0.0, 2.0], [0.5, 1.0, 2.0], [1.5, 1.0, 2.5], [1.0, 0.0, 2.5]], &[[0, 1, 2], [0, 2, 3]]);
+    let two_sided = Emission { two_sided: true, ..WHITE };
+    let mut lights = AreaLight::for_shape(ShapeId(0), WHITE, &geometry, &[]);
+    lights.extend(AreaLight::for_shape(ShapeId(0), two_sided, &geometry, &[]));
+    lights.extend(AreaLight::for_shape(ShapeId(0), WHITE, &skewed, &[]));
+    let mut random = Rng::new(13);
+    let mut queue = AreaQueue::default();
+    for count in [1, 16, 100, BATCH] {
+        queue.clear();
+        let queries: Vec<_> = (0..count).map(|_| (random.below(lights.len()), random.cube() * 3.0, random.pair())).collect();
+        for (lane, (i, p, u)) in queries.iter().enumerate() {
+            assert!(queue.push(&lights[*i], LightChoice { id: LightId::new(*i), pmf: 0.5 }, lane, *p, *u));
+        }
+        let mut found = vec![None; count];
+        queue.sample(|lane, sample, pmf| found[lane] = Some((*sample, pmf)));
+        for ((i, p, u), found) in queries.iter().zip(&found) {
+            let words = |s: &LightSample| {
+                let ShadowTarget::Point(target) = s.target else { panic!("an area light at infinity") };
+                (s.wi, s.radiance, s.pdf, target.p, target.n, target.error)
+            };
+            let alone = lights[*i].sample(&geometry, &[], *p, *u);
+            assert_eq!(found.as_ref().map(|(sample, _)| words(sample)), alone.as_ref().map(words), "{i} {p} {u:?}");
+            assert!(found.as_ref().is_none_or(|(_, pmf)| *pmf == 0.5));
+        }
+        assert!(found.iter().flatten().count() >= count / 4);
+    }
+}
+
+#[test]
 fn each_light_has_its_own_area() {
     let mut geometry = ceiling();
     let small = scene(&[[0.0, 0.0, 2.0], [0.0, 0.1, 2.0], [0.1, 0.1, 2.0], [0.1, 0.0, 2.0]], &[[0, 1, 2], [0, 2, 3]]);
@@ -187,14 +221,14 @@ fn triangles_without_area_give_no_light() {
 
 #[test]
 fn a_point_almost_in_a_rectangle_sees_it_evenly() {
-    let quad = ParallelogramEmitter::new(DVec3::new(-1.0, -0.5, 0.0), DVec3::X * 3.0, DVec3::Y * 2.0, DVec3::Z, 0.0).unwrap();
+    let quad = ParallelogramEmitter::new(DVec3::new(-1.0, -0.5, 0.0), [DVec3::X * 3.0, DVec3::Y * 2.0], DVec3::Z, 0.0).unwrap();
     // Above the inside the rectangle fills a hemisphere, above an edge half of it, above a corner a quarter.
     for (x, y, from, to) in [(0.3, 0.4, -PI, PI), (-1.0, 0.4, -0.5 * PI, 0.5 * PI), (-1.0, -0.5, 0.0, 0.5 * PI), (1.5, 1.5, -PI, 0.0)] {
         for height in [1e-12, 1e-8, 1e-5] {
             let p = DVec3::new(x, y, height);
             let (mut counts, mut random) = (vec![0u32; 256], Rng::new(3));
             for _ in 0..30_000 {
-                let s = quad.sample(p, random.pair()).unwrap();
+                let s = quad.sample(p, random.pair(), true).unwrap();
                 assert!((f64::from(s.pdf) * (to - from) - 1.0).abs() < 1e-4);
                 let d = (s.p - p).normalize();
                 let (i, j) = ((-d.z * 16.0) as usize, ((d.y.atan2(d.x) - from) / (to - from) * 16.0) as usize);

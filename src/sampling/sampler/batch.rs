@@ -36,6 +36,12 @@ impl Numbers {
         [self.0[0][i], self.0[1][i], self.0[2][i], self.0[3][i]]
     }
 
+    /// Replaces the first number of one sample.
+    #[inline(always)]
+    pub fn set_first(&mut self, i: usize, u: f32) {
+        self.0[0][i] = u;
+    }
+
     #[inline(always)]
     fn set(&mut self, i: usize, bits: [u32; 4]) {
         for (row, bits) in self.0.iter_mut().zip(bits) {

@@ -5,7 +5,7 @@ use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::Plot;
 use crate::film::{Crop, Film, FilmShape, LayerSet, PartNeeds, SampleBatch};
-use crate::integrator::{self, CameraSample, RayCounts, Setup, SurfaceNeeds, World, dimensions};
+use crate::integrator::{self, CameraBatch, CameraSample, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
 use crate::sampling::Sampler;
@@ -37,8 +37,8 @@ impl Sum {
 }
 
 /// The samples `first .. first + AT_ONCE` of all pixels.
-fn batch(world: &World, sampler: &Sampler, first: u32) -> Vec<CameraSample> {
-    let mut samples = Vec::with_capacity(COUNT * AT_ONCE as usize);
+fn batch(world: &World, sampler: &Sampler, first: u32) -> CameraBatch {
+    let mut samples = CameraBatch::default();
     for sample in first..first + AT_ONCE {
         for pixel in 0..WIDTH * WIDTH {
             let (x, y) = (pixel % WIDTH, pixel / WIDTH);
@@ -46,7 +46,7 @@ fn batch(world: &World, sampler: &Sampler, first: u32) -> Vec<CameraSample> {
             let u = sampler.sample_4d(seed, sample, dimensions::CAMERA);
             let film = Vec2::new(x as f32 + u[0], y as f32 + u[1]);
             let ray = world.scene.camera.ray(film, [WIDTH; 2], [u[2], u[3]], 0.0);
-            samples.push(CameraSample { ray, seed, sample });
+            samples.push(&CameraSample { ray, seed, sample });
         }
     }
     samples
@@ -80,8 +80,7 @@ fn checkpoint(film: &Film, sums: &[Sum], squares: f64, spp: u32) -> Checkpoint {
 
 fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let sampler = Sampler::new(settings.sampler, settings.seed);
-    let setup =
-        Setup { sampler, needs: SurfaceNeeds::default(), parts: PartNeeds::default(), side_by_side: settings.side_by_side, guide: None };
+    let setup = Setup { sampler, needs: SurfaceNeeds::default(), parts: PartNeeds::default(), guide: None };
     let integrator = integrator::build(&settings.integrator, setup);
     let mut film = Film::new(FilmShape::new([WIDTH; 2], Crop::full([WIDTH; 2]), LayerSet::COLOR), WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);

@@ -1,0 +1,51 @@
+//! Many queries at once against each of them alone.
+
+use super::*;
+use crate::math::Rng;
+use crate::math::rows::BATCH;
+
+fn bsdfs() -> Vec<Bsdf> {
+    let single = |bsdf: Bsdf| match bsdf {
+        Bsdf::Conductor(bsdf) => Bsdf::Conductor(bsdf.single_scattering()),
+        Bsdf::Dielectric(bsdf) => Bsdf::Dielectric(bsdf.single_scattering()),
+        other => other,
+    };
+    let rough = ALPHAS.into_iter().flat_map(|alpha| {
+        let made = [gold(alpha), glass(alpha), separable_gold(alpha), separable_glass(alpha), beckmann_gold(alpha), beckmann_glass(alpha)];
+        made.into_iter().chain([single(gold(alpha)), single(glass(alpha))])
+    });
+    rough.chain([gold([0.0; 2]), glass([0.0; 2])]).collect()
+}
+
+#[test]
+fn queries_in_rows_have_the_bits_of_single_ones() {
+    let mut random = Rng::new(31);
+    let (mut queries, mut evals, mut samples) = (BsdfQueryRows::default(), BsdfEvalRows::default(), BsdfSampleRows::default());
+    for bsdf in bsdfs() {
+        for count in [1, 15, 16, 100, BATCH] {
+            for i in 0..count {
+                // Some in the surface, where nothing is scattered.
+                let mut direction = || if random.below(20) == 0 { Vec3::X } else { random.direction().as_vec3() };
+                let (wo, wi) = (direction(), direction());
+                queries.wo.set(i, wo);
+                queries.wi.set(i, wi);
+                (queries.u_lobe[i], [queries.u[i], queries.v[i]]) = (random.unit_f32(), random.pair());
+            }
+            bsdf.eval_rows(&queries, count, &mut evals);
+            bsdf.sample_rows(&queries, count, &mut samples);
+            for i in 0..count {
+                let (wo, wi) = (queries.wo.get(i), queries.wi.get(i));
+                let eval = bsdf.eval(wo, wi);
+                let context = format!("{bsdf:?} {wo} {wi} of {count}");
+                assert_eq!((evals.value.get(i), evals.pdf[i]), (eval.value, eval.pdf), "{context}");
+                let sample = bsdf.sample(wo, queries.u_lobe[i], [queries.u[i], queries.v[i]]);
+                assert_eq!(samples.is_valid[i] != 0, sample.is_some(), "{context}");
+                let Some(sample) = sample else { continue };
+                let flags = (samples.is_delta[i] != 0, samples.is_transmission[i] != 0);
+                assert_eq!(flags, (sample.is_delta, sample.is_transmission), "{context}");
+                assert_eq!((samples.wi.get(i), samples.weight.get(i)), (sample.wi, sample.weight), "{context}");
+                assert_eq!((samples.pdf[i], samples.eta[i]), (sample.pdf, sample.eta), "{context}");
+            }
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! The vertices of one block of paths, in structures of arrays.
+
+use super::materials::BsdfTable;
+use crate::bsdf::{BsdfEval, Lambert};
+use crate::color::Rgb;
+use crate::geometry::{SpawnPoint, SurfaceInteraction};
+use crate::id::{InstanceId, PrimId, ShapeId};
+use crate::integrator::parts::LobeWeights;
+use crate::light::Receiver;
+use crate::math::rows::soa;
+use crate::math::{DVec3, Frame, Vec2, Vec3};
+use crate::sampling::{Numbers, Requests};
+use crate::scene::Scene;
+
+/// Bits of a vertex's `flags`.
+pub(super) mod vertex_flags {
+    /// Every lobe is a delta: light sampling is pointless.
+    pub const DELTA: u32 = 1;
+    /// Light may cross the surface.
+    pub const TRANSMITS: u32 = 2;
+    /// There is no surface, although the accelerator found a hit.
+    pub const MISS: u32 = 4;
+}
+
+/// What has become of a ray that a vertex was to spawn.
+pub(super) mod spawn {
+    /// There is none.
+    pub const NONE: u32 = 0;
+    /// It is there.
+    pub const SPAWNED: u32 = 1;
+    /// The shading normal sees its direction, the facet hides it.
+    pub const BELOW_FACET: u32 = 2;
+
+    #[inline(always)]
+    pub fn status(is_spawned: bool, is_below: bool) -> u32 {
+        if is_spawned {
+            SPAWNED
+        } else if is_below {
+            BELOW_FACET
+        } else {
+            NONE
+        }
+    }
+}
+
+soa! {
+    /// Triangles that rays hit.
+    pub(super) struct TriangleRows {
+        origin: Vec3,
+        /// Indices of the corners.
+        a_index: u32,
+        b_index: u32,
+        c_index: u32,
+        /// The corners and their normals.
+        a: Vec3,
+        b: Vec3,
+        c: Vec3,
+        n_a: Vec3,
+        n_b: Vec3,
+        n_c: Vec3,
+        u: f32,
+        v: f32,
+    }
+}
+
+soa! {
+    /// The vertices of a block's paths.
+    pub(super) struct VertexRows {
+        /// Index of the path in the block.
+        path: u32,
+        /// Direction of the ray that arrives.
+        direction: Vec3,
+        time: f32,
+        shape: u32,
+        prim: u32,
+        instance: u32,
+        /// The next four as in [`SurfaceInteraction`].
+        t: f32,
+        error: f32,
+        n_g: Vec3,
+        n_s: Vec3,
+        dp_du: Vec3,
+        uv_x: f32,
+        uv_y: f32,
+        /// Whether the point is still to be found by [`World::resolve`](crate::integrator::World::resolve).
+        is_unresolved: u32,
+        flags: u32,
+        throughput: Rgb,
+        rr_scale: f32,
+        /// Of diffuse surfaces, else zero.
+        albedo: Rgb,
+        /// The shading frame.
+        frame_x: Vec3,
+        frame_y: Vec3,
+        n: Vec3,
+        is_consistent: u32,
+        /// The direction back, in the frame.
+        wo: Vec3,
+        /// Cosine of the direction back with the geometric normal.
+        cos_geometric: f32,
+        /// Cosine of the shading and the geometric normal where a normal or bump map makes them differ, else zero.
+        cos_normals: f32,
+    }
+}
+
+soa! {
+    /// Light sampled at vertices, and the shadow rays to it.
+    pub(super) struct DirectRows {
+        /// See [`super::direct::target`].
+        target: u32,
+        is_delta: u32,
+        light: u32,
+        direction: Vec3,
+        radiance: Rgb,
+        pdf: f32,
+        target_n: Vec3,
+        target_error: f32,
+        /// The direction, in the frame.
+        wi: Vec3,
+        /// The BSDF for it,
+        value: Rgb,
+        /// and the density of finding it by scattering.
+        scatter_pdf: f32,
+        /// See [`spawn`].
+        status: u32,
+        shadow_origin: Vec3,
+        shadow_direction: Vec3,
+        shadow_end: f32,
+        contribution: Rgb,
+    }
+}
+
+soa! {
+    /// Directions sampled at vertices, and the rays along them.
+    pub(super) struct ScatterRows {
+        /// The direction, in the frame.
+        wi: Vec3,
+        weight: Rgb,
+        pdf: f32,
+        /// Factor on `rr_scale`.
+        rr_factor: f32,
+        is_valid: u32,
+        is_delta: u32,
+        is_transmission: u32,
+        /// See [`spawn`].
+        status: u32,
+        origin: Vec3,
+        direction: Vec3,
+        throughput: Rgb,
+        rr_scale: f32,
+    }
+}
+
+soa! {
+    /// Points in `f64`, apart from rows of 32 bits.
+    pub(super) struct PointRows {
+        /// Of vertices.
+        p: DVec3,
+        /// Of sampled lights.
+        target_p: DVec3,
+    }
+}
+
+/// The vertices of one block.
+#[derive(Default)]
+pub(super) struct Vertices {
+    pub count: usize,
+    pub rows: VertexRows,
+    pub triangles: TriangleRows,
+    pub points: PointRows,
+    pub direct: DirectRows,
+    pub scatter: ScatterRows,
+    /// Paths of the block that leave the scene.
+    pub misses: Vec<u8>,
+    /// Vertices on emitters.
+    pub emitters: Vec<u8>,
+    /// Vertices on surfaces that are not diffuse.
+    pub others: Vec<u8>,
+    pub bsdfs: BsdfTable,
+    pub requests: Requests,
+    /// Choice of a light (two) and a point of it (two).
+    pub u_light: Numbers,
+    /// Choice of a lobe (one), a direction (two), roulette (one).
+    pub u_bsdf: Numbers,
+}
+
+impl Vertices {
+    /// The albedo of a diffuse surface.
+    pub fn albedo(&self, lane: usize) -> Rgb {
+        self.rows.albedo.get(lane)
+    }
+
+    /// Index in the block of the path of a vertex.
+    #[inline(always)]
+    pub fn path(&self, lane: usize) -> usize {
+        self.rows.path[lane] as usize
+    }
+
+    /// The point, with its parametrisation where the scene needs that.
+    pub fn interaction(&self, lane: usize) -> SurfaceInteraction {
+        let rows = &self.rows;
+        SurfaceInteraction {
+            p: self.points.p.get(lane),
+            t: rows.t[lane],
+            error: rows.error[lane],
+            n_g: rows.n_g.get(lane),
+            n_s: rows.n_s.get(lane),
+            dp_du: rows.dp_du.get(lane),
+            uv: Vec2::new(rows.uv_x[lane], rows.uv_y[lane]),
+            shape: ShapeId(rows.shape[lane]),
+            prim: PrimId(rows.prim[lane]),
+            instance: InstanceId(rows.instance[lane]),
+            time: rows.time[lane],
+        }
+    }
+
+    /// Sets what [`interaction`](Self::interaction) returns.
+    pub fn set_interaction(&mut self, lane: usize, at: &SurfaceInteraction) {
+        let rows = &mut self.rows;
+        self.points.p.set(lane, at.p);
+        (rows.t[lane], rows.error[lane]) = (at.t, at.error);
+        rows.n_g.set(lane, at.n_g);
+        rows.n_s.set(lane, at.n_s);
+        rows.dp_du.set(lane, at.dp_du);
+        (rows.uv_x[lane], rows.uv_y[lane]) = (at.uv.x, at.uv.y);
+        (rows.shape[lane], rows.prim[lane], rows.instance[lane]) = (at.shape.0, at.prim.0, at.instance.0);
+    }
+
+    /// The normal on the side of the path.
+    #[inline(always)]
+    pub fn facing_normal(&self, lane: usize) -> Vec3 {
+        self.rows.n.get(lane) * 1f32.copysign(self.rows.wo.0[2][lane])
+    }
+
+    /// The point and the side of it that light must reach.
+    #[inline(always)]
+    pub fn receiver(&self, lane: usize) -> Receiver {
+        let transmits = self.rows.flags[lane] & vertex_flags::TRANSMITS != 0;
+        Receiver { p: self.points.p.get(lane), n: if transmits { Vec3::ZERO } else { self.facing_normal(lane) } }
+    }
+
+    #[inline(always)]
+    pub fn frame(&self, lane: usize) -> Frame {
+        Frame { x: self.rows.frame_x.get(lane), y: self.rows.frame_y.get(lane), z: self.rows.n.get(lane) }
+    }
+
+    /// Whether there is no surface, although the accelerator found a hit.
+    #[inline(always)]
+    pub fn is_miss(&self, lane: usize) -> bool {
+        self.rows.flags[lane] & vertex_flags::MISS != 0
+    }
+
+    /// The BSDF and its density for the local direction `wi`.
+    pub fn eval(&self, scene: &Scene, lane: usize, wi: Vec3) -> BsdfEval {
+        let wo = self.rows.wo.get(lane);
+        match self.bsdfs.get(scene, lane) {
+            None => Lambert { albedo: self.albedo(lane) }.eval(wo, wi),
+            Some(bsdf) => bsdf.eval(wo, wi),
+        }
+    }
+
+    /// How light from the local direction `wi` leaves a vertex along its path.
+    pub fn lobes(&self, scene: &Scene, lane: usize, wi: Vec3) -> LobeWeights {
+        match self.bsdfs.get(scene, lane) {
+            None => LobeWeights::DIFFUSE,
+            Some(bsdf) => LobeWeights::between(bsdf, self.rows.wo.get(lane), wi),
+        }
+    }
+
+    /// How light from the sampled direction leaves a vertex along its path.
+    pub fn sampled_lobes(&self, scene: &Scene, lane: usize) -> LobeWeights {
+        match (self.scatter.is_delta[lane] != 0, self.scatter.is_transmission[lane] != 0) {
+            (true, true) => LobeWeights::Transmitted,
+            (true, false) => LobeWeights::Reflected { diffuse: Rgb::BLACK },
+            (false, _) => self.lobes(scene, lane, self.scatter.wi.get(lane)),
+        }
+    }
+
+    /// What a mirror or clear glass leaves of features behind it; `None` for all other scattering.
+    pub fn feature_factor(&self, lane: usize) -> Option<Rgb> {
+        let is_smooth = self.rows.flags[lane] & vertex_flags::DELTA != 0 && self.scatter.is_delta[lane] != 0;
+        // Radiance is scaled by refraction, albedo is not.
+        is_smooth.then(|| self.scatter.weight.get(lane) * self.scatter.rr_factor[lane])
+    }
+
+    /// The target of the light sample of a vertex.
+    #[inline(always)]
+    pub fn light_target(&self, lane: usize) -> SpawnPoint {
+        SpawnPoint { p: self.points.target_p.get(lane), n: self.direct.target_n.get(lane), error: self.direct.target_error[lane] }
+    }
+}

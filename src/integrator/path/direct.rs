@@ -1,0 +1,224 @@
+//! Direct light: a light and a point of it for each vertex, weighted by MIS, and the shadow rays.
+
+use super::block::{DirectRows, PointRows, VertexRows, Vertices, spawn, vertex_flags};
+use super::terminator::{self, TerminatorRays};
+use super::wave::{BsdfScratch, Wave};
+use super::{Context, guided};
+use crate::bsdf::Lambert;
+use crate::geometry::SpawnPoint;
+use crate::integrator::Strategy;
+use crate::integrator::shading::terminator_factor;
+use crate::integrator::vertex::HemisphereTest;
+use crate::light::{LightContext, LightQueue, LightSample, ShadowTarget};
+use crate::math::rows::BATCH;
+use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::{Frame, Vec3};
+use crate::sampling::power_heuristic;
+
+/// Where light sampling ends.
+pub(super) mod target {
+    /// No light was sampled.
+    pub const NONE: u32 = 0;
+    /// At a point.
+    pub const POINT: u32 = 1;
+    /// At infinity.
+    pub const INFINITY: u32 = 2;
+}
+
+/// Samples light for the vertices of a block, and finds the shadow rays.
+#[inline(never)]
+pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
+    let Wave { vertices, media, terminator_rays, light_queue, bsdf_rows, .. } = wave;
+    let count = vertices.count;
+    vertices.direct.target[..count].fill(target::NONE);
+    if context.scene.lights.is_empty() {
+        vertices.direct.status[..count].fill(spawn::NONE);
+        return;
+    }
+    choose_lights(context, vertices, light_queue);
+    vectorize(EvalDiffuse { rows: &vertices.rows, direct: &mut vertices.direct, count });
+    eval_others(context, vertices, bsdf_rows);
+    if let Some(guide) = context.guide {
+        guided::mix_scatter_pdfs(guide, vertices);
+    }
+    let Vertices { rows, points, direct, .. } = &mut *vertices;
+    let is_mis = context.config.strategy == Strategy::Mis;
+    if context.scene.features.reliefs {
+        vectorize(Illuminate::<true> { rows, points, direct, is_mis, count });
+    } else {
+        vectorize(Illuminate::<false> { rows, points, direct, is_mis, count });
+    }
+    if context.scene.features.shading_normals {
+        wave.counts.shadow += offset_below_facets(context, vertices, terminator_rays);
+    }
+    if context.scene.features.media {
+        super::media::absorb_direct(context, vertices, media, block);
+    }
+}
+
+/// Evaluates the BSDFs that are not diffuse towards the lights.
+fn eval_others(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
+    let Vertices { rows: vertex, direct, others, bsdfs, .. } = vertices;
+    let BsdfScratch { lanes, queries, evals, .. } = rows;
+    for group in bsdfs.groups(others) {
+        lanes.clear();
+        lanes.extend(group.iter().filter(|&&lane| direct.target[usize::from(lane)] != target::NONE));
+        let Some(bsdf) = lanes.first().and_then(|&lane| bsdfs.get(context.scene, usize::from(lane))) else { continue };
+        for (i, &lane) in lanes.iter().enumerate() {
+            queries.wo.set(i, vertex.wo.get(usize::from(lane)));
+            queries.wi.set(i, direct.wi.get(usize::from(lane)));
+        }
+        bsdf.eval_rows(queries, lanes.len(), evals);
+        for (i, &lane) in lanes.iter().enumerate() {
+            direct.value.set(usize::from(lane), evals.value.get(i));
+            direct.scatter_pdf[usize::from(lane)] = evals.pdf[i];
+        }
+    }
+}
+
+/// Samples a light for each vertex that is not all mirror.
+#[inline(never)]
+fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQueue) {
+    let (scene, lights) = (context.scene, &context.scene.lights);
+    let light_context = LightContext { geometry: &scene.geometry, textures: &scene.textures, lights, found_by: context.found_by };
+    queue.clear();
+    for lane in 0..vertices.count {
+        if vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) != 0 {
+            continue;
+        }
+        let u = vertices.u_light.of(lane);
+        let receiver = vertices.receiver(lane);
+        let Some(choice) = lights.choose(&receiver, [u[0], u[3]], context.found_by) else { continue };
+        vertices.direct.light[lane] = choice.id.0;
+        if let Some(sample) = queue.push(&light_context, choice, lane, receiver.p, [u[1], u[2]]) {
+            set_light(context, vertices, lane, &sample, choice.pmf);
+        }
+    }
+    queue.sample(&light_context, |lane, sample, pmf| set_light(context, vertices, lane, sample, pmf));
+}
+
+/// Sets the light that a vertex samples, which was chosen with probability `pmf`.
+#[inline(always)]
+fn set_light(context: &Context, vertices: &mut Vertices, lane: usize, sample: &LightSample, pmf: f32) {
+    if context.config.strategy == Strategy::Bsdf && !sample.is_delta {
+        return;
+    }
+    let direct = &mut vertices.direct;
+    direct.is_delta[lane] = u32::from(sample.is_delta);
+    direct.direction.set(lane, sample.wi);
+    direct.radiance.set(lane, sample.radiance);
+    direct.pdf[lane] = sample.pdf * pmf;
+    match &sample.target {
+        ShadowTarget::Point(SpawnPoint { p, n, error }) => {
+            direct.target[lane] = target::POINT;
+            vertices.points.target_p.set(lane, *p);
+            direct.target_n.set(lane, *n);
+            direct.target_error[lane] = *error;
+        }
+        ShadowTarget::Infinity => direct.target[lane] = target::INFINITY,
+    }
+}
+
+/// Evaluates diffuse reflection towards the lights.
+struct EvalDiffuse<'a> {
+    rows: &'a VertexRows,
+    direct: &'a mut DirectRows,
+    count: usize,
+}
+
+impl Kernel for EvalDiffuse<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        eval_diffuse(self.rows, self.direct, self.count);
+    }
+}
+
+#[inline(always)]
+fn eval_diffuse(rows: &VertexRows, direct: &mut DirectRows, count: usize) {
+    for i in 0..count.min(BATCH) {
+        let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
+        let wi = frame.to_local(direct.direction.get(i));
+        let eval = Lambert { albedo: rows.albedo.get(i) }.eval(rows.wo.get(i), wi);
+        direct.wi.set(i, wi);
+        direct.value.set(i, eval.value);
+        direct.scatter_pdf[i] = eval.pdf;
+    }
+}
+
+/// Finds what shadow rays contribute, and the rays.
+struct Illuminate<'a, const RELIEF: bool> {
+    rows: &'a VertexRows,
+    points: &'a PointRows,
+    direct: &'a mut DirectRows,
+    is_mis: bool,
+    count: usize,
+}
+
+impl<const RELIEF: bool> Kernel for Illuminate<'_, RELIEF> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        illuminate::<RELIEF>(self.rows, self.points, self.direct, self.is_mis, self.count);
+    }
+}
+
+#[inline(always)]
+fn illuminate<const RELIEF: bool>(rows: &VertexRows, points: &PointRows, direct: &mut DirectRows, is_mis: bool, count: usize) {
+    for i in 0..count.min(BATCH) {
+        let direction = direct.direction.get(i);
+        let cos = direction.dot(rows.n_g.get(i));
+        let cos_local = direct.wi.0[2][i];
+        let test = HemisphereTest::new([rows.wo.0[2][i], cos_local], [rows.cos_geometric[i], cos]);
+        let factor = shadowing::<RELIEF>(test, [cos, cos_local, rows.cos_normals[i]]);
+        let pdf = direct.pdf[i];
+        let weight = if is_mis & (direct.is_delta[i] == 0) { power_heuristic(pdf, direct.scatter_pdf[i]) } else { 1.0 };
+        let value = direct.value.get(i) * factor;
+        let contribution = rows.throughput.get(i) * value * direct.radiance.get(i) * (weight / pdf);
+        direct.contribution.set(i, contribution);
+        let is_lit = (direct.target[i] != target::NONE) & !contribution.is_black();
+        direct.status[i] = spawn::status(is_lit & test.agrees(), is_lit & can_be_below(rows, test, i));
+
+        let start = SpawnPoint { p: points.p.get(i), n: rows.n_g.get(i), error: rows.error[i] };
+        let end = SpawnPoint { p: points.target_p.get(i), n: direct.target_n.get(i), error: direct.target_error[i] };
+        let (near, far) = (start.ray_to(&end), start.ray_along(direction));
+        let is_near = direct.target[i] == target::POINT;
+        let choose = |a: f32, b: f32| if is_near { a } else { b };
+        let choose_vector = |a: Vec3, b: Vec3| Vec3::new(choose(a.x, b.x), choose(a.y, b.y), choose(a.z, b.z));
+        direct.shadow_origin.set(i, choose_vector(near.origin, far.origin));
+        direct.shadow_direction.set(i, choose_vector(near.direction, far.direction));
+        direct.shadow_end[i] = choose(near.t_max, far.t_max);
+    }
+}
+
+/// The factor on light from a direction under a normal or bump map, for the cosines of the direction with the geometric and the shading normal and of these.
+#[inline(always)]
+pub(super) fn shadowing<const RELIEF: bool>(test: HemisphereTest, [cos, cos_local, cos_normals]: [f32; 3]) -> f32 {
+    if RELIEF & test.in_frame & test.in_geometry & (cos_normals != 0.0) { terminator_factor(cos, cos_local, cos_normals) } else { 1.0 }
+}
+
+/// Whether a ray may start above the facet that hides its direction. Under a normal or bump map the factor has darkened what comes near; where light
+/// passes, the side of the facet determines the medium.
+#[inline(always)]
+pub(super) fn can_be_below(rows: &VertexRows, test: HemisphereTest, i: usize) -> bool {
+    test.is_below_facet() & (rows.flags[i] & vertex_flags::TRANSMITS == 0) & (rows.cos_normals[i] == 0.0)
+}
+
+/// Starts shadow rays above the facets that hide their lights.
+fn offset_below_facets(context: &Context, vertices: &mut Vertices, buffers: &mut TerminatorRays) -> u64 {
+    terminator::offset(
+        context,
+        vertices,
+        buffers,
+        |vertices| &mut vertices.direct.status,
+        |vertices, lane, start| {
+            let ray = match vertices.direct.target[lane] {
+                target::POINT => start.spawn_to(&vertices.light_target(lane)),
+                _ => start.spawn(vertices.direct.direction.get(lane)),
+            };
+            terminator::set_shadow_ray(vertices, lane, &ray);
+        },
+    )
+}

@@ -1,0 +1,78 @@
+//! What light AOVs and AOVs of surfaces beyond the first need to know of paths; empty where none is wanted.
+
+use super::{Context, PathIntegrator};
+use crate::color::Rgb;
+use crate::id::LightId;
+use crate::integrator::parts::{LightEvent, LobeWeights};
+
+/// State beside paths and shadow rays.
+#[derive(Default)]
+pub(super) struct LightAovs {
+    /// By path, how it left its first surface; only for AOVs by scattering.
+    lobes: Vec<LobeWeights>,
+    /// By path, the throughput of the mirrors and clear glass that are all it has met; only for features.
+    features: Vec<Option<Rgb>>,
+    /// By shadow ray.
+    pub shadow_sources: Vec<(LightEvent, LightId)>,
+}
+
+impl LightAovs {
+    /// Starts with so many camera rays.
+    pub fn start(&mut self, config: &PathIntegrator, paths: usize) {
+        self.lobes.clear();
+        self.shadow_sources.clear();
+        self.features.clear();
+        if config.needs.features {
+            self.features.resize(paths, Some(Rgb::WHITE));
+        }
+    }
+
+    /// The class of light that was scattered so many times when it meets a path; `straight` if it was not.
+    pub fn event(&self, scatterings: u32, path: usize, straight: LightEvent) -> LightEvent {
+        match (scatterings, self.lobes.get(path)) {
+            (1, Some(&lobes)) => LightEvent::Direct(lobes),
+            (2.., Some(&lobes)) => LightEvent::Indirect(lobes),
+            _ => straight,
+        }
+    }
+
+    /// The class of light that a shadow ray from a path's vertex finds, which scatters it with these weights of lobes.
+    pub fn shadow_event(&self, context: &Context, path: usize, lobes: impl FnOnce() -> LobeWeights) -> LightEvent {
+        // Without AOVs by scattering, any class will do.
+        let is_first = context.bounce == 0 && context.config.parts.by_scattering;
+        if is_first { LightEvent::Direct(lobes()) } else { self.event(context.bounce + 1, path, LightEvent::Emission) }
+    }
+
+    /// Moves the state of a path to its compacted index, after a vertex that scattered it so.
+    pub fn append(
+        &mut self,
+        context: &Context,
+        [path, compacted]: [usize; 2],
+        lobes: impl FnOnce() -> LobeWeights,
+        feature_factor: impl FnOnce() -> Option<Rgb>,
+    ) {
+        if context.config.parts.by_scattering {
+            if context.bounce == 0 {
+                self.lobes.push(lobes());
+            } else {
+                self.lobes[compacted] = self.lobes[path];
+            }
+        }
+        if let Some(&before) = self.features.get(path) {
+            self.features[compacted] = before.and_then(|before| feature_factor().map(|factor| before * factor));
+        }
+    }
+
+    /// The throughput of the mirrors and clear glass that are all the path has met; `None` after anything else.
+    #[inline]
+    pub fn feature_throughput(&self, path: usize) -> Option<Rgb> {
+        self.features.get(path).copied().flatten()
+    }
+
+    /// Multiplies the state of a path by the transmittance of a medium.
+    pub fn absorb(&mut self, path: usize, transmittance: Rgb) {
+        if let Some(Some(throughput)) = self.features.get_mut(path) {
+            *throughput *= transmittance;
+        }
+    }
+}

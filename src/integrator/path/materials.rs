@@ -1,0 +1,151 @@
+//! The scattering at each vertex: the albedo of diffuse surfaces in rows, a [`Bsdf`] for all others.
+
+use super::Context;
+use super::block::{VertexRows, Vertices, vertex_flags};
+use super::wave::{Wave, path_flags};
+use crate::bsdf::{Bsdf, Lambert};
+use crate::color::Rgb;
+use crate::id::ShapeId;
+use crate::material::Material;
+use crate::math::rows::{BATCH, Row};
+use crate::scene::Scene;
+
+/// A BSDF by vertex: one of the scene's constant materials, or one made for the vertex.
+pub(super) struct BsdfTable {
+    /// Of constant materials their id, of others [`MADE`] and their place among those, or [`DIFFUSE`].
+    ids: Row<u32>,
+    made: Vec<Bsdf>,
+}
+
+const DIFFUSE: u32 = u32::MAX;
+const MADE: u32 = 1 << 31;
+
+impl Default for BsdfTable {
+    fn default() -> Self {
+        Self { ids: [DIFFUSE; BATCH], made: Vec::with_capacity(BATCH) }
+    }
+}
+
+impl BsdfTable {
+    /// The BSDF of a vertex; `None` for diffuse surfaces.
+    #[inline]
+    pub fn get<'a>(&'a self, scene: &'a Scene, lane: usize) -> Option<&'a Bsdf> {
+        let id = self.ids[lane];
+        if id == DIFFUSE {
+            None
+        } else if id & MADE != 0 {
+            Some(&self.made[(id & !MADE) as usize])
+        } else if let Material::Constant(bsdf) = &scene.materials[id as usize] {
+            Some(bsdf)
+        } else {
+            None
+        }
+    }
+
+    /// Runs of vertices with one BSDF, of vertices sorted by their BSDFs.
+    pub fn groups<'a>(&'a self, lanes: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+        lanes.chunk_by(|&a, &b| self.ids[usize::from(a)] == self.ids[usize::from(b)])
+    }
+
+    fn set_made(&mut self, lane: usize, bsdf: Bsdf) {
+        self.ids[lane] = MADE | self.made.len() as u32;
+        self.made.push(bsdf);
+    }
+}
+
+/// Evaluates the materials of a block's vertices, and finds those on emitters.
+pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
+    let Wave { vertices, rays, hits, cones, .. } = wave;
+    vertices.emitters.clear();
+    vertices.others.clear();
+    vertices.bsdfs.made.clear();
+    let scene = context.scene;
+    for lane in 0..vertices.count {
+        if vertices.is_miss(lane) {
+            set_diffuse(vertices, lane, Rgb::BLACK);
+            continue;
+        }
+        let surface = scene.surface(ShapeId(vertices.rows.shape[lane]));
+        if surface.first_light.is_some() {
+            vertices.emitters.push(lane as u8);
+        }
+        match &scene.materials[surface.material.index()] {
+            Material::Constant(Bsdf::Lambert(Lambert { albedo })) => set_diffuse(vertices, lane, *albedo),
+            Material::Constant(bsdf) => {
+                vertices.bsdfs.ids[lane] = surface.material.0;
+                set_other(&mut vertices.rows, &mut vertices.others, lane, bsdf);
+            }
+            _ => {
+                let path = vertices.path(lane);
+                let (at, ray) = (vertices.interaction(lane), rays[block].get(path));
+                let cone = cones.get(block * BATCH + path);
+                let mut place = None;
+                let footprint = || context.world.footprint(cone, &ray, hits[block].get(path).as_ref(), &at);
+                match scene.bsdf(&at, ray.direction, footprint, &mut place) {
+                    Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, *albedo),
+                    bsdf => {
+                        set_other(&mut vertices.rows, &mut vertices.others, lane, bsdf);
+                        vertices.bsdfs.set_made(lane, bsdf.clone());
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn set_diffuse(vertices: &mut Vertices, lane: usize, albedo: Rgb) {
+    vertices.bsdfs.ids[lane] = DIFFUSE;
+    vertices.rows.albedo.set(lane, albedo);
+}
+
+#[inline(always)]
+fn set_other(rows: &mut VertexRows, others: &mut Vec<u8>, lane: usize, bsdf: &Bsdf) {
+    others.push(lane as u8);
+    rows.albedo.set(lane, Rgb::BLACK);
+    rows.flags[lane] = flags(bsdf);
+}
+
+#[inline]
+fn flags(bsdf: &Bsdf) -> u32 {
+    let delta = if bsdf.is_delta() { vertex_flags::DELTA } else { 0 };
+    let transmits = if bsdf.transmits() { vertex_flags::TRANSMITS } else { 0 };
+    delta | transmits
+}
+
+/// Replaces the BSDFs of boundaries between media, and of rough surfaces under path space regularization; then sorts the vertices that are not diffuse by
+/// their BSDFs.
+pub(super) fn adjust(context: &Context, wave: &mut Wave, block: usize) {
+    if context.scene.features.media || context.config.regularization.is_some() {
+        replace_bsdfs(context, wave, block);
+    }
+    let Vertices { others, bsdfs, .. } = &mut wave.vertices;
+    others.sort_unstable_by_key(|&lane| (bsdfs.ids[usize::from(lane)], lane));
+}
+
+fn replace_bsdfs(context: &Context, wave: &mut Wave, block: usize) {
+    let regularization = context.config.regularization;
+    let Wave { vertices, paths, media, .. } = wave;
+    for k in 0..vertices.others.len() {
+        let lane = usize::from(vertices.others[k]);
+        let path = vertices.path(lane);
+        if let Some(media) = media.get(block * BATCH + path) {
+            let at = vertices.interaction(lane);
+            if let Some(bsdf) = context.world.boundary_bsdf(&at, vertices.rows.direction.get(lane), media) {
+                replace(vertices, lane, bsdf);
+            }
+        }
+        let paths = &paths[block];
+        if let Some(regularization) = regularization.filter(|_| paths.flags[path] & path_flags::ANY_NON_SPECULAR != 0)
+            && let Some(rougher) =
+                vertices.bsdfs.get(context.scene, lane).and_then(|bsdf| bsdf.with_min_alpha(regularization.alpha(paths.sample[path])))
+        {
+            replace(vertices, lane, rougher);
+        }
+    }
+}
+
+fn replace(vertices: &mut Vertices, lane: usize, bsdf: Bsdf) {
+    vertices.rows.flags[lane] = flags(&bsdf);
+    vertices.bsdfs.set_made(lane, bsdf);
+}

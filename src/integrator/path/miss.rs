@@ -1,0 +1,100 @@
+//! Light from environments and distant lights, met by rays that leave the scene.
+
+use super::Context;
+use super::radiance::Output;
+use super::wave::{PathRows, Wave};
+use crate::color::Rgb;
+use crate::id::LightId;
+use crate::integrator::parts::LightEvent;
+use crate::light::InfinityEval;
+use crate::math::Vec3;
+use crate::math::rows::BATCH;
+
+/// Adds the light that a block's paths meet which leave the scene.
+pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
+    let Wave { vertices, paths, rays, .. } = &*wave;
+    let (paths, rays, misses) = (&paths[block], &rays[block], &vertices.misses);
+    if misses.is_empty() {
+        return;
+    }
+    let world = context.world;
+    let mut directions = [Vec3::ZERO; BATCH];
+    let mut evals = [InfinityEval::default(); BATCH];
+    let image = context.scene.lights.image_at_infinity();
+    for (direction, &path) in directions.iter_mut().zip(misses) {
+        *direction = rays.direction.get(usize::from(path));
+    }
+    if let Some((_, image)) = image {
+        image.eval_batch(&directions[..misses.len()], context.found_by, &mut evals[..misses.len()]);
+    }
+    let is_visible = context.bounce > 0 || (!context.config.hide_emitters && world.shows_background);
+    for (k, &path) in misses.iter().enumerate() {
+        let i = usize::from(path);
+        let known = image.map(|_| evals[k]);
+        let slot = paths.slot[i];
+        if is_visible {
+            if context.bounce == 0 {
+                out.batch.pixels[slot as usize].alpha = world.background_alpha();
+            }
+            let light = context.config.clamped(paths.throughput.get(i) * radiance(context, paths, i, directions[k], known), context.bounce);
+            out.add(slot, light);
+            if context.config.wants_light_aovs() {
+                let event = wave.light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Environment);
+                add_to_light_aovs(context, (paths, i), (directions[k], known), light, event, out);
+            }
+        }
+        if context.wants_surfaces() {
+            let shown = context.bounce > 0 || !context.config.hide_emitters;
+            let radiance = || if shown { radiance(context, paths, i, directions[k], known) } else { Rgb::BLACK };
+            super::surface_aovs::write_miss(
+                context,
+                slot,
+                wave.light_aovs.feature_throughput(block * BATCH + i),
+                directions[k],
+                radiance,
+                out,
+            );
+        }
+    }
+}
+
+/// Radiance from infinity, weighted by MIS; `known` if it has been looked up already.
+fn radiance(context: &Context, paths: &PathRows, i: usize, direction: Vec3, known: Option<InfinityEval>) -> Rgb {
+    let lights = context.scene.lights.at_infinity();
+    lights.iter().fold(Rgb::BLACK, |sum, &id| sum + radiance_of(context, paths, i, direction, id, known))
+}
+
+#[inline(always)]
+fn radiance_of(context: &Context, paths: &PathRows, i: usize, direction: Vec3, id: LightId, known: Option<InfinityEval>) -> Rgb {
+    let lights = &context.scene.lights;
+    let InfinityEval { radiance, pdf } = known.unwrap_or_else(|| lights.get(id).eval_at_infinity(direction, context.found_by));
+    if radiance.is_black() {
+        return Rgb::BLACK;
+    }
+    radiance * super::emission::bsdf_mis_weight(context, paths, i, || pdf * lights.pmf(id, &paths.from(i), context.found_by))
+}
+
+#[inline(never)]
+fn add_to_light_aovs(
+    context: &Context,
+    (paths, i): (&PathRows, usize),
+    (direction, known): (Vec3, Option<InfinityEval>),
+    light: Rgb,
+    event: LightEvent,
+    out: &mut Output,
+) {
+    let slot = paths.slot[i];
+    out.add_by_scattering(slot, light, event);
+    match context.scene.lights.at_infinity() {
+        [] => {}
+        [id] => out.add_to_group_of(context, slot, light, *id),
+        lights => {
+            let of = |id: LightId| paths.throughput.get(i) * radiance_of(context, paths, i, direction, id, known);
+            let all = lights.iter().fold(Rgb::BLACK, |sum, &id| sum + of(id));
+            let scale = if all.max_channel() > 0.0 { light.max_channel() / all.max_channel() } else { 0.0 };
+            for &id in lights {
+                out.add_to_group_of(context, slot, of(id) * scale, id);
+            }
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! The only writer of radiance: the picture, and the light AOVs that it is divided into.
+
+use super::{Context, PathIntegrator};
+use crate::color::Rgb;
+use crate::film::SampleBatch;
+use crate::id::LightId;
+use crate::integrator::parts::{LightEvent, add_by_group, add_by_scattering, group_of};
+
+/// The samples of a wave.
+pub(super) struct Output<'a> {
+    pub batch: &'a mut SampleBatch,
+    pub config: &'a PathIntegrator,
+}
+
+impl Output<'_> {
+    /// Adds light to a sample.
+    #[inline(always)]
+    pub fn add(&mut self, slot: u32, light: Rgb) {
+        self.batch.pixels[slot as usize].radiance += light;
+    }
+
+    /// Adds light of one light to the light AOVs of a sample.
+    pub fn add_to_light_aovs(&mut self, context: &Context, slot: u32, light: Rgb, (event, id): (LightEvent, LightId)) {
+        self.add_by_scattering(slot, light, event);
+        self.add_to_group_of(context, slot, light, id);
+    }
+
+    /// Adds light to the light AOVs by scattering of a sample.
+    pub fn add_by_scattering(&mut self, slot: u32, light: Rgb, event: LightEvent) {
+        add_by_scattering(self.config.parts, self.batch.parts_mut(slot as usize), light, event);
+    }
+
+    /// Adds light to the AOV of the group that has the light `id`.
+    pub fn add_to_group_of(&mut self, context: &Context, slot: u32, light: Rgb, id: LightId) {
+        add_by_group(self.config.parts, self.batch.parts_mut(slot as usize), light, group_of(context.scene, id));
+    }
+}
+
+impl PathIntegrator {
+    /// Light that was scattered so many times between its source and the camera, clamped if it is indirect.
+    #[inline]
+    pub(super) fn clamped(&self, light: Rgb, scatterings: u32) -> Rgb {
+        if self.clamp == f32::INFINITY || scatterings <= 1 {
+            return light;
+        }
+        let largest = light.max_channel();
+        if largest > self.clamp { light * (self.clamp / largest) } else { light }
+    }
+
+    /// Whether any light AOV is wanted.
+    #[inline]
+    pub(super) fn wants_light_aovs(&self) -> bool {
+        self.parts.count() > 0
+    }
+}

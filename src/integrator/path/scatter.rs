@@ -1,0 +1,172 @@
+//! Scattering: a direction for each vertex, Russian roulette, and the rays that go on.
+
+use super::Context;
+use super::block::{PointRows, ScatterRows, VertexRows, Vertices, spawn};
+use super::direct::{can_be_below, shadowing};
+use super::terminator;
+use super::wave::{BsdfScratch, Wave};
+use crate::bsdf::Lambert;
+use crate::geometry::SpawnPoint;
+use crate::integrator::vertex::HemisphereTest;
+use crate::math::Frame;
+use crate::math::rows::BATCH;
+use crate::math::vectorize::{Kernel, vectorize};
+use crate::sampling::Numbers;
+
+/// Samples a direction for each vertex of a block, and finds the rays along them.
+pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
+    let Wave { vertices, paths, guided, terminator_rays, bsdf_rows, .. } = wave;
+    let count = vertices.count;
+    if let Some(guide) = context.guide {
+        guided.choose(guide, vertices);
+    }
+    let Vertices { rows, scatter, u_bsdf, .. } = &mut *vertices;
+    vectorize(SampleDiffuse { rows, scatter, u: u_bsdf, count });
+    sample_others(context, vertices, bsdf_rows);
+    if let Some(guide) = context.guide {
+        guided.mix(context, guide, vertices);
+    }
+    let Vertices { rows, points, scatter, u_bsdf, .. } = &mut *vertices;
+    let roulette = context.bounce + 1 >= context.config.rr_depth;
+    if context.scene.features.reliefs {
+        vectorize(Scatter::<true> { rows, points, scatter, u: u_bsdf, roulette, count });
+    } else {
+        vectorize(Scatter::<false> { rows, points, scatter, u: u_bsdf, roulette, count });
+    }
+    if context.scene.features.shading_normals {
+        wave.counts.indirect += terminator::offset(
+            context,
+            vertices,
+            terminator_rays,
+            |vertices| &mut vertices.scatter.status,
+            |vertices, lane, start| {
+                let ray = start.spawn(vertices.scatter.direction.get(lane));
+                vertices.scatter.origin.set(lane, ray.origin);
+            },
+        );
+    }
+    if context.guide.is_some() {
+        guided.record(vertices, &paths[block]);
+    }
+}
+
+/// Samples the BSDFs that are not diffuse.
+fn sample_others(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
+    let Vertices { rows: vertex, scatter, others, bsdfs, u_bsdf, .. } = vertices;
+    let BsdfScratch { queries, samples, .. } = rows;
+    for lanes in bsdfs.groups(others) {
+        let Some(bsdf) = bsdfs.get(context.scene, usize::from(lanes[0])) else { continue };
+        for (i, &lane) in lanes.iter().enumerate() {
+            let lane = usize::from(lane);
+            let u = u_bsdf.of(lane);
+            queries.wo.set(i, vertex.wo.get(lane));
+            (queries.u_lobe[i], queries.u[i], queries.v[i]) = (u[0], u[1], u[2]);
+        }
+        bsdf.sample_rows(queries, lanes.len(), samples);
+        for (i, &lane) in lanes.iter().enumerate() {
+            let lane = usize::from(lane);
+            scatter.wi.set(lane, samples.wi.get(i));
+            scatter.weight.set(lane, samples.weight.get(i));
+            scatter.pdf[lane] = samples.pdf[i];
+            scatter.rr_factor[lane] = samples.eta[i] * samples.eta[i];
+            scatter.is_valid[lane] = samples.is_valid[i];
+            scatter.is_delta[lane] = samples.is_delta[i];
+            scatter.is_transmission[lane] = samples.is_transmission[i];
+        }
+    }
+}
+
+/// Samples diffuse reflection.
+struct SampleDiffuse<'a> {
+    rows: &'a VertexRows,
+    scatter: &'a mut ScatterRows,
+    u: &'a Numbers,
+    count: usize,
+}
+
+impl Kernel for SampleDiffuse<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        sample_diffuse(self.rows, self.scatter, self.u, self.count);
+    }
+}
+
+#[inline(always)]
+fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &Numbers, count: usize) {
+    for i in 0..count.min(BATCH) {
+        let lambert = Lambert { albedo: rows.albedo.get(i) };
+        let [_, u, v, _] = u.of(i);
+        let sample = lambert.direction(rows.wo.get(i), [u, v]);
+        scatter.wi.set(i, sample.wi);
+        scatter.weight.set(i, rows.albedo.get(i));
+        scatter.pdf[i] = sample.pdf;
+        scatter.rr_factor[i] = 1.0;
+        scatter.is_valid[i] = u32::from(sample.is_valid);
+        scatter.is_delta[i] = 0;
+        scatter.is_transmission[i] = 0;
+    }
+}
+
+/// Finds the rays that go on.
+struct Scatter<'a, const RELIEF: bool> {
+    rows: &'a VertexRows,
+    points: &'a PointRows,
+    scatter: &'a mut ScatterRows,
+    u: &'a Numbers,
+    roulette: bool,
+    count: usize,
+}
+
+impl<const RELIEF: bool> Kernel for Scatter<'_, RELIEF> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { rows, points, scatter, u, roulette, count } = self;
+        spawn_rays::<RELIEF>(rows, points, scatter, u, roulette, count);
+    }
+}
+
+/// Probability with which Russian roulette lets a path go on: what it has left of its throughput, so that one that lost nothing always goes on.
+#[inline(always)]
+fn survival_probability(max_throughput: f32, rr_scale: f32) -> f32 {
+    (max_throughput * rr_scale).min(1.0)
+}
+
+#[inline(always)]
+fn spawn_rays<const RELIEF: bool>(
+    rows: &VertexRows,
+    points: &PointRows,
+    scatter: &mut ScatterRows,
+    u: &Numbers,
+    roulette: bool,
+    count: usize,
+) {
+    for i in 0..count.min(BATCH) {
+        let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
+        let wi = scatter.wi.get(i);
+        let direction = frame.to_world(wi);
+        let cos = direction.dot(rows.n_g.get(i));
+        let test = HemisphereTest::new([rows.wo.0[2][i], wi.z], [rows.cos_geometric[i], cos]);
+        let factor = shadowing::<RELIEF>(test, [cos, wi.z, rows.cos_normals[i]]);
+        let factor = if scatter.is_delta[i] == 0 { factor } else { 1.0 };
+        let weight = scatter.weight.get(i) * factor;
+        scatter.weight.set(i, weight);
+
+        let mut throughput = rows.throughput.get(i) * weight;
+        let rr_scale = rows.rr_scale[i] * scatter.rr_factor[i];
+        let survival = if roulette { survival_probability(throughput.max_channel(), rr_scale) } else { 1.0 };
+        let goes_on = (scatter.is_valid[i] != 0) & ((survival >= 1.0) | (u.of(i)[3] < survival));
+        throughput *= if survival < 1.0 { 1.0 / survival } else { 1.0 };
+        let goes_on = goes_on & !throughput.is_black();
+        scatter.throughput.set(i, throughput);
+        scatter.rr_scale[i] = rr_scale;
+
+        let start = SpawnPoint { p: points.p.get(i), n: rows.n_g.get(i), error: rows.error[i] };
+        scatter.origin.set(i, start.ray_along(direction).origin);
+        scatter.direction.set(i, direction);
+        scatter.status[i] = spawn::status(goes_on & test.agrees(), goes_on & can_be_below(rows, test, i));
+    }
+}

@@ -1,0 +1,77 @@
+//! AOVs of surfaces: of the first one, and for denoisers of the first that is no mirror and no clear glass.
+
+use super::Context;
+use super::block::Vertices;
+use super::radiance::Output;
+use super::wave::Wave;
+use crate::color::Rgb;
+use crate::geometry::SurfaceInteraction;
+use crate::integrator::surface::{place_sample, set_features};
+use crate::math::rows::BATCH;
+use crate::math::{Frame, Vec3};
+
+/// Writes the AOVs of a block's vertices.
+pub(super) fn write(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
+    if context.bounce == 0 {
+        for lane in (0..wave.vertices.count).filter(|&lane| !wave.vertices.is_miss(lane)) {
+            let slot = wave.paths[block].slot[wave.vertices.path(lane)];
+            out.batch.pixels[slot as usize].alpha = 1.0;
+        }
+    }
+    if context.wants_surfaces() {
+        write_surfaces(context, wave, block, out);
+    }
+}
+
+#[inline(never)]
+fn write_surfaces(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
+    let Wave { vertices, paths, hits, light_aovs, .. } = &*wave;
+    let needs = context.config.needs;
+    for lane in (0..vertices.count).filter(|&lane| !vertices.is_miss(lane)) {
+        let i = vertices.path(lane);
+        let features = light_aovs.feature_throughput(block * BATCH + i);
+        if context.bounce > 0 && features.is_none() {
+            continue;
+        }
+        let at = vertices.interaction(lane);
+        let surface = &mut out.batch.surfaces[paths[block].slot[i] as usize];
+        if context.bounce == 0 {
+            *surface = place_sample(context.world, needs, &at, hits[block].get(i).as_ref());
+        }
+        if features.is_some() || needs.albedo {
+            let albedo = albedo(context, vertices, lane, &at);
+            if context.bounce == 0 {
+                surface.albedo = albedo;
+            }
+            if let Some(throughput) = features {
+                set_features(surface, throughput, albedo, at.n_s);
+            }
+        }
+    }
+}
+
+fn albedo(context: &Context, vertices: &Vertices, lane: usize, at: &SurfaceInteraction) -> Rgb {
+    match vertices.bsdfs.get(context.scene, lane) {
+        None => vertices.albedo(lane),
+        Some(bsdf) => bsdf.albedo(Frame::from_normal(at.n_s).to_local(-vertices.rows.direction.get(lane))),
+    }
+}
+
+/// Writes the AOVs of a sample whose path leaves the scene: to denoisers, the radiance of what is there, as far as it is not brighter than white.
+#[inline(never)]
+pub(super) fn write_miss(
+    context: &Context,
+    slot: u32,
+    features: Option<Rgb>,
+    direction: Vec3,
+    radiance: impl FnOnce() -> Rgb,
+    out: &mut Output,
+) {
+    let surface = &mut out.batch.surfaces[slot as usize];
+    if context.bounce == 0 && context.config.needs.motion {
+        surface.motion = context.world.motion_at_infinity(direction).to_array();
+    }
+    if let Some(throughput) = features {
+        set_features(surface, throughput, radiance().map(|value| value.min(1.0)), Vec3::ZERO);
+    }
+}

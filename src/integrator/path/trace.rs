@@ -1,0 +1,51 @@
+//! Closest hits of all paths, and what shadow rays add.
+
+use super::Context;
+use super::radiance::Output;
+use super::wave::Wave;
+use crate::accel::Coherence;
+use crate::integrator::RayCounts;
+use crate::math::rows::BATCH;
+
+/// Finds the closest hits of all rays.
+pub(super) fn closest(context: &Context, wave: &mut Wave, counts: &mut RayCounts) {
+    let is_camera = context.bounce == 0;
+    *(if is_camera { &mut counts.camera } else { &mut counts.indirect }) += wave.count as u64;
+    let coherence = if is_camera { Coherence::Coherent } else { Coherence::Incoherent };
+    for block in 0..wave.blocks() {
+        let count = wave.block_len(block);
+        let (rays, hits) = (&mut wave.rays[block], &mut wave.hits[block]);
+        context.world.accel.intersect_rows(rays, count, hits, coherence);
+        if is_camera && context.config.hide_emitters {
+            for lane in 0..count {
+                let (mut ray, mut hit) = (rays.get(lane), hits.get(lane));
+                counts.camera += context.world.pass_emitters(&mut ray, &mut hit);
+                rays.set(lane, &ray);
+                hits.set(lane, hit);
+            }
+        }
+    }
+}
+
+/// Traces the shadow rays of the wave and adds the light of those that nothing blocks.
+pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, counts: &mut RayCounts) {
+    let shadows = &mut wave.shadows;
+    counts.shadow += shadows.count as u64;
+    let toward_one_place = context.bounce == 0 && !context.scene.features.environment;
+    let coherence = if toward_one_place { Coherence::Coherent } else { Coherence::Incoherent };
+    let mut occluded = [false; BATCH];
+    for (block, rays) in shadows.rays.iter().enumerate().take(shadows.count.div_ceil(BATCH)) {
+        let first = block * BATCH;
+        let count = BATCH.min(shadows.count - first);
+        context.world.accel.occluded_rows(rays, count, &mut occluded, coherence);
+        for (i, _) in (first..).zip(&occluded[..count]).filter(|(_, occluded)| !**occluded) {
+            let (slot, light) = (shadows.slots[i], shadows.contributions[i]);
+            out.add(slot, light);
+            if let Some(&source) = wave.light_aovs.shadow_sources.get(i) {
+                out.add_to_light_aovs(context, slot, light, source);
+            }
+        }
+    }
+    shadows.clear();
+    wave.light_aovs.shadow_sources.clear();
+}

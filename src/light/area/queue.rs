@@ -1,0 +1,133 @@
+//! Area lights that many vertices sample at once.
+
+use super::AreaLight;
+use super::parallelogram::ParallelogramRows;
+use crate::color::Rgb;
+use crate::geometry::SpawnPoint;
+use crate::light::{LightChoice, LightSample, ShadowTarget};
+use crate::math::rows::{BATCH, Row, soa};
+use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::{DVec3, Vec3};
+
+soa! {
+    /// Points that sample lights, and the points sampled.
+    struct PointRows {
+        p: DVec3,
+        q: DVec3,
+        wi: DVec3,
+        pdf: f64,
+    }
+}
+
+/// No light.
+const NO_LIGHT: u32 = u32::MAX;
+
+/// Vertices that sample parallelograms, at most [`BATCH`].
+pub(in crate::light) struct AreaQueue {
+    count: usize,
+    lanes: Row<u32>,
+    pmfs: Row,
+    u: [Row; 2],
+    radiance: [Rgb; BATCH],
+    two_sided: Row<u32>,
+    errors: Row,
+    /// Ids of the lights in `shapes` and the rows before: most often they are there already.
+    ids: Row<u32>,
+    shapes: ParallelogramRows,
+    points: PointRows,
+}
+
+impl Default for AreaQueue {
+    fn default() -> Self {
+        let row = [0.0; BATCH];
+        Self {
+            count: 0,
+            lanes: [0; BATCH],
+            pmfs: row,
+            u: [row; 2],
+            radiance: [Rgb::BLACK; BATCH],
+            two_sided: [0; BATCH],
+            errors: row,
+            ids: [NO_LIGHT; BATCH],
+            shapes: ParallelogramRows::default(),
+            points: PointRows::default(),
+        }
+    }
+}
+
+impl AreaQueue {
+    /// Forgets the lights of another scene.
+    pub fn reset(&mut self) {
+        self.ids = [NO_LIGHT; BATCH];
+    }
+
+    /// Empties the queue.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Queues the sample of a light, for the vertex `lane` at `p`; `false` if the light is to be sampled alone.
+    #[inline(always)]
+    pub fn push(&mut self, light: &AreaLight, choice: LightChoice, lane: usize, p: DVec3, u: [f32; 2]) -> bool {
+        let Some(quad) = light.even_parallelogram() else { return false };
+        let i = self.count;
+        self.count += 1;
+        (self.lanes[i], self.pmfs[i]) = (lane as u32, choice.pmf);
+        (self.u[0][i], self.u[1][i]) = (u[0], u[1]);
+        if self.ids[i] != choice.id.0 {
+            self.ids[i] = choice.id.0;
+            (self.radiance[i], self.errors[i]) = (light.emission.radiance, quad.error);
+            self.two_sided[i] = u32::from(light.emission.two_sided);
+            self.shapes.set(i, &quad.shape);
+        }
+        self.points.p.set(i, p);
+        true
+    }
+
+    /// Samples all lights; `set` takes each sample with its vertex and the probability of the choice.
+    #[inline(always)]
+    pub fn sample(&mut self, mut set: impl FnMut(usize, &LightSample, f32)) {
+        let Self { count, lanes, pmfs, u, radiance, two_sided, errors, shapes, points, .. } = self;
+        if *count == 0 {
+            return;
+        }
+        vectorize(SampleParallelograms { shapes, two_sided, u, points, count: *count });
+        for i in 0..*count {
+            let pdf = points.pdf[i] as f32;
+            if pdf > 0.0 {
+                let n: Vec3 = shapes.normal.get(i).as_vec3();
+                let target = ShadowTarget::Point(SpawnPoint { p: points.q.get(i), n, error: errors[i] });
+                let sample = LightSample { wi: points.wi.get(i).as_vec3(), radiance: radiance[i], pdf, is_delta: false, target };
+                set(lanes[i] as usize, &sample, pmfs[i]);
+            }
+        }
+    }
+}
+
+struct SampleParallelograms<'a> {
+    shapes: &'a ParallelogramRows,
+    two_sided: &'a Row<u32>,
+    u: &'a [Row; 2],
+    points: &'a mut PointRows,
+    count: usize,
+}
+
+impl Kernel for SampleParallelograms<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        sample_parallelograms(self.shapes, self.two_sided, self.u, self.points, self.count);
+    }
+}
+
+#[inline(always)]
+fn sample_parallelograms(shapes: &ParallelogramRows, two_sided: &Row<u32>, u: &[Row; 2], points: &mut PointRows, count: usize) {
+    // Whole vectors: what is computed for vertices beyond the count is not used.
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        let sample = shapes.get(i).sample(points.p.get(i), [u[0][i], u[1][i]], two_sided[i] != 0);
+        points.q.set(i, sample.q);
+        points.wi.set(i, sample.wi);
+        points.pdf[i] = sample.pdf;
+    }
+}
