@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use steradian::accel::{self, AccelKind, Accelerator};
+use steradian::accel::{self, AccelKind, Accelerator, HitRows};
+use steradian::math::RayRows;
+use steradian::math::rows::BATCH;
 use steradian_benches::models::{Model, hare, scans};
 use steradian_benches::others::{BvhCrate, ObvhsCrate, Other};
 use steradian_benches::rays::{RaySet, ray_sets};
@@ -80,12 +82,16 @@ fn queries(criterion: &mut Criterion) {
                 let any = set.any;
                 time(&mut group, &kind.to_string(), &set, |ray| if any { accel.occluded(ray) } else { accel.intersect(ray).is_some() });
             }
-            let mut hits = vec![None; set.rays.len()];
-            let mut occluded = vec![false; set.rays.len()];
+            let (blocks, mut hits, mut occluded) = (RayRows::blocks(&set.rays), HitRows::default(), [false; BATCH]);
             group.bench_function("embree in batches", |bencher| {
-                bencher.iter(|| match set.any {
-                    true => accels[0].1.occluded_batch(black_box(&set.rays), &mut occluded, set.coherence),
-                    false => accels[0].1.intersect_batch(black_box(&set.rays), &mut hits, set.coherence),
+                bencher.iter(|| {
+                    for (rays, count) in black_box(&blocks) {
+                        match set.any {
+                            true => accels[0].1.occluded_rows(rays, *count, &mut occluded, set.coherence),
+                            false => accels[0].1.intersect_rows(rays, *count, &mut hits, set.coherence),
+                        }
+                        black_box((&hits, &occluded));
+                    }
                 });
             });
             for (name, other) in &others {

@@ -10,10 +10,11 @@ use std::path::Path;
 use std::time::Instant;
 use std::{env, fs};
 
-use steradian::accel::{Accelerator, Coherence, EmbreeAccel};
+use steradian::accel::{Accelerator, Coherence, EmbreeAccel, HitRows};
 use steradian::geometry::{Geometry, Hit, Mesh, Shape};
 use steradian::id::ShapeId;
-use steradian::math::{Ray, Vec3};
+use steradian::math::rows::BATCH;
+use steradian::math::{Ray, RayRows, Vec3};
 use steradian_benches::models;
 use steradian_benches::rays::ray_sets;
 
@@ -127,22 +128,23 @@ const QUERIES: [(&str, Query); 6] = [
 const BLOCK: usize = 1024;
 
 fn measure(accel: &dyn Accelerator, name: &str, rays: &[Ray], passes: usize) {
-    let (mut hits, mut found) = (vec![None; BLOCK], vec![false; BLOCK]);
+    let mut found = Found { hits: vec![HitRows::default(); BLOCK / BATCH], occluded: vec![[false; BATCH]; BLOCK / BATCH] };
+    let rows: Vec<RayRows> = rays.chunks(BATCH).map(RayRows::of).collect();
     let mut best = vec![[f64::INFINITY; QUERIES.len()]; rays.len() / BLOCK];
     let mut answers = [Answer::default(); QUERIES.len()];
     for pass in 0..=passes {
         answers = Default::default();
         for (i, (_, query)) in QUERIES.iter().enumerate() {
-            for ((block, rays), best) in rays.chunks(BLOCK).enumerate().zip(&mut best) {
+            for (((block, rays), rows), best) in rays.chunks(BLOCK).enumerate().zip(rows.chunks(BLOCK / BATCH)).zip(&mut best) {
                 let (first, answer) = (block * BLOCK, &mut answers[i]);
                 let start = Instant::now();
-                run(*query, black_box(accel), rays, first, &mut hits, &mut found, answer);
+                run(*query, black_box(accel), (rays, rows), first, &mut found, answer);
                 let time = start.elapsed().as_nanos() as f64;
                 // The first pass warms up.
                 if pass > 0 {
                     best[i] = best[i].min(time);
                 }
-                gather(*query, first, &hits, &found, answer);
+                gather(*query, first, &found, answer);
             }
         }
     }
@@ -174,17 +176,15 @@ impl Answer {
     }
 }
 
-/// Asks for a block of rays from number `first` on: single rays are taken into the answer at once, batches go to the arrays.
+/// What batches find.
+struct Found {
+    hits: Vec<HitRows>,
+    occluded: Vec<[bool; BATCH]>,
+}
+
+/// Traces a block of rays from number `first` on: hits of single rays are taken into the answer at once, those of batches go to `found`.
 #[inline(never)]
-fn run(
-    query: Query,
-    accel: &dyn Accelerator,
-    rays: &[Ray],
-    first: usize,
-    hits: &mut [Option<Hit>],
-    found: &mut [bool],
-    answer: &mut Answer,
-) {
+fn run(query: Query, accel: &dyn Accelerator, (rays, rows): (&[Ray], &[RayRows]), first: usize, found: &mut Found, answer: &mut Answer) {
     match query {
         Query::Closest(None) => {
             for (i, ray) in rays.iter().enumerate() {
@@ -200,18 +200,26 @@ fn run(
                 }
             }
         }
-        Query::Closest(Some(coherence)) => accel.intersect_batch(rays, hits, coherence),
-        Query::Any(Some(coherence)) => accel.occluded_batch(rays, found, coherence),
+        Query::Closest(Some(coherence)) => {
+            rows.iter().zip(&mut found.hits).for_each(|(rows, hits)| accel.intersect_rows(rows, BATCH, hits, coherence));
+        }
+        Query::Any(Some(coherence)) => {
+            rows.iter().zip(&mut found.occluded).for_each(|(rows, occluded)| accel.occluded_rows(rows, BATCH, occluded, coherence));
+        }
     }
 }
 
-/// Takes what is in the arrays.
-fn gather(query: Query, first: usize, hits: &[Option<Hit>], found: &[bool], answer: &mut Answer) {
+/// Takes what batches have found.
+fn gather(query: Query, first: usize, found: &Found, answer: &mut Answer) {
     match query {
         Query::Closest(Some(_)) => {
-            hits.iter().enumerate().filter_map(|(i, hit)| Some((i, hit.as_ref()?))).for_each(|(i, hit)| answer.take(first + i, hit));
+            let hits = found.hits.iter().flat_map(|hits| (0..BATCH).map(|lane| hits.get(lane)));
+            hits.enumerate().filter_map(|(i, hit)| Some((i, hit?))).for_each(|(i, hit)| answer.take(first + i, &hit));
         }
-        Query::Any(Some(_)) => found.iter().enumerate().filter(|(_, found)| **found).for_each(|(i, _)| answer.add(first + i, 1)),
+        Query::Any(Some(_)) => {
+            let occluded = found.occluded.iter().flatten();
+            occluded.enumerate().filter(|(_, occluded)| **occluded).for_each(|(i, _)| answer.add(first + i, 1));
+        }
         Query::Closest(None) | Query::Any(None) => {}
     }
 }

@@ -63,20 +63,18 @@ pub trait Accelerator: Send + Sync {
 
     /// [`intersect`](Self::intersect) for each ray, in order, in rows. `hits` is as long as `rays`.
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], coherence: Coherence) {
-        let (mut rows, mut found) = (RayRows::default(), HitRows::default());
+        let mut found = HitRows::default();
         for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            rays.iter().enumerate().for_each(|(lane, ray)| rows.set(lane, ray));
-            self.intersect_rows(&rows, rays.len(), &mut found, coherence);
+            self.intersect_rows(&RayRows::of(rays), rays.len(), &mut found, coherence);
             hits.iter_mut().enumerate().for_each(|(lane, hit)| *hit = found.get(lane));
         }
     }
 
     /// [`occluded`](Self::occluded) for each ray, in order, in rows. `occluded` is as long as `rays`.
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], coherence: Coherence) {
-        let (mut rows, mut found) = (RayRows::default(), [false; BATCH]);
+        let mut found = [false; BATCH];
         for (rays, occluded) in rays.chunks(BATCH).zip(occluded.chunks_mut(BATCH)) {
-            rays.iter().enumerate().for_each(|(lane, ray)| rows.set(lane, ray));
-            self.occluded_rows(&rows, rays.len(), &mut found, coherence);
+            self.occluded_rows(&RayRows::of(rays), rays.len(), &mut found, coherence);
             occluded.copy_from_slice(&found[..occluded.len()]);
         }
     }

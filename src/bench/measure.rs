@@ -9,9 +9,11 @@ use super::agreement::{self, Agreement};
 use super::machine::{memory_in_use, reset_peak_memory};
 use super::{RayKind, RaySet, Watch, epo, median_and_range};
 use crate::accel::inspect::{StructureStats, TraversalCounts};
-use crate::accel::{self, AccelKind, Accelerator, Coherence, LinearAccel};
+use crate::accel::{self, AccelKind, Accelerator, Coherence, HitRows, LinearAccel};
 use crate::error::{Error, Result};
 use crate::geometry::Geometry;
+use crate::math::rows::BATCH;
+use crate::math::{Ray, RayRows};
 
 /// What is asked of a benchmark.
 #[derive(Clone, Debug)]
@@ -371,35 +373,35 @@ fn modes(kind: RayKind, accel: &str) -> &'static [Mode] {
 }
 
 /// Seconds to trace all rays.
-fn replay(accel: &dyn Accelerator, rays: &[crate::math::Ray], mode: Mode, any_hit: bool, threads: usize) -> Result<f64> {
-    let trace = |rays: &[crate::math::Ray]| {
-        let coherence = if mode == Mode::CoherentBatch { Coherence::Coherent } else { Coherence::Incoherent };
-        match (mode, any_hit) {
-            (Mode::Single, false) => {
-                black_box(rays.iter().filter_map(|ray| accel.intersect(ray)).fold(0u32, |sum, hit| sum ^ hit.prim.0));
-            }
-            (Mode::Single, true) => {
-                black_box(rays.iter().filter(|ray| accel.occluded(ray)).count());
-            }
-            (_, false) => {
-                let mut hits = [None; CHUNK];
-                for rays in rays.chunks(CHUNK) {
-                    accel.intersect_batch(rays, &mut hits[..rays.len()], coherence);
-                    black_box(&hits);
-                }
-            }
-            (_, true) => {
-                let mut occluded = [false; CHUNK];
-                for rays in rays.chunks(CHUNK) {
-                    accel.occluded_batch(rays, &mut occluded[..rays.len()], coherence);
-                    black_box(&occluded);
-                }
+fn replay(accel: &dyn Accelerator, rays: &[Ray], mode: Mode, any_hit: bool, threads: usize) -> Result<f64> {
+    let singles = |rays: &[Ray]| {
+        if any_hit {
+            black_box(rays.iter().filter(|ray| accel.occluded(ray)).count());
+        } else {
+            black_box(rays.iter().filter_map(|ray| accel.intersect(ray)).fold(0u32, |sum, hit| sum ^ hit.prim.0));
+        }
+    };
+    let coherence = if mode == Mode::CoherentBatch { Coherence::Coherent } else { Coherence::Incoherent };
+    let batches = |blocks: &[(RayRows, usize)]| {
+        let (mut hits, mut occluded) = (HitRows::default(), [false; BATCH]);
+        for (rays, count) in blocks {
+            if any_hit {
+                accel.occluded_rows(rays, *count, &mut occluded, coherence);
+                black_box(&occluded);
+            } else {
+                accel.intersect_rows(rays, *count, &mut hits, coherence);
+                black_box(&hits);
             }
         }
     };
+    let blocks = if mode == Mode::Single { Vec::new() } else { RayRows::blocks(rays) };
     if threads == 1 {
         let start = Instant::now();
-        trace(rays);
+        if mode == Mode::Single {
+            singles(rays)
+        } else {
+            batches(&blocks)
+        }
         return Ok(start.elapsed().as_secs_f64());
     }
     use rayon::prelude::*;
@@ -409,7 +411,11 @@ fn replay(accel: &dyn Accelerator, rays: &[crate::math::Ray], mode: Mode, any_hi
         .map_err(|e| Error::Internal(format!("cannot start {threads} threads: {e}")))?;
     Ok(pool.install(|| {
         let start = Instant::now();
-        rays.par_chunks(CHUNK).for_each(trace);
+        if mode == Mode::Single {
+            rays.par_chunks(CHUNK).for_each(singles);
+        } else {
+            blocks.par_chunks(CHUNK / BATCH).for_each(batches);
+        }
         start.elapsed().as_secs_f64()
     }))
 }

@@ -58,12 +58,12 @@ impl Disk {
     }
 
     /// The surface at a hit of `ray`.
-    #[inline]
+    #[inline(always)]
     pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
         let (x, y) = (raw.x, raw.y);
         if detail == Detail::Place {
-            return LocalSurface { p: dvec3(x, y, 0.0), n: DVec3::Z, pdf_area: 1.0 / self.area, ..LocalSurface::default() };
+            return LocalSurface { p: dvec3(x, y, 0.0), n: DVec3::Z, pdf_area: 1.0 / self.area, ..LocalSurface::ZERO };
         }
         let width = self.radius - self.inner_radius;
         let v = ((x * x + y * y).sqrt() - self.inner_radius) / width;

@@ -130,17 +130,17 @@ impl Frustum {
     }
 
     /// The surface at a hit of `ray`. At an apex the normal is that of the line on the cone at the ray's own angle, or at phi = 0.
-    #[inline]
+    #[inline(always)]
     pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
         let toward = direction_from_axis(raw.x, raw.y);
-        let z = raw.z.clamp(0.0, self.height);
+        let z = raw.z.max(0.0).min(self.height);
         let v = z / self.height;
         let spread = self.top_radius - self.radius;
         let p = (toward * (self.radius + spread * v)).extend(z);
         let (n, pdf_area) = (self.normal(toward.x, toward.y), 1.0 / self.area);
         if detail == Detail::Place {
-            return LocalSurface { p, n, pdf_area, ..LocalSurface::default() };
+            return LocalSurface { p, n, pdf_area, ..LocalSurface::ZERO };
         }
         LocalSurface {
             p,
@@ -152,7 +152,7 @@ impl Frustum {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn normal(&self, cos: f64, sin: f64) -> DVec3 {
         dvec3(self.height * cos, self.height * sin, self.radius - self.top_radius) / self.slant
     }

@@ -277,13 +277,15 @@ impl Mesh {
     #[inline(always)]
     pub(crate) fn vertex_normals(&self, corners: [u32; 3]) -> Option<[Vec3; 3]> {
         let normals = self.normals.as_ref()?;
-        Some(corners.map(|i| Vec3::from(normals[i as usize])))
+        // Not by `map`, which is a call.
+        let [a, b, c] = corners;
+        Some([Vec3::from(normals[a as usize]), Vec3::from(normals[b as usize]), Vec3::from(normals[c as usize])])
     }
 
     /// The uv at barycentric coordinates `u`, `v` of a triangle's second and third vertex; without uvs these coordinates themselves.
     pub fn uv(&self, prim: PrimId, u: f32, v: f32) -> Vec2 {
         let Some(uvs) = &self.uvs else { return Vec2::new(u, v) };
-        let [a, b, c] = self.triangles[prim.index()].map(|i| Vec2::from(uvs[i as usize]));
+        let [a, b, c] = corner_uvs(uvs, self.triangles[prim.index()]);
         a * (1.0 - u - v) + b * u + c * v
     }
 
@@ -379,7 +381,7 @@ impl Mesh {
     /// The parametrisation at a hit with the shading normal of this [length](Self::shading_normal).
     #[inline(never)]
     fn parameters(&self, hit: &Hit, points: &TrianglePoints, n_s: Vec3, length: f32, time: f32) -> Parameters {
-        let [a, b, c] = self.triangles[hit.prim.index()].map(|i| i as usize);
+        let corners = self.triangles[hit.prim.index()];
         let (u, v) = (hit.u, hit.v);
         let w = 1.0 - u - v;
 
@@ -387,7 +389,7 @@ impl Mesh {
         let Some(uvs) = &self.uvs else {
             return Parameters { dp_du: edge_b, dp_dv: edge_c, uv: Vec2::new(u, v) };
         };
-        let (uv_a, uv_b, uv_c) = (Vec2::from(uvs[a]), Vec2::from(uvs[b]), Vec2::from(uvs[c]));
+        let [uv_a, uv_b, uv_c] = corner_uvs(uvs, corners);
         let uv = uv_a * w + uv_b * u + uv_c * v;
         if let Some((tangent, side)) = self.tangent(hit.prim, [w, u, v], time) {
             // MikkTSpace's frame is that of the interpolated vectors before they are normalised, up to a factor common to all three.
@@ -403,7 +405,7 @@ impl Mesh {
         let points = self.triangle_points_at(hit.prim, time);
         let edges = [points.b - points.a, points.c - points.a];
         let Some(uvs) = &self.uvs else { return edges };
-        let [a, b, c] = self.triangles[hit.prim.index()].map(|i| Vec2::from(uvs[i as usize]));
+        let [a, b, c] = corner_uvs(uvs, self.triangles[hit.prim.index()]);
         derivatives(edges, [b - a, c - a])
     }
 
@@ -419,6 +421,12 @@ impl Mesh {
         let ((from, side), (to, _)) = (at(first)?, at(second)?);
         Some((from * (1.0 - s) + to * s, side))
     }
+}
+
+/// The uvs of three vertices.
+#[inline(always)]
+fn corner_uvs(uvs: &[[f32; 2]], [a, b, c]: [u32; 3]) -> [Vec2; 3] {
+    [Vec2::from(uvs[a as usize]), Vec2::from(uvs[b as usize]), Vec2::from(uvs[c as usize])]
 }
 
 /// The unit shading normal where the corners' normals have these weights but the first one's, and the length of the interpolated vector.

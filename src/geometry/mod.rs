@@ -29,7 +29,10 @@ pub use instance::{Instance, InverseReach, Object};
 pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
 pub(crate) use mesh::interpolated_normal;
 pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
-pub use placed::{Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, Placed, PlacedPoint, RayPacket, ShapeSample};
+pub use placed::{
+    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, Placed, PlacedNormalRows, PlacedPoint, PlacedPointRows, RayPacket,
+    ShapeSample,
+};
 pub use profile::Profile;
 pub use quad::Quad;
 pub use revolution::{ProfileParameter, Revolution};

@@ -7,10 +7,15 @@
 //! Errors of an intersection are those of `f64` relative to the coordinates of the ray's origin in the shape's space. [`Placed`] therefore
 //! moves the origin along the ray to the shape before it asks, so that they are relative to the shape's size.
 
+mod points;
+
+pub use points::{PlacedNormalRows, PlacedPointRows};
+
 use super::{Detail, Disk, Frustum, Hit, Quad, Revolution, Sphere, SurfaceInteraction};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
+use crate::math::rows::BATCH;
 use crate::math::vectorize::{Kernel, vectorize};
-use crate::math::{Bounds, DAffine3, DVec3, Ray, RayF64, Transform, Vec2, Vec3};
+use crate::math::{Bounds, DAffine3, DVec3, Ray, RayF64, RayRows, Transform, Vec2, Vec3};
 
 /// A surface given by a formula.
 #[derive(Clone, Debug)]
@@ -37,7 +42,7 @@ pub struct LocalHit {
 }
 
 /// A point of a shape in the shape's own space.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalSurface {
     /// The point, moved exactly onto the surface.
     pub p: DVec3,
@@ -51,6 +56,11 @@ pub struct LocalSurface {
     pub uv: [f64; 2],
     /// Density of [`Analytic::sample`] here, with respect to area in the shape's own space.
     pub pdf_area: f64,
+}
+
+impl LocalSurface {
+    /// All zero; as a constant, for [`Default::default`] is a call.
+    pub const ZERO: Self = Self { p: DVec3::ZERO, n: DVec3::ZERO, dp_du: DVec3::ZERO, dp_dv: DVec3::ZERO, uv: [0.0; 2], pdf_area: 0.0 };
 }
 
 /// A point chosen on a shape.
@@ -254,6 +264,24 @@ impl Placed {
         self.interaction_and_dp_dv(detail, ray, hit).map(|(at, _)| at)
     }
 
+    /// The points of the [interactions](Self::interaction) for hits of the first `count` rays at the distances `t`.
+    pub fn resolve_rows(
+        &self,
+        rays: &RayRows,
+        t: &[f32; BATCH],
+        count: usize,
+        points: &mut PlacedPointRows,
+        normals: &mut PlacedNormalRows,
+    ) {
+        points::resolve(self, rays, t, count, points, normals);
+    }
+
+    /// As [`SurfaceInteraction::error`], at all points.
+    #[inline]
+    pub fn error(&self) -> f32 {
+        self.error
+    }
+
     /// The interaction with the change of the point with v.
     #[inline(always)]
     pub(super) fn interaction_and_dp_dv(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
@@ -332,7 +360,7 @@ impl Placed {
         Some(length / (self.shape.area() * self.transform.determinant().abs()))
     }
 
-    #[inline]
+    #[inline(always)]
     fn place(&self, p: DVec3, n: DVec3, pdf_area: f64) -> PlacedPoint {
         let normal = self.transform.normal(n);
         let length = normal.length();

@@ -83,7 +83,7 @@ impl Quad {
     }
 
     /// The surface at a hit of `ray`.
-    #[inline]
+    #[inline(always)]
     pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let q = ray.origin - self.origin + ray.direction * hit.t;
         let (u, v) = (q.dot(self.dual_u).clamp(0.0, 1.0), q.dot(self.dual_v).clamp(0.0, 1.0));
@@ -98,7 +98,7 @@ impl Quad {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn point(&self, u: f64, v: f64) -> DVec3 {
         self.origin + self.edge_u * u + self.edge_v * v
     }

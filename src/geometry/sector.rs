@@ -102,10 +102,12 @@ impl Sector {
 }
 
 /// Direction from the axis to `(x, y)`; +x at the axis itself, and so close to it that squares vanish.
-#[inline]
+#[inline(always)]
 pub(super) fn direction_from_axis(x: f64, y: f64) -> DVec2 {
     let squared = x * x + y * y;
-    if squared >= f64::MIN_POSITIVE && squared.is_finite() { dvec2(x, y) / squared.sqrt() } else { DVec2::X }
+    let is_usable = (squared >= f64::MIN_POSITIVE) & (squared < f64::INFINITY);
+    let direction = dvec2(x, y) / squared.sqrt();
+    if is_usable { direction } else { DVec2::X }
 }
 
 #[cfg(test)]

@@ -96,13 +96,13 @@ impl Sphere {
     }
 
     /// The surface at a hit of `ray`.
-    #[inline]
+    #[inline(always)]
     pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
         let n = raw / raw.length();
         let p = n * self.radius;
         if detail == Detail::Place {
-            return LocalSurface { p, n, pdf_area: 1.0 / self.area, ..LocalSurface::default() };
+            return LocalSurface { p, n, pdf_area: 1.0 / self.area, ..LocalSurface::ZERO };
         }
         let rho = (p.x * p.x + p.y * p.y).sqrt();
         let toward = direction_from_axis(p.x, p.y);

@@ -100,6 +100,12 @@ impl<'a> World<'a> {
         self.skips_parameters[shape.index()] && matches!(self.scene.geometry.shape(shape), Shape::Mesh(mesh) if !mesh.is_deforming())
     }
 
+    /// Whether a shape is analytic and nothing but the point and the normal of its hits is needed.
+    #[inline]
+    pub(super) fn is_plain_analytic(&self, shape: ShapeId) -> bool {
+        self.skips_parameters[shape.index()] && matches!(self.scene.geometry.shape(shape), Shape::Analytic(_))
+    }
+
     /// With the parametrisation of every surface, whether or not the scene needs it.
     pub fn in_full(self) -> Self {
         Self { skips_parameters: vec![false; self.skips_parameters.len()], ..self }

@@ -2,6 +2,7 @@
 
 mod aabb;
 pub mod bernstein;
+pub mod compact;
 mod cone;
 pub mod float;
 mod frame;

@@ -1,7 +1,7 @@
 //! Rays in world space (`f32`, what accelerators take) and in a shape's own space (`f64`, what shapes solve in).
 
 use super::float::EMBREE_LARGE;
-use super::rows::soa;
+use super::rows::{BATCH, soa};
 use super::{DVec3, Vec3};
 
 /// A ray segment: the points `origin + t * direction` with `t_min <= t <= t_max`. The direction need not be unit.
@@ -71,6 +71,18 @@ soa! {
 }
 
 impl RayRows {
+    /// Rows of rays, of which there are at most [`BATCH`].
+    pub fn of(rays: &[Ray]) -> Self {
+        let mut rows = Self::default();
+        rays.iter().enumerate().for_each(|(lane, ray)| rows.set(lane, ray));
+        rows
+    }
+
+    /// Rays in blocks of [`BATCH`], with the number of rays of each.
+    pub fn blocks(rays: &[Ray]) -> Vec<(Self, usize)> {
+        rays.chunks(BATCH).map(|rays| (Self::of(rays), rays.len())).collect()
+    }
+
     /// The ray of one lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Ray {

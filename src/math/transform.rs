@@ -68,7 +68,7 @@ impl Transform {
     }
 
     /// A normal from object to world, by the inverse transpose; not normalised.
-    #[inline]
+    #[inline(always)]
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.normal_matrix * n
     }
@@ -102,7 +102,7 @@ impl Transform {
     }
 
     /// By how much the map changes volume; negative if it swaps handedness.
-    #[inline]
+    #[inline(always)]
     pub fn determinant(&self) -> f64 {
         self.determinant
     }

@@ -97,9 +97,7 @@ impl Chunk {
     fn push_packet(&mut self, tracer: &Tracer, run: &[Ray], any_hit: bool, coherence: Coherence) {
         let mut valid = Lanes([0; WIDTH]);
         let mut rays = RTCRay16 { mask: [ALL_GEOMETRIES; WIDTH], ..RTCRay16::default() };
-        let mut rows = RayRows::default();
-        run.iter().enumerate().for_each(|(lane, ray)| rows.set(lane, ray));
-        fill(&mut rays, &mut valid, tracer, &rows, 0..run.len());
+        fill(&mut rays, &mut valid, tracer, &RayRows::of(run), 0..run.len());
         let (inside, outside): (Vec<usize>, Vec<usize>) = (0..run.len()).partition(|&lane| valid.0[lane] != 0);
         if !inside.is_empty() {
             self.packets.push((valid, rays));

@@ -1,14 +1,15 @@
 //! The vertices of one block of paths, in structures of arrays.
 
+use super::Context;
 use super::materials::BsdfTable;
 use crate::bsdf::{BsdfEval, Lambert};
 use crate::color::Rgb;
-use crate::geometry::{SpawnPoint, SurfaceInteraction};
+use crate::geometry::{PlacedNormalRows, PlacedPointRows, SpawnPoint, SurfaceInteraction};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::integrator::parts::LobeWeights;
 use crate::light::Receiver;
-use crate::math::rows::soa;
-use crate::math::{DVec3, Frame, Vec2, Vec3};
+use crate::math::rows::{BATCH, Row, soa};
+use crate::math::{DVec3, Frame, RayRows, Vec2, Vec3};
 use crate::sampling::{Numbers, Requests};
 use crate::scene::Scene;
 
@@ -68,6 +69,11 @@ soa! {
     pub(super) struct VertexRows {
         /// Index of the path in the block.
         path: u32,
+        /// The next four as in [`PathRows`](super::wave::PathRows).
+        slot: u32,
+        seed: u32,
+        sample: u32,
+        path_flags: u32,
         /// Direction of the ray that arrives.
         direction: Vec3,
         time: f32,
@@ -86,6 +92,7 @@ soa! {
         is_unresolved: u32,
         flags: u32,
         throughput: Rgb,
+        /// As in `PathRows`.
         rr_scale: f32,
         /// Of diffuse surfaces, else zero.
         albedo: Rgb,
@@ -94,6 +101,8 @@ soa! {
         frame_y: Vec3,
         n: Vec3,
         is_consistent: u32,
+        /// The normal on the side of the path, or zero where light may cross.
+        receiver_n: Vec3,
         /// The direction back, in the frame.
         wo: Vec3,
         /// Cosine of the direction back with the geometric normal.
@@ -148,6 +157,8 @@ soa! {
         direction: Vec3,
         throughput: Rgb,
         rr_scale: f32,
+        /// As in `PathRows`.
+        path_flags: u32,
     }
 }
 
@@ -161,6 +172,27 @@ soa! {
     }
 }
 
+/// Hits on one analytic shape.
+pub(super) struct AnalyticScratch {
+    pub lanes: Vec<u8>,
+    pub rays: RayRows,
+    pub t: Row,
+    pub points: PlacedPointRows,
+    pub normals: PlacedNormalRows,
+}
+
+impl Default for AnalyticScratch {
+    fn default() -> Self {
+        Self {
+            lanes: Vec::with_capacity(BATCH),
+            rays: RayRows::default(),
+            t: [0.0; BATCH],
+            points: PlacedPointRows::default(),
+            normals: PlacedNormalRows::default(),
+        }
+    }
+}
+
 /// The vertices of one block.
 #[derive(Default)]
 pub(super) struct Vertices {
@@ -168,6 +200,7 @@ pub(super) struct Vertices {
     pub rows: VertexRows,
     pub triangles: TriangleRows,
     pub points: PointRows,
+    pub analytic: AnalyticScratch,
     pub direct: DirectRows,
     pub scatter: ScatterRows,
     /// Paths of the block that leave the scene.
@@ -193,7 +226,7 @@ impl Vertices {
     /// Index in the block of the path of a vertex.
     #[inline(always)]
     pub fn path(&self, lane: usize) -> usize {
-        self.rows.path[lane] as usize
+        self.rows.path[lane] as usize % BATCH
     }
 
     /// The point, with its parametrisation where the scene needs that.
@@ -235,8 +268,7 @@ impl Vertices {
     /// The point and the side of it that light must reach.
     #[inline(always)]
     pub fn receiver(&self, lane: usize) -> Receiver {
-        let transmits = self.rows.flags[lane] & vertex_flags::TRANSMITS != 0;
-        Receiver { p: self.points.p.get(lane), n: if transmits { Vec3::ZERO } else { self.facing_normal(lane) } }
+        Receiver { p: self.points.p.get(lane), n: self.rows.receiver_n.get(lane) }
     }
 
     #[inline(always)]
@@ -281,6 +313,14 @@ impl Vertices {
         let is_smooth = self.rows.flags[lane] & vertex_flags::DELTA != 0 && self.scatter.is_delta[lane] != 0;
         // Radiance is scaled by refraction, albedo is not.
         is_smooth.then(|| self.scatter.weight.get(lane) * self.scatter.rr_factor[lane])
+    }
+
+    /// Clamps what shadow rays contribute.
+    pub fn clamp_direct(&mut self, context: &Context) {
+        for lane in 0..self.count {
+            let contribution = self.direct.contribution.get(lane);
+            self.direct.contribution.set(lane, context.config.clamped(contribution, context.bounce + 1));
+        }
     }
 
     /// The target of the light sample of a vertex.

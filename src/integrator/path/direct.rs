@@ -82,7 +82,7 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
     let (scene, lights) = (context.scene, &context.scene.lights);
     let light_context = LightContext { geometry: &scene.geometry, textures: &scene.textures, lights, found_by: context.found_by };
     queue.clear();
-    for lane in 0..vertices.count {
+    for lane in 0..vertices.count.min(BATCH) {
         if vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) != 0 {
             continue;
         }

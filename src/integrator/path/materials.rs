@@ -60,7 +60,7 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
     vertices.others.clear();
     vertices.bsdfs.made.clear();
     let scene = context.scene;
-    for lane in 0..vertices.count {
+    for lane in 0..vertices.count.min(BATCH) {
         if vertices.is_miss(lane) {
             set_diffuse(vertices, lane, Rgb::BLACK);
             continue;

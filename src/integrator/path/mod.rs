@@ -125,12 +125,12 @@ impl PathIntegrator {
                 }
                 materials::adjust(context, wave, block);
                 vertices::build_frames(context, wave);
-                wave.draw(context, block);
+                wave.draw(context);
                 direct::sample(context, wave, block);
                 scatter::sample(context, wave, block);
                 wave.append(context, block, &mut survivors);
             }
-            wave.count = survivors;
+            wave.finish(survivors);
             trace::shadow(context, wave, out, counts);
             wave.guided.mark_radiance(out);
         }

@@ -4,7 +4,7 @@ use super::Context;
 use super::block::{PointRows, ScatterRows, VertexRows, Vertices, spawn};
 use super::direct::{can_be_below, shadowing};
 use super::terminator;
-use super::wave::{BsdfScratch, Wave};
+use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
 use crate::geometry::SpawnPoint;
 use crate::integrator::vertex::HemisphereTest;
@@ -28,10 +28,11 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
     }
     let Vertices { rows, points, scatter, u_bsdf, .. } = &mut *vertices;
     let roulette = context.bounce + 1 >= context.config.rr_depth;
+    let no_lights = context.scene.lights.is_empty();
     if context.scene.features.reliefs {
-        vectorize(Scatter::<true> { rows, points, scatter, u: u_bsdf, roulette, count });
+        vectorize(Scatter::<true> { rows, points, scatter, u: u_bsdf, roulette, no_lights, count });
     } else {
-        vectorize(Scatter::<false> { rows, points, scatter, u: u_bsdf, roulette, count });
+        vectorize(Scatter::<false> { rows, points, scatter, u: u_bsdf, roulette, no_lights, count });
     }
     if context.scene.features.shading_normals {
         wave.counts.indirect += terminator::offset(
@@ -116,6 +117,7 @@ struct Scatter<'a, const RELIEF: bool> {
     scatter: &'a mut ScatterRows,
     u: &'a Numbers,
     roulette: bool,
+    no_lights: bool,
     count: usize,
 }
 
@@ -124,8 +126,8 @@ impl<const RELIEF: bool> Kernel for Scatter<'_, RELIEF> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { rows, points, scatter, u, roulette, count } = self;
-        spawn_rays::<RELIEF>(rows, points, scatter, u, roulette, count);
+        let Self { rows, points, scatter, u, roulette, no_lights, count } = self;
+        spawn_rays::<RELIEF>(rows, points, scatter, u, [roulette, no_lights], count);
     }
 }
 
@@ -141,7 +143,7 @@ fn spawn_rays<const RELIEF: bool>(
     points: &PointRows,
     scatter: &mut ScatterRows,
     u: &Numbers,
-    roulette: bool,
+    [roulette, no_lights]: [bool; 2],
     count: usize,
 ) {
     for i in 0..count.min(BATCH) {
@@ -167,6 +169,10 @@ fn spawn_rays<const RELIEF: bool>(
         let start = SpawnPoint { p: points.p.get(i), n: rows.n_g.get(i), error: rows.error[i] };
         scatter.origin.set(i, start.ray_along(direction).origin);
         scatter.direction.set(i, direction);
+        let is_delta = scatter.is_delta[i] != 0;
+        let specular = if is_delta | no_lights { path_flags::SPECULAR } else { 0 };
+        let non_specular = if is_delta { rows.path_flags[i] & path_flags::ANY_NON_SPECULAR } else { path_flags::ANY_NON_SPECULAR };
+        scatter.path_flags[i] = specular | non_specular;
         scatter.status[i] = spawn::status(goes_on & test.agrees(), goes_on & can_be_below(rows, test, i));
     }
 }

@@ -13,7 +13,7 @@ use crate::math::{Frame, Vec3};
 /// Writes the AOVs of a block's vertices.
 pub(super) fn write(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
     if context.bounce == 0 {
-        for lane in (0..wave.vertices.count).filter(|&lane| !wave.vertices.is_miss(lane)) {
+        for lane in (0..wave.vertices.count.min(BATCH)).filter(|&lane| !wave.vertices.is_miss(lane)) {
             let slot = wave.paths[block].slot[wave.vertices.path(lane)];
             out.batch.pixels[slot as usize].alpha = 1.0;
         }

@@ -39,13 +39,14 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
         let count = BATCH.min(shadows.count - first);
         context.world.accel.occluded_rows(rays, count, &mut occluded, coherence);
         for (i, _) in (first..).zip(&occluded[..count]).filter(|(_, occluded)| !**occluded) {
-            let (slot, light) = (shadows.slots[i], shadows.contributions[i]);
+            let rows = &shadows.rows[block];
+            let (slot, light) = (rows.slot[i % BATCH], rows.contribution.get(i % BATCH));
             out.add(slot, light);
             if let Some(&source) = wave.light_aovs.shadow_sources.get(i) {
                 out.add_to_light_aovs(context, slot, light, source);
             }
         }
     }
-    shadows.clear();
+    shadows.count = 0;
     wave.light_aovs.shadow_sources.clear();
 }

@@ -1,16 +1,17 @@
 //! From hits to vertices: points in `f64`, normals, shading frames.
 
 use super::Context;
-use super::block::{PointRows, TriangleRows, VertexRows, Vertices, vertex_flags};
-use super::wave::Wave;
+use super::block::{AnalyticScratch, PointRows, TriangleRows, VertexRows, Vertices, vertex_flags};
+use super::wave::{PathRows, Wave};
 use crate::accel::HitRows;
 use crate::color::Rgb;
 use crate::geometry::{Hit, Mesh, Shape, TrianglePoints, interpolated_normal};
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
-use crate::math::Frame;
-use crate::math::rows::BATCH;
+use crate::math::compact::Lanes;
+use crate::math::rows::{BATCH, Row};
 use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::{Frame, RayRows, Vec3};
 
 /// Finds the vertices of a block's paths, and which paths miss.
 #[inline(never)]
@@ -19,34 +20,19 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     let Wave { vertices, paths, rays, hits, .. } = wave;
     let (paths, rays, hits) = (&paths[block], &rays[block], &hits[block]);
     let smooth = context.scene.features.shading_normals;
-    vertices.count = 0;
+    let lanes = Lanes::different(&hits.shape, HitRows::MISS, count);
     vertices.misses.clear();
+    vertices.misses.extend((0..count.min(BATCH)).filter(|&path| !lanes.contains(path)).map(|path| path as u8));
+    start_vertices(vertices, &lanes, paths, rays, hits);
     let mut triangles = 0;
-    for path in 0..count {
-        if hits.shape[path] == HitRows::MISS {
-            vertices.misses.push(path as u8);
-            continue;
-        }
-        let lane = vertices.count;
-        vertices.count += 1;
-        let rows = &mut vertices.rows;
-        rows.path[lane] = path as u32;
-        rows.direction.set(lane, rays.direction.get(path));
-        rows.time[lane] = rays.time[path];
-        (rows.shape[lane], rows.prim[lane], rows.instance[lane]) = (hits.shape[path], hits.prim[path], hits.instance[path]);
-        rows.throughput.set(lane, paths.throughput.get(path));
-        rows.rr_scale[lane] = paths.rr_scale[path];
-        rows.flags[lane] = 0;
-        let mesh = if hits.instance[path] == Hit::NO_INSTANCE.0 { plain_mesh(context, ShapeId(hits.shape[path])) } else { None };
+    for lane in 0..vertices.count.min(BATCH) {
+        let Vertices { rows, triangles: corners, .. } = vertices;
+        let mesh = if rows.instance[lane] == Hit::NO_INSTANCE.0 { plain_mesh(context, ShapeId(rows.shape[lane])) } else { None };
         rows.is_unresolved[lane] = u32::from(mesh.is_none());
         if let Some(mesh) = mesh {
             triangles += 1;
-            vertices.triangles.origin.set(lane, rays.origin.get(path));
             // The positions are gathered in a loop of their own: here all lanes wait for memory together.
-            let [a, b, c] = mesh.triangles()[hits.prim[path] as usize];
-            let indices = &mut vertices.triangles;
-            (indices.a_index[lane], indices.b_index[lane], indices.c_index[lane]) = (a, b, c);
-            (indices.u[lane], indices.v[lane]) = (hits.u[path], hits.v[path]);
+            [corners.a_index[lane], corners.b_index[lane], corners.c_index[lane]] = mesh.triangles()[rows.prim[lane] as usize];
         }
     }
     if triangles > 0 {
@@ -58,7 +44,10 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
             vectorize(IntersectTriangles::<false> { triangles, rows, points, count: *count });
         }
     }
-    for lane in 0..vertices.count {
+    if context.scene.features.analytic_shapes {
+        resolve_analytic(context, vertices, rays, hits);
+    }
+    for lane in 0..vertices.count.min(BATCH) {
         if vertices.rows.is_unresolved[lane] != 0 {
             let path = vertices.path(lane);
             match context.world.resolve(&rays.get(path), hits.get(path)) {
@@ -73,6 +62,75 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     }
 }
 
+/// Starts a vertex for each of the chosen paths.
+fn start_vertices(vertices: &mut Vertices, lanes: &Lanes, paths: &PathRows, rays: &RayRows, hits: &HitRows) {
+    const INDICES: Row<u32> = {
+        let mut indices = [0; BATCH];
+        let mut i = 0;
+        while i < BATCH {
+            indices[i] = i as u32;
+            i += 1;
+        }
+        indices
+    };
+    let Vertices { count, rows, triangles, .. } = vertices;
+    *count = lanes.len();
+    lanes.compact(&INDICES, &mut rows.path);
+    lanes.compact(&paths.slot, &mut rows.slot);
+    lanes.compact(&paths.seed, &mut rows.seed);
+    lanes.compact(&paths.sample, &mut rows.sample);
+    lanes.compact(&paths.flags, &mut rows.path_flags);
+    lanes.compact_3(&paths.throughput.0, &mut rows.throughput.0);
+    lanes.compact(&paths.rr_scale, &mut rows.rr_scale);
+    lanes.compact_3(&rays.origin.0, &mut triangles.origin.0);
+    lanes.compact_3(&rays.direction.0, &mut rows.direction.0);
+    lanes.compact(&rays.time, &mut rows.time);
+    lanes.compact(&hits.u, &mut triangles.u);
+    lanes.compact(&hits.v, &mut triangles.v);
+    lanes.compact(&hits.shape, &mut rows.shape);
+    lanes.compact(&hits.prim, &mut rows.prim);
+    lanes.compact(&hits.instance, &mut rows.instance);
+    rows.flags = [0; BATCH];
+}
+
+/// Resolves hits on analytic shapes in the world of which only the point and the normal is needed, many on one shape at a time.
+fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, hits: &HitRows) {
+    let Vertices { count, rows, points, analytic, .. } = vertices;
+    let AnalyticScratch { lanes, rays: gathered, t, points: found, normals } = analytic;
+    lanes.clear();
+    let is_wanted = |lane: usize| {
+        let is_in_world = rows.is_unresolved[lane] != 0 && rows.instance[lane] == Hit::NO_INSTANCE.0;
+        is_in_world && context.world.is_plain_analytic(ShapeId(rows.shape[lane]))
+    };
+    lanes.extend((0..BATCH.min(*count)).filter(|&lane| is_wanted(lane)).map(|lane| lane as u8));
+    lanes.sort_unstable_by_key(|&lane| (rows.shape[usize::from(lane)], lane));
+    for lanes in lanes.chunk_by(|&a, &b| rows.shape[usize::from(a)] == rows.shape[usize::from(b)]) {
+        let Shape::Analytic(placed) = context.scene.geometry.shape(ShapeId(rows.shape[usize::from(lanes[0])])) else { continue };
+        if lanes.len() < MIN_ANALYTIC_LANES {
+            continue;
+        }
+        for (i, &lane) in lanes.iter().enumerate() {
+            let path = rows.path[usize::from(lane)] as usize;
+            gathered.set(i, &rays.get(path));
+            t[i] = hits.t[path];
+        }
+        placed.resolve_rows(gathered, t, lanes.len(), found, normals);
+        for (i, &lane) in lanes.iter().enumerate().filter(|&(i, _)| normals.is_resolved[i] != 0) {
+            let lane = usize::from(lane);
+            points.p.set(lane, found.p.get(i));
+            (rows.t[lane], rows.error[lane]) = (found.t[i] as f32, placed.error());
+            rows.n_g.set(lane, normals.n.get(i));
+            rows.n_s.set(lane, normals.n.get(i));
+            rows.dp_du.set(lane, Vec3::ZERO);
+            (rows.uv_x[lane], rows.uv_y[lane]) = (0.0, 0.0);
+            rows.is_unresolved[lane] = 0;
+        }
+    }
+}
+
+/// Hits on one shape that are worth a vector.
+const MIN_ANALYTIC_LANES: usize = 3;
+
 /// The mesh of a shape in the world that is at rest, if nothing depends on its parametrisation.
 #[inline(always)]
 fn plain_mesh<'a>(context: &Context<'a>, shape: ShapeId) -> Option<&'a Mesh> {
@@ -85,7 +143,7 @@ fn plain_mesh<'a>(context: &Context<'a>, shape: ShapeId) -> Option<&'a Mesh> {
 /// Gathers the corners of the triangles.
 fn gather_triangles(context: &Context, vertices: &mut Vertices, smooth: bool) {
     let Vertices { count, rows, triangles, .. } = vertices;
-    for lane in (0..*count).filter(|&lane| rows.is_unresolved[lane] == 0) {
+    for lane in (0..BATCH.min(*count)).filter(|&lane| rows.is_unresolved[lane] == 0) {
         let Shape::Mesh(mesh) = context.scene.geometry.shape(ShapeId(rows.shape[lane])) else { continue };
         let indices = [triangles.a_index[lane], triangles.b_index[lane], triangles.c_index[lane]];
         let TrianglePoints { a, b, c } = mesh.points(indices);
@@ -211,7 +269,10 @@ impl<const SMOOTH: bool, const TANGENTS: bool> Kernel for BuildFrames<'_, SMOOTH
             rows.frame_x.set(i, frame.x);
             rows.frame_y.set(i, frame.y);
             rows.n.set(i, n);
-            rows.wo.set(i, frame.to_local(back));
+            let wo = frame.to_local(back);
+            rows.wo.set(i, wo);
+            let side = if rows.flags[i] & vertex_flags::TRANSMITS != 0 { 0.0 } else { 1f32.copysign(wo.z) };
+            rows.receiver_n.set(i, n * side);
             rows.cos_geometric[i] = back.dot(n_g);
             rows.cos_normals[i] = 0.0;
         }

@@ -12,6 +12,7 @@ use crate::id::LightId;
 use crate::integrator::media::MediaState;
 use crate::integrator::{CameraBatch, CameraBlock, RayCounts};
 use crate::light::{LightQueue, Receiver};
+use crate::math::compact::Lanes;
 use crate::math::rows::{BATCH, soa};
 use crate::math::{DVec3, Ray, RayCone, RayRows, Vec3};
 use crate::sampling::{PixelSeed, Requests};
@@ -80,34 +81,29 @@ pub(super) struct BsdfScratch {
     pub samples: BsdfSampleRows,
 }
 
+soa! {
+    /// What shadow rays add to samples if nothing is in the way.
+    pub(super) struct ShadowRows {
+        contribution: Rgb,
+        slot: u32,
+    }
+}
+
 /// Shadow rays of a wave.
 #[derive(Default)]
 pub(super) struct ShadowQueue {
     pub count: usize,
     pub rays: Vec<RayRows>,
-    /// What each adds to its sample if nothing is in the way.
-    pub contributions: Vec<Rgb>,
-    pub slots: Vec<u32>,
+    pub rows: Vec<ShadowRows>,
 }
 
-impl ShadowQueue {
-    pub fn clear(&mut self) {
-        self.count = 0;
-        self.contributions.clear();
-        self.slots.clear();
-    }
-
-    #[inline(always)]
-    fn push(&mut self, ray: &Ray, contribution: Rgb, slot: u32) {
-        let (block, lane) = (self.count / BATCH, self.count % BATCH);
-        if block == self.rays.len() {
-            self.rays.push(RayRows::default());
-        }
-        self.rays[block].set(lane, ray);
-        self.contributions.push(contribution);
-        self.slots.push(slot);
-        self.count += 1;
-    }
+/// Appends the chosen `$lanes` of rows, and of rows of vectors, to columns of a block and the next.
+macro_rules! append {
+    ($lanes:expr, $at:expr, $to:expr, $next:expr, { $($row:expr => $column:ident,)* }, { $($vectors:expr => $vector_column:ident,)* }) => {{
+        let (to, mut next) = ($to, $next);
+        $($lanes.append(&$row, &mut to.$column, next.as_mut().map(|next| &mut next.$column), $at);)*
+        $($lanes.append_3(&$vectors.0, &mut to.$vector_column.0, next.as_mut().map(|next| &mut next.$vector_column.0), $at);)*
+    }};
 }
 
 /// A wave, kept by its thread.
@@ -158,7 +154,7 @@ impl Wave {
         self.cones.extend(samples.iter().map_while(|sample| context.world.camera_cone(&sample.ray)));
         self.light_aovs.start(context.config, samples.len());
         self.guided.clear();
-        self.shadows.clear();
+        self.shadows.count = 0;
         self.light_queue.reset();
         self.counts = RayCounts::default();
     }
@@ -173,12 +169,11 @@ impl Wave {
     }
 
     /// Draws the random numbers of the vertices of a block.
-    pub fn draw(&mut self, context: &Context, block: usize) {
+    pub fn draw(&mut self, context: &Context) {
         let Vertices { rows, requests, count, u_light, u_bsdf, .. } = &mut self.vertices;
-        let paths = &self.paths[block];
-        for (lane, &path) in rows.path[..*count].iter().enumerate() {
-            requests.pixels[lane] = PixelSeed(paths.seed[path as usize]);
-            requests.samples[lane] = paths.sample[path as usize];
+        requests.samples = rows.sample;
+        for (pixel, seed) in requests.pixels.iter_mut().zip(rows.seed) {
+            *pixel = PixelSeed(seed);
         }
         let sampler = &context.config.sampler;
         if !context.scene.lights.is_empty() {
@@ -190,61 +185,99 @@ impl Wave {
     /// Queues the shadow rays of a block's vertices and moves the paths that go on to the index `survivors` and those after it.
     #[inline(never)]
     pub fn append(&mut self, context: &Context, block: usize, survivors: &mut usize) {
-        let wants_light_aovs = context.config.wants_light_aovs();
-        let no_lights = context.scene.lights.is_empty();
-        for lane in 0..self.vertices.count {
-            let vertices = &self.vertices;
-            let (direct, scatter) = (&vertices.direct, &vertices.scatter);
-            let path = vertices.path(lane);
-            let index = block * BATCH + path;
-            let time = vertices.rows.time[lane];
-            let slot = self.paths[block].slot[path];
-            if direct.status[lane] == spawn::SPAWNED {
-                let ray = Ray {
-                    t_max: direct.shadow_end[lane],
-                    time,
-                    ..Ray::new(direct.shadow_origin.get(lane), direct.shadow_direction.get(lane))
-                };
-                self.shadows.push(&ray, context.config.clamped(direct.contribution.get(lane), context.bounce + 1), slot);
-                if wants_light_aovs {
-                    let event = self.light_aovs.shadow_event(context, index, || vertices.lobes(context.scene, lane, direct.wi.get(lane)));
-                    self.light_aovs.shadow_sources.push((event, LightId(direct.light[lane])));
-                }
+        if context.config.clamp.is_finite() {
+            self.vertices.clamp_direct(context);
+        }
+        self.queue_shadow_rays(context, block);
+        let Vertices { count, scatter, .. } = &self.vertices;
+        let lanes = Lanes::equal(&scatter.status, spawn::SPAWNED, *count);
+        if lanes.len() == 0 {
+            return;
+        }
+        if !(self.media.is_empty() && self.cones.is_empty() && !context.wants_aovs()) {
+            self.append_optional(context, block, *survivors);
+        }
+        let Vertices { rows, points, scatter, .. } = &self.vertices;
+        let (to, at) = (*survivors / BATCH, *survivors % BATCH);
+        let (paths, next_paths) = pair(&mut self.paths, to);
+        let (rays, next_rays) = pair(&mut self.rays, to);
+        append!(lanes, at, paths, next_paths, {
+            scatter.pdf => pdf,
+            scatter.rr_scale => rr_scale,
+            scatter.path_flags => flags,
+            rows.slot => slot,
+            rows.seed => seed,
+            rows.sample => sample,
+        }, {
+            scatter.throughput => throughput,
+            points.p => from_p,
+            rows.receiver_n => from_n,
+        });
+        append!(lanes, at, rays, next_rays, { rows.time => time, }, { scatter.origin => origin, scatter.direction => direction, });
+        *survivors += lanes.len();
+    }
+
+    /// Sets the intervals of the rays that go on.
+    pub fn finish(&mut self, survivors: usize) {
+        self.count = survivors;
+        let blocks = self.blocks();
+        for rays in &mut self.rays[..blocks] {
+            (rays.t_min, rays.t_max) = ([0.0; BATCH], [f32::INFINITY; BATCH]);
+        }
+    }
+
+    fn queue_shadow_rays(&mut self, context: &Context, block: usize) {
+        let Vertices { count, rows, direct, .. } = &self.vertices;
+        let lanes = Lanes::equal(&direct.status, spawn::SPAWNED, *count);
+        if context.config.wants_light_aovs() {
+            for lane in (0..BATCH).filter(|&lane| lanes.contains(lane)) {
+                let lobes = || self.vertices.lobes(context.scene, lane, direct.wi.get(lane));
+                let event = self.light_aovs.shadow_event(context, block * BATCH + self.vertices.path(lane), lobes);
+                self.light_aovs.shadow_sources.push((event, LightId(direct.light[lane])));
             }
-            if scatter.status[lane] != spawn::SPAWNED {
-                continue;
+        }
+        let shadows = &mut self.shadows;
+        let (to, at) = (shadows.count / BATCH, shadows.count % BATCH);
+        while shadows.rays.len() < to + 2 {
+            shadows.rays.push(RayRows::default());
+            shadows.rows.push(ShadowRows::default());
+        }
+        let (rays, next_rays) = pair(&mut shadows.rays, to);
+        append!(lanes, at, rays, next_rays, { direct.shadow_end => t_max, rows.time => time, }, {
+            direct.shadow_origin => origin,
+            direct.shadow_direction => direction,
+        });
+        let (queued, next_queued) = pair(&mut shadows.rows, to);
+        append!(lanes, at, queued, next_queued, { rows.slot => slot, }, { direct.contribution => contribution, });
+        shadows.count += lanes.len();
+    }
+
+    /// Moves the state that only some renders have.
+    fn append_optional(&mut self, context: &Context, block: usize, survivors: usize) {
+        let Self { vertices, media, cones, light_aovs, .. } = self;
+        let scatter = &vertices.scatter;
+        let mut to = survivors;
+        for lane in (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED) {
+            let path = block * BATCH + vertices.path(lane);
+            if let Some(&state) = media.get(path) {
+                media[to] = super::media::after(context, vertices, lane, &state);
             }
-            let to = *survivors;
-            *survivors += 1;
-            let is_delta = scatter.is_delta[lane] != 0;
-            let is_specular = is_delta || no_lights;
-            let non_specular =
-                self.paths[block].flags[path] & path_flags::ANY_NON_SPECULAR | if is_delta { 0 } else { path_flags::ANY_NON_SPECULAR };
-            let next = Path {
-                throughput: scatter.throughput.get(lane),
-                pdf: scatter.pdf[lane],
-                rr_scale: scatter.rr_scale[lane],
-                flags: non_specular | if is_specular { path_flags::SPECULAR } else { 0 },
-                slot,
-                seed: self.paths[block].seed[path],
-                sample: self.paths[block].sample[path],
-                from_p: vertices.points.p.get(lane),
-                from_n: vertices.receiver(lane).n,
-            };
-            let direction = scatter.direction.get(lane);
-            if let Some(&state) = self.media.get(index) {
-                self.media[to] = super::media::after(context, vertices, lane, &state);
-            }
-            if let Some(&cone) = self.cones.get(index) {
-                let pdf = if is_specular { f32::INFINITY } else { next.pdf };
-                self.cones[to] = context.world.scattered_cone(cone, vertices.rows.t[lane], pdf);
+            if let Some(&cone) = cones.get(path) {
+                let is_specular = scatter.path_flags[lane] & path_flags::SPECULAR != 0;
+                let pdf = if is_specular { f32::INFINITY } else { scatter.pdf[lane] };
+                cones[to] = context.world.scattered_cone(cone, vertices.rows.t[lane], pdf);
             }
             if context.wants_aovs() {
                 let lobes = || vertices.sampled_lobes(context.scene, lane);
-                self.light_aovs.append(context, [index, to], lobes, || vertices.feature_factor(lane));
+                light_aovs.append(context, [path, to], lobes, || vertices.feature_factor(lane));
             }
-            self.paths[to / BATCH].set(to % BATCH, &next);
-            self.rays[to / BATCH].set(to % BATCH, &Ray { time, ..Ray::new(scatter.origin.get(lane), direction) });
+            to += 1;
         }
     }
+}
+
+/// A block and the next, if there is one.
+fn pair<T>(blocks: &mut [T], i: usize) -> (&mut T, Option<&mut T>) {
+    let (before, after) = blocks.split_at_mut(i + 1);
+    (&mut before[i], after.first_mut())
 }

@@ -93,25 +93,34 @@ impl Parallelogram {
         self.corner + self.axis_u * along_u + self.axis_v * along_v
     }
 
-    /// A point as seen from `p`, by solid angle or by area, on emitters that are `two_sided` or not. Without branches, for loops over many vertices.
+    /// A point as seen from `p` by area, on emitters that are `two_sided` or not, and whether it is to be sampled by solid angle instead. Without branches,
+    /// as the next, for loops over many vertices.
     #[inline(always)]
-    pub fn sample(&self, p: DVec3, u: [f32; 2], two_sided: bool) -> ParallelogramSample {
+    pub fn sample_by_area(&self, p: DVec3, u: [f32; 2], two_sided: bool) -> (ParallelogramSample, bool) {
         let view = self.view(p);
-        let solid_angle = view.solid_angle();
-        let by_solid_angle = (self.is_rectangle != 0.0) & view.is_near() & (solid_angle > MIN_SOLID_ANGLE);
-        let [x, y] = view.sample(solid_angle, u);
-        let [x, y] =
-            if by_solid_angle { [x - view.x0, y - view.y0] } else { [f64::from(u[0]) * self.length_u, f64::from(u[1]) * self.length_v] };
-        let q = self.point(x, y);
+        let q = self.point(f64::from(u[0]) * self.length_u, f64::from(u[1]) * self.length_v);
         let toward = q - p;
         let distance_squared = toward.length_squared();
         let distance = distance_squared.sqrt();
-        let by_area = self.pdf_area * distance_squared * distance / self.normal.dot(toward).abs();
-        let pdf = if by_solid_angle { 1.0 / solid_angle } else { by_area };
+        let pdf = self.pdf_area * distance_squared * distance / self.normal.dot(toward).abs();
         let is_seen = !view.is_edge_on(self.corner) & (two_sided | self.sees_front(p));
         // A NaN, where both points are one, is no sample either.
-        let is_seen = is_seen & (pdf > 0.0) & (pdf < f64::from(f32::MAX));
-        ParallelogramSample { q, wi: toward * (1.0 / distance), pdf: if is_seen { pdf } else { 0.0 } }
+        let is_valid = is_seen & (pdf > 0.0) & (pdf < f64::from(f32::MAX));
+        let sample = ParallelogramSample { q, wi: toward * (1.0 / distance), pdf: if is_valid { pdf } else { 0.0 } };
+        (sample, is_seen & (self.is_rectangle != 0.0) & view.is_near())
+    }
+
+    /// A point by solid angle as seen from `p`, of a rectangle of which something is seen from there, or `otherwise` if the solid angle is too small.
+    #[inline(always)]
+    pub fn sample_by_solid_angle(&self, p: DVec3, u: [f32; 2], otherwise: &ParallelogramSample) -> ParallelogramSample {
+        let view = self.view(p);
+        let solid_angle = view.solid_angle();
+        let [x, y] = view.sample(solid_angle, u);
+        let q = self.point(x - view.x0, y - view.y0);
+        let toward = q - p;
+        let wi = toward * (1.0 / toward.length());
+        let sample = ParallelogramSample { q, wi, pdf: 1.0 / solid_angle };
+        if solid_angle > MIN_SOLID_ANGLE { sample } else { *otherwise }
     }
 
     /// Density per solid angle with which `sample` from `p` finds the point `q`.
@@ -167,7 +176,11 @@ impl ParallelogramEmitter {
 
     /// A point as seen from `p`, whatever the texture; `None` if nothing is seen from there.
     pub fn sample(&self, p: DVec3, u: [f32; 2], two_sided: bool) -> Option<SurfaceSample> {
-        let ParallelogramSample { q, wi, pdf } = self.shape.sample(p, u, two_sided);
+        let (mut sample, by_solid_angle) = self.shape.sample_by_area(p, u, two_sided);
+        if by_solid_angle {
+            sample = self.shape.sample_by_solid_angle(p, u, &sample);
+        }
+        let ParallelogramSample { q, wi, pdf } = sample;
         (pdf > 0.0).then(|| SurfaceSample { p: q, n: self.normal(), wi: wi.as_vec3(), pdf: pdf as f32 })
     }
 

@@ -1,7 +1,7 @@
 //! Area lights that many vertices sample at once.
 
 use super::AreaLight;
-use super::parallelogram::ParallelogramRows;
+use super::parallelogram::{ParallelogramRows, ParallelogramSample};
 use crate::color::Rgb;
 use crate::geometry::SpawnPoint;
 use crate::light::{LightChoice, LightSample, ShadowTarget};
@@ -11,11 +11,13 @@ use crate::math::{DVec3, Vec3};
 
 soa! {
     /// Points that sample lights, and the points sampled.
-    struct PointRows {
+    struct PointRows of Point {
         p: DVec3,
         q: DVec3,
         wi: DVec3,
         pdf: f64,
+        /// 1 where the sample is to be one by solid angle, else 0.
+        is_near: f64,
     }
 }
 
@@ -35,6 +37,15 @@ pub(in crate::light) struct AreaQueue {
     ids: Row<u32>,
     shapes: ParallelogramRows,
     points: PointRows,
+    near: NearQueue,
+}
+
+/// Those of the vertices that sample by solid angle.
+struct NearQueue {
+    places: Row<u32>,
+    u: [Row; 2],
+    shapes: ParallelogramRows,
+    points: PointRows,
 }
 
 impl Default for AreaQueue {
@@ -51,6 +62,29 @@ impl Default for AreaQueue {
             ids: [NO_LIGHT; BATCH],
             shapes: ParallelogramRows::default(),
             points: PointRows::default(),
+            near: NearQueue { places: [0; BATCH], u: [row; 2], shapes: ParallelogramRows::default(), points: PointRows::default() },
+        }
+    }
+}
+
+impl NearQueue {
+    /// Replaces the samples of those vertices.
+    #[inline(always)]
+    fn sample(&mut self, shapes: &ParallelogramRows, u: &[Row; 2], points: &mut PointRows, count: usize) {
+        let mut near = 0;
+        for place in (0..count.min(BATCH)).filter(|&place| points.is_near[place] != 0.0) {
+            let i = near % BATCH;
+            self.places[i] = place as u32;
+            (self.u[0][i], self.u[1][i]) = (u[0][place], u[1][place]);
+            self.shapes.set(i, &shapes.get(place));
+            self.points.set(i, &points.get(place));
+            near += 1;
+        }
+        if near > 0 {
+            vectorize(SampleBySolidAngle { shapes: &self.shapes, u: &self.u, points: &mut self.points, count: near });
+            for (i, &place) in self.places[..near].iter().enumerate() {
+                points.set(place as usize % BATCH, &self.points.get(i));
+            }
         }
     }
 }
@@ -87,11 +121,12 @@ impl AreaQueue {
     /// Samples all lights; `set` takes each sample with its vertex and the probability of the choice.
     #[inline(always)]
     pub fn sample(&mut self, mut set: impl FnMut(usize, &LightSample, f32)) {
-        let Self { count, lanes, pmfs, u, radiance, two_sided, errors, shapes, points, .. } = self;
+        let Self { count, lanes, pmfs, u, radiance, two_sided, errors, shapes, points, near, .. } = self;
         if *count == 0 {
             return;
         }
-        vectorize(SampleParallelograms { shapes, two_sided, u, points, count: *count });
+        vectorize(SampleByArea { shapes, two_sided, u, points, count: *count });
+        near.sample(shapes, u, points, *count);
         for i in 0..*count {
             let pdf = points.pdf[i] as f32;
             if pdf > 0.0 {
@@ -104,7 +139,7 @@ impl AreaQueue {
     }
 }
 
-struct SampleParallelograms<'a> {
+struct SampleByArea<'a> {
     shapes: &'a ParallelogramRows,
     two_sided: &'a Row<u32>,
     u: &'a [Row; 2],
@@ -112,20 +147,48 @@ struct SampleParallelograms<'a> {
     count: usize,
 }
 
-impl Kernel for SampleParallelograms<'_> {
+impl Kernel for SampleByArea<'_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        sample_parallelograms(self.shapes, self.two_sided, self.u, self.points, self.count);
+        sample_by_area(self.shapes, self.two_sided, self.u, self.points, self.count);
+    }
+}
+
+// Whole vectors, here and below: what is computed for vertices beyond the count is not used.
+#[inline(always)]
+fn sample_by_area(shapes: &ParallelogramRows, two_sided: &Row<u32>, u: &[Row; 2], points: &mut PointRows, count: usize) {
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        let (sample, is_near) = shapes.get(i).sample_by_area(points.p.get(i), [u[0][i], u[1][i]], two_sided[i] != 0);
+        points.q.set(i, sample.q);
+        points.wi.set(i, sample.wi);
+        points.pdf[i] = sample.pdf;
+        points.is_near[i] = if is_near { 1.0 } else { 0.0 };
+    }
+}
+
+struct SampleBySolidAngle<'a> {
+    shapes: &'a ParallelogramRows,
+    u: &'a [Row; 2],
+    points: &'a mut PointRows,
+    count: usize,
+}
+
+impl Kernel for SampleBySolidAngle<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        sample_by_solid_angle(self.shapes, self.u, self.points, self.count);
     }
 }
 
 #[inline(always)]
-fn sample_parallelograms(shapes: &ParallelogramRows, two_sided: &Row<u32>, u: &[Row; 2], points: &mut PointRows, count: usize) {
-    // Whole vectors: what is computed for vertices beyond the count is not used.
+fn sample_by_solid_angle(shapes: &ParallelogramRows, u: &[Row; 2], points: &mut PointRows, count: usize) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
-        let sample = shapes.get(i).sample(points.p.get(i), [u[0][i], u[1][i]], two_sided[i] != 0);
+        let Point { p, q, wi, pdf, .. } = points.get(i);
+        let sample = shapes.get(i).sample_by_solid_angle(p, [u[0][i], u[1][i]], &ParallelogramSample { q, wi, pdf });
         points.q.set(i, sample.q);
         points.wi.set(i, sample.wi);
         points.pdf[i] = sample.pdf;

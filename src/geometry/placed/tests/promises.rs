@@ -4,6 +4,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::*;
 use crate::geometry::ProfileParameter;
+use crate::id::{PrimId, ShapeId};
 use crate::math::vectorize::with_each;
 
 fn vase() -> Profile {
@@ -234,6 +235,40 @@ fn hits_whose_distance_was_rounded_otherwise_are_found_again() {
     assert_eq!(placed.interaction(&ray, &Hit { t: 4.000_01, ..hit }).map(|at| at.t), Some(4.0));
     // The end of the ray may be the hit itself.
     assert!(placed.interaction(&Ray { t_max: 2.0, ..ray }, &Hit { t: 2.0, ..NO_HIT }).is_some());
+}
+
+#[test]
+fn points_resolved_in_rows_are_those_of_single_hits() {
+    let mut random = Rng::new(29);
+    let [mut resolved, mut hits] = [0usize; 2];
+    for shape in shapes() {
+        let matrix = DMat3::from_cols(dvec3(0.6, 0.8, 0.1), dvec3(-0.8, 0.5, 0.0), dvec3(0.1, 0.2, 1.3));
+        let transform = Transform::new(DAffine3 { matrix3: matrix, translation: dvec3(0.3, -2.0, 1.0) }).unwrap();
+        let placed = Placed::new(shape, transform);
+        for count in [1, 16, 60, BATCH] {
+            let (mut rays, mut t) = (RayRows::default(), [0.0; BATCH]);
+            let mut found = Vec::new();
+            while found.len() < count {
+                let origin = (random.cube() * 4.0 - 2.0 + transform.point(DVec3::ZERO)).as_vec3();
+                let toward = transform.point(random.cube() - 0.5).as_vec3();
+                let ray = Ray::new(origin, toward - origin);
+                let Some(hit) = placed.intersect(&ray) else { continue };
+                rays.set(found.len(), &ray);
+                t[found.len()] = hit.t as f32;
+                found.push(Hit { t: hit.t as f32, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(0), instance: Hit::NO_INSTANCE });
+            }
+            let (mut points, mut normals) = (PlacedPointRows::default(), PlacedNormalRows::default());
+            placed.resolve_rows(&rays, &t, count, &mut points, &mut normals);
+            for (i, hit) in found.iter().enumerate().filter(|&(i, _)| normals.is_resolved[i] != 0) {
+                let at = placed.interaction_with(Detail::Place, &rays.get(i), hit).unwrap();
+                let found = (points.p.get(i), points.t[i] as f32, normals.n.get(i), placed.error());
+                assert_eq!(found, (at.p, at.t, at.n_g, at.error), "{placed:?} {i}");
+                resolved += 1;
+            }
+            hits += if placed.intersects_packets() { count } else { 0 };
+        }
+    }
+    assert!(resolved > hits * 9 / 10, "{resolved} of {hits}");
 }
 
 #[test]
