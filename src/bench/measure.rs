@@ -398,9 +398,9 @@ fn replay(accel: &dyn Accelerator, rays: &[Ray], mode: Mode, any_hit: bool, thre
     if threads == 1 {
         let start = Instant::now();
         if mode == Mode::Single {
-            singles(rays)
+            singles(rays);
         } else {
-            batches(&blocks)
+            batches(&blocks);
         }
         return Ok(start.elapsed().as_secs_f64());
     }

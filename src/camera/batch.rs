@@ -1,7 +1,7 @@
 //! Rays through many points of the film at once.
 
 use super::{Camera, Projection};
-use crate::math::rows::{BATCH, Row};
+use crate::math::rows::{BATCH, Row, pair};
 use crate::math::vectorize::{Kernel, vectorize};
 use crate::math::{RayRows, Vec2};
 
@@ -37,7 +37,7 @@ impl Kernel for PinholeRays<'_> {
     fn call(self) {
         let Self { camera, half_height, size, film, rays, count } = self;
         for i in 0..count.min(BATCH) {
-            let toward = camera.on_picture(Vec2::new(film[0][i], film[1][i]), size, half_height);
+            let toward = camera.on_picture(Vec2::from(pair(film, i)), size, half_height);
             let start = camera.pinhole_start(toward);
             rays.origin.set(i, camera.world_from_camera.point(start).as_vec3());
             rays.direction.set(i, camera.world_from_camera.vector(toward).normalize().as_vec3());

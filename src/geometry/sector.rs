@@ -105,7 +105,7 @@ impl Sector {
 #[inline(always)]
 pub(super) fn direction_from_axis(x: f64, y: f64) -> DVec2 {
     let squared = x * x + y * y;
-    let is_usable = (squared >= f64::MIN_POSITIVE) & (squared < f64::INFINITY);
+    let is_usable = (f64::MIN_POSITIVE..f64::INFINITY).contains(&squared);
     let direction = dvec2(x, y) / squared.sqrt();
     if is_usable { direction } else { DVec2::X }
 }

@@ -79,6 +79,12 @@ impl Lanes {
         self.count
     }
 
+    /// Whether there are none.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
     /// Whether a lane is among them.
     #[inline(always)]
     pub fn contains(&self, lane: usize) -> bool {

@@ -8,7 +8,7 @@ pub const BATCH: usize = 128;
 /// One number for each of many things.
 pub type Row<T = f32> = [T; BATCH];
 
-/// What [`soa!`](crate::math::rows::soa) can store by component.
+/// What structures of arrays store by component.
 pub trait Element: Copy {
     /// One for each of many things.
     type Rows: Clone + std::fmt::Debug;
@@ -43,6 +43,12 @@ macro_rules! number {
 }
 
 number!(f32 0.0, f64 0.0, u32 0);
+
+/// The pair of one.
+#[inline(always)]
+pub fn pair(rows: &[Row; 2], i: usize) -> [f32; 2] {
+    [rows[0][i], rows[1][i]]
+}
 
 /// A vector for each, by component.
 #[derive(Clone, Debug)]

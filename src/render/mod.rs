@@ -34,7 +34,7 @@ use crate::film::{
 use crate::integrator::{self, CameraBatch, CameraBlock, Cancel, Integrator, RayCounts, Setup, SurfaceNeeds, World, dimensions};
 use crate::light::LightGroups;
 use crate::math::Vec2;
-use crate::math::rows::{BATCH, Row};
+use crate::math::rows::{BATCH, Row, pair};
 use crate::sampling::{Numbers, Requests, Sampler};
 use crate::scene::Scene;
 
@@ -242,7 +242,7 @@ impl<'a> Job<'a> {
             camera.pinhole_rays(self.view, film, rays, count);
         } else {
             for i in 0..count {
-                let (u, at) = (numbers.of(i), Vec2::new(film[0][i], film[1][i]));
+                let (u, at) = (numbers.of(i), Vec2::from(pair(film, i)));
                 rays.set(i, &camera.ray(at, self.view, [u[2], u[3]], rays.time[i]));
             }
         }

@@ -3,7 +3,7 @@
 use super::{Analytic, CenteredRay, LocalHit, Placed};
 use crate::geometry::{Detail, LocalSurface};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::rows::{BATCH, soa};
+use crate::math::rows::{BATCH, Element, soa};
 use crate::math::vectorize::{Kernel, vectorize};
 use crate::math::{DVec3, Ray, RayF64, RayRows, Vec3};
 
@@ -114,7 +114,7 @@ fn resolve_on<S: Surface>(
         points.t[i] = distance + shift;
         normals.n.set(i, found.n);
         // The first hit is the one that was found, and ahead; false for a NaN.
-        let expected = f64::from(t[i]);
+        let expected = f64::from(<f32 as Element>::get(t, i));
         let is_resolved = ((expected - shift) - distance <= 8.0 * UNIT_ROUNDOFF * expected) & (distance + shift > 0.0);
         normals.is_resolved[i] = u32::from(is_resolved);
     }

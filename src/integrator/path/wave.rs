@@ -191,7 +191,7 @@ impl Wave {
         self.queue_shadow_rays(context, block);
         let Vertices { count, scatter, .. } = &self.vertices;
         let lanes = Lanes::equal(&scatter.status, spawn::SPAWNED, *count);
-        if lanes.len() == 0 {
+        if lanes.is_empty() {
             return;
         }
         if !(self.media.is_empty() && self.cones.is_empty() && !context.wants_aovs()) {
@@ -256,8 +256,8 @@ impl Wave {
     fn append_optional(&mut self, context: &Context, block: usize, survivors: usize) {
         let Self { vertices, media, cones, light_aovs, .. } = self;
         let scatter = &vertices.scatter;
-        let mut to = survivors;
-        for lane in (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED) {
+        let lanes = (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED);
+        for (to, lane) in (survivors..).zip(lanes) {
             let path = block * BATCH + vertices.path(lane);
             if let Some(&state) = media.get(path) {
                 media[to] = super::media::after(context, vertices, lane, &state);
@@ -271,7 +271,6 @@ impl Wave {
                 let lobes = || vertices.sampled_lobes(context.scene, lane);
                 light_aovs.append(context, [path, to], lobes, || vertices.feature_factor(lane));
             }
-            to += 1;
         }
     }
 }

@@ -5,7 +5,7 @@ use super::parallelogram::{ParallelogramRows, ParallelogramSample};
 use crate::color::Rgb;
 use crate::geometry::SpawnPoint;
 use crate::light::{LightChoice, LightSample, ShadowTarget};
-use crate::math::rows::{BATCH, Row, soa};
+use crate::math::rows::{BATCH, Element, Row, pair, soa};
 use crate::math::vectorize::{Kernel, vectorize};
 use crate::math::{DVec3, Vec3};
 
@@ -160,7 +160,7 @@ impl Kernel for SampleByArea<'_> {
 #[inline(always)]
 fn sample_by_area(shapes: &ParallelogramRows, two_sided: &Row<u32>, u: &[Row; 2], points: &mut PointRows, count: usize) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
-        let (sample, is_near) = shapes.get(i).sample_by_area(points.p.get(i), [u[0][i], u[1][i]], two_sided[i] != 0);
+        let (sample, is_near) = shapes.get(i).sample_by_area(points.p.get(i), pair(u, i), <u32 as Element>::get(two_sided, i) != 0);
         points.q.set(i, sample.q);
         points.wi.set(i, sample.wi);
         points.pdf[i] = sample.pdf;
@@ -188,7 +188,7 @@ impl Kernel for SampleBySolidAngle<'_> {
 fn sample_by_solid_angle(shapes: &ParallelogramRows, u: &[Row; 2], points: &mut PointRows, count: usize) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         let Point { p, q, wi, pdf, .. } = points.get(i);
-        let sample = shapes.get(i).sample_by_solid_angle(p, [u[0][i], u[1][i]], &ParallelogramSample { q, wi, pdf });
+        let sample = shapes.get(i).sample_by_solid_angle(p, pair(u, i), &ParallelogramSample { q, wi, pdf });
         points.q.set(i, sample.q);
         points.wi.set(i, sample.wi);
         points.pdf[i] = sample.pdf;
