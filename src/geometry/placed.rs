@@ -111,7 +111,7 @@ impl Analytic {
     pub fn surface_with(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         match self {
             Self::Sphere(sphere) => sphere.surface(detail, ray, hit),
-            Self::Quad(quad) => quad.surface(ray, hit),
+            Self::Quad(quad) => quad.surface(detail, ray, hit),
             Self::Disk(disk) => disk.surface(detail, ray, hit),
             Self::Frustum(frustum) => frustum.surface(detail, ray, hit),
             Self::Revolution(revolution) => revolution.surface(ray, hit),

@@ -3,7 +3,7 @@
 //! Object space: `origin + u edge_u + v edge_v` with `u` and `v` in `[0, 1]`, which are also the uv unless others are given. The normal is
 //! `edge_u` x `edge_v`.
 
-use super::{LocalHit, LocalSurface, ShapeError, ShapeSample};
+use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
 use crate::math::{Bounds, DVec3, RayF64};
 
 /// A parallelogram.
@@ -84,12 +84,16 @@ impl Quad {
 
     /// The surface at a hit of `ray`.
     #[inline(always)]
-    pub fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
+    pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let q = ray.origin - self.origin + ray.direction * hit.t;
         let (u, v) = (q.dot(self.dual_u).clamp(0.0, 1.0), q.dot(self.dual_v).clamp(0.0, 1.0));
+        let p = self.point(u, v);
+        if detail == Detail::Place {
+            return LocalSurface { p, n: self.n, pdf_area: 1.0 / self.area, ..LocalSurface::ZERO };
+        }
         let ([u0, v0], [width, height]) = (self.uv_origin, self.uv_size);
         LocalSurface {
-            p: self.point(u, v),
+            p,
             n: self.n,
             dp_du: self.edge_u / width,
             dp_dv: self.edge_v / height,
@@ -139,7 +143,7 @@ mod tests {
         let target = dvec3(1.0, 2.0, 3.0) + quad.edge_u() * 0.25 + quad.edge_v() * 0.75;
         let ray = RayF64 { origin: target + dvec3(1.0, -2.0, 4.0), direction: dvec3(-0.5, 1.0, -2.0), t_min: 0.0, t_max: f64::INFINITY };
         let hit = LocalHit { t: quad.distance(&ray), profile: 0.0 };
-        let s = quad.surface(&ray, &hit);
+        let s = quad.surface(Detail::Full, &ray, &hit);
         assert!((hit.t - 2.0).abs() < 1e-14 && (s.uv[0] - 0.25).abs() < 1e-14 && (s.uv[1] - 0.75).abs() < 1e-14);
         assert_eq!(s.n, DVec3::Z);
         // Within the plane, and parallel to it.

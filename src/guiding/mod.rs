@@ -85,9 +85,9 @@ impl Leaf {
     }
 }
 
-/// What is known of the light at a surface.
+/// What paths have learned of the light at a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Known<'a> {
+pub struct GuideRegion<'a> {
     /// Where it comes from.
     pub directions: &'a Directions,
     /// How many directions the surface had better choose.
@@ -166,10 +166,10 @@ impl Guide {
 
     /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.
     #[inline]
-    pub fn at(&self, p: Vec3, n: Vec3) -> Option<Known<'_>> {
+    pub fn at(&self, p: Vec3, n: Vec3) -> Option<GuideRegion<'_>> {
         let learned = &self.learned[self.find(root(n), self.normalized(p)).0];
         let directions = learned.directions.as_deref()?;
-        Some(Known { directions, surface_share: learned.surface_share })
+        Some(GuideRegion { directions, surface_share: learned.surface_share })
     }
 
     /// Learns from light. What is not a finite number above zero counts as no light. Equal records are treated alike.

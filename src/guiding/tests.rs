@@ -41,7 +41,7 @@ fn taught(rounds: u32, count: usize, order: u64) -> Guide {
     guide
 }
 
-fn known_at(guide: &Guide) -> Known<'_> {
+fn known_at(guide: &Guide) -> GuideRegion<'_> {
     guide.at(Vec3::splat(0.4), Vec3::Z).unwrap()
 }
 
@@ -127,7 +127,7 @@ fn no_record_can_poison_the_guide() {
     }
     for _ in 0..10_000 {
         let p = if rng.unit() < 0.5 { Vec3::splat(0.5) } else { random_place(&mut rng) };
-        let Known { directions, surface_share } = guide.at(p, Vec3::Z).unwrap();
+        let GuideRegion { directions, surface_share } = guide.at(p, Vec3::Z).unwrap();
         let sample = directions.sample(rng.pair());
         assert!(sample.direction.is_finite() && sample.pdf > 0.0 && sample.pdf.is_finite(), "{sample:?}");
         assert!((0.0..=1.0).contains(&surface_share));

@@ -11,7 +11,7 @@ const WIDTH: usize = 16;
 
 /// Chosen lanes of a block.
 #[derive(Clone, Copy, Debug)]
-pub struct Lanes {
+pub struct Compaction {
     masks: [u16; BATCH / WIDTH],
     count: usize,
     simd: Option<V4>,
@@ -49,7 +49,7 @@ impl Compact for f64 {
     }
 }
 
-impl Lanes {
+impl Compaction {
     /// Those of the first `count` lanes whose `flags` are `chosen`.
     #[inline]
     pub fn equal(flags: &Row<u32>, chosen: u32, count: usize) -> Self {
@@ -137,7 +137,7 @@ fn place<'a, T>(to: &'a mut Row<T>, next: Option<&'a mut Row<T>>, at: usize) -> 
 
 struct Compress<'a, T> {
     simd: V4,
-    lanes: &'a Lanes,
+    lanes: &'a Compaction,
     from: &'a Row<T>,
     to: &'a mut Row<T>,
     next: Option<&'a mut Row<T>>,
@@ -188,13 +188,13 @@ mod tests {
                 let flags: Row<u32> = std::array::from_fn(|_| u32::from(random.below(10) < share));
                 let numbers: Row = std::array::from_fn(|i| i as f32);
                 let chosen: Vec<usize> = (0..count).filter(|&lane| flags[lane] == 1).collect();
-                let lanes = Lanes::equal(&flags, 1, count);
+                let lanes = Compaction::equal(&flags, 1, count);
                 assert_eq!(lanes.len(), chosen.len());
                 assert!((0..BATCH).all(|lane| lanes.contains(lane) == chosen.contains(&lane)));
-                assert_eq!(Lanes::different(&flags, 0, count).masks, lanes.masks);
+                assert_eq!(Compaction::different(&flags, 0, count).masks, lanes.masks);
                 for at in [0, 1, 100, BATCH - 1] {
                     // With the instructions that the machine has, and without.
-                    for lanes in [lanes, Lanes { simd: None, ..lanes }] {
+                    for lanes in [lanes, Compaction { simd: None, ..lanes }] {
                         let (mut first, mut second) = ([-1.0; BATCH], [-1.0; BATCH]);
                         lanes.append(&numbers, &mut first, Some(&mut second), at);
                         let (mut first_f64, mut second_f64) = ([-1.0; BATCH], [-1.0; BATCH]);

@@ -1,25 +1,25 @@
-//! Structures of arrays: rows of numbers for loops that work on many things [at once](super::vectorize).
+//! Structures of arrays: rows of numbers, one per lane, for loops that become [vector code](super::vectorize).
 
 use super::{DVec3, Vec3};
 
-/// Things in one row: few enough that their rows stay in the nearest caches.
+/// Lanes of a row: few enough that rows stay in the nearest caches.
 pub const BATCH: usize = 128;
 
-/// One number for each of many things.
+/// One number per lane.
 pub type Row<T = f32> = [T; BATCH];
 
 /// What structures of arrays store by component.
 pub trait Element: Copy {
-    /// One for each of many things.
+    /// One per lane.
     type Rows: Clone + std::fmt::Debug;
 
     /// All zero.
     const ZERO: Self::Rows;
 
-    /// That of one.
+    /// The element of a lane.
     fn get(rows: &Self::Rows, i: usize) -> Self;
 
-    /// Sets that of one.
+    /// Sets the element of a lane.
     fn set(rows: &mut Self::Rows, i: usize, value: Self);
 }
 
@@ -44,13 +44,13 @@ macro_rules! number {
 
 number!(f32 0.0, f64 0.0, u32 0);
 
-/// The pair of one.
+/// The pair of a lane.
 #[inline(always)]
 pub fn pair(rows: &[Row; 2], i: usize) -> [f32; 2] {
     [rows[0][i], rows[1][i]]
 }
 
-/// A vector for each, by component.
+/// A vector per lane, by component.
 #[derive(Clone, Debug)]
 pub struct Vectors(pub [Row; 3]);
 
@@ -58,13 +58,13 @@ impl Vectors {
     /// All zero.
     pub const ZERO: Self = Self([[0.0; BATCH]; 3]);
 
-    /// Those of one.
+    /// The vector of a lane.
     #[inline(always)]
     pub fn get(&self, i: usize) -> Vec3 {
         Vec3::new(self.0[0][i], self.0[1][i], self.0[2][i])
     }
 
-    /// Sets those of one.
+    /// Sets the vector of a lane.
     #[inline(always)]
     pub fn set(&mut self, i: usize, v: Vec3) {
         (self.0[0][i], self.0[1][i], self.0[2][i]) = (v.x, v.y, v.z);
@@ -86,7 +86,7 @@ impl Element for Vec3 {
     }
 }
 
-/// A point for each, by coordinate.
+/// A point per lane, by coordinate.
 #[derive(Clone, Debug)]
 pub struct Points(pub [Row<f64>; 3]);
 
@@ -94,13 +94,13 @@ impl Points {
     /// All zero.
     pub const ZERO: Self = Self([[0.0; BATCH]; 3]);
 
-    /// Those of one.
+    /// The point of a lane.
     #[inline(always)]
     pub fn get(&self, i: usize) -> DVec3 {
         DVec3::new(self.0[0][i], self.0[1][i], self.0[2][i])
     }
 
-    /// Sets those of one.
+    /// Sets the point of a lane.
     #[inline(always)]
     pub fn set(&mut self, i: usize, v: DVec3) {
         (self.0[0][i], self.0[1][i], self.0[2][i]) = (v.x, v.y, v.z);

@@ -107,9 +107,9 @@ unsafe fn set_ray(out: *mut RTCRay, words: &RayWords, key: u32) {
 
 /// Which lanes Embree may look at: -1, others 0.
 #[repr(C, align(64))]
-pub(super) struct Lanes(pub(super) [i32; WIDTH]);
+pub(super) struct LaneMask(pub(super) [i32; WIDTH]);
 
-impl Lanes {
+impl LaneMask {
     #[inline]
     fn is_full(&self) -> bool {
         !self.0.contains(&0)
@@ -118,14 +118,14 @@ impl Lanes {
 
 /// Sixteen rays for closest hits, reused from packet to packet.
 pub(super) struct HitPacket {
-    valid: Lanes,
+    valid: LaneMask,
     rayhits: RTCRayHit16,
 }
 
 impl HitPacket {
     pub(super) fn new() -> Self {
         let ray = RTCRay16 { mask: [ALL_GEOMETRIES; WIDTH], ..RTCRay16::default() };
-        Self { valid: Lanes([0; WIDTH]), rayhits: RTCRayHit16 { ray, hit: RTCHit16::default() } }
+        Self { valid: LaneMask([0; WIDTH]), rayhits: RTCRayHit16 { ray, hit: RTCHit16::default() } }
     }
 
     /// Traces at most sixteen `lanes` of `rays`, the first of which is a multiple of 16; [`read`](Self::read) gives the results.
@@ -168,13 +168,13 @@ impl HitPacket {
 
 /// Sixteen rays for any hit, reused from packet to packet.
 pub(super) struct ShadowPacket {
-    valid: Lanes,
+    valid: LaneMask,
     rays: RTCRay16,
 }
 
 impl ShadowPacket {
     pub(super) fn new() -> Self {
-        Self { valid: Lanes([0; WIDTH]), rays: RTCRay16 { mask: [ALL_GEOMETRIES; WIDTH], ..RTCRay16::default() } }
+        Self { valid: LaneMask([0; WIDTH]), rays: RTCRay16 { mask: [ALL_GEOMETRIES; WIDTH], ..RTCRay16::default() } }
     }
 
     /// Traces at most sixteen `lanes` of `rays`, the first of which is a multiple of 16: which of them hit anything.
@@ -206,7 +206,7 @@ fn lanes_mut<T>(row: &mut Row<T>, first: usize) -> &mut [T; WIDTH] {
 
 /// Writes `rays` into the packet, and for those that are not fit for one harmless numbers and `valid = 0`.
 #[inline(always)]
-pub(super) fn fill(packet: &mut RTCRay16, valid: &mut Lanes, tracer: &Tracer, rays: &RayRows, range: Range<usize>) {
+pub(super) fn fill(packet: &mut RTCRay16, valid: &mut LaneMask, tracer: &Tracer, rays: &RayRows, range: Range<usize>) {
     let first = range.start;
     let (o, d) = (&rays.origin.0, &rays.direction.0);
     (packet.org_x, packet.org_y, packet.org_z) = (*lanes(&o[0], first), *lanes(&o[1], first), *lanes(&o[2], first));
@@ -226,7 +226,7 @@ pub(super) fn fill(packet: &mut RTCRay16, valid: &mut Lanes, tracer: &Tracer, ra
 }
 
 #[cold]
-fn deactivate(packet: &mut RTCRay16, valid: &Lanes) {
+fn deactivate(packet: &mut RTCRay16, valid: &LaneMask) {
     for lane in (0..WIDTH).filter(|&lane| valid.0[lane] == 0) {
         put(packet, lane, &Ray::INACTIVE);
     }

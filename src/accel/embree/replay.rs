@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::EmbreeAccel;
 use super::gate::RayWords;
-use super::packet::{ALL_GEOMETRIES, INVALID, Lanes, Tracer, WIDTH, fill};
+use super::packet::{ALL_GEOMETRIES, INVALID, LaneMask, Tracer, WIDTH, fill};
 use super::sys::{self, RTCHit, RTCHit16, RTCRay, RTCRay16, RTCRayHit, RTCRayHit16};
 use crate::accel::Coherence;
 use crate::math::{Ray, RayRows};
@@ -24,7 +24,7 @@ pub struct EmbreeReplay<'a, 'g> {
 #[derive(Default)]
 struct Chunk {
     steps: Vec<Step>,
-    packets: Vec<(Lanes, RTCRay16)>,
+    packets: Vec<(LaneMask, RTCRay16)>,
     singles: Vec<RTCRay>,
     rays: usize,
 }
@@ -95,7 +95,7 @@ impl Chunk {
     }
 
     fn push_packet(&mut self, tracer: &Tracer, run: &[Ray], any_hit: bool, coherence: Coherence) {
-        let mut valid = Lanes([0; WIDTH]);
+        let mut valid = LaneMask([0; WIDTH]);
         let mut rays = RTCRay16 { mask: [ALL_GEOMETRIES; WIDTH], ..RTCRay16::default() };
         fill(&mut rays, &mut valid, tracer, &RayRows::of(run), 0..run.len());
         let (inside, outside): (Vec<usize>, Vec<usize>) = (0..run.len()).partition(|&lane| valid.0[lane] != 0);
@@ -125,7 +125,7 @@ impl Chunk {
 }
 
 /// The number of hits of a packet.
-fn trace_packet(tracer: &Tracer, valid: &Lanes, rays: &RTCRay16, any_hit: bool, frustum: bool) -> u64 {
+fn trace_packet(tracer: &Tracer, valid: &LaneMask, rays: &RTCRay16, any_hit: bool, frustum: bool) -> u64 {
     let lanes = valid.0.as_ptr();
     if any_hit {
         let mut rays = *rays;

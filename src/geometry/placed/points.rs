@@ -1,7 +1,7 @@
 //! Points of many hits on one analytic surface, the same as of each of them alone.
 
 use super::{Analytic, CenteredRay, LocalHit, Placed};
-use crate::geometry::{Detail, LocalSurface};
+use crate::geometry::{Detail, Disk, Frustum, LocalSurface, Quad, Sphere};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::rows::{BATCH, Element, soa};
 use crate::math::vectorize::{Kernel, vectorize};
@@ -49,34 +49,29 @@ struct Resolve<'a> {
     normals: &'a mut PlacedNormalRows,
 }
 
-/// The distance and the surface of a shape, inlined into loops.
-trait Surface {
+/// A shape whose functions are inlined into loops that become vector code.
+trait LaneShape {
     fn distance(&self, ray: &RayF64) -> f64;
-    fn surface(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface;
+    fn place(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface;
 }
 
-macro_rules! surfaces {
-    ($($shape:ident: |$self:ident, $ray:ident, $hit:ident| $surface:expr),*) => {$(
-        impl Surface for crate::geometry::$shape {
+macro_rules! lane_shapes {
+    ($($shape:ty),*) => {$(
+        impl LaneShape for $shape {
             #[inline(always)]
             fn distance(&self, ray: &RayF64) -> f64 {
-                Self::distance(self, ray)
+                <$shape>::distance(self, ray)
             }
 
             #[inline(always)]
-            fn surface(&$self, $ray: &RayF64, $hit: &LocalHit) -> LocalSurface {
-                $surface
+            fn place(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
+                self.surface(Detail::Place, ray, hit)
             }
         }
     )*};
 }
 
-surfaces! {
-    Sphere: |self, ray, hit| Self::surface(self, Detail::Place, ray, hit),
-    Quad: |self, ray, hit| Self::surface(self, ray, hit),
-    Disk: |self, ray, hit| Self::surface(self, Detail::Place, ray, hit),
-    Frustum: |self, ray, hit| Self::surface(self, Detail::Place, ray, hit)
-}
+lane_shapes!(Sphere, Quad, Disk, Frustum);
 
 impl Kernel for Resolve<'_> {
     type Output = ();
@@ -95,7 +90,7 @@ impl Kernel for Resolve<'_> {
 }
 
 #[inline(always)]
-fn resolve_on<S: Surface>(
+fn resolve_on<S: LaneShape>(
     placed: &Placed,
     shape: &S,
     rays: &RayRows,
@@ -108,7 +103,7 @@ fn resolve_on<S: Surface>(
         let ray = Ray { t_min: rays.t_min[i], ..Ray::new(rays.origin.get(i), rays.direction.get(i)) };
         let CenteredRay { ray: local, shift } = placed.centered_ray(&ray);
         let distance = shape.distance(&local);
-        let surface = shape.surface(&local, &LocalHit { t: distance, profile: 0.0 });
+        let surface = shape.place(&local, &LocalHit { t: distance, profile: 0.0 });
         let found = placed.place(surface.p, surface.n, surface.pdf_area);
         points.p.set(i, found.p);
         points.t[i] = distance + shift;

@@ -208,7 +208,7 @@ pub(super) struct Vertices {
     /// Vertices on emitters.
     pub emitters: Vec<u8>,
     /// Vertices on surfaces that are not diffuse.
-    pub others: Vec<u8>,
+    pub non_diffuse: Vec<u8>,
     pub bsdfs: BsdfTable,
     pub requests: Requests,
     /// Choice of a light (two) and a point of it (two).

@@ -1,9 +1,10 @@
 //! Direct light: a light and a point of it for each vertex, weighted by MIS, and the shadow rays.
 
+use super::Context;
 use super::block::{DirectRows, PointRows, VertexRows, Vertices, spawn, vertex_flags};
+use super::guided::{self, Regions};
 use super::terminator::{self, TerminatorRays};
 use super::wave::{BsdfScratch, Wave};
-use super::{Context, guided};
 use crate::bsdf::Lambert;
 use crate::geometry::SpawnPoint;
 use crate::integrator::Strategy;
@@ -26,8 +27,7 @@ pub(super) mod target {
 }
 
 /// Samples light for the vertices of a block, and finds the shadow rays.
-#[inline(never)]
-pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
+pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
     let Wave { vertices, media, terminator_rays, light_queue, bsdf_rows, .. } = wave;
     let count = vertices.count;
     vertices.direct.target[..count].fill(target::NONE);
@@ -37,9 +37,9 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
     }
     choose_lights(context, vertices, light_queue);
     vectorize(EvalDiffuse { rows: &vertices.rows, direct: &mut vertices.direct, count });
-    eval_others(context, vertices, bsdf_rows);
-    if let Some(guide) = context.guide {
-        guided::mix_scatter_pdfs(guide, vertices);
+    eval_non_diffuse(context, vertices, bsdf_rows);
+    if let Some(regions) = regions {
+        guided::mix_scatter_pdfs(regions, vertices);
     }
     let Vertices { rows, points, direct, .. } = &mut *vertices;
     let is_mis = context.config.strategy == Strategy::Mis;
@@ -57,10 +57,10 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
 }
 
 /// Evaluates the BSDFs that are not diffuse towards the lights.
-fn eval_others(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
-    let Vertices { rows: vertex, direct, others, bsdfs, .. } = vertices;
+fn eval_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
+    let Vertices { rows: vertex, direct, non_diffuse, bsdfs, .. } = vertices;
     let BsdfScratch { lanes, queries, evals, .. } = rows;
-    for group in bsdfs.groups(others) {
+    for group in bsdfs.groups(non_diffuse) {
         lanes.clear();
         lanes.extend(group.iter().filter(|&&lane| direct.target[usize::from(lane)] != target::NONE));
         let Some(bsdf) = lanes.first().and_then(|&lane| bsdfs.get(context.scene, usize::from(lane))) else { continue };
@@ -77,7 +77,6 @@ fn eval_others(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratc
 }
 
 /// Samples a light for each vertex that is not all mirror.
-#[inline(never)]
 fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQueue) {
     let (scene, lights) = (context.scene, &context.scene.lights);
     let light_context = LightContext { geometry: &scene.geometry, textures: &scene.textures, lights, found_by: context.found_by };

@@ -2,15 +2,16 @@
 
 use super::Context;
 use super::block::{Vertices, spawn, vertex_flags};
+use super::direct::target;
 use super::radiance::Output;
 use super::wave::PathRows;
 use crate::color::Rgb;
-use crate::guiding::{Guide, Known, Record};
+use crate::guiding::{Guide, GuideRegion, Record};
 use crate::math::Vec3;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::rows::BATCH;
 
-/// Roulette disregards at most that a direction was chosen so many times as often as by the BSDF alone.
+/// Largest ratio of the density of a direction to that of the BSDF alone which roulette disregards.
 const MAX_PDF_RATIO: f32 = 1e6;
 
 /// A scattered direction, to be learned from.
@@ -48,23 +49,30 @@ fn is_guided(vertices: &Vertices, lane: usize) -> bool {
     vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::TRANSMITS | vertex_flags::MISS) == 0
 }
 
-/// What is known at a vertex.
-fn region<'a>(guide: &'a Guide, vertices: &Vertices, lane: usize) -> Option<Known<'a>> {
-    if is_guided(vertices, lane) { guide.at(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane)) } else { None }
+/// The guide's region of each vertex of a block, where directions may be guided.
+pub(super) type Regions<'a> = [Option<GuideRegion<'a>>; BATCH];
+
+/// Finds the regions of a block's vertices.
+pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions<'a> {
+    let mut regions = [None; BATCH];
+    for (lane, region) in regions.iter_mut().enumerate().take(vertices.count).filter(|&(lane, _)| is_guided(vertices, lane)) {
+        *region = guide.at(vertices.points.p.get(lane).as_vec3(), vertices.facing_normal(lane));
+    }
+    regions
 }
 
 /// The density of a direction that the BSDF and the guide choose with these.
 #[inline]
-fn mixed(region: &Known, [bsdf, guide]: [f32; 2]) -> f32 {
+fn mixed(region: &GuideRegion, [bsdf, guide]: [f32; 2]) -> f32 {
     region.surface_share * bsdf + (1.0 - region.surface_share) * guide
 }
 
 /// Replaces the densities with which scattering finds the lights' directions.
-pub(super) fn mix_scatter_pdfs(guide: &Guide, vertices: &mut Vertices) {
-    for lane in 0..vertices.count {
-        if let Some(region) = region(guide, vertices, lane) {
-            let direct = &mut vertices.direct;
-            direct.scatter_pdf[lane] = mixed(&region, [direct.scatter_pdf[lane], region.directions.pdf(direct.direction.get(lane))]);
+pub(super) fn mix_scatter_pdfs(regions: &Regions, vertices: &mut Vertices) {
+    let direct = &mut vertices.direct;
+    for (lane, region) in regions.iter().enumerate().take(vertices.count) {
+        if let (Some(region), true) = (region, direct.target[lane] != target::NONE) {
+            direct.scatter_pdf[lane] = mixed(region, [direct.scatter_pdf[lane], region.directions.pdf(direct.direction.get(lane))]);
         }
     }
 }
@@ -77,10 +85,10 @@ impl GuideRecorder {
     }
 
     /// Chooses between the BSDF and the guide at each vertex; the number for the choice becomes one for the lobe.
-    pub fn choose(&mut self, guide: &Guide, vertices: &mut Vertices) {
-        for lane in 0..vertices.count {
+    pub fn choose(&mut self, regions: &Regions, vertices: &mut Vertices) {
+        for (lane, region) in regions.iter().enumerate().take(vertices.count) {
             self.sampled[lane] = None;
-            let Some(region) = region(guide, vertices, lane) else { continue };
+            let Some(region) = region else { continue };
             let (u, share) = (vertices.u_bsdf.of(lane), region.surface_share);
             if u[0] < share {
                 vertices.u_bsdf.set_first(lane, (u[0] / share).min(ONE_MINUS_EPSILON));
@@ -92,15 +100,15 @@ impl GuideRecorder {
     }
 
     /// Replaces the BSDF's samples by those of the guide, and all densities by those of both together.
-    pub fn mix(&mut self, context: &Context, guide: &Guide, vertices: &mut Vertices) {
-        for lane in 0..vertices.count {
+    pub fn mix(&mut self, context: &Context, regions: &Regions, vertices: &mut Vertices) {
+        for (lane, region) in regions.iter().enumerate().take(vertices.count) {
             self.densities[lane] = None;
-            let Some(region) = region(guide, vertices, lane) else { continue };
+            let Some(region) = region else { continue };
             if let Some((direction, guide_pdf)) = self.sampled[lane] {
                 let wi = vertices.frame(lane).to_local(direction);
                 let eval = vertices.eval(context.scene, lane, wi);
                 let densities = [eval.pdf, guide_pdf];
-                let pdf = mixed(&region, densities);
+                let pdf = mixed(region, densities);
                 let scatter = &mut vertices.scatter;
                 scatter.wi.set(lane, wi);
                 scatter.weight.set(lane, eval.value * (1.0 / pdf));
@@ -118,7 +126,7 @@ impl GuideRecorder {
                     scatter.rr_factor[lane] *= region.surface_share;
                 } else {
                     let densities = [scatter.pdf[lane], region.directions.pdf(direction)];
-                    let pdf = mixed(&region, densities);
+                    let pdf = mixed(region, densities);
                     let ratio = pdf / scatter.pdf[lane];
                     scatter.weight.set(lane, weight * (1.0 / ratio));
                     scatter.pdf[lane] = pdf;
@@ -129,7 +137,7 @@ impl GuideRecorder {
         }
     }
 
-    /// Takes up the directions of the paths that go on.
+    /// Records the directions of the paths that go on.
     pub fn record(&mut self, vertices: &Vertices, paths: &PathRows) {
         let scatter = &vertices.scatter;
         for lane in (0..vertices.count).filter(|&lane| scatter.status[lane] == spawn::SPAWNED && scatter.is_delta[lane] == 0) {

@@ -17,7 +17,7 @@ pub(super) struct LightAovs {
 }
 
 impl LightAovs {
-    /// Starts with so many camera rays.
+    /// Starts with `paths` camera rays.
     pub fn start(&mut self, config: &PathIntegrator, paths: usize) {
         self.lobes.clear();
         self.shadow_sources.clear();
@@ -27,7 +27,7 @@ impl LightAovs {
         }
     }
 
-    /// The class of light that was scattered so many times when it meets a path; `straight` if it was not.
+    /// The class of light that was scattered `scatterings` times before it meets a path; `straight` if none.
     pub fn event(&self, scatterings: u32, path: usize, straight: LightEvent) -> LightEvent {
         match (scatterings, self.lobes.get(path)) {
             (1, Some(&lobes)) => LightEvent::Direct(lobes),

@@ -57,7 +57,7 @@ impl BsdfTable {
 pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
     let Wave { vertices, rays, hits, cones, .. } = wave;
     vertices.emitters.clear();
-    vertices.others.clear();
+    vertices.non_diffuse.clear();
     vertices.bsdfs.made.clear();
     let scene = context.scene;
     for lane in 0..vertices.count.min(BATCH) {
@@ -73,7 +73,7 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
             Material::Constant(Bsdf::Lambert(Lambert { albedo })) => set_diffuse(vertices, lane, *albedo),
             Material::Constant(bsdf) => {
                 vertices.bsdfs.ids[lane] = surface.material.0;
-                set_other(&mut vertices.rows, &mut vertices.others, lane, bsdf);
+                set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, bsdf);
             }
             _ => {
                 let path = vertices.path(lane);
@@ -84,7 +84,7 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
                 match scene.bsdf(&at, ray.direction, footprint, &mut place) {
                     Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, *albedo),
                     bsdf => {
-                        set_other(&mut vertices.rows, &mut vertices.others, lane, bsdf);
+                        set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, bsdf);
                         vertices.bsdfs.set_made(lane, bsdf.clone());
                     }
                 }
@@ -100,8 +100,8 @@ fn set_diffuse(vertices: &mut Vertices, lane: usize, albedo: Rgb) {
 }
 
 #[inline(always)]
-fn set_other(rows: &mut VertexRows, others: &mut Vec<u8>, lane: usize, bsdf: &Bsdf) {
-    others.push(lane as u8);
+fn set_non_diffuse(rows: &mut VertexRows, non_diffuse: &mut Vec<u8>, lane: usize, bsdf: &Bsdf) {
+    non_diffuse.push(lane as u8);
     rows.albedo.set(lane, Rgb::BLACK);
     rows.flags[lane] = flags(bsdf);
 }
@@ -113,21 +113,21 @@ fn flags(bsdf: &Bsdf) -> u32 {
     delta | transmits
 }
 
-/// Replaces the BSDFs of boundaries between media, and of rough surfaces under path space regularization; then sorts the vertices that are not diffuse by
-/// their BSDFs.
-pub(super) fn adjust(context: &Context, wave: &mut Wave, block: usize) {
-    if context.scene.features.media || context.config.regularization.is_some() {
-        replace_bsdfs(context, wave, block);
-    }
-    let Vertices { others, bsdfs, .. } = &mut wave.vertices;
-    others.sort_unstable_by_key(|&lane| (bsdfs.ids[usize::from(lane)], lane));
+/// Sorts the vertices that are not diffuse by their BSDFs.
+pub(super) fn sort_by_bsdf(vertices: &mut Vertices) {
+    let Vertices { non_diffuse, bsdfs, .. } = vertices;
+    non_diffuse.sort_unstable_by_key(|&lane| (bsdfs.ids[usize::from(lane)], lane));
 }
 
-fn replace_bsdfs(context: &Context, wave: &mut Wave, block: usize) {
+/// Replaces the BSDFs of boundaries between media, and of rough surfaces under path space regularization.
+pub(super) fn replace_bsdfs(context: &Context, wave: &mut Wave, block: usize) {
     let regularization = context.config.regularization;
+    if !context.scene.features.media && regularization.is_none() {
+        return;
+    }
     let Wave { vertices, paths, media, .. } = wave;
-    for k in 0..vertices.others.len() {
-        let lane = usize::from(vertices.others[k]);
+    for k in 0..vertices.non_diffuse.len() {
+        let lane = usize::from(vertices.non_diffuse[k]);
         let path = vertices.path(lane);
         if let Some(media) = media.get(block * BATCH + path) {
             let at = vertices.interaction(lane);

@@ -71,7 +71,6 @@ struct Context<'a> {
     /// Whether paths end at this vertex.
     is_last: bool,
     found_by: FoundBy,
-    guide: Option<&'a Guide>,
 }
 
 impl Context<'_> {
@@ -101,7 +100,7 @@ impl PathIntegrator {
     /// The main loop.
     fn render_wave(&self, world: &World, samples: &CameraBatch, out: &mut Output, counts: &mut RayCounts, wave: &mut Wave) {
         let (found_by, guide) = (self.strategy.found_by(), self.guide.as_deref());
-        let mut context = Context { config: self, world, scene: world.scene, bounce: 0, is_last: false, found_by, guide };
+        let mut context = Context { config: self, world, scene: world.scene, bounce: 0, is_last: false, found_by };
         wave.start(&context, samples);
         for bounce in 0..self.max_depth {
             if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && world.gives_up()) {
@@ -123,14 +122,16 @@ impl PathIntegrator {
                 if context.is_last {
                     continue;
                 }
-                materials::adjust(context, wave, block);
+                materials::replace_bsdfs(context, wave, block);
+                materials::sort_by_bsdf(&mut wave.vertices);
                 vertices::build_frames(context, wave);
                 wave.draw(context);
-                direct::sample(context, wave, block);
-                scatter::sample(context, wave, block);
+                let regions = guide.map(|guide| guided::find_regions(guide, &wave.vertices));
+                direct::sample(context, regions.as_ref(), wave, block);
+                scatter::sample(context, regions.as_ref(), wave, block);
                 wave.append(context, block, &mut survivors);
             }
-            wave.finish(survivors);
+            wave.finish_bounce(survivors);
             trace::shadow(context, wave, out, counts);
             wave.guided.mark_radiance(out);
         }

@@ -37,7 +37,7 @@ impl Output<'_> {
 }
 
 impl PathIntegrator {
-    /// Light that was scattered so many times between its source and the camera, clamped if it is indirect.
+    /// Light that was scattered `scatterings` times between its source and the camera, clamped if it is indirect.
     #[inline]
     pub(super) fn clamped(&self, light: Rgb, scatterings: u32) -> Rgb {
         if self.clamp == f32::INFINITY || scatterings <= 1 {

@@ -3,6 +3,7 @@
 use super::Context;
 use super::block::{PointRows, ScatterRows, VertexRows, Vertices, spawn};
 use super::direct::{can_be_below, shadowing};
+use super::guided::Regions;
 use super::terminator;
 use super::wave::{BsdfScratch, Wave, path_flags};
 use crate::bsdf::Lambert;
@@ -14,17 +15,17 @@ use crate::math::vectorize::{Kernel, vectorize};
 use crate::sampling::Numbers;
 
 /// Samples a direction for each vertex of a block, and finds the rays along them.
-pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
+pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
     let Wave { vertices, paths, guided, terminator_rays, bsdf_rows, .. } = wave;
     let count = vertices.count;
-    if let Some(guide) = context.guide {
-        guided.choose(guide, vertices);
+    if let Some(regions) = regions {
+        guided.choose(regions, vertices);
     }
     let Vertices { rows, scatter, u_bsdf, .. } = &mut *vertices;
     vectorize(SampleDiffuse { rows, scatter, u: u_bsdf, count });
-    sample_others(context, vertices, bsdf_rows);
-    if let Some(guide) = context.guide {
-        guided.mix(context, guide, vertices);
+    sample_non_diffuse(context, vertices, bsdf_rows);
+    if let Some(regions) = regions {
+        guided.mix(context, regions, vertices);
     }
     let Vertices { rows, points, scatter, u_bsdf, .. } = &mut *vertices;
     let roulette = context.bounce + 1 >= context.config.rr_depth;
@@ -46,16 +47,16 @@ pub(super) fn sample(context: &Context, wave: &mut Wave, block: usize) {
             },
         );
     }
-    if context.guide.is_some() {
+    if regions.is_some() {
         guided.record(vertices, &paths[block]);
     }
 }
 
 /// Samples the BSDFs that are not diffuse.
-fn sample_others(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
-    let Vertices { rows: vertex, scatter, others, bsdfs, u_bsdf, .. } = vertices;
+fn sample_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
+    let Vertices { rows: vertex, scatter, non_diffuse, bsdfs, u_bsdf, .. } = vertices;
     let BsdfScratch { queries, samples, .. } = rows;
-    for lanes in bsdfs.groups(others) {
+    for lanes in bsdfs.groups(non_diffuse) {
         let Some(bsdf) = bsdfs.get(context.scene, usize::from(lanes[0])) else { continue };
         for (i, &lane) in lanes.iter().enumerate() {
             let lane = usize::from(lane);

@@ -1,4 +1,4 @@
-//! Rays that the shading normal sees and the facet hides: they start above the facet, on the smooth surface that it stands for (Hanika, "Hacking the
+//! Rays that the shading normal sees and the facet hides: they start above the facet, on the smooth surface that it approximates (Hanika, "Hacking the
 //! Shadow Terminator"), if nothing lies between.
 
 use super::Context;

@@ -8,19 +8,18 @@ use crate::color::Rgb;
 use crate::geometry::{Hit, Mesh, Shape, TrianglePoints, interpolated_normal};
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
-use crate::math::compact::Lanes;
-use crate::math::rows::{BATCH, Row};
+use crate::math::compact::Compaction;
+use crate::math::rows::{BATCH, Row, Vectors};
 use crate::math::vectorize::{Kernel, vectorize};
-use crate::math::{Frame, RayRows, Vec3};
+use crate::math::{Frame, RayRows};
 
 /// Finds the vertices of a block's paths, and which paths miss.
-#[inline(never)]
 pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     let count = wave.block_len(block);
     let Wave { vertices, paths, rays, hits, .. } = wave;
     let (paths, rays, hits) = (&paths[block], &rays[block], &hits[block]);
     let smooth = context.scene.features.shading_normals;
-    let lanes = Lanes::different(&hits.shape, HitRows::MISS, count);
+    let lanes = Compaction::different(&hits.shape, HitRows::MISS, count);
     vertices.misses.clear();
     vertices.misses.extend((0..count.min(BATCH)).filter(|&path| !lanes.contains(path)).map(|path| path as u8));
     start_vertices(vertices, &lanes, paths, rays, hits);
@@ -63,7 +62,7 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
 }
 
 /// Starts a vertex for each of the chosen paths.
-fn start_vertices(vertices: &mut Vertices, lanes: &Lanes, paths: &PathRows, rays: &RayRows, hits: &HitRows) {
+fn start_vertices(vertices: &mut Vertices, lanes: &Compaction, paths: &PathRows, rays: &RayRows, hits: &HitRows) {
     const INDICES: Row<u32> = {
         let mut indices = [0; BATCH];
         let mut i = 0;
@@ -91,6 +90,9 @@ fn start_vertices(vertices: &mut Vertices, lanes: &Lanes, paths: &PathRows, rays
     lanes.compact(&hits.prim, &mut rows.prim);
     lanes.compact(&hits.instance, &mut rows.instance);
     rows.flags = [0; BATCH];
+    // Not every hit sets them.
+    rows.dp_du = Vectors::ZERO;
+    (rows.uv_x, rows.uv_y) = ([0.0; BATCH], [0.0; BATCH]);
 }
 
 /// Resolves hits on analytic shapes in the world of which only the point and the normal is needed, many on one shape at a time.
@@ -121,8 +123,6 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
             (rows.t[lane], rows.error[lane]) = (found.t[i] as f32, placed.error());
             rows.n_g.set(lane, normals.n.get(i));
             rows.n_s.set(lane, normals.n.get(i));
-            rows.dp_du.set(lane, Vec3::ZERO);
-            (rows.uv_x[lane], rows.uv_y[lane]) = (0.0, 0.0);
             rows.is_unresolved[lane] = 0;
         }
     }

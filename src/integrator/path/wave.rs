@@ -12,7 +12,7 @@ use crate::id::LightId;
 use crate::integrator::media::MediaState;
 use crate::integrator::{CameraBatch, CameraBlock, RayCounts};
 use crate::light::{LightQueue, Receiver};
-use crate::math::compact::Lanes;
+use crate::math::compact::Compaction;
 use crate::math::rows::{BATCH, soa};
 use crate::math::{DVec3, Ray, RayCone, RayRows, Vec3};
 use crate::sampling::{PixelSeed, Requests};
@@ -132,7 +132,6 @@ pub(super) struct Wave {
 
 impl Wave {
     /// Starts a path with each camera sample.
-    #[inline(never)]
     pub fn start(&mut self, context: &Context, samples: &CameraBatch) {
         self.count = samples.len();
         let blocks = self.count.div_ceil(BATCH);
@@ -183,14 +182,13 @@ impl Wave {
     }
 
     /// Queues the shadow rays of a block's vertices and moves the paths that go on to the index `survivors` and those after it.
-    #[inline(never)]
     pub fn append(&mut self, context: &Context, block: usize, survivors: &mut usize) {
         if context.config.clamp.is_finite() {
             self.vertices.clamp_direct(context);
         }
         self.queue_shadow_rays(context, block);
         let Vertices { count, scatter, .. } = &self.vertices;
-        let lanes = Lanes::equal(&scatter.status, spawn::SPAWNED, *count);
+        let lanes = Compaction::equal(&scatter.status, spawn::SPAWNED, *count);
         if lanes.is_empty() {
             return;
         }
@@ -218,7 +216,7 @@ impl Wave {
     }
 
     /// Sets the intervals of the rays that go on.
-    pub fn finish(&mut self, survivors: usize) {
+    pub fn finish_bounce(&mut self, survivors: usize) {
         self.count = survivors;
         let blocks = self.blocks();
         for rays in &mut self.rays[..blocks] {
@@ -228,7 +226,7 @@ impl Wave {
 
     fn queue_shadow_rays(&mut self, context: &Context, block: usize) {
         let Vertices { count, rows, direct, .. } = &self.vertices;
-        let lanes = Lanes::equal(&direct.status, spawn::SPAWNED, *count);
+        let lanes = Compaction::equal(&direct.status, spawn::SPAWNED, *count);
         if context.config.wants_light_aovs() {
             for lane in (0..BATCH).filter(|&lane| lanes.contains(lane)) {
                 let lobes = || self.vertices.lobes(context.scene, lane, direct.wi.get(lane));
