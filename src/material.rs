@@ -141,7 +141,7 @@ pub enum Varying {
 
 impl Varying {
     /// The scattering over `footprint`.
-    fn bsdf(&self, textures: &[Texture], footprint: &Footprint) -> Bsdf {
+    pub fn bsdf(&self, textures: &[Texture], footprint: &Footprint) -> Bsdf {
         match self {
             Self::Diffuse { albedo, roughness } => match (albedo.at(textures, footprint), roughness.at(textures, footprint)) {
                 (albedo, 0.0) => Bsdf::Lambert(Lambert { albedo }),

@@ -146,6 +146,11 @@ impl Scene {
 
     /// The material that a ray meets at a point, of those that the shape's material consists of.
     pub fn met_material(&self, at: &SurfaceInteraction, direction: Vec3) -> &Material {
+        &self.materials[self.met_material_id(at, direction).index()]
+    }
+
+    /// The id of [`met_material`](Self::met_material).
+    pub fn met_material_id(&self, at: &SurfaceInteraction, direction: Vec3) -> MaterialId {
         self.descend(self.surface(at.shape).material, at, direction, |_| ())
     }
 
@@ -161,13 +166,13 @@ impl Scene {
     }
 
     /// The part of a material that a ray meets, which consists of no others; `visit` learns of the parts on the way to it.
-    fn descend(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3, mut visit: impl FnMut(MaterialId)) -> &Material {
+    fn descend(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3, mut visit: impl FnMut(MaterialId)) -> MaterialId {
         let is_front = direction.dot(at.n_g) < 0.0;
         loop {
             let material = &self.materials[id.index()];
             match material.part(&self.textures, || self.texture_point(at), is_front, || choice(at, direction, id)) {
                 Some(part) => id = part,
-                None => return material,
+                None => return id,
             }
             visit(id);
         }

@@ -89,6 +89,7 @@ impl Disk {
     }
 
     /// A point distributed uniformly by area.
+    #[inline(always)]
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
         // rho² is uniform between the squared radii.
         let inner_squared = self.inner_radius * self.inner_radius;

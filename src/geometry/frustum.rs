@@ -169,6 +169,7 @@ impl Frustum {
     }
 
     /// A point distributed uniformly by area.
+    #[inline(always)]
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
         // The density along the side is proportional to the radius; inverted without dividing by the difference of the radii.
         let (bottom, top) = (self.radius, self.top_radius);

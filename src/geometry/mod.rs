@@ -30,8 +30,8 @@ pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
 pub(crate) use mesh::interpolated_normal;
 pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
 pub use placed::{
-    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, Placed, PlacedNormalRows, PlacedPoint, PlacedPointRows, RayPacket,
-    ShapeSample,
+    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, Placed, PlacedNormalRows, PlacedPoint, PlacedPointRows, PlacedSampleRows,
+    RayPacket, ShapeSample,
 };
 pub use profile::Profile;
 pub use quad::Quad;

@@ -9,11 +9,11 @@
 
 mod points;
 
-pub use points::{PlacedNormalRows, PlacedPointRows};
+pub use points::{PlacedNormalRows, PlacedPointRows, PlacedSampleRows};
 
 use super::{Detail, Disk, Frustum, Hit, Quad, Revolution, Sphere, SurfaceInteraction};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Row};
 use crate::math::vectorize::{Kernel, vectorize};
 use crate::math::{Bounds, DAffine3, DVec3, Ray, RayF64, RayRows, Transform, Vec2, Vec3};
 
@@ -332,6 +332,16 @@ impl Placed {
     pub fn sample_area(&self, u: [f32; 2]) -> PlacedPoint {
         let sample = self.shape.sample([f64::from(u[0]), f64::from(u[1])]);
         self.place(sample.p, sample.n, sample.pdf_area)
+    }
+
+    /// Whether [`sample_area_rows`](Self::sample_area_rows) samples anything.
+    pub fn samples_in_rows(&self) -> bool {
+        !matches!(self.shape, Analytic::Revolution(_))
+    }
+
+    /// [`sample_area`](Self::sample_area) with each of the first `count` pairs, at most [`BATCH`].
+    pub fn sample_area_rows(&self, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+        points::sample(self, u, count, out);
     }
 
     /// Surface parameters at a placed point of the surface; where the shape's sampling found it, with `u`.

@@ -119,6 +119,7 @@ impl Quad {
     }
 
     /// A point distributed uniformly by area.
+    #[inline(always)]
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
         ShapeSample { p: self.point(u[0], u[1]), n: self.n, pdf_area: 1.0 / self.area }
     }

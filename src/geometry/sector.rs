@@ -78,7 +78,7 @@ impl Sector {
     }
 
     /// Cosine and sine of the angle `fraction * phi_max`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn direction(&self, fraction: f64) -> DVec2 {
         if self.is_full {
             // The choice of an angle may round.

@@ -133,6 +133,7 @@ impl Sphere {
     }
 
     /// A point distributed uniformly by area (a sphere's area between two heights is proportional to their difference).
+    #[inline(always)]
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
         let z = (self.z_min + (self.z_max - self.z_min) * u[1]).clamp(self.z_min, self.z_max);
         let rho = ((self.radius - z) * (self.radius + z)).sqrt();

@@ -4,7 +4,7 @@ use super::cancel::Cancel;
 use super::cones::Division;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
-use crate::geometry::{Detail, Hit, Shape, SurfaceInteraction};
+use crate::geometry::{Analytic, Detail, Hit, Shape, SurfaceInteraction};
 use crate::id::{MaterialId, ShapeId};
 use crate::light::{FoundBy, Light};
 use crate::material::Material;
@@ -100,10 +100,13 @@ impl<'a> World<'a> {
         self.skips_parameters[shape.index()] && matches!(self.scene.geometry.shape(shape), Shape::Mesh(mesh) if !mesh.is_deforming())
     }
 
-    /// Whether a shape is analytic and nothing but the point and the normal of its hits is needed.
+    /// Whether a shape is analytic and [`Placed::resolve_rows`] finds all that is needed of its hits.
     #[inline]
-    pub(super) fn is_plain_analytic(&self, shape: ShapeId) -> bool {
-        self.skips_parameters[shape.index()] && matches!(self.scene.geometry.shape(shape), Shape::Analytic(_))
+    pub(super) fn resolves_in_rows(&self, shape: ShapeId) -> bool {
+        match self.scene.geometry.shape(shape) {
+            Shape::Analytic(placed) => self.skips_parameters[shape.index()] || matches!(placed.shape, Analytic::Quad(_)),
+            Shape::Mesh(_) => false,
+        }
     }
 
     /// With the parametrisation of every surface, whether or not the scene needs it.

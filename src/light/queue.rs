@@ -1,16 +1,17 @@
 //! Light samples for many vertices at once, the same as for each of them alone.
 
-use super::area::AreaQueue;
+use super::area::{AreaQueue, EmitterQueue};
 use super::{EnvironmentMap, FoundBy, Light, LightChoice, LightSample, LightSet};
 use crate::geometry::Geometry;
 use crate::math::DVec3;
 use crate::math::rows::{BATCH, Row};
 use crate::texture::Texture;
 
-/// Vertices that sample lights, at most [`BATCH`]: rectangles and the image around the scene are sampled for all of them at once.
+/// Vertices that sample lights, at most [`BATCH`]: area lights and the image around the scene are sampled for many of them at once.
 #[derive(Default)]
 pub struct LightQueue {
     area: AreaQueue,
+    emitters: EmitterQueue,
     sky: SkyQueue,
 }
 
@@ -36,6 +37,7 @@ impl LightQueue {
     /// Empties the queue.
     pub fn clear(&mut self) {
         self.area.clear();
+        self.emitters.clear();
         self.sky.count = 0;
     }
 
@@ -43,7 +45,7 @@ impl LightQueue {
     #[inline(always)]
     pub fn push(&mut self, context: &LightContext, choice: LightChoice, lane: usize, p: DVec3, u: [f32; 2]) -> Option<LightSample> {
         match context.lights.get(choice.id) {
-            Light::Area(light) if self.area.push(light, choice, lane, p, u) => None,
+            Light::Area(light) if self.area.push(light, choice, lane, p, u) || self.emitters.push(light, choice, lane, p, u) => None,
             _ if context.lights.image_at_infinity().is_some_and(|(id, _)| id == choice.id) => {
                 self.sky.push(lane, choice.pmf, u);
                 None
@@ -56,6 +58,11 @@ impl LightQueue {
     #[inline(always)]
     pub fn sample(&mut self, context: &LightContext, mut set: impl FnMut(usize, &LightSample, f32)) {
         self.area.sample(&mut set);
+        let area = |id| match context.lights.get(id) {
+            Light::Area(light) => Some(light),
+            _ => None,
+        };
+        self.emitters.sample(area, context.geometry, &mut set);
         if let (Some((_, image)), true) = (context.lights.image_at_infinity(), self.sky.count > 0) {
             self.sky.sample(image, context.found_by, set);
         }

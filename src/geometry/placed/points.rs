@@ -1,9 +1,9 @@
 //! Points of many hits on one analytic surface, the same as of each of them alone.
 
 use super::{Analytic, CenteredRay, LocalHit, Placed};
-use crate::geometry::{Detail, Disk, Frustum, LocalSurface, Quad, Sphere};
+use crate::geometry::{Detail, Disk, Frustum, LocalSurface, Quad, ShapeSample, Sphere};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::rows::{BATCH, Element, soa};
+use crate::math::rows::{BATCH, Element, Row, pair, soa};
 use crate::math::vectorize::{Kernel, vectorize};
 use crate::math::{DVec3, Ray, RayF64, RayRows, Vec3};
 
@@ -22,13 +22,70 @@ soa! {
     pub struct PlacedNormalRows {
         /// Unit normal.
         n: Vec3,
+        /// Change of the point with u; as the next two, zero for other shapes than quads.
+        dp_du: Vec3,
+        /// The first of uv.
+        uv_x: f32,
+        /// The second of uv.
+        uv_y: f32,
         /// 0 where [`Placed::interaction`] has to be called, else 1.
         is_resolved: u32,
     }
 }
 
-/// Finds the points of the hits of the first `count` rays at the distances `t`, at most [`BATCH`], without parameters. Nothing is resolved on surfaces of
-/// revolution.
+soa! {
+    /// Points as [`PlacedPoint`](super::PlacedPoint) has them.
+    pub struct PlacedSampleRows {
+        /// The point, in the space the shape is placed in.
+        p: DVec3,
+        /// Unit normal.
+        n: DVec3,
+        /// Density per placed area.
+        pdf_area: f64,
+    }
+}
+
+/// Samples the first `count` points, at most [`BATCH`]. Surfaces of revolution are sampled alone.
+pub(super) fn sample(placed: &Placed, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+    vectorize(Sample { placed, u, count, out });
+}
+
+struct Sample<'a> {
+    placed: &'a Placed,
+    u: &'a [Row; 2],
+    count: usize,
+    out: &'a mut PlacedSampleRows,
+}
+
+impl Kernel for Sample<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { placed, u, count, out } = self;
+        match &placed.shape {
+            Analytic::Sphere(sphere) => sample_on(placed, sphere, u, count, out),
+            Analytic::Quad(quad) => sample_on(placed, quad, u, count, out),
+            Analytic::Disk(disk) => sample_on(placed, disk, u, count, out),
+            Analytic::Frustum(frustum) => sample_on(placed, frustum, u, count, out),
+            Analytic::Revolution(_) => out.pdf_area = [0.0; BATCH],
+        }
+    }
+}
+
+#[inline(always)]
+fn sample_on<S: LaneShape>(placed: &Placed, shape: &S, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        let sample = shape.sample(pair(u, i).map(f64::from));
+        let point = placed.place(sample.p, sample.n, sample.pdf_area);
+        out.p.set(i, point.p);
+        out.n.set(i, point.n.as_dvec3());
+        out.pdf_area[i] = point.pdf_area;
+    }
+}
+
+/// Finds the points of the hits of the first `count` rays at the distances `t`, at most [`BATCH`], with parameters on quads alone. Nothing is resolved on
+/// surfaces of revolution.
 pub(super) fn resolve(
     placed: &Placed,
     rays: &RayRows,
@@ -53,10 +110,11 @@ struct Resolve<'a> {
 trait LaneShape {
     fn distance(&self, ray: &RayF64) -> f64;
     fn place(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface;
+    fn sample(&self, u: [f64; 2]) -> ShapeSample;
 }
 
 macro_rules! lane_shapes {
-    ($($shape:ty),*) => {$(
+    ($($shape:ty: $detail:expr),*) => {$(
         impl LaneShape for $shape {
             #[inline(always)]
             fn distance(&self, ray: &RayF64) -> f64 {
@@ -65,13 +123,18 @@ macro_rules! lane_shapes {
 
             #[inline(always)]
             fn place(&self, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
-                self.surface(Detail::Place, ray, hit)
+                self.surface($detail, ray, hit)
+            }
+
+            #[inline(always)]
+            fn sample(&self, u: [f64; 2]) -> ShapeSample {
+                <$shape>::sample(self, u)
             }
         }
     )*};
 }
 
-lane_shapes!(Sphere, Quad, Disk, Frustum);
+lane_shapes!(Sphere: Detail::Place, Quad: Detail::Full, Disk: Detail::Place, Frustum: Detail::Place);
 
 impl Kernel for Resolve<'_> {
     type Output = ();
@@ -108,6 +171,8 @@ fn resolve_on<S: LaneShape>(
         points.p.set(i, found.p);
         points.t[i] = distance + shift;
         normals.n.set(i, found.n);
+        normals.dp_du.set(i, placed.transform.vector(surface.dp_du).as_vec3());
+        (normals.uv_x[i], normals.uv_y[i]) = (surface.uv[0] as f32, surface.uv[1] as f32);
         // The first hit is the one that was found, and ahead; false for a NaN.
         let expected = f64::from(<f32 as Element>::get(t, i));
         let is_resolved = ((expected - shift) - distance <= 8.0 * UNIT_ROUNDOFF * expected) & (distance + shift > 0.0);

@@ -69,26 +69,31 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
         if surface.first_light.is_some() {
             vertices.emitters.push(lane as u8);
         }
-        match &scene.materials[surface.material.index()] {
+        let mut id = surface.material;
+        if scene.materials[id.index()].parts().is_some() {
+            id = scene.met_material_id(&vertices.interaction(lane), vertices.rows.direction.get(lane));
+        }
+        match &scene.materials[id.index()] {
             Material::Constant(Bsdf::Lambert(Lambert { albedo })) => set_diffuse(vertices, lane, *albedo),
             Material::Constant(bsdf) => {
-                vertices.bsdfs.ids[lane] = surface.material.0;
+                vertices.bsdfs.ids[lane] = id.0;
                 set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, bsdf);
             }
-            _ => {
+            Material::Varying(varying) => {
                 let path = vertices.path(lane);
                 let (at, ray) = (vertices.interaction(lane), rays[block].get(path));
                 let cone = cones.get(block * BATCH + path);
-                let mut place = None;
-                let footprint = || context.world.footprint(cone, &ray, hits[block].get(path).as_ref(), &at);
-                match scene.bsdf(&at, ray.direction, footprint, &mut place) {
-                    Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, *albedo),
+                let footprint = context.world.footprint(cone, &ray, hits[block].get(path).as_ref(), &at);
+                match varying.bsdf(&scene.textures, &footprint) {
+                    Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
                     bsdf => {
-                        set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, bsdf);
-                        vertices.bsdfs.set_made(lane, bsdf.clone());
+                        set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
+                        vertices.bsdfs.set_made(lane, bsdf);
                     }
                 }
             }
+            // Met materials do not consist of others.
+            Material::Mix { .. } | Material::TwoSided { .. } => set_diffuse(vertices, lane, Rgb::BLACK),
         }
     }
 }

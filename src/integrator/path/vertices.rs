@@ -95,14 +95,14 @@ fn start_vertices(vertices: &mut Vertices, lanes: &Compaction, paths: &PathRows,
     (rows.uv_x, rows.uv_y) = ([0.0; BATCH], [0.0; BATCH]);
 }
 
-/// Resolves hits on analytic shapes in the world of which only the point and the normal is needed, many on one shape at a time.
+/// Resolves hits on analytic shapes in the world that need no more than rows have, many on one shape at a time.
 fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, hits: &HitRows) {
     let Vertices { count, rows, points, analytic, .. } = vertices;
     let AnalyticScratch { lanes, rays: gathered, t, points: found, normals } = analytic;
     lanes.clear();
     let is_wanted = |lane: usize| {
         let is_in_world = rows.is_unresolved[lane] != 0 && rows.instance[lane] == Hit::NO_INSTANCE.0;
-        is_in_world && context.world.is_plain_analytic(ShapeId(rows.shape[lane]))
+        is_in_world && context.world.resolves_in_rows(ShapeId(rows.shape[lane]))
     };
     lanes.extend((0..BATCH.min(*count)).filter(|&lane| is_wanted(lane)).map(|lane| lane as u8));
     lanes.sort_unstable_by_key(|&lane| (rows.shape[usize::from(lane)], lane));
@@ -123,6 +123,8 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
             (rows.t[lane], rows.error[lane]) = (found.t[i] as f32, placed.error());
             rows.n_g.set(lane, normals.n.get(i));
             rows.n_s.set(lane, normals.n.get(i));
+            rows.dp_du.set(lane, normals.dp_du.get(i));
+            (rows.uv_x[lane], rows.uv_y[lane]) = (normals.uv_x[i], normals.uv_y[i]);
             rows.is_unresolved[lane] = 0;
         }
     }

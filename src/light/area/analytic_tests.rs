@@ -1,9 +1,12 @@
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
-use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance};
+use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance, words};
 use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
-use crate::math::{DAffine3, DMat3, Transform};
+use crate::id::LightId;
+use crate::light::LightChoice;
+use crate::math::rows::BATCH;
+use crate::math::{DAffine3, DMat3, Rng, Transform};
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
 const TWO_SIDED: Emission = Emission { two_sided: true, ..WHITE };
@@ -110,4 +113,39 @@ fn the_area_of_a_stretched_surface_is_that_of_the_surface() {
     // Half an even turn keeps area.
     let geometry = place(Analytic::Disk(Disk::new(2.0, 1.0, FRAC_PI_3).unwrap()), DAffine3::from_rotation_y(0.3));
     assert!((light(&geometry, WHITE).area() / (0.5 * FRAC_PI_3 * 3.0) - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
+    let mut shapes = partial();
+    shapes.push(("sphere", sphere()));
+    let maps = [skew([1.0, 2.0, 0.5]), skew([0.7; 3])];
+    let placed =
+        shapes.iter().flat_map(|(_, shape)| maps.map(|map| Shape::Analytic(Placed::new(shape.clone(), Transform::new(map).unwrap()))));
+    let geometry = Geometry { shapes: placed.collect(), ..Geometry::default() };
+    let lights: Vec<_> = (0..geometry.shapes.len())
+        .flat_map(|i| [WHITE, TWO_SIDED].map(|emission| AreaLight::new(ShapeId::new(i), PrimId(0), emission, &geometry, &[])))
+        .filter(|light| matches!(light.form, Form::Sphere(_) | Form::Placed { .. }))
+        .collect();
+    let mut random = Rng::new(31);
+    let mut queue = EmitterQueue::default();
+    let mut sampled = 0;
+    for kinds in [1, 2, 4, 4, 4, 4, lights.len()] {
+        queue.clear();
+        let first = random.below(lights.len());
+        let queries: Vec<_> =
+            (0..BATCH).map(|_| ((first + random.below(kinds)) % lights.len(), random.cube() * 5.0 - 2.0, random.pair())).collect();
+        for (lane, (i, p, u)) in queries.iter().enumerate() {
+            assert!(queue.push(&lights[*i], LightChoice { id: LightId::new(*i), pmf: 0.5 }, lane, *p, *u));
+        }
+        let mut found = vec![None; BATCH];
+        queue.sample(|id| Some(&lights[id.index()]), &geometry, |lane, sample, pmf| found[lane] = Some((*sample, pmf)));
+        for ((i, p, u), found) in queries.iter().zip(&found) {
+            let alone = lights[*i].sample(&geometry, &[], *p, *u);
+            assert_eq!(found.as_ref().map(|(sample, _)| words(sample)), alone.as_ref().map(words), "{i} {p} {u:?}");
+            assert!(found.as_ref().is_none_or(|(_, pmf)| *pmf == 0.5));
+            sampled += usize::from(found.is_some());
+        }
+    }
+    assert!(sampled > BATCH);
 }

@@ -1,5 +1,6 @@
 //! Light from surfaces.
 
+mod emitters;
 mod parallelogram;
 mod queue;
 mod sphere;
@@ -8,6 +9,7 @@ mod triangle;
 
 use std::f64::consts::PI;
 
+pub(super) use emitters::EmitterQueue;
 use parallelogram::ParallelogramEmitter;
 pub(super) use queue::AreaQueue;
 use sphere::SphereEmitter;
@@ -116,21 +118,29 @@ impl SurfaceSample {
     /// The point `q` with the unit normal `n`, found with a density per area, as seen from `p`; `None` if it is seen edge-on.
     #[inline]
     fn from_area(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> Option<Self> {
+        let (wi, pdf) = Self::direction_and_pdf(p, q, n, pdf_area);
+        Self { p: q, n: n.as_vec3(), wi: wi.as_vec3(), pdf: pdf as f32 }.if_valid()
+    }
+
+    /// The direction of `q` from `p`, and the density per solid angle for one per area.
+    #[inline(always)]
+    fn direction_and_pdf(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> (DVec3, f64) {
         let toward = q - p;
         let distance_squared = toward.length_squared();
         let distance = distance_squared.sqrt();
-        let pdf = (pdf_area * distance_squared * distance / n.dot(toward).abs()) as f32;
-        // A NaN, where both points are one, is no sample either.
-        (pdf > 0.0 && pdf < f32::INFINITY).then(|| Self { p: q, n: n.as_vec3(), wi: (toward * (1.0 / distance)).as_vec3(), pdf })
+        (toward * (1.0 / distance), pdf_area * distance_squared * distance / n.dot(toward).abs())
+    }
+
+    /// `None` without a finite density. A NaN, where both points are one, is no sample either.
+    #[inline]
+    fn if_valid(self) -> Option<Self> {
+        (self.pdf > 0.0 && self.pdf < f32::INFINITY).then_some(self)
     }
 
     /// The density of [`from_area`](Self::from_area), 0 where that gives nothing.
     #[inline]
     fn pdf_from_area(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> f32 {
-        let toward = q - p;
-        let distance_squared = toward.length_squared();
-        let pdf = (pdf_area * distance_squared * distance_squared.sqrt() / n.dot(toward).abs()) as f32;
-        if pdf > 0.0 && pdf < f32::INFINITY { pdf } else { 0.0 }
+        Self::from_area(p, q, n, pdf_area).map_or(0.0, |sample| sample.pdf)
     }
 }
 

@@ -28,7 +28,7 @@ impl SphereEmitter {
     }
 
     /// The cone that the sphere fills at this squared distance from its centre, without cancellation however far that is.
-    #[inline]
+    #[inline(always)]
     fn cone(&self, distance_squared: f64) -> Cone {
         let radius_squared = self.radius * self.radius;
         let sin_squared = radius_squared / distance_squared;
@@ -39,11 +39,19 @@ impl SphereEmitter {
     /// A point of the sphere as seen from `p`: uniform by solid angle from outside, uniform by area from inside.
     #[inline]
     pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
-        let from_center = p - self.center;
-        let distance_squared = from_center.length_squared();
+        let distance_squared = (p - self.center).length_squared();
         if !self.is_outside(distance_squared) {
             return self.sample_from_inside(p, u);
         }
+        let OutsideSample { q, n, wi, pdf } = self.sample_from_outside(p, u);
+        Some(SurfaceSample { p: q, n: n.as_vec3(), wi: wi.as_vec3(), pdf: pdf as f32 })
+    }
+
+    /// [`sample`](Self::sample) from outside, without branches, for loops over many vertices.
+    #[inline(always)]
+    pub fn sample_from_outside(&self, p: DVec3, u: [f32; 2]) -> OutsideSample {
+        let from_center = p - self.center;
+        let distance_squared = from_center.length_squared();
         let distance = distance_squared.sqrt();
         let cone = self.cone(distance_squared);
 
@@ -63,12 +71,12 @@ impl SphereEmitter {
         let around = unit_circle(u[1]);
         let across = x * around.x + y * around.y;
         let outward = axis * cos_alpha + across * sin_alpha;
-        Some(SurfaceSample {
-            p: self.center + outward * self.radius,
-            n: outward.as_vec3(),
-            wi: (across * sin - axis * cos).as_vec3(),
-            pdf: (1.0 / (TAU * cone.one_minus_cos)) as f32,
-        })
+        OutsideSample {
+            q: self.center + outward * self.radius,
+            n: outward,
+            wi: across * sin - axis * cos,
+            pdf: 1.0 / (TAU * cone.one_minus_cos),
+        }
     }
 
     #[inline]
@@ -96,6 +104,18 @@ impl SphereEmitter {
     pub fn area(&self) -> f64 {
         4.0 * PI * self.radius * self.radius
     }
+}
+
+/// A point of a sphere as seen from a point outside of it.
+pub(super) struct OutsideSample {
+    /// The point.
+    pub q: DVec3,
+    /// Unit normal, outwards.
+    pub n: DVec3,
+    /// Unit direction to the point.
+    pub wi: DVec3,
+    /// Density per solid angle.
+    pub pdf: f64,
 }
 
 /// A cone by its half-angle.

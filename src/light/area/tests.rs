@@ -150,6 +150,12 @@ fn hits_have_the_density_of_samples() {
     }
 }
 
+/// All numbers of the sample of an area light.
+pub(super) fn words(sample: &LightSample) -> (Vec3, Rgb, f32, DVec3, Vec3, f32) {
+    let ShadowTarget::Point(target) = sample.target else { panic!("an area light at infinity") };
+    (sample.wi, sample.radiance, sample.pdf, target.p, target.n, target.error)
+}
+
 #[test]
 fn queued_samples_have_the_bits_of_single_ones() {
     let geometry = ceiling();
@@ -169,10 +175,6 @@ fn queued_samples_have_the_bits_of_single_ones() {
         let mut found = vec![None; count];
         queue.sample(|lane, sample, pmf| found[lane] = Some((*sample, pmf)));
         for ((i, p, u), found) in queries.iter().zip(&found) {
-            let words = |s: &LightSample| {
-                let ShadowTarget::Point(target) = s.target else { panic!("an area light at infinity") };
-                (s.wi, s.radiance, s.pdf, target.p, target.n, target.error)
-            };
             let alone = lights[*i].sample(&geometry, &[], *p, *u);
             assert_eq!(found.as_ref().map(|(sample, _)| words(sample)), alone.as_ref().map(words), "{i} {p} {u:?}");
             assert!(found.as_ref().is_none_or(|(_, pmf)| *pmf == 0.5));

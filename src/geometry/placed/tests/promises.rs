@@ -260,9 +260,13 @@ fn points_resolved_in_rows_are_those_of_single_hits() {
             let (mut points, mut normals) = (PlacedPointRows::default(), PlacedNormalRows::default());
             placed.resolve_rows(&rays, &t, count, &mut points, &mut normals);
             for (i, hit) in found.iter().enumerate().filter(|&(i, _)| normals.is_resolved[i] != 0) {
-                let at = placed.interaction_with(Detail::Place, &rays.get(i), hit).unwrap();
+                let at = placed.interaction(&rays.get(i), hit).unwrap();
                 let found = (points.p.get(i), points.t[i] as f32, normals.n.get(i), placed.error());
                 assert_eq!(found, (at.p, at.t, at.n_g, at.error), "{placed:?} {i}");
+                if matches!(placed.shape, Analytic::Quad(_)) {
+                    let found = (normals.dp_du.get(i), normals.uv_x[i], normals.uv_y[i]);
+                    assert_eq!(found, (at.dp_du, at.uv.x, at.uv.y), "{placed:?} {i}");
+                }
                 resolved += 1;
             }
             hits += if placed.intersects_packets() { count } else { 0 };

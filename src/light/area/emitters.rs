@@ -1,0 +1,182 @@
+//! Spheres and other analytic shapes that many vertices sample at once, the same as each of them alone.
+
+use super::{AreaLight, Form, SphereEmitter, SurfaceSample};
+use crate::geometry::{Geometry, Placed, PlacedSampleRows, Shape};
+use crate::id::LightId;
+use crate::light::{LightChoice, LightSample};
+use crate::math::DVec3;
+use crate::math::rows::{BATCH, Row, pair, soa};
+use crate::math::vectorize::{Kernel, vectorize};
+
+soa! {
+    /// Points that sample a light, and the points sampled as seen from there.
+    struct ViewRows {
+        p: DVec3,
+        q: DVec3,
+        n: DVec3,
+        wi: DVec3,
+        /// Density per solid angle. Not positive where there is no sample.
+        pdf: f64,
+    }
+}
+
+/// A vertex that samples a light.
+#[derive(Clone, Copy)]
+struct Entry {
+    id: LightId,
+    lane: u8,
+    pmf: f32,
+    p: DVec3,
+    u: [f32; 2],
+}
+
+/// Vertices that sample spheres and other analytic shapes, at most [`BATCH`].
+pub(in crate::light) struct EmitterQueue {
+    entries: Vec<Entry>,
+    u: [Row; 2],
+    views: ViewRows,
+    samples: PlacedSampleRows,
+}
+
+impl Default for EmitterQueue {
+    fn default() -> Self {
+        Self { entries: Vec::with_capacity(BATCH), u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: PlacedSampleRows::default() }
+    }
+}
+
+/// Vertices with one light that are worth a vector.
+const MIN_LANES: usize = 3;
+
+impl EmitterQueue {
+    /// Empties the queue.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
+    /// Queues the sample of a light, for the vertex `lane` at `p`; `false` if the light is to be sampled alone.
+    #[inline(always)]
+    pub fn push(&mut self, light: &AreaLight, choice: LightChoice, lane: usize, p: DVec3, u: [f32; 2]) -> bool {
+        if !(light.emission.is_even() && matches!(light.form, Form::Sphere(_) | Form::Placed { .. })) {
+            return false;
+        }
+        self.entries.push(Entry { id: choice.id, lane: lane as u8, pmf: choice.pmf, p, u });
+        true
+    }
+
+    /// Samples all lights, `light` by its id; `set` takes each sample with its vertex and the probability of the choice.
+    pub fn sample<'a>(
+        &mut self,
+        light: impl Fn(LightId) -> Option<&'a AreaLight>,
+        geometry: &Geometry,
+        mut set: impl FnMut(usize, &LightSample, f32),
+    ) {
+        let Self { entries, u, views, samples } = self;
+        entries.sort_unstable_by_key(|entry| (entry.id.0, entry.lane));
+        for group in entries.chunk_by(|a, b| a.id == b.id) {
+            let Some(light) = light(group[0].id) else { continue };
+            let is_in_rows = group.len() >= MIN_LANES && {
+                for (i, entry) in group.iter().enumerate() {
+                    views.p.set(i, entry.p);
+                    (u[0][i], u[1][i]) = (entry.u[0], entry.u[1]);
+                }
+                light.sample_rows(geometry, u, group.len(), samples, views)
+            };
+            for (i, entry) in group.iter().enumerate() {
+                let sample = if is_in_rows { light.sample_of_row(views, i) } else { light.sample(geometry, &[], entry.p, entry.u) };
+                if let Some(sample) = sample {
+                    set(usize::from(entry.lane), &sample, entry.pmf);
+                }
+            }
+        }
+    }
+}
+
+impl AreaLight {
+    /// Samples the light for the first `count` points of `views`; `false` if it has to be sampled alone.
+    fn sample_rows(&self, geometry: &Geometry, u: &[Row; 2], count: usize, samples: &mut PlacedSampleRows, views: &mut ViewRows) -> bool {
+        match (&self.form, geometry.shape(self.shape)) {
+            (Form::Sphere(sphere), _) if !sphere.inward && views.p_are(count, |p| sphere.sees_front(p)) => {
+                vectorize(SampleSphere { sphere, u, views, count });
+                true
+            }
+            (Form::Placed { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
+                sample_placed(placed, u, count, samples, views);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn sample_of_row(&self, views: &ViewRows, i: usize) -> Option<LightSample> {
+        let (n, wi, pdf) = (views.n.get(i).as_vec3(), views.wi.get(i).as_vec3(), views.pdf[i] as f32);
+        let sample = SurfaceSample { p: views.q.get(i), n, wi, pdf }.if_valid()?;
+        let is_seen = self.emission.two_sided || matches!(self.form, Form::Sphere(_)) || wi.dot(n) < 0.0;
+        is_seen.then(|| LightSample::at(&sample, 0.0, self.emission.radiance))
+    }
+}
+
+impl ViewRows {
+    fn p_are(&self, count: usize, is: impl Fn(DVec3) -> bool) -> bool {
+        (0..count.min(BATCH)).all(|i| is(self.p.get(i)))
+    }
+}
+
+struct SampleSphere<'a> {
+    sphere: &'a SphereEmitter,
+    u: &'a [Row; 2],
+    views: &'a mut ViewRows,
+    count: usize,
+}
+
+impl Kernel for SampleSphere<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        sample_sphere(self.sphere, self.u, self.views, self.count);
+    }
+}
+
+// Whole vectors, here and below: what is computed for vertices beyond the count is not used.
+#[inline(always)]
+fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, count: usize) {
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        let point = sphere.sample_from_outside(views.p.get(i), pair(u, i));
+        views.q.set(i, point.q);
+        views.n.set(i, point.n);
+        views.wi.set(i, point.wi);
+        views.pdf[i] = point.pdf;
+    }
+}
+
+fn sample_placed(placed: &Placed, u: &[Row; 2], count: usize, samples: &mut PlacedSampleRows, views: &mut ViewRows) {
+    placed.sample_area_rows(u, count, samples);
+    vectorize(SeeSamples { samples, views, count });
+}
+
+struct SeeSamples<'a> {
+    samples: &'a PlacedSampleRows,
+    views: &'a mut ViewRows,
+    count: usize,
+}
+
+impl Kernel for SeeSamples<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        see_samples(self.samples, self.views, self.count);
+    }
+}
+
+#[inline(always)]
+fn see_samples(samples: &PlacedSampleRows, views: &mut ViewRows, count: usize) {
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        let (q, n) = (samples.p.get(i), samples.n.get(i));
+        let (wi, pdf) = SurfaceSample::direction_and_pdf(views.p.get(i), q, n, samples.pdf_area[i]);
+        views.q.set(i, q);
+        views.n.set(i, n);
+        views.wi.set(i, wi);
+        views.pdf[i] = pdf;
+    }
+}
