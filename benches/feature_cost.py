@@ -66,12 +66,13 @@ FEATURES = {
         "`Material::Constant`; `Features::filtered_textures`",
         [
             ("src/scene.rs", r"place\.insert\(self\.met_material\(at, direction\)\.bsdf\(&self\.textures, footprint\)\)", "{ let _ = (direction, footprint, place); " + NEVER + " }"),
-            ("src/light/area/mod.rs", r"Some\(id\) => self\.textured\(&textures\[id\.index\(\)\], uv\(\)\),", "Some(_) => { let _ = (textures, uv); " + NEVER + " }"),
+            ("src/light/area/mod.rs", r"Some\(id\) => self\.textured\(&textures\[id\.index\(\)\], &point\(\)\),", "Some(_) => { let _ = (textures, point); " + NEVER + " }"),
+            ("src/integrator/path/materials.rs", r"Material::Varying\(varying\) => \{", "Material::Varying(_) if false => {}\n            Material::Varying(varying) => {\n                if true { " + NEVER + " }"),
             ("src/integrator/cones.rs", r"= self\.division\?;", "= None::<Division>?;"),
-            ("src/integrator/path.rs", r"cones\.get\(i\)\.copied\(\)", "None::<RayCone>"),
+            ("src/integrator/path/wave.rs", r"cones\.get\(path\)", "None::<&RayCone>"),
         ],
     ),
-    "vertex colours": ("`Features::vertex_colors`", [flag("vertex_colors")]),
+    "mesh attributes": ("`Features::attributes`", [flag("attributes")]),
     "cut-outs": (
         "`Cutouts::is_empty`; a filter of the meshes that have holes",
         [
@@ -95,9 +96,10 @@ FEATURES = {
         [("src/camera/mod.rs", r"Some\(lens\) => \{\s*let on_lens[^}]*\}", "Some(_) => { let _ = lens_u; " + NEVER + " }")],
     ),
     "user geometry": (
-        "`Shape::Analytic`",
+        "`Features::analytic_shapes`, `Shape::Analytic`",
         [
-            ("src/geometry/mod.rs", r"Self::Analytic\(placed\) => placed\.interaction\(ray, hit\),", "Self::Analytic(_) => " + NEVER + ","),
+            flag("analytic_shapes"),
+            ("src/geometry/mod.rs", r"Self::Analytic\(placed\) => placed\.interaction_with\(detail, ray, hit\),", "Self::Analytic(_) => " + NEVER + ","),
         ],
     ),
     "instances": (
@@ -118,19 +120,20 @@ FEATURES = {
         ],
     ),
     "light tree": ("`LightSet::selection`", [("src/light/set.rs", r"(?<=if let Some\(tree\) = )&self\.tree|(?<=match )&self\.tree", "&None::<Box<LightTree>>")]),
-    "media": ("`Features::media`, a constant of `shade_all`", [flag("media")]),
+    "media": ("`Features::media`", [flag("media")]),
     "anisotropy": ("`Features::anisotropic`, `Features::parameters`", [flag("anisotropic"), flag("parameters")]),
     "layers beside the colour": (
-        "a constant of `shade_all`, `LayerSet`",
+        "`Context::wants_surfaces` and the like, `LayerSet`",
         [
-            ("src/integrator/path.rs", r"self\.needs != SurfaceNeeds::default\(\)", "false"),
-            ("src/integrator/path.rs", r"self\.sorts\(\)", "false"),
-            ("src/film/tile.rs", r"self\.layers\.beside_color\(\)", "false"),
+            ("src/integrator/path/mod.rs", r"self\.config\.needs != SurfaceNeeds::default\(\)", "false"),
+            ("src/integrator/path/mod.rs", r"self\.config\.parts\.by_scattering \|\| self\.config\.needs\.features", "false"),
+            ("src/integrator/path/radiance.rs", r"self\.parts\.count\(\) > 0", "false"),
+            ("src/film/tile.rs", r"self\.layout\.beside_color\(\)", "false"),
         ],
     ),
     "variance": ("`FilmTile::wants_groups`", [("src/film/tile.rs", r"!self\.spread\.is_empty\(\)", "false")]),
-    "filters with negative lobes": ("the filter's weight", [("src/film/tile.rs", r"if weight != 1\.0 \{\s*self\.correct\(", "if false {\n            self.correct(")]),
-    "clamping": ("the clamp of `path`", [("src/integrator/path.rs", r"self\.clamp == f32::INFINITY \|\|", "true ||")]),
+    "filters with negative lobes": ("the filter's weight", [("src/film/tile.rs", r"self\.layout\.signed", "false")]),
+    "clamping": ("the clamp of `path`", [("src/integrator/path/radiance.rs", r"self\.clamp == f32::INFINITY \|\|", "true ||")]),
 }
 # What a scene uses it cannot do without.
 # Scenes with large meshes are no use: reading them and building over them varies by more than a feature costs.
@@ -149,9 +152,6 @@ def copy_sources(work):
             (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, work / name)
     shutil.rmtree(work / "src", ignore_errors=True)
     shutil.copytree(ROOT / "src", work / "src", ignore=lambda folder, names: UNNEEDED if Path(folder) == ROOT / "src" else set())
-    # The build script includes this file.
-    (work / "src/denoise").mkdir()
-    shutil.copy(ROOT / "src/denoise/search.rs", work / "src/denoise/search.rs")
     library = work / "src/lib.rs"
     library.write_text(re.sub(r"pub mod (bench|convert|denoise|farm|live);\n", "", library.read_text()))
     (work / "src/main.rs").write_text(PROGRAM)

@@ -17,18 +17,19 @@ mod tree;
 
 pub use area::{AreaLight, Emission};
 pub use directional::DirectionalLight;
-pub use environment::{Environment, EnvironmentMap, EnvironmentMapError};
+pub use environment::{Environment, EnvironmentMap, EnvironmentMapError, EnvironmentScratch};
 pub use groups::LightGroups;
 pub use ies::{IesLight, IesProfile};
 pub use point::PointLight;
 pub use projector::{Projection, Projector};
-pub use queue::{LightContext, LightQueue};
+pub use queue::{LightContext, LightQueries, LightQueue, LightSampleRows, light_target};
 pub use set::{LightChoice, LightSelection, LightSet};
 pub use spot::SpotLight;
 pub use tree::Receiver;
 
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint, SurfaceInteraction};
+use crate::math::rows::soa;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::texture::Texture;
 use bounds::LightBounds;
@@ -69,6 +70,16 @@ pub struct InfinityEval {
     pub radiance: Rgb,
     /// Density per solid angle with which the light's `sample` chooses the direction.
     pub pdf: f32,
+}
+
+soa! {
+    /// As [`InfinityEval`].
+    pub struct InfinityEvalRows {
+        /// Radiance arriving.
+        radiance: Rgb,
+        /// Density per solid angle.
+        pdf: f32,
+    }
 }
 
 /// Where a shadow ray ends.

@@ -1,18 +1,89 @@
 //! Light samples for many vertices at once, the same as for each of them alone.
 
 use super::area::{AreaQueue, EmitterQueue};
-use super::{EnvironmentMap, FoundBy, Light, LightChoice, LightSample, LightSet};
-use crate::geometry::Geometry;
-use crate::math::DVec3;
-use crate::math::rows::{BATCH, Row};
+use super::environment::{EnvironmentScratch, InfinitySampleRows};
+use super::{EnvironmentMap, FoundBy, Light, LightSample, LightSet, Receiver, ShadowTarget};
+use crate::color::Rgb;
+use crate::geometry::{Geometry, SpawnPoint};
+use crate::id::LightId;
+use crate::math::rows::{BATCH, Points, Row, soa};
+use crate::math::{DVec3, Vec3};
+use crate::sampling::Numbers;
 use crate::texture::Texture;
 
+/// Where light samples end.
+pub mod light_target {
+    /// There is no sample.
+    pub const NONE: u32 = 0;
+    /// At a point.
+    pub const POINT: u32 = 1;
+    /// At infinity.
+    pub const INFINITY: u32 = 2;
+}
+
+soa! {
+    /// Samples as [`LightSample`] has them, without the point they end at.
+    pub struct LightSampleRows {
+        /// Id of the light; only where one was chosen.
+        light: u32,
+        /// See [`light_target`]. All others are only set where there is a sample.
+        target: u32,
+        /// Whether nothing else can find the direction.
+        is_delta: u32,
+        /// Unit direction to the light.
+        direction: Vec3,
+        /// Radiance that arrives.
+        radiance: Rgb,
+        /// Density per solid angle, times the probability with which the light was chosen.
+        pdf: f32,
+        /// Of an end at a point: the normal there,
+        target_n: Vec3,
+        /// and the error of the position.
+        target_error: f32,
+    }
+}
+
+impl LightSampleRows {
+    /// Sets the sample of a vertex, whose light was chosen with probability `pmf`.
+    #[inline(always)]
+    fn set(&mut self, lane: usize, sample: &LightSample, pmf: f32, target_p: &mut Points) {
+        self.is_delta[lane] = u32::from(sample.is_delta);
+        self.direction.set(lane, sample.wi);
+        self.radiance.set(lane, sample.radiance);
+        self.pdf[lane] = sample.pdf * pmf;
+        match &sample.target {
+            ShadowTarget::Point(SpawnPoint { p, n, error }) => {
+                self.target[lane] = light_target::POINT;
+                target_p.set(lane, *p);
+                self.target_n.set(lane, *n);
+                self.target_error[lane] = *error;
+            }
+            ShadowTarget::Infinity => self.target[lane] = light_target::INFINITY,
+        }
+    }
+}
+
 /// Vertices that sample lights, at most [`BATCH`]: area lights and the image around the scene are sampled for many of them at once.
-#[derive(Default)]
 pub struct LightQueue {
+    /// Probability with which the light of each vertex was chosen.
+    pmfs: Row,
     area: AreaQueue,
     emitters: EmitterQueue,
     sky: SkyQueue,
+    /// Vertices whose lights are sampled one by one.
+    alone: Vec<(usize, LightId)>,
+}
+
+impl Default for LightQueue {
+    fn default() -> Self {
+        Self {
+            pmfs: [0.0; BATCH],
+            area: AreaQueue::default(),
+            emitters: EmitterQueue::default(),
+            sky: SkyQueue::default(),
+            alone: Vec::with_capacity(BATCH),
+        }
+    }
 }
 
 /// What light sampling reads.
@@ -28,6 +99,26 @@ pub struct LightContext<'a> {
     pub found_by: FoundBy,
 }
 
+/// What light sampling reads of vertices.
+#[derive(Clone, Copy)]
+pub struct LightQueries<'a> {
+    /// How many vertices there are.
+    pub count: usize,
+    /// Their points.
+    pub points: &'a Points,
+    /// Numbers in `[0, 1)`: the first and the last choose a light, the others a point of it.
+    pub u: &'a Numbers,
+}
+
+impl LightQueries<'_> {
+    /// The point of a vertex, and the numbers for a point of its light.
+    #[inline(always)]
+    pub(super) fn get(&self, lane: usize) -> (DVec3, [f32; 2]) {
+        let [_, u, v, _] = self.u.of(lane);
+        (self.points.get(lane), [u, v])
+    }
+}
+
 impl LightQueue {
     /// Prepares for another scene.
     pub fn reset(&mut self) {
@@ -38,67 +129,75 @@ impl LightQueue {
     pub fn clear(&mut self) {
         self.area.clear();
         self.emitters.clear();
-        self.sky.count = 0;
+        self.sky.lanes.clear();
+        self.alone.clear();
     }
 
-    /// Samples a light, `u` in the unit square, for the vertex `lane` at `p`: now (the result), or with [`sample`](Self::sample).
+    /// Chooses a light for the vertex `lane` and queues its sample.
     #[inline(always)]
-    pub fn push(&mut self, context: &LightContext, choice: LightChoice, lane: usize, p: DVec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn push(
+        &mut self,
+        context: &LightContext,
+        lane: usize,
+        receiver: &Receiver,
+        [u, _, _, v]: [f32; 4],
+        samples: &mut LightSampleRows,
+    ) {
+        let Some(choice) = context.lights.choose(receiver, [u, v], context.found_by) else { return };
+        (samples.light[lane], self.pmfs[lane]) = (choice.id.0, choice.pmf);
         match context.lights.get(choice.id) {
-            Light::Area(light) if self.area.push(light, choice, lane, p, u) || self.emitters.push(light, choice, lane, p, u) => None,
-            _ if context.lights.image_at_infinity().is_some_and(|(id, _)| id == choice.id) => {
-                self.sky.push(lane, choice.pmf, u);
-                None
-            }
-            light => light.sample(context.geometry, context.textures, p, u, context.found_by),
+            Light::Area(light) if self.area.push(light, choice.id, lane) || self.emitters.push(light, choice.id, lane) => {}
+            _ if context.lights.image_at_infinity().is_some_and(|(id, _)| id == choice.id) => self.sky.lanes.push(lane),
+            _ => self.alone.push((lane, choice.id)),
         }
     }
 
-    /// Samples what was queued; `set` takes each sample with its vertex and the probability with which the light was chosen.
-    #[inline(always)]
-    pub fn sample(&mut self, context: &LightContext, mut set: impl FnMut(usize, &LightSample, f32)) {
-        self.area.sample(&mut set);
-        let area = |id| match context.lights.get(id) {
-            Light::Area(light) => Some(light),
-            _ => None,
-        };
-        self.emitters.sample(area, context.geometry, &mut set);
-        if let (Some((_, image)), true) = (context.lights.image_at_infinity(), self.sky.count > 0) {
-            self.sky.sample(image, context.found_by, set);
+    /// Samples what was queued, and sets the targets of all vertices.
+    pub fn sample(&mut self, context: &LightContext, queries: &LightQueries, samples: &mut LightSampleRows, target_p: &mut Points) {
+        let Self { pmfs, area, emitters, sky, alone } = self;
+        area.sample(queries, pmfs, samples, target_p);
+        let mut set = |lane: usize, sample: &LightSample| samples.set(lane, sample, pmfs[lane], target_p);
+        emitters.sample(context, queries, &mut set);
+        if let Some((_, image)) = context.lights.image_at_infinity() {
+            sky.sample(image, context.found_by, queries, &mut set);
+        }
+        for &(lane, id) in &*alone {
+            let (p, u) = queries.get(lane);
+            if let Some(sample) = context.lights.get(id).sample(context.geometry, context.textures, p, u, context.found_by) {
+                set(lane, &sample);
+            }
         }
     }
 }
 
 /// Vertices that sample an image around the scene.
 struct SkyQueue {
-    count: usize,
-    lanes: Row<u32>,
-    pmfs: Row,
+    lanes: Vec<usize>,
     u: [[f32; 2]; BATCH],
-    samples: [Option<LightSample>; BATCH],
+    scratch: EnvironmentScratch,
+    samples: InfinitySampleRows,
 }
 
 impl Default for SkyQueue {
     fn default() -> Self {
-        Self { count: 0, lanes: [0; BATCH], pmfs: [0.0; BATCH], u: [[0.0; 2]; BATCH], samples: [None; BATCH] }
+        Self {
+            lanes: Vec::with_capacity(BATCH),
+            u: [[0.0; 2]; BATCH],
+            scratch: EnvironmentScratch::default(),
+            samples: InfinitySampleRows::default(),
+        }
     }
 }
 
 impl SkyQueue {
-    #[inline(always)]
-    fn push(&mut self, lane: usize, pmf: f32, u: [f32; 2]) {
-        let i = self.count;
-        self.count += 1;
-        (self.lanes[i], self.pmfs[i], self.u[i]) = (lane as u32, pmf, u);
-    }
-
-    #[inline(always)]
-    fn sample(&mut self, image: &EnvironmentMap, found_by: FoundBy, mut set: impl FnMut(usize, &LightSample, f32)) {
-        let Self { count, lanes, pmfs, u, samples } = self;
-        image.sample_batch(&u[..*count], found_by, &mut samples[..*count]);
-        for ((sample, &lane), &pmf) in samples[..*count].iter().zip(&*lanes).zip(&*pmfs) {
-            if let Some(sample) = sample {
-                set(lane as usize, sample, pmf);
+    fn sample(&mut self, image: &EnvironmentMap, found_by: FoundBy, queries: &LightQueries, mut set: impl FnMut(usize, &LightSample)) {
+        let Self { lanes, u, scratch, samples } = self;
+        for (u, &lane) in u.iter_mut().zip(&*lanes) {
+            *u = queries.get(lane).1;
+        }
+        if !lanes.is_empty() && image.sample_rows(u, lanes.len(), found_by, scratch, samples) {
+            for (i, &lane) in lanes.iter().enumerate() {
+                set(lane, &LightSample::far_away(samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
             }
         }
     }

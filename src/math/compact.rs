@@ -107,6 +107,10 @@ impl Compaction {
     /// may change too.
     #[inline]
     pub fn append<T: Compact>(&self, from: &Row<T>, to: &mut Row<T>, next: Option<&mut Row<T>>, at: usize) {
+        if self.count == BATCH && at == 0 {
+            *to = *from;
+            return;
+        }
         if let Some(simd) = self.simd {
             simd.vectorize(Compress { simd, lanes: self, from, to, next, at });
             return;

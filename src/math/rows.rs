@@ -71,6 +71,12 @@ impl Vectors {
     }
 }
 
+impl Default for Vectors {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
 impl Element for Vec3 {
     type Rows = Vectors;
     const ZERO: Vectors = Vectors::ZERO;

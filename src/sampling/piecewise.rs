@@ -67,16 +67,14 @@ impl Block {
     /// The probability of a cell of a block that has the probability `pmf`; positive where the weight is.
     #[inline]
     fn pmf(&self, x: usize, y: usize, pmf: f64) -> f32 {
-        let weight = f64::from(self.0[y][x]);
+        let weight = self.0[y][x];
         if weight == 0.0 {
             return 0.0;
         }
-        let [a, b, c, d] = self.0.map(|row| {
-            let [a, b, c, d] = row.map(f64::from);
-            (a + b) + (c + d)
-        });
-        let sum = (a + b) + (c + d);
-        ((pmf * weight / sum) as f32).max(f32::MIN_POSITIVE)
+        let [first, second, third, fourth] = &self.0;
+        let columns: [f32; SIDE] = std::array::from_fn(|i| (first[i] + second[i]) + (third[i] + fourth[i]));
+        let sum = (columns[0] + columns[1]) + (columns[2] + columns[3]);
+        ((pmf * f64::from(weight / sum)) as f32).max(f32::MIN_POSITIVE)
     }
 }
 
@@ -269,9 +267,26 @@ impl Piecewise2d {
     /// The probability of a cell.
     #[inline]
     pub fn pmf(&self, x: usize, y: usize) -> f32 {
+        self.blocks[y / SIDE * self.columns.len + x / SIDE].pmf(x % SIDE, y % SIDE, self.block_pmf(x, y))
+    }
+
+    /// The probabilities of the first `count` cells, as [`pmf`](Self::pmf).
+    pub fn pmfs<const N: usize>(&self, x: &[u32; N], y: &[u32; N], count: usize, pmfs: &mut [f32; N]) {
+        let mut blocks = [Block::default(); N];
+        for ((block, x), y) in blocks.iter_mut().zip(x).zip(y).take(count) {
+            *block = self.blocks[*y as usize / SIDE * self.columns.len + *x as usize / SIDE];
+        }
+        for (((pmf, block), &x), &y) in pmfs.iter_mut().zip(&blocks).zip(x).zip(y).take(count) {
+            let (x, y) = (x as usize, y as usize);
+            *pmf = block.pmf(x % SIDE, y % SIDE, self.block_pmf(x, y));
+        }
+    }
+
+    /// The probability of the block of a cell.
+    #[inline]
+    fn block_pmf(&self, x: usize, y: usize) -> f64 {
         let (across, down) = (x / SIDE, y / SIDE);
-        let block = self.rows.pmf(0, down) * self.columns.pmf(down, across);
-        self.blocks[down * self.columns.len + across].pmf(x % SIDE, y % SIDE, block)
+        self.rows.pmf(0, down) * self.columns.pmf(down, across)
     }
 
     /// A point with its density; `u` in `[0, 1)²`.

@@ -7,7 +7,7 @@ use crate::color::Rgb;
 use crate::geometry::{PlacedNormalRows, PlacedPointRows, SpawnPoint, SurfaceInteraction};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::integrator::parts::LobeWeights;
-use crate::light::Receiver;
+use crate::light::{LightSampleRows, Receiver};
 use crate::math::rows::{BATCH, Row, soa};
 use crate::math::{DVec3, Frame, RayRows, Vec2, Vec3};
 use crate::sampling::{Numbers, Requests};
@@ -113,18 +113,9 @@ soa! {
 }
 
 soa! {
-    /// Light sampled at vertices, and the shadow rays to it.
+    /// Direct light at vertices, and the shadow rays to it.
     pub(super) struct DirectRows {
-        /// See [`super::direct::target`].
-        target: u32,
-        is_delta: u32,
-        light: u32,
-        direction: Vec3,
-        radiance: Rgb,
-        pdf: f32,
-        target_n: Vec3,
-        target_error: f32,
-        /// The direction, in the frame.
+        /// The direction of the light sample, in the frame.
         wi: Vec3,
         /// The BSDF for it,
         value: Rgb,
@@ -201,6 +192,7 @@ pub(super) struct Vertices {
     pub triangles: TriangleRows,
     pub points: PointRows,
     pub analytic: AnalyticScratch,
+    pub light_samples: LightSampleRows,
     pub direct: DirectRows,
     pub scatter: ScatterRows,
     /// Paths of the block that leave the scene.
@@ -326,6 +318,10 @@ impl Vertices {
     /// The target of the light sample of a vertex.
     #[inline(always)]
     pub fn light_target(&self, lane: usize) -> SpawnPoint {
-        SpawnPoint { p: self.points.target_p.get(lane), n: self.direct.target_n.get(lane), error: self.direct.target_error[lane] }
+        SpawnPoint {
+            p: self.points.target_p.get(lane),
+            n: self.light_samples.target_n.get(lane),
+            error: self.light_samples.target_error[lane],
+        }
     }
 }

@@ -10,43 +10,32 @@ use crate::geometry::SpawnPoint;
 use crate::integrator::Strategy;
 use crate::integrator::shading::terminator_factor;
 use crate::integrator::vertex::HemisphereTest;
-use crate::light::{LightContext, LightQueue, LightSample, ShadowTarget};
+use crate::light::{LightContext, LightQueries, LightQueue, LightSampleRows, light_target};
 use crate::math::rows::BATCH;
 use crate::math::vectorize::{Kernel, vectorize};
 use crate::math::{Frame, Vec3};
 use crate::sampling::power_heuristic;
 
-/// Where light sampling ends.
-pub(super) mod target {
-    /// No light was sampled.
-    pub const NONE: u32 = 0;
-    /// At a point.
-    pub const POINT: u32 = 1;
-    /// At infinity.
-    pub const INFINITY: u32 = 2;
-}
-
 /// Samples light for the vertices of a block, and finds the shadow rays.
 pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
     let Wave { vertices, media, terminator_rays, light_queue, bsdf_rows, .. } = wave;
     let count = vertices.count;
-    vertices.direct.target[..count].fill(target::NONE);
     if context.scene.lights.is_empty() {
         vertices.direct.status[..count].fill(spawn::NONE);
         return;
     }
     choose_lights(context, vertices, light_queue);
-    vectorize(EvalDiffuse { rows: &vertices.rows, direct: &mut vertices.direct, count });
+    vectorize(EvalDiffuse { rows: &vertices.rows, lights: &vertices.light_samples, direct: &mut vertices.direct, count });
     eval_non_diffuse(context, vertices, bsdf_rows);
     if let Some(regions) = regions {
         guided::mix_scatter_pdfs(regions, vertices);
     }
-    let Vertices { rows, points, direct, .. } = &mut *vertices;
+    let Vertices { rows, points, light_samples: lights, direct, .. } = &mut *vertices;
     let is_mis = context.config.strategy == Strategy::Mis;
     if context.scene.features.reliefs {
-        vectorize(Illuminate::<true> { rows, points, direct, is_mis, count });
+        vectorize(Illuminate::<true> { rows, points, lights, direct, is_mis, count });
     } else {
-        vectorize(Illuminate::<false> { rows, points, direct, is_mis, count });
+        vectorize(Illuminate::<false> { rows, points, lights, direct, is_mis, count });
     }
     if context.scene.features.shading_normals {
         wave.counts.shadow += offset_below_facets(context, vertices, terminator_rays);
@@ -58,11 +47,11 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
 
 /// Evaluates the BSDFs that are not diffuse towards the lights.
 fn eval_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfScratch) {
-    let Vertices { rows: vertex, direct, non_diffuse, bsdfs, .. } = vertices;
+    let Vertices { rows: vertex, light_samples: lights, direct, non_diffuse, bsdfs, .. } = vertices;
     let BsdfScratch { lanes, queries, evals, .. } = rows;
     for group in bsdfs.groups(non_diffuse) {
         lanes.clear();
-        lanes.extend(group.iter().filter(|&&lane| direct.target[usize::from(lane)] != target::NONE));
+        lanes.extend(group.iter().filter(|&&lane| lights.target[usize::from(lane)] != light_target::NONE));
         let Some(bsdf) = lanes.first().and_then(|&lane| bsdfs.get(context.scene, usize::from(lane))) else { continue };
         for (i, &lane) in lanes.iter().enumerate() {
             queries.wo.set(i, vertex.wo.get(usize::from(lane)));
@@ -81,46 +70,24 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
     let (scene, lights) = (context.scene, &context.scene.lights);
     let light_context = LightContext { geometry: &scene.geometry, textures: &scene.textures, lights, found_by: context.found_by };
     queue.clear();
-    for lane in 0..vertices.count.min(BATCH) {
-        if vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) != 0 {
-            continue;
-        }
-        let u = vertices.u_light.of(lane);
+    for lane in (0..vertices.count.min(BATCH)).filter(|&lane| vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0) {
         let receiver = vertices.receiver(lane);
-        let Some(choice) = lights.choose(&receiver, [u[0], u[3]], context.found_by) else { continue };
-        vertices.direct.light[lane] = choice.id.0;
-        if let Some(sample) = queue.push(&light_context, choice, lane, receiver.p, [u[1], u[2]]) {
-            set_light(context, vertices, lane, &sample, choice.pmf);
-        }
+        queue.push(&light_context, lane, &receiver, vertices.u_light.of(lane), &mut vertices.light_samples);
     }
-    queue.sample(&light_context, |lane, sample, pmf| set_light(context, vertices, lane, sample, pmf));
-}
-
-/// Sets the light that a vertex samples, which was chosen with probability `pmf`.
-#[inline(always)]
-fn set_light(context: &Context, vertices: &mut Vertices, lane: usize, sample: &LightSample, pmf: f32) {
-    if context.config.strategy == Strategy::Bsdf && !sample.is_delta {
-        return;
-    }
-    let direct = &mut vertices.direct;
-    direct.is_delta[lane] = u32::from(sample.is_delta);
-    direct.direction.set(lane, sample.wi);
-    direct.radiance.set(lane, sample.radiance);
-    direct.pdf[lane] = sample.pdf * pmf;
-    match &sample.target {
-        ShadowTarget::Point(SpawnPoint { p, n, error }) => {
-            direct.target[lane] = target::POINT;
-            vertices.points.target_p.set(lane, *p);
-            direct.target_n.set(lane, *n);
-            direct.target_error[lane] = *error;
+    let Vertices { count, points, u_light, light_samples, .. } = vertices;
+    let queries = LightQueries { count: *count, points: &points.p, u: u_light };
+    queue.sample(&light_context, &queries, light_samples, &mut points.target_p);
+    if context.config.strategy == Strategy::Bsdf {
+        for lane in (0..BATCH).filter(|&lane| light_samples.is_delta[lane] == 0) {
+            light_samples.target[lane] = light_target::NONE;
         }
-        ShadowTarget::Infinity => direct.target[lane] = target::INFINITY,
     }
 }
 
 /// Evaluates diffuse reflection towards the lights.
 struct EvalDiffuse<'a> {
     rows: &'a VertexRows,
+    lights: &'a LightSampleRows,
     direct: &'a mut DirectRows,
     count: usize,
 }
@@ -130,15 +97,15 @@ impl Kernel for EvalDiffuse<'_> {
 
     #[inline(always)]
     fn call(self) {
-        eval_diffuse(self.rows, self.direct, self.count);
+        eval_diffuse(self.rows, self.lights, self.direct, self.count);
     }
 }
 
 #[inline(always)]
-fn eval_diffuse(rows: &VertexRows, direct: &mut DirectRows, count: usize) {
+fn eval_diffuse(rows: &VertexRows, lights: &LightSampleRows, direct: &mut DirectRows, count: usize) {
     for i in 0..count.min(BATCH) {
         let frame = Frame { x: rows.frame_x.get(i), y: rows.frame_y.get(i), z: rows.n.get(i) };
-        let wi = frame.to_local(direct.direction.get(i));
+        let wi = frame.to_local(lights.direction.get(i));
         let eval = Lambert { albedo: rows.albedo.get(i) }.eval(rows.wo.get(i), wi);
         direct.wi.set(i, wi);
         direct.value.set(i, eval.value);
@@ -150,6 +117,7 @@ fn eval_diffuse(rows: &VertexRows, direct: &mut DirectRows, count: usize) {
 struct Illuminate<'a, const RELIEF: bool> {
     rows: &'a VertexRows,
     points: &'a PointRows,
+    lights: &'a LightSampleRows,
     direct: &'a mut DirectRows,
     is_mis: bool,
     count: usize,
@@ -160,30 +128,37 @@ impl<const RELIEF: bool> Kernel for Illuminate<'_, RELIEF> {
 
     #[inline(always)]
     fn call(self) {
-        illuminate::<RELIEF>(self.rows, self.points, self.direct, self.is_mis, self.count);
+        illuminate::<RELIEF>(self.rows, self.points, self.lights, self.direct, self.is_mis, self.count);
     }
 }
 
 #[inline(always)]
-fn illuminate<const RELIEF: bool>(rows: &VertexRows, points: &PointRows, direct: &mut DirectRows, is_mis: bool, count: usize) {
+fn illuminate<const RELIEF: bool>(
+    rows: &VertexRows,
+    points: &PointRows,
+    lights: &LightSampleRows,
+    direct: &mut DirectRows,
+    is_mis: bool,
+    count: usize,
+) {
     for i in 0..count.min(BATCH) {
-        let direction = direct.direction.get(i);
+        let direction = lights.direction.get(i);
         let cos = direction.dot(rows.n_g.get(i));
         let cos_local = direct.wi.0[2][i];
         let test = HemisphereTest::new([rows.wo.0[2][i], cos_local], [rows.cos_geometric[i], cos]);
         let factor = shadowing::<RELIEF>(test, [cos, cos_local, rows.cos_normals[i]]);
-        let pdf = direct.pdf[i];
-        let weight = if is_mis & (direct.is_delta[i] == 0) { power_heuristic(pdf, direct.scatter_pdf[i]) } else { 1.0 };
+        let pdf = lights.pdf[i];
+        let weight = if is_mis & (lights.is_delta[i] == 0) { power_heuristic(pdf, direct.scatter_pdf[i]) } else { 1.0 };
         let value = direct.value.get(i) * factor;
-        let contribution = rows.throughput.get(i) * value * direct.radiance.get(i) * (weight / pdf);
+        let contribution = rows.throughput.get(i) * value * lights.radiance.get(i) * (weight / pdf);
         direct.contribution.set(i, contribution);
-        let is_lit = (direct.target[i] != target::NONE) & !contribution.is_black();
+        let is_lit = (lights.target[i] != light_target::NONE) & !contribution.is_black();
         direct.status[i] = spawn::status(is_lit & test.agrees(), is_lit & can_be_below(rows, test, i));
 
         let start = SpawnPoint { p: points.p.get(i), n: rows.n_g.get(i), error: rows.error[i] };
-        let end = SpawnPoint { p: points.target_p.get(i), n: direct.target_n.get(i), error: direct.target_error[i] };
+        let end = SpawnPoint { p: points.target_p.get(i), n: lights.target_n.get(i), error: lights.target_error[i] };
         let (near, far) = (start.ray_to(&end), start.ray_along(direction));
-        let is_near = direct.target[i] == target::POINT;
+        let is_near = lights.target[i] == light_target::POINT;
         let choose = |a: f32, b: f32| if is_near { a } else { b };
         let choose_vector = |a: Vec3, b: Vec3| Vec3::new(choose(a.x, b.x), choose(a.y, b.y), choose(a.z, b.z));
         direct.shadow_origin.set(i, choose_vector(near.origin, far.origin));
@@ -213,9 +188,9 @@ fn offset_below_facets(context: &Context, vertices: &mut Vertices, buffers: &mut
         buffers,
         |vertices| &mut vertices.direct.status,
         |vertices, lane, start| {
-            let ray = match vertices.direct.target[lane] {
-                target::POINT => start.spawn_to(&vertices.light_target(lane)),
-                _ => start.spawn(vertices.direct.direction.get(lane)),
+            let ray = match vertices.light_samples.target[lane] {
+                light_target::POINT => start.spawn_to(&vertices.light_target(lane)),
+                _ => start.spawn(vertices.light_samples.direction.get(lane)),
             };
             terminator::set_shadow_ray(vertices, lane, &ray);
         },

@@ -2,11 +2,11 @@
 
 use super::Context;
 use super::block::{Vertices, spawn, vertex_flags};
-use super::direct::target;
 use super::radiance::Output;
 use super::wave::PathRows;
 use crate::color::Rgb;
 use crate::guiding::{Guide, GuideRegion, Record};
+use crate::light::light_target;
 use crate::math::Vec3;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::rows::BATCH;
@@ -69,10 +69,10 @@ fn mixed(region: &GuideRegion, [bsdf, guide]: [f32; 2]) -> f32 {
 
 /// Replaces the densities with which scattering finds the lights' directions.
 pub(super) fn mix_scatter_pdfs(regions: &Regions, vertices: &mut Vertices) {
-    let direct = &mut vertices.direct;
+    let Vertices { light_samples, direct, .. } = vertices;
     for (lane, region) in regions.iter().enumerate().take(vertices.count) {
-        if let (Some(region), true) = (region, direct.target[lane] != target::NONE) {
-            direct.scatter_pdf[lane] = mixed(region, [direct.scatter_pdf[lane], region.directions.pdf(direct.direction.get(lane))]);
+        if let (Some(region), true) = (region, light_samples.target[lane] != light_target::NONE) {
+            direct.scatter_pdf[lane] = mixed(region, [direct.scatter_pdf[lane], region.directions.pdf(light_samples.direction.get(lane))]);
         }
     }
 }

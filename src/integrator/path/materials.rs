@@ -121,7 +121,7 @@ fn flags(bsdf: &Bsdf) -> u32 {
 /// Sorts the vertices that are not diffuse by their BSDFs.
 pub(super) fn sort_by_bsdf(vertices: &mut Vertices) {
     let Vertices { non_diffuse, bsdfs, .. } = vertices;
-    non_diffuse.sort_unstable_by_key(|&lane| (bsdfs.ids[usize::from(lane)], lane));
+    non_diffuse.sort_unstable_by_key(|&lane| u64::from(bsdfs.ids[usize::from(lane)]) << 8 | u64::from(lane));
 }
 
 /// Replaces the BSDFs of boundaries between media, and of rough surfaces under path space regularization.

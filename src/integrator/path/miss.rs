@@ -6,54 +6,57 @@ use super::wave::{PathRows, Wave};
 use crate::color::Rgb;
 use crate::id::LightId;
 use crate::integrator::parts::LightEvent;
-use crate::light::InfinityEval;
+use crate::light::{EnvironmentScratch, InfinityEval, InfinityEvalRows};
 use crate::math::Vec3;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Vectors};
+
+/// Buffers of one block.
+#[derive(Default)]
+pub(super) struct MissScratch {
+    directions: Vectors,
+    evals: InfinityEvalRows,
+    environment: EnvironmentScratch,
+}
 
 /// Adds the light that a block's paths meet which leave the scene.
 pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Output) {
-    let Wave { vertices, paths, rays, .. } = &*wave;
+    let Wave { vertices, paths, rays, light_aovs, miss, .. } = wave;
     let (paths, rays, misses) = (&paths[block], &rays[block], &vertices.misses);
     if misses.is_empty() {
         return;
     }
     let world = context.world;
-    let mut directions = [Vec3::ZERO; BATCH];
-    let mut evals = [InfinityEval::default(); BATCH];
+    let MissScratch { directions, evals, environment } = miss;
     let image = context.scene.lights.image_at_infinity();
-    for (direction, &path) in directions.iter_mut().zip(misses) {
-        *direction = rays.direction.get(usize::from(path));
+    for (k, &path) in misses.iter().enumerate() {
+        directions.set(k, rays.direction.get(usize::from(path)));
     }
     if let Some((_, image)) = image {
-        image.eval_batch(&directions[..misses.len()], context.found_by, &mut evals[..misses.len()]);
+        // No density is needed of what the camera sees.
+        let found_by = (context.bounce > 0).then_some(context.found_by);
+        image.eval_rows(directions, misses.len(), found_by, environment, evals);
     }
     let is_visible = context.bounce > 0 || (!context.config.hide_emitters && world.shows_background);
     for (k, &path) in misses.iter().enumerate() {
         let i = usize::from(path);
-        let known = image.map(|_| evals[k]);
+        let direction = directions.get(k);
+        let known = image.map(|_| InfinityEval { radiance: evals.radiance.get(k), pdf: evals.pdf[k] });
         let slot = paths.slot[i];
         if is_visible {
             if context.bounce == 0 {
                 out.batch.pixels[slot as usize].alpha = world.background_alpha();
             }
-            let light = context.config.clamped(paths.throughput.get(i) * radiance(context, paths, i, directions[k], known), context.bounce);
+            let light = context.config.clamped(paths.throughput.get(i) * radiance(context, paths, i, direction, known), context.bounce);
             out.add(slot, light);
             if context.config.wants_light_aovs() {
-                let event = wave.light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Environment);
-                add_to_light_aovs(context, (paths, i), (directions[k], known), light, event, out);
+                let event = light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Environment);
+                add_to_light_aovs(context, (paths, i), (direction, known), light, event, out);
             }
         }
         if context.wants_surfaces() {
             let shown = context.bounce > 0 || !context.config.hide_emitters;
-            let radiance = || if shown { radiance(context, paths, i, directions[k], known) } else { Rgb::BLACK };
-            super::surface_aovs::write_miss(
-                context,
-                slot,
-                wave.light_aovs.feature_throughput(block * BATCH + i),
-                directions[k],
-                radiance,
-                out,
-            );
+            let radiance = || if shown { radiance(context, paths, i, direction, known) } else { Rgb::BLACK };
+            super::surface_aovs::write_miss(context, slot, light_aovs.feature_throughput(block * BATCH + i), direction, radiance, out);
         }
     }
 }

@@ -105,7 +105,7 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
         is_in_world && context.world.resolves_in_rows(ShapeId(rows.shape[lane]))
     };
     lanes.extend((0..BATCH.min(*count)).filter(|&lane| is_wanted(lane)).map(|lane| lane as u8));
-    lanes.sort_unstable_by_key(|&lane| (rows.shape[usize::from(lane)], lane));
+    lanes.sort_unstable_by_key(|&lane| u64::from(rows.shape[usize::from(lane)]) << 8 | u64::from(lane));
     for lanes in lanes.chunk_by(|&a, &b| rows.shape[usize::from(a)] == rows.shape[usize::from(b)]) {
         let Shape::Analytic(placed) = context.scene.geometry.shape(ShapeId(rows.shape[usize::from(lanes[0])])) else { continue };
         if lanes.len() < MIN_ANALYTIC_LANES {

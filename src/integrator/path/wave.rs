@@ -3,6 +3,7 @@
 use super::block::{Vertices, spawn};
 use super::guided::GuideRecorder;
 use super::light_aovs::LightAovs;
+use super::miss::MissScratch;
 use super::terminator::TerminatorRays;
 use super::{Context, dimensions};
 use crate::accel::HitRows;
@@ -125,6 +126,7 @@ pub(super) struct Wave {
     pub shadows: ShadowQueue,
     pub terminator_rays: TerminatorRays,
     pub light_queue: LightQueue,
+    pub miss: MissScratch,
     pub bsdf_rows: BsdfScratch,
     /// Rays that stages have traced beside those of paths and shadow rays.
     pub counts: RayCounts,
@@ -231,7 +233,7 @@ impl Wave {
             for lane in (0..BATCH).filter(|&lane| lanes.contains(lane)) {
                 let lobes = || self.vertices.lobes(context.scene, lane, direct.wi.get(lane));
                 let event = self.light_aovs.shadow_event(context, block * BATCH + self.vertices.path(lane), lobes);
-                self.light_aovs.shadow_sources.push((event, LightId(direct.light[lane])));
+                self.light_aovs.shadow_sources.push((event, LightId(self.vertices.light_samples.light[lane])));
             }
         }
         let shadows = &mut self.shadows;

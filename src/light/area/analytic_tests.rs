@@ -4,9 +4,10 @@ use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance, 
 use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
 use crate::id::LightId;
-use crate::light::LightChoice;
-use crate::math::rows::BATCH;
+use crate::light::{FoundBy, Light, LightContext, LightQueries, LightSet};
+use crate::math::rows::{BATCH, Points};
 use crate::math::{DAffine3, DMat3, Rng, Transform};
+use crate::sampling::Numbers;
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
 const TWO_SIDED: Emission = Emission { two_sided: true, ..WHITE };
@@ -129,21 +130,25 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
         .collect();
     let mut random = Rng::new(31);
     let mut queue = EmitterQueue::default();
+    let set = LightSet::new(lights.iter().cloned().map(Light::Area).collect(), &geometry);
+    let context = LightContext { geometry: &geometry, textures: &[], lights: &set, found_by: FoundBy::Lights };
+    let mut points = Points::ZERO;
     let mut sampled = 0;
     for kinds in [1, 2, 4, 4, 4, 4, lights.len()] {
         queue.clear();
         let first = random.below(lights.len());
-        let queries: Vec<_> =
+        let vertices: Vec<_> =
             (0..BATCH).map(|_| ((first + random.below(kinds)) % lights.len(), random.cube() * 5.0 - 2.0, random.pair())).collect();
-        for (lane, (i, p, u)) in queries.iter().enumerate() {
-            assert!(queue.push(&lights[*i], LightChoice { id: LightId::new(*i), pmf: 0.5 }, lane, *p, *u));
+        let numbers = Numbers::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
+        for (lane, (i, p, _)) in vertices.iter().enumerate() {
+            points.set(lane, *p);
+            assert!(queue.push(&lights[*i], LightId::new(*i), lane));
         }
         let mut found = vec![None; BATCH];
-        queue.sample(|id| Some(&lights[id.index()]), &geometry, |lane, sample, pmf| found[lane] = Some((*sample, pmf)));
-        for ((i, p, u), found) in queries.iter().zip(&found) {
+        queue.sample(&context, &LightQueries { count: BATCH, points: &points, u: &numbers }, |lane, sample| found[lane] = Some(*sample));
+        for ((i, p, u), found) in vertices.iter().zip(&found) {
             let alone = lights[*i].sample(&geometry, &[], *p, *u);
-            assert_eq!(found.as_ref().map(|(sample, _)| words(sample)), alone.as_ref().map(words), "{i} {p} {u:?}");
-            assert!(found.as_ref().is_none_or(|(_, pmf)| *pmf == 0.5));
+            assert_eq!(found.as_ref().map(words), alone.as_ref().map(words), "{i} {p} {u:?}");
             sampled += usize::from(found.is_some());
         }
     }

@@ -3,7 +3,7 @@
 use super::{AreaLight, Form, SphereEmitter, SurfaceSample};
 use crate::geometry::{Geometry, Placed, PlacedSampleRows, Shape};
 use crate::id::LightId;
-use crate::light::{LightChoice, LightSample};
+use crate::light::{Light, LightContext, LightQueries, LightSample};
 use crate::math::DVec3;
 use crate::math::rows::{BATCH, Row, pair, soa};
 use crate::math::vectorize::{Kernel, vectorize};
@@ -20,19 +20,10 @@ soa! {
     }
 }
 
-/// A vertex that samples a light.
-#[derive(Clone, Copy)]
-struct Entry {
-    id: LightId,
-    lane: u8,
-    pmf: f32,
-    p: DVec3,
-    u: [f32; 2],
-}
-
 /// Vertices that sample spheres and other analytic shapes, at most [`BATCH`].
 pub(in crate::light) struct EmitterQueue {
-    entries: Vec<Entry>,
+    /// The light and the vertex of each.
+    entries: Vec<(LightId, usize)>,
     u: [Row; 2],
     views: ViewRows,
     samples: PlacedSampleRows,
@@ -53,38 +44,36 @@ impl EmitterQueue {
         self.entries.clear();
     }
 
-    /// Queues the sample of a light, for the vertex `lane` at `p`; `false` if the light is to be sampled alone.
+    /// Queues the sample of a light for the vertex `lane`; `false` if the light is not sampled here.
     #[inline(always)]
-    pub fn push(&mut self, light: &AreaLight, choice: LightChoice, lane: usize, p: DVec3, u: [f32; 2]) -> bool {
+    pub fn push(&mut self, light: &AreaLight, id: LightId, lane: usize) -> bool {
         if !(light.emission.is_even() && matches!(light.form, Form::Sphere(_) | Form::Placed { .. })) {
             return false;
         }
-        self.entries.push(Entry { id: choice.id, lane: lane as u8, pmf: choice.pmf, p, u });
+        self.entries.push((id, lane));
         true
     }
 
-    /// Samples all lights, `light` by its id; `set` takes each sample with its vertex and the probability of the choice.
-    pub fn sample<'a>(
-        &mut self,
-        light: impl Fn(LightId) -> Option<&'a AreaLight>,
-        geometry: &Geometry,
-        mut set: impl FnMut(usize, &LightSample, f32),
-    ) {
+    /// Samples all lights; `set` takes each sample with its vertex.
+    pub fn sample(&mut self, context: &LightContext, queries: &LightQueries, mut set: impl FnMut(usize, &LightSample)) {
         let Self { entries, u, views, samples } = self;
-        entries.sort_unstable_by_key(|entry| (entry.id.0, entry.lane));
-        for group in entries.chunk_by(|a, b| a.id == b.id) {
-            let Some(light) = light(group[0].id) else { continue };
+        entries.sort_unstable_by_key(|&(id, lane)| u64::from(id.0) << 8 | lane as u64);
+        for group in entries.chunk_by(|a, b| a.0 == b.0) {
+            let Light::Area(light) = context.lights.get(group[0].0) else { continue };
             let is_in_rows = group.len() >= MIN_LANES && {
-                for (i, entry) in group.iter().enumerate() {
-                    views.p.set(i, entry.p);
-                    (u[0][i], u[1][i]) = (entry.u[0], entry.u[1]);
+                for (i, &(_, lane)) in group.iter().enumerate() {
+                    let (p, [s, t]) = queries.get(lane);
+                    views.p.set(i, p);
+                    (u[0][i], u[1][i]) = (s, t);
                 }
-                light.sample_rows(geometry, u, group.len(), samples, views)
+                light.sample_rows(context.geometry, u, group.len(), samples, views)
             };
-            for (i, entry) in group.iter().enumerate() {
-                let sample = if is_in_rows { light.sample_of_row(views, i) } else { light.sample(geometry, &[], entry.p, entry.u) };
+            for (i, &(_, lane)) in group.iter().enumerate() {
+                let (p, u) = queries.get(lane);
+                let sample =
+                    if is_in_rows { light.sample_of_row(views, i) } else { light.sample(context.geometry, context.textures, p, u) };
                 if let Some(sample) = sample {
-                    set(usize::from(entry.lane), &sample, entry.pmf);
+                    set(lane, &sample);
                 }
             }
         }

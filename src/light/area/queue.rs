@@ -3,17 +3,16 @@
 use super::AreaLight;
 use super::parallelogram::{ParallelogramRows, ParallelogramSample};
 use crate::color::Rgb;
-use crate::geometry::SpawnPoint;
-use crate::light::{LightChoice, LightSample, ShadowTarget};
-use crate::math::rows::{BATCH, Element, Row, pair, soa};
+use crate::id::LightId;
+use crate::light::{LightQueries, LightSampleRows, light_target};
+use crate::math::DVec3;
+use crate::math::rows::{BATCH, Points, Row, pair, soa};
 use crate::math::vectorize::{Kernel, vectorize};
-use crate::math::{DVec3, Vec3};
+use crate::sampling::Numbers;
 
 soa! {
-    /// Points that sample lights, and the points sampled.
-    struct PointRows of Point {
-        p: DVec3,
-        q: DVec3,
+    /// Points of lights as seen from vertices.
+    struct ViewRows of View {
         wi: DVec3,
         pdf: f64,
         /// 1 where the sample is to be one by solid angle, else 0.
@@ -21,31 +20,46 @@ soa! {
     }
 }
 
+soa! {
+    /// What samples have of their lights.
+    struct EmissionRows {
+        radiance: Rgb,
+        error: f32,
+        two_sided: u32,
+        /// 1 where the vertex samples the light now, else 0.
+        is_queued: u32,
+    }
+}
+
 /// No light.
 const NO_LIGHT: u32 = u32::MAX;
 
-/// Vertices that sample parallelograms, at most [`BATCH`].
+/// Vertices that sample parallelograms, at most [`BATCH`], by lane.
 pub(in crate::light) struct AreaQueue {
     count: usize,
-    lanes: Row<u32>,
-    pmfs: Row,
-    u: [Row; 2],
-    radiance: [Rgb; BATCH],
-    two_sided: Row<u32>,
-    errors: Row,
-    /// Ids of the lights in `shapes` and the rows before: most often they are there already.
+    /// Ids of the lights in `shapes` and `emissions`: most often they are there already.
     ids: Row<u32>,
     shapes: ParallelogramRows,
-    points: PointRows,
+    emissions: EmissionRows,
+    views: ViewRows,
     near: NearQueue,
 }
 
 /// Those of the vertices that sample by solid angle.
 struct NearQueue {
-    places: Row<u32>,
+    lanes: Row<u32>,
     u: [Row; 2],
     shapes: ParallelogramRows,
-    points: PointRows,
+    points: NearRows,
+    views: ViewRows,
+}
+
+soa! {
+    /// Points of vertices and of lights.
+    struct NearRows {
+        p: DVec3,
+        q: DVec3,
+    }
 }
 
 impl Default for AreaQueue {
@@ -53,37 +67,43 @@ impl Default for AreaQueue {
         let row = [0.0; BATCH];
         Self {
             count: 0,
-            lanes: [0; BATCH],
-            pmfs: row,
-            u: [row; 2],
-            radiance: [Rgb::BLACK; BATCH],
-            two_sided: [0; BATCH],
-            errors: row,
             ids: [NO_LIGHT; BATCH],
             shapes: ParallelogramRows::default(),
-            points: PointRows::default(),
-            near: NearQueue { places: [0; BATCH], u: [row; 2], shapes: ParallelogramRows::default(), points: PointRows::default() },
+            emissions: EmissionRows::default(),
+            views: ViewRows::default(),
+            near: NearQueue {
+                lanes: [0; BATCH],
+                u: [row; 2],
+                shapes: ParallelogramRows::default(),
+                points: NearRows::default(),
+                views: ViewRows::default(),
+            },
         }
     }
 }
 
 impl NearQueue {
     /// Replaces the samples of those vertices.
-    #[inline(always)]
-    fn sample(&mut self, shapes: &ParallelogramRows, u: &[Row; 2], points: &mut PointRows, count: usize) {
+    fn sample(&mut self, shapes: &ParallelogramRows, queries: &LightQueries, views: &mut ViewRows, target_p: &mut Points) {
+        let Self { lanes, u, shapes: near_shapes, points, views: near_views } = self;
         let mut near = 0;
-        for place in (0..count.min(BATCH)).filter(|&place| points.is_near[place] != 0.0) {
+        for lane in (0..queries.count.min(BATCH)).filter(|&lane| views.is_near[lane] != 0.0) {
             let i = near % BATCH;
-            self.places[i] = place as u32;
-            (self.u[0][i], self.u[1][i]) = (u[0][place], u[1][place]);
-            self.shapes.set(i, &shapes.get(place));
-            self.points.set(i, &points.get(place));
+            let (p, [s, t]) = queries.get(lane);
+            lanes[i] = lane as u32;
+            (u[0][i], u[1][i]) = (s, t);
+            near_shapes.set(i, &shapes.get(lane));
+            points.p.set(i, p);
+            points.q.set(i, target_p.get(lane));
+            near_views.set(i, &views.get(lane));
             near += 1;
         }
         if near > 0 {
-            vectorize(SampleBySolidAngle { shapes: &self.shapes, u: &self.u, points: &mut self.points, count: near });
-            for (i, &place) in self.places[..near].iter().enumerate() {
-                points.set(place as usize % BATCH, &self.points.get(i));
+            vectorize(SampleBySolidAngle { shapes: near_shapes, u, points, views: near_views, count: near });
+            for (i, &lane) in lanes[..near].iter().enumerate() {
+                let lane = lane as usize % BATCH;
+                target_p.set(lane, points.q.get(i));
+                views.set(lane, &near_views.get(i));
             }
         }
     }
@@ -98,53 +118,43 @@ impl AreaQueue {
     /// Empties the queue.
     pub fn clear(&mut self) {
         self.count = 0;
+        self.emissions.is_queued = [0; BATCH];
     }
 
-    /// Queues the sample of a light, for the vertex `lane` at `p`; `false` if the light is to be sampled alone.
+    /// Queues the sample of a light for the vertex `lane`; `false` if the light is not sampled here.
     #[inline(always)]
-    pub fn push(&mut self, light: &AreaLight, choice: LightChoice, lane: usize, p: DVec3, u: [f32; 2]) -> bool {
+    pub fn push(&mut self, light: &AreaLight, id: LightId, lane: usize) -> bool {
         let Some(quad) = light.even_parallelogram() else { return false };
-        let i = self.count;
         self.count += 1;
-        (self.lanes[i], self.pmfs[i]) = (lane as u32, choice.pmf);
-        (self.u[0][i], self.u[1][i]) = (u[0], u[1]);
-        if self.ids[i] != choice.id.0 {
-            self.ids[i] = choice.id.0;
-            (self.radiance[i], self.errors[i]) = (light.emission.radiance, quad.error);
-            self.two_sided[i] = u32::from(light.emission.two_sided);
-            self.shapes.set(i, &quad.shape);
+        self.emissions.is_queued[lane] = 1;
+        if self.ids[lane] != id.0 {
+            self.ids[lane] = id.0;
+            self.emissions.radiance.set(lane, light.emission.radiance);
+            (self.emissions.error[lane], self.emissions.two_sided[lane]) = (quad.error, u32::from(light.emission.two_sided));
+            self.shapes.set(lane, &quad.shape);
         }
-        self.points.p.set(i, p);
         true
     }
 
-    /// Samples all lights; `set` takes each sample with its vertex and the probability of the choice.
-    #[inline(always)]
-    pub fn sample(&mut self, mut set: impl FnMut(usize, &LightSample, f32)) {
-        let Self { count, lanes, pmfs, u, radiance, two_sided, errors, shapes, points, near, .. } = self;
+    /// Samples all lights. Samples and targets of vertices that are not queued are overwritten, with no sample.
+    pub fn sample(&mut self, queries: &LightQueries, pmfs: &Row, samples: &mut LightSampleRows, target_p: &mut Points) {
+        let Self { count, shapes, emissions, views, near, .. } = self;
         if *count == 0 {
+            samples.target = [light_target::NONE; BATCH];
             return;
         }
-        vectorize(SampleByArea { shapes, two_sided, u, points, count: *count });
-        near.sample(shapes, u, points, *count);
-        for i in 0..*count {
-            let pdf = points.pdf[i] as f32;
-            if pdf > 0.0 {
-                let n: Vec3 = shapes.normal.get(i).as_vec3();
-                let target = ShadowTarget::Point(SpawnPoint { p: points.q.get(i), n, error: errors[i] });
-                let sample = LightSample { wi: points.wi.get(i).as_vec3(), radiance: radiance[i], pdf, is_delta: false, target };
-                set(lanes[i] as usize, &sample, pmfs[i]);
-            }
-        }
+        vectorize(SampleByArea { shapes, emissions, queries, views, target_p });
+        near.sample(shapes, queries, views, target_p);
+        vectorize(SetSamples { shapes, emissions, views, pmfs, samples, count: queries.count });
     }
 }
 
 struct SampleByArea<'a> {
     shapes: &'a ParallelogramRows,
-    two_sided: &'a Row<u32>,
-    u: &'a [Row; 2],
-    points: &'a mut PointRows,
-    count: usize,
+    emissions: &'a EmissionRows,
+    queries: &'a LightQueries<'a>,
+    views: &'a mut ViewRows,
+    target_p: &'a mut Points,
 }
 
 impl Kernel for SampleByArea<'_> {
@@ -152,26 +162,37 @@ impl Kernel for SampleByArea<'_> {
 
     #[inline(always)]
     fn call(self) {
-        sample_by_area(self.shapes, self.two_sided, self.u, self.points, self.count);
+        let Self { shapes, emissions, queries, views, target_p } = self;
+        sample_by_area(shapes, emissions, queries.points, queries.u, views, target_p, queries.count);
     }
 }
 
 // Whole vectors, here and below: what is computed for vertices beyond the count is not used.
 #[inline(always)]
-fn sample_by_area(shapes: &ParallelogramRows, two_sided: &Row<u32>, u: &[Row; 2], points: &mut PointRows, count: usize) {
+fn sample_by_area(
+    shapes: &ParallelogramRows,
+    emissions: &EmissionRows,
+    points: &Points,
+    u: &Numbers,
+    views: &mut ViewRows,
+    target_p: &mut Points,
+    count: usize,
+) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
-        let (sample, is_near) = shapes.get(i).sample_by_area(points.p.get(i), pair(u, i), <u32 as Element>::get(two_sided, i) != 0);
-        points.q.set(i, sample.q);
-        points.wi.set(i, sample.wi);
-        points.pdf[i] = sample.pdf;
-        points.is_near[i] = if is_near { 1.0 } else { 0.0 };
+        let [_, s, t, _] = u.of(i);
+        let (sample, is_near) = shapes.get(i).sample_by_area(points.get(i), [s, t], emissions.two_sided[i] != 0);
+        target_p.set(i, sample.q);
+        views.wi.set(i, sample.wi);
+        views.pdf[i] = sample.pdf;
+        views.is_near[i] = if is_near & (emissions.is_queued[i] != 0) { 1.0 } else { 0.0 };
     }
 }
 
 struct SampleBySolidAngle<'a> {
     shapes: &'a ParallelogramRows,
     u: &'a [Row; 2],
-    points: &'a mut PointRows,
+    points: &'a mut NearRows,
+    views: &'a mut ViewRows,
     count: usize,
 }
 
@@ -180,17 +201,58 @@ impl Kernel for SampleBySolidAngle<'_> {
 
     #[inline(always)]
     fn call(self) {
-        sample_by_solid_angle(self.shapes, self.u, self.points, self.count);
+        sample_by_solid_angle(self.shapes, self.u, self.points, self.views, self.count);
     }
 }
 
 #[inline(always)]
-fn sample_by_solid_angle(shapes: &ParallelogramRows, u: &[Row; 2], points: &mut PointRows, count: usize) {
+fn sample_by_solid_angle(shapes: &ParallelogramRows, u: &[Row; 2], points: &mut NearRows, views: &mut ViewRows, count: usize) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
-        let Point { p, q, wi, pdf, .. } = points.get(i);
+        let (p, q) = (points.p.get(i), points.q.get(i));
+        let View { wi, pdf, .. } = views.get(i);
         let sample = shapes.get(i).sample_by_solid_angle(p, pair(u, i), &ParallelogramSample { q, wi, pdf });
         points.q.set(i, sample.q);
-        points.wi.set(i, sample.wi);
-        points.pdf[i] = sample.pdf;
+        views.wi.set(i, sample.wi);
+        views.pdf[i] = sample.pdf;
+    }
+}
+
+struct SetSamples<'a> {
+    shapes: &'a ParallelogramRows,
+    emissions: &'a EmissionRows,
+    views: &'a ViewRows,
+    pmfs: &'a Row,
+    samples: &'a mut LightSampleRows,
+    count: usize,
+}
+
+impl Kernel for SetSamples<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        set_samples(self.shapes, self.emissions, self.views, self.pmfs, self.samples, self.count);
+    }
+}
+
+#[inline(always)]
+fn set_samples(
+    shapes: &ParallelogramRows,
+    emissions: &EmissionRows,
+    views: &ViewRows,
+    pmfs: &Row,
+    samples: &mut LightSampleRows,
+    count: usize,
+) {
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        let pdf = views.pdf[i] as f32;
+        let is_sampled = (emissions.is_queued[i] != 0) & (pdf > 0.0);
+        samples.target[i] = if is_sampled { light_target::POINT } else { light_target::NONE };
+        samples.is_delta[i] = 0;
+        samples.direction.set(i, views.wi.get(i).as_vec3());
+        samples.radiance.set(i, emissions.radiance.get(i));
+        samples.pdf[i] = pdf * pmfs[i];
+        samples.target_n.set(i, shapes.normal.get(i).as_vec3());
+        samples.target_error[i] = emissions.error[i];
     }
 }

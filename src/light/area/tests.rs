@@ -2,10 +2,11 @@ use std::f64::consts::{PI, TAU};
 
 use super::*;
 use crate::id::LightId;
-use crate::light::LightChoice;
 use crate::light::test_support::assert_chi_squared;
+use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::Rng;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Points};
+use crate::sampling::Numbers;
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
 
@@ -166,20 +167,38 @@ fn queued_samples_have_the_bits_of_single_ones() {
     lights.extend(AreaLight::for_shape(ShapeId(0), WHITE, &skewed, &[]));
     let mut random = Rng::new(13);
     let mut queue = AreaQueue::default();
+    let mut points = Points::ZERO;
     for count in [1, 16, 100, BATCH] {
         queue.clear();
-        let queries: Vec<_> = (0..count).map(|_| (random.below(lights.len()), random.cube() * 3.0, random.pair())).collect();
-        for (lane, (i, p, u)) in queries.iter().enumerate() {
-            assert!(queue.push(&lights[*i], LightChoice { id: LightId::new(*i), pmf: 0.5 }, lane, *p, *u));
+        let vertices: Vec<_> = (0..count).map(|_| (random.below(lights.len()), random.cube() * 3.0, random.pair())).collect();
+        let numbers = Numbers::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
+        // One in eight is not queued.
+        let is_queued = |lane: usize| lane % 8 != 3;
+        for (lane, (i, p, _)) in vertices.iter().enumerate() {
+            points.set(lane, *p);
+            assert!(!is_queued(lane) || queue.push(&lights[*i], LightId::new(*i), lane));
         }
-        let mut found = vec![None; count];
-        queue.sample(|lane, sample, pmf| found[lane] = Some((*sample, pmf)));
-        for ((i, p, u), found) in queries.iter().zip(&found) {
+        let (mut samples, mut target_p) = (LightSampleRows::default(), Points::ZERO);
+        queue.sample(&LightQueries { count, points: &points, u: &numbers }, &[0.5; BATCH], &mut samples, &mut target_p);
+        let mut sampled = 0;
+        for (lane, (i, p, u)) in vertices.iter().enumerate() {
+            let found = (samples.target[lane] == light_target::POINT).then(|| {
+                let normal_and_error = (samples.target_n.get(lane), samples.target_error[lane]);
+                assert_eq!(samples.is_delta[lane], 0);
+                (
+                    samples.direction.get(lane),
+                    samples.radiance.get(lane),
+                    2.0 * samples.pdf[lane],
+                    target_p.get(lane),
+                    normal_and_error.0,
+                    normal_and_error.1,
+                )
+            });
             let alone = lights[*i].sample(&geometry, &[], *p, *u);
-            assert_eq!(found.as_ref().map(|(sample, _)| words(sample)), alone.as_ref().map(words), "{i} {p} {u:?}");
-            assert!(found.as_ref().is_none_or(|(_, pmf)| *pmf == 0.5));
+            assert_eq!(found, alone.as_ref().map(words).filter(|_| is_queued(lane)), "{i} {p} {u:?}");
+            sampled += usize::from(found.is_some());
         }
-        assert!(found.iter().flatten().count() >= count / 4);
+        assert!(sampled >= count / 4);
     }
 }
 

@@ -1,49 +1,166 @@
-//! Many directions of an image at once: where they look is found side by side, and the lookups, which wait for memory, follow one another
-//! closely.
+//! Many directions of an image at once: what is computed is computed in rows, and what waits for memory is nothing but copies, which do not wait for one
+//! another.
 
-use super::{Chosen, EnvironmentMap, Location, far_away};
-use crate::light::{FoundBy, InfinityEval, LightSample};
+use super::{EnvironmentMap, Location};
+use crate::color::{Rgb, RgbRows};
+use crate::light::{FoundBy, InfinityEvalRows};
 use crate::math::Vec3;
-use crate::math::rows::BATCH;
+use crate::math::rows::{BATCH, Element, Vectors, soa};
 use crate::math::vectorize::{Kernel, vectorize};
 use crate::sampling::PiecewiseCell;
 
-const NOWHERE: Location = Location { x: 0, y: 0, within: [0.0; 2] };
+soa! {
+    /// As [`Location`].
+    struct LocationRows {
+        x: u32,
+        y: u32,
+        s: f32,
+        t: f32,
+    }
+}
+
+soa! {
+    /// The texels at the corners of cells.
+    struct CornerRows {
+        upper_left: Rgb,
+        upper_right: Rgb,
+        lower_left: Rgb,
+        lower_right: Rgb,
+    }
+}
+
+soa! {
+    /// Cells that were chosen, as [`PiecewiseCell`].
+    struct CellRows {
+        x: u32,
+        y: u32,
+        u: f32,
+        v: f32,
+        pmf: f32,
+        inverse_solid_angle: f32,
+    }
+}
+
+soa! {
+    /// Cosines of the polar angle at a cell's upper and lower limit.
+    struct LimitRows {
+        upper: f64,
+        lower: f64,
+    }
+}
+
+soa! {
+    /// Light samples from infinity.
+    pub struct InfinitySampleRows {
+        /// Unit direction to the light.
+        wi: Vec3,
+        /// Radiance that arrives.
+        radiance: Rgb,
+        /// Density per solid angle.
+        pdf: f32,
+    }
+}
+
+/// Buffers of [`EnvironmentMap::eval_rows`] and [`EnvironmentMap::sample_rows`].
+pub struct EnvironmentScratch {
+    locations: LocationRows,
+    corners: CornerRows,
+    cells: CellRows,
+    limits: LimitRows,
+    chosen: [PiecewiseCell; BATCH],
+}
+
+impl Default for EnvironmentScratch {
+    fn default() -> Self {
+        Self {
+            locations: LocationRows::default(),
+            corners: CornerRows::default(),
+            cells: CellRows::default(),
+            limits: LimitRows::default(),
+            chosen: [PiecewiseCell::default(); BATCH],
+        }
+    }
+}
+
+impl LocationRows {
+    #[inline(always)]
+    fn get(&self, i: usize) -> Location {
+        Location { x: self.x[i], y: self.y[i], within: [self.s[i], self.t[i]] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, at: Location) {
+        (self.x[i], self.y[i]) = (at.x, at.y);
+        [self.s[i], self.t[i]] = at.within;
+    }
+}
 
 impl EnvironmentMap {
-    /// [`Environment::eval`](super::Environment::eval) for as many unit directions as there are places for the results.
-    pub fn eval_batch(&self, directions: &[Vec3], found_by: FoundBy, evals: &mut [InfinityEval]) {
-        let mut locations = [NOWHERE; BATCH];
-        for (directions, evals) in directions.chunks(BATCH).zip(evals.chunks_mut(BATCH)) {
-            vectorize(Locate { map: self, directions, locations: &mut locations });
-            for (&at, eval) in locations.iter().zip(evals) {
-                *eval = InfinityEval { radiance: self.lookup(at), pdf: self.pdf(at, found_by) };
+    /// [`Environment::eval`](super::Environment::eval) for the first `count` unit directions, at most [`BATCH`]; the densities only if `found_by` is given.
+    pub fn eval_rows(
+        &self,
+        directions: &Vectors,
+        count: usize,
+        found_by: Option<FoundBy>,
+        scratch: &mut EnvironmentScratch,
+        evals: &mut InfinityEvalRows,
+    ) {
+        let EnvironmentScratch { locations, corners, .. } = scratch;
+        vectorize(Locate { map: self, directions, locations, count });
+        self.look_up(locations, count, corners, &mut evals.radiance);
+        let Some(found_by) = found_by else { return };
+        match self.density(found_by) {
+            None => evals.pdf = [0.0; BATCH],
+            Some(density) => {
+                density.pmfs(&locations.x, &locations.y, count, &mut evals.pdf);
+                for (pdf, &y) in evals.pdf.iter_mut().zip(&locations.y).take(count) {
+                    *pdf *= self.inverse_solid_angles[y as usize];
+                }
             }
         }
     }
 
-    /// [`Environment::sample`](super::Environment::sample) for as many pairs of numbers as there are places for the results.
-    pub fn sample_batch(&self, us: &[[f32; 2]], found_by: FoundBy, samples: &mut [Option<LightSample>]) {
-        let Some(density) = self.density(found_by) else {
-            samples.fill(None);
-            return;
-        };
-        let mut cells = [PiecewiseCell::default(); BATCH];
-        let mut chosen = [Chosen { wi: Vec3::ZERO, at: NOWHERE, pdf: 0.0 }; BATCH];
-        for (us, samples) in us.chunks(BATCH).zip(samples.chunks_mut(BATCH)) {
-            density.sample_cells(us, &mut cells);
-            vectorize(ChooseDirections { map: self, cells: &cells[..us.len()], chosen: &mut chosen });
-            for (chosen, sample) in chosen.iter().zip(samples) {
-                *sample = Some(far_away(chosen.wi, self.lookup(chosen.at), chosen.pdf));
-            }
+    /// [`Environment::sample`](super::Environment::sample) with the first `count` pairs of numbers, at most [`BATCH`]; `false` if there is nothing to find.
+    pub fn sample_rows(
+        &self,
+        u: &[[f32; 2]; BATCH],
+        count: usize,
+        found_by: FoundBy,
+        scratch: &mut EnvironmentScratch,
+        samples: &mut InfinitySampleRows,
+    ) -> bool {
+        let Some(density) = self.density(found_by) else { return false };
+        let EnvironmentScratch { locations, corners, cells, limits, chosen } = scratch;
+        density.sample_cells(&u[..count], chosen);
+        for (i, cell) in chosen.iter().enumerate().take(count) {
+            (cells.x[i], cells.y[i], cells.pmf[i]) = (cell.x as u32, cell.y as u32, cell.pmf);
+            [cells.u[i], cells.v[i]] = cell.within;
+            cells.inverse_solid_angle[i] = self.inverse_solid_angles[cell.y];
+            (limits.upper[i], limits.lower[i]) = (self.cosines[cell.y], self.cosines[cell.y + 1]);
         }
+        vectorize(FindDirections { map: self, cells, limits, locations, samples, count });
+        self.look_up(locations, count, corners, &mut samples.radiance);
+        true
+    }
+
+    /// The radiance at locations.
+    fn look_up(&self, locations: &LocationRows, count: usize, corners: &mut CornerRows, radiance: &mut RgbRows) {
+        for i in 0..count.min(BATCH) {
+            let [a, b, c, d] = self.corners(locations.x[i] as usize, locations.y[i] as usize);
+            corners.upper_left.set(i, a);
+            corners.upper_right.set(i, b);
+            corners.lower_left.set(i, c);
+            corners.lower_right.set(i, d);
+        }
+        vectorize(Interpolate { locations, corners, radiance, count });
     }
 }
 
 struct Locate<'a> {
     map: &'a EnvironmentMap,
-    directions: &'a [Vec3],
-    locations: &'a mut [Location; BATCH],
+    directions: &'a Vectors,
+    locations: &'a mut LocationRows,
+    count: usize,
 }
 
 impl Kernel for Locate<'_> {
@@ -51,25 +168,77 @@ impl Kernel for Locate<'_> {
 
     #[inline(always)]
     fn call(self) {
-        for (location, &direction) in self.locations.iter_mut().zip(self.directions) {
-            *location = self.map.locate(direction);
-        }
+        let Self { map, directions, locations, count } = self;
+        locate(map, directions, locations, count);
     }
 }
 
-struct ChooseDirections<'a> {
-    map: &'a EnvironmentMap,
-    cells: &'a [PiecewiseCell],
-    chosen: &'a mut [Chosen; BATCH],
+// Whole vectors, here and below: what is computed beyond the count is not used.
+#[inline(always)]
+fn locate(map: &EnvironmentMap, directions: &Vectors, locations: &mut LocationRows, count: usize) {
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        locations.set(i, map.locate(directions.get(i)));
+    }
 }
 
-impl Kernel for ChooseDirections<'_> {
+struct FindDirections<'a> {
+    map: &'a EnvironmentMap,
+    cells: &'a CellRows,
+    limits: &'a LimitRows,
+    locations: &'a mut LocationRows,
+    samples: &'a mut InfinitySampleRows,
+    count: usize,
+}
+
+impl Kernel for FindDirections<'_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        for (chosen, cell) in self.chosen.iter_mut().zip(self.cells) {
-            *chosen = self.map.direction_in(cell);
-        }
+        let Self { map, cells, limits, locations, samples, count } = self;
+        find_directions(map, cells, limits, locations, samples, count);
+    }
+}
+
+#[inline(always)]
+fn find_directions(
+    map: &EnvironmentMap,
+    cells: &CellRows,
+    limits: &LimitRows,
+    locations: &mut LocationRows,
+    samples: &mut InfinitySampleRows,
+    count: usize,
+) {
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        let (wi, at) = map.direction_in([cells.x[i], cells.y[i]], [cells.u[i], cells.v[i]], [limits.upper[i], limits.lower[i]]);
+        locations.set(i, at);
+        samples.wi.set(i, wi);
+        samples.pdf[i] = cells.pmf[i] * <f32 as Element>::get(&cells.inverse_solid_angle, i);
+    }
+}
+
+struct Interpolate<'a> {
+    locations: &'a LocationRows,
+    corners: &'a CornerRows,
+    radiance: &'a mut RgbRows,
+    count: usize,
+}
+
+impl Kernel for Interpolate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { locations, corners, radiance, count } = self;
+        interpolate_rows(locations, corners, radiance, count);
+    }
+}
+
+#[inline(always)]
+fn interpolate_rows(locations: &LocationRows, corners: &CornerRows, radiance: &mut RgbRows, count: usize) {
+    for i in 0..count.next_multiple_of(16).min(BATCH) {
+        let upper = [corners.upper_left.get(i), corners.upper_right.get(i)];
+        let lower = [corners.lower_left.get(i), corners.lower_right.get(i)];
+        radiance.set(i, super::interpolate([upper, lower], locations.get(i).within));
     }
 }

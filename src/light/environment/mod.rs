@@ -10,6 +10,8 @@
 
 mod batch;
 
+pub use batch::{EnvironmentScratch, InfinitySampleRows};
+
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -50,7 +52,7 @@ impl Environment {
                 (chosen.wi, map.lookup(chosen.at), chosen.pdf)
             }
         };
-        Some(far_away(wi, radiance, pdf))
+        Some(LightSample::far_away(wi, radiance, pdf))
     }
 
     /// Radiance arriving along the unit direction `wi`, and the density of sampling it.
@@ -92,10 +94,12 @@ impl Environment {
     }
 }
 
-/// Light from infinity.
-#[inline(always)]
-fn far_away(wi: Vec3, radiance: Rgb, pdf: f32) -> LightSample {
-    LightSample { wi, radiance, pdf, is_delta: false, target: ShadowTarget::Infinity }
+impl LightSample {
+    /// Light from infinity.
+    #[inline(always)]
+    pub(super) fn far_away(wi: Vec3, radiance: Rgb, pdf: f32) -> Self {
+        Self { wi, radiance, pdf, is_delta: false, target: ShadowTarget::Infinity }
+    }
 }
 
 /// Why an image cannot be an environment.
@@ -140,6 +144,8 @@ pub struct EnvironmentMap {
     densities: [OnceLock<Option<Piecewise2d>>; 2],
     /// Cosine of the polar angle at the upper limit of each row of the density, and at the lower pole.
     cosines: Vec<f64>,
+    /// 1 over the solid angle of the cells of each row.
+    inverse_solid_angles: Vec<f32>,
 }
 
 /// A direction in the image: a cell of the density and where between its corners, linear in azimuth and polar angle.
@@ -183,8 +189,10 @@ impl EnvironmentMap {
         let axes = [rotation.x_axis, rotation.y_axis, rotation.z_axis].map(|axis| axis.normalize().as_vec3());
         // Half rows at both poles.
         let limit = |row: usize| (row as f64 - 0.5).clamp(0.0, height as f64) / height as f64;
-        let cosines = (0..=height + 1).map(|row| (PI * limit(row)).cos()).collect();
-        Ok(Self { width, height, texels, axes, densities: Default::default(), cosines })
+        let cosines: Vec<_> = (0..=height + 1).map(|row| (PI * limit(row)).cos()).collect();
+        let inverse_solid_angle = |cap: f64| width as f32 / (TAU * cap as f32);
+        let inverse_solid_angles = cosines.windows(2).map(|row| inverse_solid_angle(row[0] - row[1])).collect();
+        Ok(Self { width, height, texels, axes, densities: Default::default(), cosines, inverse_solid_angles })
     }
 
     /// What is to be found in each cell: the mean of the bilinear luminance (its corners' mean) times the cell's solid angle; row by row.
@@ -245,8 +253,7 @@ impl EnvironmentMap {
     #[inline]
     fn lookup(&self, at: Location) -> Rgb {
         let [a, b, c, d] = self.corners(at.x as usize, at.y as usize);
-        let [s, t] = at.within;
-        (a * (1.0 - s) + b * s) * (1.0 - t) + (c * (1.0 - s) + d * s) * t
+        interpolate([[a, b], [c, d]], at.within)
     }
 
     /// Where in the image the unit direction `wi` looks.
@@ -269,29 +276,24 @@ impl EnvironmentMap {
     #[inline]
     fn pdf(&self, at: Location, found_by: FoundBy) -> f32 {
         let (x, y) = (at.x as usize, at.y as usize);
-        self.density(found_by).map_or(0.0, |density| density.pmf(x, y) * self.inverse_solid_angle(y))
-    }
-
-    #[inline]
-    fn inverse_solid_angle(&self, row: usize) -> f32 {
-        let cap = self.cosines[row] - self.cosines[row + 1];
-        self.width as f32 / (TAU * cap as f32)
+        self.density(found_by).map_or(0.0, |density| density.pmf(x, y) * self.inverse_solid_angles[y])
     }
 
     /// A direction chosen by a density.
     #[inline]
     fn choose(&self, density: &Piecewise2d, u: [f32; 2]) -> Chosen {
-        self.direction_in(&density.sample_cell(u))
+        let PiecewiseCell { x, y, within, pmf } = density.sample_cell(u);
+        let (wi, at) = self.direction_in([x as u32, y as u32], within, [self.cosines[y], self.cosines[y + 1]]);
+        Chosen { wi, at, pdf: pmf * self.inverse_solid_angles[y] }
     }
 
-    /// The direction at a point of a cell.
+    /// The direction at a point within a cell, which has these cosines at its upper and lower limit.
     #[inline(always)]
-    fn direction_in(&self, cell: &PiecewiseCell) -> Chosen {
+    fn direction_in(&self, [column, row]: [u32; 2], within: [f32; 2], [upper, lower]: [f64; 2]) -> (Vec3, Location) {
         // Uniform on the cell: in the cosine of the polar angle and in the azimuth.
-        let (upper, lower) = (self.cosines[cell.y], self.cosines[cell.y + 1]);
-        let cos = upper + f64::from(cell.within[1]) * (lower - upper);
+        let cos = upper + f64::from(within[1]) * (lower - upper);
         let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
-        let x = cell.x as f32 + 0.5 + cell.within[0];
+        let x = column as f32 + 0.5 + within[0];
         let x = if x >= self.width as f32 { x - self.width as f32 } else { x };
         // u = 1/2 is -Z and the azimuth turns towards +X.
         let around = unit_circle(x / self.width as f32) * sin;
@@ -299,10 +301,15 @@ impl EnvironmentMap {
         let wi = right * -around.y as f32 + up * cos as f32 + back * around.x as f32;
 
         let theta = angle_of(sin as f32, cos as f32);
-        let t = theta * FRAC_1_PI * self.height as f32 + 0.5 - cell.y as f32;
-        let at = Location { x: cell.x as u32, y: cell.y as u32, within: [cell.within[0], t.clamp(0.0, 1.0)] };
-        Chosen { wi: wi.normalize(), at, pdf: cell.pmf * self.inverse_solid_angle(cell.y) }
+        let t = theta * FRAC_1_PI * self.height as f32 + 0.5 - row as f32;
+        (wi.normalize(), Location { x: column, y: row, within: [within[0], t.clamp(0.0, 1.0)] })
     }
+}
+
+/// The bilinear interpolation of two rows of two texels.
+#[inline(always)]
+fn interpolate([[a, b], [c, d]]: [[Rgb; 2]; 2], [s, t]: [f32; 2]) -> Rgb {
+    (a * (1.0 - s) + b * s) * (1.0 - t) + (c * (1.0 - s) + d * s) * t
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::*;
+use crate::light::InfinityEvalRows;
 use crate::light::test_support::assert_chi_squared;
+use crate::math::rows::{BATCH, Vectors};
 use crate::math::{DVec3, Rng};
 
 fn map(width: usize, height: usize, texel: impl Fn(usize, usize) -> f32) -> EnvironmentMap {
@@ -180,17 +182,22 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
 fn many_directions_at_once_are_each_of_them() {
     let mut rng = Rng::new(77);
     let map = map(37, 19, |x, y| if y < 3 { 0.0 } else { ((x * 7 + y * 3) % 11) as f32 });
-    let directions: Vec<_> = (0..1000).map(|_| rng.cube().as_vec3().normalize()).collect();
-    let us: Vec<_> = (0..1000).map(|_| rng.pair()).collect();
-    for found_by in [FoundBy::Lights, FoundBy::Both] {
-        let (mut evals, mut samples) = (vec![InfinityEval::default(); 1000], vec![None; 1000]);
-        map.eval_batch(&directions, found_by, &mut evals);
-        map.sample_batch(&us, found_by, &mut samples);
-        let sky = environment(map.clone());
-        for i in 0..1000 {
-            assert_eq!(evals[i], sky.eval(directions[i], found_by));
-            let (one, many) = (sky.sample(us[i], found_by).unwrap(), samples[i].unwrap());
-            assert!(one.wi == many.wi && one.radiance == many.radiance && one.pdf == many.pdf);
+    let sky = environment(map.clone());
+    let mut directions = Vectors::ZERO;
+    let mut scratch = EnvironmentScratch::default();
+    for count in [1, 17, BATCH, BATCH, BATCH, BATCH] {
+        (0..count).for_each(|i| directions.set(i, (rng.cube() - 0.5).as_vec3().normalize()));
+        let u = std::array::from_fn(|_| rng.pair());
+        for found_by in [FoundBy::Lights, FoundBy::Both] {
+            let (mut evals, mut samples) = (InfinityEvalRows::default(), InfinitySampleRows::default());
+            map.eval_rows(&directions, count, Some(found_by), &mut scratch, &mut evals);
+            assert!(map.sample_rows(&u, count, found_by, &mut scratch, &mut samples));
+            for i in 0..count {
+                let InfinityEval { radiance, pdf } = sky.eval(directions.get(i), found_by);
+                assert_eq!((evals.radiance.get(i), evals.pdf[i]), (radiance, pdf));
+                let one = sky.sample(u[i], found_by).unwrap();
+                assert_eq!((one.wi, one.radiance, one.pdf), (samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
+            }
         }
     }
 }

@@ -36,6 +36,16 @@ impl Numbers {
         [self.0[0][i], self.0[1][i], self.0[2][i], self.0[3][i]]
     }
 
+    /// From the four numbers of each sample.
+    #[cfg(test)]
+    pub fn new(samples: &[[f32; 4]]) -> Self {
+        let mut numbers = Self::default();
+        for (i, sample) in samples.iter().enumerate() {
+            (0..4).for_each(|k| numbers.0[k][i] = sample[k]);
+        }
+        numbers
+    }
+
     /// Replaces the first number of one sample.
     #[inline(always)]
     pub fn set_first(&mut self, i: usize, u: f32) {
