@@ -3,7 +3,7 @@
 #
 #   ./setup.sh          install what is missing, build, render scenes/gallery.json to gallery.exr and gallery.png
 #   ./setup.sh test     install what is missing, run all tests
-#   ./setup.sh install  install what is missing, build, put `steradian` into ~/.cargo/bin
+#   ./setup.sh install  install what is missing, build for this machine, put `steradian` into ~/.cargo/bin
 #   ./setup.sh package  install what is missing, build, make a Debian package in target/debian
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -59,7 +59,14 @@ case "${1:-render}" in
         echo "The picture: $PWD/gallery.png (for a screen) and $PWD/gallery.exr (linear, for compositing)" >&2
         ;;
     test) cargo test --locked ;;
-    install) cargo install --locked --profile dist --path . ;;
+    install)
+        # With the instructions of this machine, if it has them (AVX2 and others): a few per cent faster, with the same pictures.
+        loader=/lib64/ld-linux-x86-64.so.2
+        if [ -x "$loader" ] && "$loader" --help 2>/dev/null | grep -q 'x86-64-v3 (supported'; then
+            export RUSTFLAGS="${RUSTFLAGS:-} -C target-cpu=x86-64-v3"
+        fi
+        cargo install --locked --profile dist --path .
+        ;;
     package)
         command -v cargo-deb >/dev/null || cargo install --locked cargo-deb
         command -v dpkg-shlibdeps >/dev/null || as_root apt-get install -y -qq --no-install-recommends dpkg-dev >/dev/null

@@ -26,10 +26,8 @@ SAMPLES = (2, 8)
 NEVER = "unsafe { std::hint::unreachable_unchecked() }"
 
 
-# Not needed to render: parts of the library, and crates of the command line and of the benchmarks.
-UNNEEDED = {"bench", "convert", "bin", "denoise", "farm", "live"}
-UNUSED = ["clap", "clap_complete", "clap_mangen", "httparse", "indicatif", "libloading", "plotters", "rustix", "signal-hook"]
-UNUSED += ["tev_client", "toml", "tracing-subscriber", "twofloat"]
+# Not needed to render, beside what the feature `bench` has.
+UNNEEDED = {"bench", "bin"}
 
 # Renders a scene as the command line does and prints a digest of the picture.
 PROGRAM = """//! Renders SCENE with so many samples, on one thread.
@@ -152,12 +150,10 @@ def copy_sources(work):
             (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(ROOT / name, work / name)
     shutil.rmtree(work / "src", ignore_errors=True)
     shutil.copytree(ROOT / "src", work / "src", ignore=lambda folder, names: UNNEEDED if Path(folder) == ROOT / "src" else set())
-    library = work / "src/lib.rs"
-    library.write_text(re.sub(r"pub mod (bench|convert|denoise|farm|live);\n", "", library.read_text()))
     (work / "src/main.rs").write_text(PROGRAM)
     manifest = (ROOT / "Cargo.toml").read_text()
     manifest = re.sub(r"(?ms)^\[(\[bin\]\]|\[test\]\]|workspace\]|dev-dependencies\]|profile[^\n]*\]).*?(?=^\[|\Z)", "", manifest)
-    manifest = re.sub(rf"(?m)^({'|'.join(UNUSED)}) = .*\n", "", manifest)
+    manifest = manifest.replace('default = ["bench"]', "default = []")
     if not (work / "Cargo.toml").exists() or (work / "Cargo.toml").read_text() != manifest:
         (work / "Cargo.toml").write_text(manifest)
 

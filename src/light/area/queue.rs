@@ -6,7 +6,7 @@ use crate::color::Rgb;
 use crate::id::LightId;
 use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::DVec3;
-use crate::math::rows::{BATCH, Points, Row, pair, soa};
+use crate::math::rows::{BATCH, Element, Points, Row, pair, soa};
 use crate::math::vectorize::{Kernel, vectorize};
 use crate::sampling::Numbers;
 
@@ -251,7 +251,7 @@ fn set_samples(
         samples.is_delta[i] = 0;
         samples.direction.set(i, views.wi.get(i).as_vec3());
         samples.radiance.set(i, emissions.radiance.get(i));
-        samples.pdf[i] = pdf * pmfs[i];
+        samples.pdf[i] = pdf * <f32 as Element>::get(pmfs, i);
         samples.target_n.set(i, shapes.normal.get(i).as_vec3());
         samples.target_error[i] = emissions.error[i];
     }

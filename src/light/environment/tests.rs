@@ -192,10 +192,10 @@ fn many_directions_at_once_are_each_of_them() {
             let (mut evals, mut samples) = (InfinityEvalRows::default(), InfinitySampleRows::default());
             map.eval_rows(&directions, count, Some(found_by), &mut scratch, &mut evals);
             assert!(map.sample_rows(&u, count, found_by, &mut scratch, &mut samples));
-            for i in 0..count {
+            for (i, u) in u.iter().enumerate().take(count) {
                 let InfinityEval { radiance, pdf } = sky.eval(directions.get(i), found_by);
                 assert_eq!((evals.radiance.get(i), evals.pdf[i]), (radiance, pdf));
-                let one = sky.sample(u[i], found_by).unwrap();
+                let one = sky.sample(*u, found_by).unwrap();
                 assert_eq!((one.wi, one.radiance, one.pdf), (samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
             }
         }
