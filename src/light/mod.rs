@@ -107,6 +107,14 @@ pub struct LightSample {
 }
 
 impl LightSample {
+    /// Light from infinity.
+    #[inline(always)]
+    fn far_away(wi: Vec3, radiance: Rgb, pdf: f32) -> Self {
+        Self { wi, radiance, pdf, is_delta: false, target: ShadowTarget::Infinity }
+    }
+}
+
+impl LightSample {
     /// The ray from a surface to where the light comes from.
     #[inline(always)]
     pub fn shadow_ray(&self, from: &SurfaceInteraction) -> Ray {

@@ -195,7 +195,7 @@ impl SkyQueue {
         for (u, &lane) in u.iter_mut().zip(&*lanes) {
             *u = queries.get(lane).1;
         }
-        if !lanes.is_empty() && image.sample_rows(u, lanes.len(), found_by, scratch, samples) {
+        if !lanes.is_empty() && scratch.sample(image, u, lanes.len(), found_by, samples) {
             for (i, &lane) in lanes.iter().enumerate() {
                 set(lane, &LightSample::far_away(samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
             }

@@ -34,7 +34,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
     if let Some((_, image)) = image {
         // No density is needed of what the camera sees.
         let found_by = (context.bounce > 0).then_some(context.found_by);
-        image.eval_rows(directions, misses.len(), found_by, environment, evals);
+        environment.eval(image, directions, misses.len(), found_by, evals);
     }
     let is_visible = context.bounce > 0 || (!context.config.hide_emitters && world.shows_background);
     for (k, &path) in misses.iter().enumerate() {

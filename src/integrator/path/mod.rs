@@ -27,6 +27,7 @@ use std::sync::Arc;
 use super::cancel;
 use super::regularization::Regularization;
 use super::{CameraBatch, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions};
+use crate::color::Rgb;
 use crate::film::{PartNeeds, SampleBatch};
 use crate::guiding::Guide;
 use crate::light::FoundBy;
@@ -97,6 +98,22 @@ impl Integrator for PathIntegrator {
 }
 
 impl PathIntegrator {
+    /// Light that was scattered `scatterings` times between its source and the camera, clamped if it is indirect.
+    #[inline]
+    fn clamped(&self, light: Rgb, scatterings: u32) -> Rgb {
+        if self.clamp == f32::INFINITY || scatterings <= 1 {
+            return light;
+        }
+        let largest = light.max_channel();
+        if largest > self.clamp { light * (self.clamp / largest) } else { light }
+    }
+
+    /// Whether any light AOV is wanted.
+    #[inline]
+    fn wants_light_aovs(&self) -> bool {
+        self.parts.count() > 0
+    }
+
     /// The main loop.
     fn render_wave(&self, world: &World, samples: &CameraBatch, out: &mut Output, counts: &mut RayCounts, wave: &mut Wave) {
         let (found_by, guide) = (self.strategy.found_by(), self.guide.as_deref());

@@ -35,21 +35,3 @@ impl Output<'_> {
         add_by_group(self.config.parts, self.batch.parts_mut(slot as usize), light, group_of(context.scene, id));
     }
 }
-
-impl PathIntegrator {
-    /// Light that was scattered `scatterings` times between its source and the camera, clamped if it is indirect.
-    #[inline]
-    pub(super) fn clamped(&self, light: Rgb, scatterings: u32) -> Rgb {
-        if self.clamp == f32::INFINITY || scatterings <= 1 {
-            return light;
-        }
-        let largest = light.max_channel();
-        if largest > self.clamp { light * (self.clamp / largest) } else { light }
-    }
-
-    /// Whether any light AOV is wanted.
-    #[inline]
-    pub(super) fn wants_light_aovs(&self) -> bool {
-        self.parts.count() > 0
-    }
-}

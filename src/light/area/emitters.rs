@@ -1,7 +1,7 @@
 //! Spheres and other analytic shapes that many vertices sample at once, the same as each of them alone.
 
 use super::{AreaLight, Form, SphereEmitter, SurfaceSample};
-use crate::geometry::{Geometry, Placed, PlacedSampleRows, Shape};
+use crate::geometry::{Geometry, PlacedSampleRows, Shape};
 use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSample};
 use crate::math::DVec3;
@@ -66,12 +66,12 @@ impl EmitterQueue {
                     views.p.set(i, p);
                     (u[0][i], u[1][i]) = (s, t);
                 }
-                light.sample_rows(context.geometry, u, group.len(), samples, views)
+                sample_rows(light, context.geometry, u, group.len(), samples, views)
             };
             for (i, &(_, lane)) in group.iter().enumerate() {
                 let (p, u) = queries.get(lane);
                 let sample =
-                    if is_in_rows { light.sample_of_row(views, i) } else { light.sample(context.geometry, context.textures, p, u) };
+                    if is_in_rows { sample_of_row(light, views, i) } else { light.sample(context.geometry, context.textures, p, u) };
                 if let Some(sample) = sample {
                     set(lane, &sample);
                 }
@@ -80,34 +80,35 @@ impl EmitterQueue {
     }
 }
 
-impl AreaLight {
-    /// Samples the light for the first `count` points of `views`; `false` if it has to be sampled alone.
-    fn sample_rows(&self, geometry: &Geometry, u: &[Row; 2], count: usize, samples: &mut PlacedSampleRows, views: &mut ViewRows) -> bool {
-        match (&self.form, geometry.shape(self.shape)) {
-            (Form::Sphere(sphere), _) if !sphere.inward && views.p_are(count, |p| sphere.sees_front(p)) => {
-                vectorize(SampleSphere { sphere, u, views, count });
-                true
-            }
-            (Form::Placed { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
-                sample_placed(placed, u, count, samples, views);
-                true
-            }
-            _ => false,
+/// Samples a light for the first `count` points of `views`; `false` if it has to be sampled alone.
+fn sample_rows(
+    light: &AreaLight,
+    geometry: &Geometry,
+    u: &[Row; 2],
+    count: usize,
+    samples: &mut PlacedSampleRows,
+    views: &mut ViewRows,
+) -> bool {
+    match (&light.form, geometry.shape(light.shape)) {
+        (Form::Sphere(sphere), _) if !sphere.inward && (0..count.min(BATCH)).all(|i| sphere.sees_front(views.p.get(i))) => {
+            vectorize(SampleSphere { sphere, u, views, count });
+            true
         }
-    }
-
-    fn sample_of_row(&self, views: &ViewRows, i: usize) -> Option<LightSample> {
-        let (n, wi, pdf) = (views.n.get(i).as_vec3(), views.wi.get(i).as_vec3(), views.pdf[i] as f32);
-        let sample = SurfaceSample { p: views.q.get(i), n, wi, pdf }.if_valid()?;
-        let is_seen = self.emission.two_sided || matches!(self.form, Form::Sphere(_)) || wi.dot(n) < 0.0;
-        is_seen.then(|| LightSample::at(&sample, 0.0, self.emission.radiance))
+        (Form::Placed { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
+            placed.sample_area_rows(u, count, samples);
+            vectorize(SeeSamples { samples, views, count });
+            true
+        }
+        _ => false,
     }
 }
 
-impl ViewRows {
-    fn p_are(&self, count: usize, is: impl Fn(DVec3) -> bool) -> bool {
-        (0..count.min(BATCH)).all(|i| is(self.p.get(i)))
-    }
+/// The sample of one of the points.
+fn sample_of_row(light: &AreaLight, views: &ViewRows, i: usize) -> Option<LightSample> {
+    let (n, wi, pdf) = (views.n.get(i).as_vec3(), views.wi.get(i).as_vec3(), views.pdf[i] as f32);
+    let sample = SurfaceSample { p: views.q.get(i), n, wi, pdf }.if_valid()?;
+    let is_seen = light.emission.two_sided || matches!(light.form, Form::Sphere(_)) || wi.dot(n) < 0.0;
+    is_seen.then(|| sample.with_radiance(light.emission.radiance, 0.0))
 }
 
 struct SampleSphere<'a> {
@@ -136,11 +137,6 @@ fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, cou
         views.wi.set(i, point.wi);
         views.pdf[i] = point.pdf;
     }
-}
-
-fn sample_placed(placed: &Placed, u: &[Row; 2], count: usize, samples: &mut PlacedSampleRows, views: &mut ViewRows) {
-    placed.sample_area_rows(u, count, samples);
-    vectorize(SeeSamples { samples, views, count });
 }
 
 struct SeeSamples<'a> {

@@ -137,19 +137,17 @@ impl SurfaceSample {
         (self.pdf > 0.0 && self.pdf < f32::INFINITY).then_some(self)
     }
 
+    /// Light of this radiance from the point, which has this error of its position.
+    #[inline(always)]
+    fn with_radiance(&self, radiance: Rgb, error: f32) -> LightSample {
+        let target = ShadowTarget::Point(SpawnPoint { p: self.p, n: self.n, error });
+        LightSample { wi: self.wi, radiance, pdf: self.pdf, is_delta: false, target }
+    }
+
     /// The density of [`from_area`](Self::from_area), 0 where that gives nothing.
     #[inline]
     fn pdf_from_area(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> f32 {
         Self::from_area(p, q, n, pdf_area).map_or(0.0, |sample| sample.pdf)
-    }
-}
-
-impl LightSample {
-    /// Light from a point of a surface with this error of its position.
-    #[inline(always)]
-    fn at(sample: &SurfaceSample, error: f32, radiance: Rgb) -> Self {
-        let target = ShadowTarget::Point(SpawnPoint { p: sample.p, n: sample.n, error });
-        Self { wi: sample.wi, radiance, pdf: sample.pdf, is_delta: false, target }
     }
 }
 
@@ -202,7 +200,7 @@ impl AreaLight {
             return self.sample_textured(geometry, textures, p, u);
         }
         let (sample, error) = self.sample_surface(geometry, p, u)?;
-        Some(LightSample::at(&sample, error, self.emission.radiance))
+        Some(sample.with_radiance(self.emission.radiance, error))
     }
 
     /// [`sample`](Self::sample) for emission with a texture or holes.
@@ -213,7 +211,7 @@ impl AreaLight {
             _ => self.sample_surface(geometry, p, u)?,
         };
         let radiance = self.emission.expected(textures, &textured::point(geometry.shape(self.shape), self.prim, sample.p, u));
-        Some(LightSample::at(&sample, error, radiance))
+        Some(sample.with_radiance(radiance, error))
     }
 
     /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where `p` sees the dark side.

@@ -61,7 +61,7 @@ soa! {
     }
 }
 
-/// Buffers of [`EnvironmentMap::eval_rows`] and [`EnvironmentMap::sample_rows`].
+/// Buffers for many directions of an image.
 pub struct EnvironmentScratch {
     locations: LocationRows,
     corners: CornerRows,
@@ -95,65 +95,65 @@ impl LocationRows {
     }
 }
 
-impl EnvironmentMap {
+impl EnvironmentScratch {
     /// [`Environment::eval`](super::Environment::eval) for the first `count` unit directions, at most [`BATCH`]; the densities only if `found_by` is given.
-    pub fn eval_rows(
-        &self,
+    pub fn eval(
+        &mut self,
+        map: &EnvironmentMap,
         directions: &Vectors,
         count: usize,
         found_by: Option<FoundBy>,
-        scratch: &mut EnvironmentScratch,
         evals: &mut InfinityEvalRows,
     ) {
-        let EnvironmentScratch { locations, corners, .. } = scratch;
-        vectorize(Locate { map: self, directions, locations, count });
-        self.look_up(locations, count, corners, &mut evals.radiance);
+        let Self { locations, corners, .. } = self;
+        vectorize(Locate { map, directions, locations, count });
+        look_up(map, locations, count, corners, &mut evals.radiance);
         let Some(found_by) = found_by else { return };
-        match self.density(found_by) {
+        match map.density(found_by) {
             None => evals.pdf = [0.0; BATCH],
             Some(density) => {
                 density.pmfs(&locations.x, &locations.y, count, &mut evals.pdf);
                 for (pdf, &y) in evals.pdf.iter_mut().zip(&locations.y).take(count) {
-                    *pdf *= self.inverse_solid_angles[y as usize];
+                    *pdf *= map.inverse_solid_angles[y as usize];
                 }
             }
         }
     }
 
     /// [`Environment::sample`](super::Environment::sample) with the first `count` pairs of numbers, at most [`BATCH`]; `false` if there is nothing to find.
-    pub fn sample_rows(
-        &self,
+    pub fn sample(
+        &mut self,
+        map: &EnvironmentMap,
         u: &[[f32; 2]; BATCH],
         count: usize,
         found_by: FoundBy,
-        scratch: &mut EnvironmentScratch,
         samples: &mut InfinitySampleRows,
     ) -> bool {
-        let Some(density) = self.density(found_by) else { return false };
-        let EnvironmentScratch { locations, corners, cells, limits, chosen } = scratch;
+        let Some(density) = map.density(found_by) else { return false };
+        let Self { locations, corners, cells, limits, chosen } = self;
         density.sample_cells(&u[..count], chosen);
         for (i, cell) in chosen.iter().enumerate().take(count) {
             (cells.x[i], cells.y[i], cells.pmf[i]) = (cell.x as u32, cell.y as u32, cell.pmf);
             [cells.u[i], cells.v[i]] = cell.within;
-            cells.inverse_solid_angle[i] = self.inverse_solid_angles[cell.y];
-            (limits.upper[i], limits.lower[i]) = (self.cosines[cell.y], self.cosines[cell.y + 1]);
+            cells.inverse_solid_angle[i] = map.inverse_solid_angles[cell.y];
+            (limits.upper[i], limits.lower[i]) = (map.cosines[cell.y], map.cosines[cell.y + 1]);
         }
-        vectorize(FindDirections { map: self, cells, limits, locations, samples, count });
-        self.look_up(locations, count, corners, &mut samples.radiance);
+        vectorize(FindDirections { map, cells, limits, locations, samples, count });
+        look_up(map, locations, count, corners, &mut samples.radiance);
         true
     }
+}
 
-    /// The radiance at locations.
-    fn look_up(&self, locations: &LocationRows, count: usize, corners: &mut CornerRows, radiance: &mut RgbRows) {
-        for i in 0..count.min(BATCH) {
-            let [a, b, c, d] = self.corners(locations.x[i] as usize, locations.y[i] as usize);
-            corners.upper_left.set(i, a);
-            corners.upper_right.set(i, b);
-            corners.lower_left.set(i, c);
-            corners.lower_right.set(i, d);
-        }
-        vectorize(Interpolate { locations, corners, radiance, count });
+/// The radiance at locations.
+fn look_up(map: &EnvironmentMap, locations: &LocationRows, count: usize, corners: &mut CornerRows, radiance: &mut RgbRows) {
+    for i in 0..count.min(BATCH) {
+        let [a, b, c, d] = map.corners(locations.x[i] as usize, locations.y[i] as usize);
+        corners.upper_left.set(i, a);
+        corners.upper_right.set(i, b);
+        corners.lower_left.set(i, c);
+        corners.lower_right.set(i, d);
     }
+    vectorize(Interpolate { locations, corners, radiance, count });
 }
 
 struct Locate<'a> {

@@ -16,7 +16,7 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-use super::{FoundBy, InfinityEval, LightSample, ShadowTarget};
+use super::{FoundBy, InfinityEval, LightSample};
 use crate::color::Rgb;
 use crate::math::{DMat3, Vec3, angle_of, unit_circle};
 use crate::sampling::{Piecewise2d, PiecewiseCell};
@@ -91,14 +91,6 @@ impl Environment {
             Self::Map(map) => map.fluence(found_by),
         };
         PI * scene_radius * scene_radius * fluence
-    }
-}
-
-impl LightSample {
-    /// Light from infinity.
-    #[inline(always)]
-    pub(super) fn far_away(wi: Vec3, radiance: Rgb, pdf: f32) -> Self {
-        Self { wi, radiance, pdf, is_delta: false, target: ShadowTarget::Infinity }
     }
 }
 

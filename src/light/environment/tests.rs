@@ -190,8 +190,8 @@ fn many_directions_at_once_are_each_of_them() {
         let u = std::array::from_fn(|_| rng.pair());
         for found_by in [FoundBy::Lights, FoundBy::Both] {
             let (mut evals, mut samples) = (InfinityEvalRows::default(), InfinitySampleRows::default());
-            map.eval_rows(&directions, count, Some(found_by), &mut scratch, &mut evals);
-            assert!(map.sample_rows(&u, count, found_by, &mut scratch, &mut samples));
+            scratch.eval(&map, &directions, count, Some(found_by), &mut evals);
+            assert!(scratch.sample(&map, &u, count, found_by, &mut samples));
             for (i, u) in u.iter().enumerate().take(count) {
                 let InfinityEval { radiance, pdf } = sky.eval(directions.get(i), found_by);
                 assert_eq!((evals.radiance.get(i), evals.pdf[i]), (radiance, pdf));
