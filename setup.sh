@@ -62,7 +62,7 @@ case "${1:-render}" in
     install)
         # With the instructions of this machine, if it has them (AVX2 and others): a few per cent faster, with the same pictures.
         loader=/lib64/ld-linux-x86-64.so.2
-        if [ -x "$loader" ] && "$loader" --help 2>/dev/null | grep -q 'x86-64-v3 (supported'; then
+        if [ -x "$loader" ] && "$loader" --help 2>/dev/null | grep 'x86-64-v3 (supported' >/dev/null; then
             export RUSTFLAGS="${RUSTFLAGS:-} -C target-cpu=x86-64-v3"
         fi
         cargo install --locked --profile dist --path .

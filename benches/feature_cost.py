@@ -125,13 +125,13 @@ FEATURES = {
         [
             ("src/integrator/path/mod.rs", r"self\.config\.needs != SurfaceNeeds::default\(\)", "false"),
             ("src/integrator/path/mod.rs", r"self\.config\.parts\.by_scattering \|\| self\.config\.needs\.features", "false"),
-            ("src/integrator/path/radiance.rs", r"self\.parts\.count\(\) > 0", "false"),
+            ("src/integrator/path/mod.rs", r"self\.parts\.count\(\) > 0", "false"),
             ("src/film/tile.rs", r"self\.layout\.beside_color\(\)", "false"),
         ],
     ),
     "variance": ("`FilmTile::wants_groups`", [("src/film/tile.rs", r"!self\.spread\.is_empty\(\)", "false")]),
     "filters with negative lobes": ("the filter's weight", [("src/film/tile.rs", r"self\.layout\.signed", "false")]),
-    "clamping": ("the clamp of `path`", [("src/integrator/path/radiance.rs", r"self\.clamp == f32::INFINITY \|\|", "true ||")]),
+    "clamping": ("the clamp of `path`", [("src/integrator/path/mod.rs", r"self\.clamp == f32::INFINITY \|\|", "true ||")]),
 }
 # What a scene uses it cannot do without.
 # Scenes with large meshes are no use: reading them and building over them varies by more than a feature costs.

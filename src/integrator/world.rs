@@ -100,7 +100,7 @@ impl<'a> World<'a> {
         self.skips_parameters[shape.index()] && matches!(self.scene.geometry.shape(shape), Shape::Mesh(mesh) if !mesh.is_deforming())
     }
 
-    /// Whether a shape is analytic and [`Placed::resolve_rows`] finds all that is needed of its hits.
+    /// Whether a shape is analytic and [`Placed::resolve_rows`](crate::geometry::Placed::resolve_rows) finds all that is needed of its hits.
     #[inline]
     pub(super) fn resolves_in_rows(&self, shape: ShapeId) -> bool {
         match self.scene.geometry.shape(shape) {
