@@ -65,18 +65,18 @@ FEATURES = {
         [
             ("src/scene.rs", r"place\.insert\(self\.met_material\(at, direction\)\.bsdf\(&self\.textures, footprint\)\)", "{ let _ = (direction, footprint, place); " + NEVER + " }"),
             ("src/light/area/mod.rs", r"Some\(id\) => self\.textured\(&textures\[id\.index\(\)\], &point\(\)\),", "Some(_) => { let _ = (textures, point); " + NEVER + " }"),
-            ("src/integrator/path/materials.rs", r"Material::Varying\(varying\) => \{", "Material::Varying(_) if false => {}\n            Material::Varying(varying) => {\n                if true { " + NEVER + " }"),
-            ("src/integrator/cones.rs", r"= self\.division\?;", "= None::<Division>?;"),
+            ("src/integrator/path/materials.rs", r"Material::Textured\(textured\) => \{", "Material::Textured(_) if false => {}\n            Material::Textured(textured) => {\n                if true { " + NEVER + " }"),
+            ("src/integrator/cones.rs", r"= self\.pixel_footprint\?;", "= None::<PixelFootprint>?;"),
             ("src/integrator/path/wave.rs", r"cones\.get\(path\)", "None::<&RayCone>"),
         ],
     ),
     "mesh attributes": ("`Features::attributes`", [flag("attributes")]),
     "cut-outs": (
-        "`Cutouts::is_empty`; a filter of the meshes that have holes",
+        "`AlphaMasks::is_empty`; a filter of the meshes that have holes",
         [
             ("src/geometry/cutout.rs", r"self\.0\.is_none\(\)", "true"),
-            ("src/geometry/cutout.rs", r"self\.0\.as_ref\(\)\.is_some_and\(\|coverage\| coverage\.has_holes\(shape\)\)", "{ let _ = shape; false }"),
-            ("src/geometry/cutout.rs", r"Some\(coverage\) if coverage\.has_holes\(hit\.shape\) =>", "Some(coverage) if false && coverage.has_holes(hit.shape) =>"),
+            ("src/geometry/cutout.rs", r"self\.0\.as_ref\(\)\.is_some_and\(\|mask\| mask\.has_holes\(shape\)\)", "{ let _ = shape; false }"),
+            ("src/geometry/cutout.rs", r"Some\(mask\) if mask\.has_holes\(hit\.shape\) =>", "Some(mask) if false && mask.has_holes(hit.shape) =>"),
             ("src/light/area/mod.rs", r"self\.texture\.is_none\(\) && self\.opacity\.is_none\(\)", "self.texture.is_none()"),
         ],
     ),
@@ -114,7 +114,7 @@ FEATURES = {
         [
             flag("environment"),
             ("src/light/set.rs", r"&self\.at_infinity\n", "&[]\n"),
-            ("src/light/set.rs", r"match &self\.beside_bsdf \{", "match &None::<Choosing> {"),
+            ("src/light/set.rs", r"match &self\.mis_compensated \{", "match &None::<LightDistribution> {"),
         ],
     ),
     "light tree": ("`LightSet::selection`", [("src/light/set.rs", r"(?<=if let Some\(tree\) = )&self\.tree|(?<=match )&self\.tree", "&None::<Box<LightTree>>")]),
@@ -123,9 +123,9 @@ FEATURES = {
     "layers beside the colour": (
         "`Context::wants_surfaces` and the like, `LayerSet`",
         [
-            ("src/integrator/path/mod.rs", r"self\.config\.needs != SurfaceNeeds::default\(\)", "false"),
-            ("src/integrator/path/mod.rs", r"self\.config\.parts\.by_scattering \|\| self\.config\.needs\.features", "false"),
-            ("src/integrator/path/mod.rs", r"self\.parts\.count\(\) > 0", "false"),
+            ("src/integrator/path/mod.rs", r"self\.config\.needs != SurfaceAovs::default\(\)", "false"),
+            ("src/integrator/path/mod.rs", r"self\.config\.light_aovs\.by_scattering \|\| self\.config\.needs\.features", "false"),
+            ("src/integrator/path/mod.rs", r"self\.light_aovs\.count\(\) > 0", "false"),
             ("src/film/tile.rs", r"self\.layout\.beside_color\(\)", "false"),
         ],
     ),

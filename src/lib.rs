@@ -13,7 +13,7 @@
 //!
 //! | # | modules |
 //! |---|---|
-//! | 0 | `id`, `error`, `memory`, `printable` |
+//! | 0 | `id`, `error`, `memory`, `printable`, `bytes` |
 //! | 1 | `math`, `desc`, `file`, `attribute` |
 //! | 2 | `color`, `sampling`, `import`, `config` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
@@ -32,6 +32,7 @@ pub mod attribute;
 #[cfg(feature = "bench")]
 pub mod bench;
 pub mod bsdf;
+mod bytes;
 pub mod camera;
 pub mod color;
 pub mod compile;

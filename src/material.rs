@@ -7,8 +7,8 @@ pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, PlasticCoat, RangedI
 pub use principled::PrincipledInputs;
 
 use crate::bsdf::{
-    Beckmann, Bsdf, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
-    SeparableGgx, SingleScatteringBsdf, ThinDielectric,
+    Beckmann, Bsdf, BsdfFlags, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic,
+    Principled, SeparableGgx, SingleScatteringBsdf, ThinDielectric,
 };
 use crate::color::Rgb;
 use crate::id::{MaterialId, TextureId};
@@ -21,7 +21,7 @@ pub enum Material {
     /// The same scattering everywhere, prepared once.
     Constant(Bsdf),
     /// Scattering that textures change.
-    Varying(Box<Varying>),
+    Textured(Box<TexturedMaterial>),
     /// One of two materials at each point, chosen anew at each hit: the second with the probability `amount`.
     Mix {
         /// Where `amount` is 0.
@@ -42,7 +42,7 @@ pub enum Material {
 
 /// Parameters that may come from textures.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Varying {
+pub enum TexturedMaterial {
     /// Diffuse, rough or not.
     Diffuse {
         /// Fraction of light reflected.
@@ -139,7 +139,35 @@ pub enum Varying {
     Principled(PrincipledInputs),
 }
 
-impl Varying {
+impl Facets {
+    #[inline(always)]
+    fn conductor(self, metal: &Conductor, alpha: [f32; 2], tint: Rgb) -> Bsdf {
+        match self {
+            Self::Ggx => Bsdf::Conductor(metal.with_surface(alpha, tint)),
+            Self::SingleGgx => Bsdf::Conductor(metal.with_surface(alpha, tint).single_scattering()),
+            Self::SeparableGgx => Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(metal.with_facets(SeparableGgx::new(alpha), tint))),
+            Self::Beckmann => Bsdf::Beckmann(SingleScatteringBsdf::Conductor(metal.with_facets(Beckmann::new(alpha), tint))),
+        }
+    }
+
+    #[inline(always)]
+    fn dielectric(self, ior: f32, alpha: [f32; 2], [reflection, transmission]: [Rgb; 2]) -> Bsdf {
+        match self {
+            Self::Ggx => Bsdf::Dielectric(Dielectric::new(ior, alpha).tinted(reflection, transmission)),
+            Self::SingleGgx => Bsdf::Dielectric(Dielectric::new(ior, alpha).single_scattering().tinted(reflection, transmission)),
+            Self::SeparableGgx => {
+                let glass = Dielectric::with_facets(ior, alpha, SeparableGgx::new).tinted(reflection, transmission);
+                Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(glass))
+            }
+            Self::Beckmann => {
+                let glass = Dielectric::with_facets(ior, alpha, Beckmann::new).tinted(reflection, transmission);
+                Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(glass))
+            }
+        }
+    }
+}
+
+impl TexturedMaterial {
     /// The scattering over `footprint`.
     pub fn bsdf(&self, textures: &[Texture], footprint: &Footprint) -> Bsdf {
         match self {
@@ -153,31 +181,10 @@ impl Varying {
             )),
             Self::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: reflectance.at(textures, footprint) }),
             Self::Conductor { metal, tint, alpha, facets } => {
-                let (alpha, tint) = (alpha.at(textures, footprint), tint.at(textures, footprint));
-                match facets {
-                    Facets::Ggx => Bsdf::Conductor(metal.with_surface(alpha, tint)),
-                    Facets::SingleGgx => Bsdf::Conductor(metal.with_surface(alpha, tint).single_scattering()),
-                    Facets::SeparableGgx => {
-                        Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(metal.with_facets(SeparableGgx::new(alpha), tint)))
-                    }
-                    Facets::Beckmann => Bsdf::Beckmann(SingleScatteringBsdf::Conductor(metal.with_facets(Beckmann::new(alpha), tint))),
-                }
+                facets.conductor(metal, alpha.at(textures, footprint), tint.at(textures, footprint))
             }
             Self::Dielectric { ior, alpha, facets, tints } => {
-                let (ior, alpha) = (*ior, alpha.at(textures, footprint));
-                let [reflection, transmission] = tints.map(|tint| tint.at(textures, footprint));
-                match facets {
-                    Facets::Ggx => Bsdf::Dielectric(Dielectric::new(ior, alpha).tinted(reflection, transmission)),
-                    Facets::SingleGgx => Bsdf::Dielectric(Dielectric::new(ior, alpha).single_scattering().tinted(reflection, transmission)),
-                    Facets::SeparableGgx => {
-                        let glass = Dielectric::with_facets(ior, alpha, SeparableGgx::new).tinted(reflection, transmission);
-                        Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(glass))
-                    }
-                    Facets::Beckmann => {
-                        let glass = Dielectric::with_facets(ior, alpha, Beckmann::new).tinted(reflection, transmission);
-                        Bsdf::Beckmann(SingleScatteringBsdf::Dielectric(glass))
-                    }
-                }
+                facets.dielectric(*ior, alpha.at(textures, footprint), tints.map(|tint| tint.at(textures, footprint)))
             }
             Self::Phong { diffuse, specular, exponent, cosine } => {
                 // What exceeds 1 together is taken from the diffuse part.
@@ -261,34 +268,21 @@ impl Varying {
         found
     }
 
-    /// Whether light may cross the surface.
-    fn transmits(&self) -> bool {
+    /// The lobes that it has for some values of its textures.
+    fn flags(&self) -> BsdfFlags {
+        type F = BsdfFlags;
+        let both_sides = F::REFLECTION | F::TRANSMISSION;
         match self {
-            Self::DiffuseTransmission { .. } | Self::Dielectric { .. } | Self::ThinDielectric { .. } => true,
-            Self::Principled(inputs) => !inputs.transmission.is_zero() || !inputs.diffuse_transmission.is_zero(),
-            Self::Diffuse { .. }
-            | Self::Mirror { .. }
-            | Self::Conductor { .. }
-            | Self::Phong { .. }
-            | Self::CookTorrance { .. }
-            | Self::Plastic { .. }
-            | Self::Coated { .. } => false,
-        }
-    }
-
-    /// Whether scattering may depend on the direction of the tangents.
-    fn is_anisotropic(&self) -> bool {
-        match self {
-            Self::Diffuse { .. }
-            | Self::DiffuseTransmission { .. }
-            | Self::Mirror { .. }
-            | Self::ThinDielectric { .. }
-            | Self::Phong { .. }
-            | Self::CookTorrance { .. } => false,
-            Self::Conductor { alpha, .. } | Self::Dielectric { alpha, .. } => alpha.axes[0] != alpha.axes[1],
-            Self::Plastic { coat, .. } => coat.is_anisotropic(),
-            Self::Coated { coat, base, .. } => coat.is_anisotropic() || base.is_anisotropic(),
-            Self::Principled(inputs) => !inputs.anisotropic.is_zero(),
+            Self::Diffuse { .. } => F::DIFFUSE | F::REFLECTION,
+            Self::DiffuseTransmission { .. } => F::DIFFUSE | both_sides,
+            Self::Mirror { .. } => F::SPECULAR | F::REFLECTION,
+            Self::Conductor { alpha, .. } => alpha.flags() | F::REFLECTION,
+            Self::Dielectric { alpha, .. } => alpha.flags() | both_sides,
+            Self::Phong { .. } | Self::CookTorrance { .. } => F::DIFFUSE | F::GLOSSY | F::REFLECTION,
+            Self::ThinDielectric { .. } => F::SPECULAR | both_sides,
+            Self::Plastic { coat, .. } => coat.flags() | F::DIFFUSE,
+            Self::Coated { coat, base, .. } => coat.flags() | base.flags(),
+            Self::Principled(inputs) => inputs.flags(),
         }
     }
 }
@@ -299,7 +293,7 @@ impl Material {
     pub fn bsdf<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>) -> Bsdf {
         match self {
             Self::Constant(bsdf) => bsdf.clone(),
-            Self::Varying(varying) => varying.bsdf(textures, &footprint()),
+            Self::Textured(textured) => textured.bsdf(textures, &footprint()),
             Self::Mix { .. } | Self::TwoSided { .. } => Bsdf::Lambert(Lambert { albedo: Rgb::BLACK }),
         }
     }
@@ -308,9 +302,9 @@ impl Material {
     /// for all other materials.
     pub fn boundary<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>, ior: f32) -> Option<Bsdf> {
         match self {
-            Self::Varying(varying) => match **varying {
-                Varying::Dielectric { alpha, facets, tints, .. } => {
-                    Some(Varying::Dielectric { ior, alpha, facets, tints }.bsdf(textures, &footprint()))
+            Self::Textured(textured) => match **textured {
+                TexturedMaterial::Dielectric { alpha, facets, tints, .. } => {
+                    Some(TexturedMaterial::Dielectric { ior, alpha, facets, tints }.bsdf(textures, &footprint()))
                 }
                 _ => None,
             },
@@ -328,7 +322,7 @@ impl Material {
         u: impl FnOnce() -> f32,
     ) -> Option<MaterialId> {
         match self {
-            Self::Constant(_) | Self::Varying(_) => None,
+            Self::Constant(_) | Self::Textured(_) => None,
             Self::Mix { first, second, amount } => Some(if u() < amount.at(textures, &point()) { *second } else { *first }),
             Self::TwoSided { front, back } => Some(if is_front { *front } else { *back }),
         }
@@ -337,61 +331,43 @@ impl Material {
     /// The materials that this one consists of.
     pub fn parts(&self) -> Option<[MaterialId; 2]> {
         match *self {
-            Self::Constant(_) | Self::Varying(_) => None,
+            Self::Constant(_) | Self::Textured(_) => None,
             Self::Mix { first, second, .. } => Some([first, second]),
             Self::TwoSided { front, back } => Some([front, back]),
         }
     }
 
-    /// Whether light may cross the surface; of what consists of others, the parts tell.
-    pub fn transmits(&self) -> bool {
+    /// The lobes that it may have; none of its own where it consists of other materials.
+    pub fn flags(&self) -> BsdfFlags {
         match self {
-            Self::Constant(bsdf) => bsdf.transmits(),
-            Self::Varying(varying) => varying.transmits(),
-            Self::Mix { .. } | Self::TwoSided { .. } => false,
+            Self::Constant(bsdf) => bsdf.flags(),
+            Self::Textured(textured) => textured.flags(),
+            Self::Mix { .. } | Self::TwoSided { .. } => BsdfFlags::empty(),
         }
     }
 
-    /// Whether a texture has a say in it.
+    /// Whether any input is textured.
     pub fn is_textured(&self) -> bool {
         !self.textures().is_empty()
     }
 
-    /// The textures that have a say in it; of what consists of others, the parts tell of theirs.
+    /// The textures of its own inputs, not those of materials that it consists of.
     pub fn textures(&self) -> Vec<TextureId> {
         match self {
             Self::Constant(_) | Self::TwoSided { .. } => Vec::new(),
-            Self::Varying(varying) => varying.textures(),
+            Self::Textured(textured) => textured.textures(),
             Self::Mix { amount, .. } => amount.texture().into_iter().collect(),
-        }
-    }
-
-    /// Whether light sampling is pointless everywhere on the material.
-    pub fn is_delta(&self) -> bool {
-        match self {
-            Self::Constant(bsdf) => bsdf.is_delta(),
-            Self::Varying(varying) => matches!(**varying, Varying::Mirror { .. } | Varying::ThinDielectric { .. }),
-            Self::Mix { .. } | Self::TwoSided { .. } => false,
-        }
-    }
-
-    /// Whether scattering may depend on the direction of the surface's tangents; of what consists of others, the parts tell.
-    pub fn is_anisotropic(&self) -> bool {
-        match self {
-            Self::Constant(bsdf) => bsdf.is_anisotropic(),
-            Self::Varying(varying) => varying.is_anisotropic(),
-            Self::Mix { .. } | Self::TwoSided { .. } => false,
         }
     }
 }
 
-impl From<Varying> for Material {
+impl From<TexturedMaterial> for Material {
     /// What no texture changes is prepared once.
-    fn from(varying: Varying) -> Self {
-        if varying.is_constant() {
-            Self::Constant(varying.bsdf(&[], &Footprint::point(Vec2::ZERO)))
+    fn from(textured: TexturedMaterial) -> Self {
+        if textured.is_constant() {
+            Self::Constant(textured.bsdf(&[], &Footprint::point(Vec2::ZERO)))
         } else {
-            Self::Varying(Box::new(varying))
+            Self::Textured(Box::new(textured))
         }
     }
 }

@@ -56,7 +56,7 @@ const MOST: usize = 8;
 
 /// The media that contain a point, the one that is there first. Of more than eight, those that count least are forgotten.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Interior {
+pub struct MediumStack {
     /// Ascending by id; those with a count of 0 are unused and come last.
     entries: [Entry; MOST],
 }
@@ -74,7 +74,7 @@ impl Default for Entry {
     }
 }
 
-impl Interior {
+impl MediumStack {
     /// The medium that is there; `None` in empty space.
     #[inline]
     pub fn medium(&self) -> Option<MediumId> {
@@ -83,7 +83,7 @@ impl Interior {
 
     /// Inside of one more surface of a medium.
     #[must_use]
-    pub fn entered(mut self, medium: MediumId) -> Self {
+    pub fn pushed(mut self, medium: MediumId) -> Self {
         let at = self.entries.partition_point(|entry| entry.count > 0 && entry.medium < medium);
         match self.entries.get_mut(at) {
             None => {}
@@ -98,7 +98,7 @@ impl Interior {
 
     /// Outside of one surface of a medium; unchanged where none contains the point.
     #[must_use]
-    pub fn left(mut self, medium: MediumId) -> Self {
+    pub fn popped(mut self, medium: MediumId) -> Self {
         let Some(at) = self.entries.iter().position(|entry| entry.count > 0 && entry.medium == medium) else {
             return self;
         };
@@ -113,23 +113,23 @@ impl Interior {
 
 /// The media on both sides of a surface where it is crossed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sides {
+pub struct BoundaryMedia {
     /// On the side of the normal.
-    pub outside: Interior,
+    pub outside: MediumStack,
     /// On the other side, which is within the surface.
-    pub inside: Interior,
+    pub inside: MediumStack,
 }
 
-impl Sides {
-    /// Of a surface of `medium` seen from a point within `here`, on the side of the normal if `is_front`. Where the point is not known to be
-    /// within the surface that it is about to leave, the surface is believed.
-    pub fn new(here: Interior, medium: MediumId, is_front: bool) -> Self {
-        let outside = if is_front { here } else { here.left(medium) };
-        Self { outside, inside: outside.entered(medium) }
+impl BoundaryMedia {
+    /// Of a surface of `medium` seen from a point within `here`, on the side of the normal if `is_front`. Where the
+    /// point is not known to be within the surface that it is about to leave, the surface is believed.
+    pub fn new(current: MediumStack, medium: MediumId, is_front: bool) -> Self {
+        let outside = if is_front { current } else { current.popped(medium) };
+        Self { outside, inside: outside.pushed(medium) }
     }
 
     /// The side beyond the surface for a ray that arrives from the side of the normal, if `is_front`.
-    pub fn beyond(&self, is_front: bool) -> Interior {
+    pub fn beyond(&self, is_front: bool) -> MediumStack {
         if is_front { self.inside } else { self.outside }
     }
 }
@@ -177,13 +177,13 @@ impl Media {
     }
 
     /// What is left of light after a distance within `here`.
-    pub fn transmittance(&self, here: &Interior, distance: f32) -> Rgb {
-        here.medium().map_or(Rgb::WHITE, |id| transmittance(self.list[id.index()].absorption, distance))
+    pub fn transmittance(&self, current: &MediumStack, distance: f32) -> Rgb {
+        current.medium().map_or(Rgb::WHITE, |id| transmittance(self.list[id.index()].absorption, distance))
     }
 
     /// The relative index of refraction between the two sides of a surface, for one channel if it is chosen.
-    pub fn relative_ior(&self, sides: &Sides, channel: Option<usize>) -> RelativeIor {
-        let ior = |here: &Interior| here.medium().map_or([1.0; 3], |id| self.list[id.index()].ior);
+    pub fn relative_ior(&self, sides: &BoundaryMedia, channel: Option<usize>) -> RelativeIor {
+        let ior = |current: &MediumStack| current.medium().map_or([1.0; 3], |id| self.list[id.index()].ior);
         let (inside, outside) = (ior(&sides.inside), ior(&sides.outside));
         let relative = [0, 1, 2].map(|i| inside[i] / outside[i]);
         match channel {
@@ -233,39 +233,39 @@ mod tests {
         // Every order of entering three media, one of them twice, and every order of leaving them.
         let all = [0, 1, 1, 2].map(MediumId);
         let orders = || (0..256).map(|i| [i & 3, i >> 2 & 3, i >> 4 & 3, i >> 6 & 3]).filter(|o| (0..4).all(|k| o.contains(&k)));
-        let full = all.into_iter().fold(Interior::default(), Interior::entered);
+        let full = all.into_iter().fold(MediumStack::default(), MediumStack::pushed);
         assert_eq!(full.medium(), Some(MediumId(0)));
         for order in orders() {
-            assert_eq!(order.iter().fold(Interior::default(), |here, &k| here.entered(all[k])), full);
+            assert_eq!(order.iter().fold(MediumStack::default(), |current, &k| current.pushed(all[k])), full);
             let mut rest: Vec<MediumId> = all.to_vec();
-            let mut here = full;
+            let mut current = full;
             for k in order {
-                here = here.left(all[k]);
+                current = current.popped(all[k]);
                 rest.remove(rest.iter().position(|m| *m == all[k]).unwrap());
-                assert_eq!(here.medium(), rest.iter().min().copied());
+                assert_eq!(current.medium(), rest.iter().min().copied());
             }
-            assert_eq!(here, Interior::default());
+            assert_eq!(current, MediumStack::default());
         }
     }
 
     #[test]
     fn leaving_what_does_not_contain_the_point_changes_nothing() {
-        let here = Interior::default().entered(MediumId(3));
-        assert_eq!(here.left(MediumId(2)), here);
-        assert_eq!(Interior::default().left(MediumId(0)), Interior::default());
+        let current = MediumStack::default().pushed(MediumId(3));
+        assert_eq!(current.popped(MediumId(2)), current);
+        assert_eq!(MediumStack::default().popped(MediumId(0)), MediumStack::default());
         // But the surface is still one between the medium and what lies outside.
-        let sides = Sides::new(Interior::default(), MediumId(2), false);
+        let sides = BoundaryMedia::new(MediumStack::default(), MediumId(2), false);
         assert_eq!((sides.inside.medium(), sides.outside.medium()), (Some(MediumId(2)), None));
     }
 
     #[test]
     fn of_too_many_media_the_least_are_forgotten() {
-        let mut here = (0..12).rev().map(MediumId).fold(Interior::default(), Interior::entered);
+        let mut current = (0..12).rev().map(MediumId).fold(MediumStack::default(), MediumStack::pushed);
         for i in 0..MOST as u32 {
-            assert_eq!(here.medium(), Some(MediumId(i)));
-            here = here.left(MediumId(i));
+            assert_eq!(current.medium(), Some(MediumId(i)));
+            current = current.popped(MediumId(i));
         }
-        assert_eq!(here, Interior::default());
+        assert_eq!(current, MediumStack::default());
     }
 
     #[test]

@@ -6,8 +6,8 @@ thread_local! {
     static FALLIBLE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `request`, which copes with memory that cannot be had, as `Vec::try_reserve` reports it. A program whose allocator ends it when memory
-/// runs out lets such requests fail instead, by [`is_fallible`].
+/// Runs `request`, which copes with memory that cannot be had, as `Vec::try_reserve` reports it. A program whose
+/// allocator ends it when memory runs out lets such requests fail instead, by [`is_fallible`].
 pub fn fallible<T>(request: impl FnOnce() -> T) -> T {
     let before = FALLIBLE.replace(true);
     let result = request();

@@ -92,8 +92,8 @@ fn right_angled(at: &SurfaceInteraction, tangent: Vec3, dp_dv: Vec3) -> [Vec3; 2
     [tangent, if bitangent.dot(dp_dv) < 0.0 { -bitangent } else { bitangent }]
 }
 
-/// The gradient on the surface of a function with these slopes along u and v (Mikkelsen, "Bump Mapping Unparametrized Surfaces on the GPU");
-/// zero where u and v have no directions.
+/// The gradient on the surface of a function with these slopes along u and v (Mikkelsen, "Bump Mapping Unparametrized
+/// Surfaces on the GPU"); zero where u and v have no directions.
 fn surface_gradient(at: &SurfaceInteraction, dp_dv: Vec3, slope_u: f32, slope_v: f32) -> Vec3 {
     let (across_u, across_v) = (dp_dv.cross(at.n_s), at.n_s.cross(at.dp_du));
     let gradient = (across_u * slope_u + across_v * slope_v) / at.dp_du.dot(across_u);

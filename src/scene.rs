@@ -1,5 +1,7 @@
 //! A scene ready to render: tables and ids, no paths, and no names but those of layers: light groups, objects, materials.
 
+use std::borrow::Cow;
+
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::film::Identities;
@@ -39,7 +41,7 @@ impl Surface {
 
 /// What a scene uses; what it does not use costs nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Features {
+pub struct SceneFeatures {
     /// Some shape emits or there is a light.
     pub lights: bool,
     /// Some light is at infinity and visible to rays that leave the scene.
@@ -96,7 +98,7 @@ pub struct Scene {
     /// The camera.
     pub camera: Camera,
     /// What the scene uses.
-    pub features: Features,
+    pub features: SceneFeatures,
     /// What shapes, materials and instances are called.
     pub identities: Identities,
 }
@@ -127,20 +129,12 @@ impl Scene {
     }
 
     /// The scattering at a point for a ray that arrives in `direction` and stands for `footprint`.
-    /// What is not the same everywhere is made in `place`.
     #[inline(always)]
-    pub fn bsdf<'a, 'f>(
-        &'a self,
-        at: &SurfaceInteraction,
-        direction: Vec3,
-        footprint: impl FnOnce() -> Footprint<'f>,
-        place: &'a mut Option<Bsdf>,
-    ) -> &'a Bsdf {
-        let material = self.material(at.shape);
-        if let Material::Constant(bsdf) = material {
-            bsdf
+    pub fn bsdf<'a, 'f>(&'a self, at: &SurfaceInteraction, direction: Vec3, footprint: impl FnOnce() -> Footprint<'f>) -> Cow<'a, Bsdf> {
+        if let Material::Constant(bsdf) = self.material(at.shape) {
+            Cow::Borrowed(bsdf)
         } else {
-            place.insert(self.met_material(at, direction).bsdf(&self.textures, footprint))
+            Cow::Owned(self.met_material(at, direction).bsdf(&self.textures, footprint))
         }
     }
 
@@ -179,8 +173,8 @@ impl Scene {
     }
 }
 
-/// A number in `[0, 1)` hashed from a point, a direction and a material: the choice between the parts of a mix is the same for any number of
-/// threads, and another for every sample of a pixel.
+/// A number in `[0, 1)` hashed from a point, a direction and a material: the choice between the parts of a mix is the
+/// same for any number of threads, and another for every sample of a pixel.
 fn choice(at: &SurfaceInteraction, direction: Vec3, id: MaterialId) -> f32 {
     let words = at.p.to_array().map(f64::to_bits).into_iter().chain(direction.to_array().map(|x| u64::from(x.to_bits())));
     let hash = words.fold(mix(u64::from(id.0)), |hash, word| mix(hash ^ word));

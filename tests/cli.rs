@@ -38,7 +38,7 @@ fn faults_have_their_exit_codes_and_one_line() {
 #[test]
 fn without_outputs_the_files_are_named_after_the_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), "render scene.json --layers Z --json stats.json");
+    let output = run(folder.path(), "render scene.json --layers Z --json stats.json --accel embree");
     assert_eq!(output.status.code(), Some(0), "{}", told(&output));
     let told = told(&output);
     assert!(told.contains("wrote scene.exr\n") && told.contains("wrote scene.png\n") && told.ends_with("Progress: 100%\n"), "{told}");

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use steradian::accel::{AccelKind, Coherence, build};
-use steradian::geometry::{Coverage, Cutouts, Geometry, Hit, Placed, Shape, Sphere};
+use steradian::geometry::{AlphaMask, AlphaMasks, Geometry, Hit, Placed, Shape, Sphere};
 use steradian::id::ShapeId;
 use steradian::math::{DMat3, DVec3, Ray};
 
@@ -11,12 +11,12 @@ use crate::util::geometry::{Rng, cube, grid, ids, instances, meshes, placed_anal
 #[derive(Debug)]
 struct Veil(f32);
 
-impl Coverage for Veil {
+impl AlphaMask for Veil {
     fn has_holes(&self, shape: ShapeId) -> bool {
         shape.0 != 0
     }
 
-    fn coverage(&self, _: &Shape, _: &Ray, _: &Hit) -> f32 {
+    fn alpha(&self, _: &Shape, _: &Ray, _: &Hit) -> f32 {
         self.0
     }
 }
@@ -25,18 +25,18 @@ impl Coverage for Veil {
 #[derive(Debug)]
 struct Half;
 
-impl Coverage for Half {
+impl AlphaMask for Half {
     fn has_holes(&self, _: ShapeId) -> bool {
         true
     }
 
-    fn coverage(&self, _: &Shape, ray: &Ray, hit: &Hit) -> f32 {
+    fn alpha(&self, _: &Shape, ray: &Ray, hit: &Hit) -> f32 {
         if ray.at(hit.t).x >= 0.0 { 1.0 } else { 0.0 }
     }
 }
 
-fn with(coverage: impl Coverage + 'static, geometry: Geometry) -> Geometry {
-    Geometry { cutouts: Cutouts::new(Arc::new(coverage)), ..geometry }
+fn with(coverage: impl AlphaMask + 'static, geometry: Geometry) -> Geometry {
+    Geometry { cutouts: AlphaMasks::new(Arc::new(coverage)), ..geometry }
 }
 
 fn scenes(rng: &mut Rng) -> Vec<Geometry> {

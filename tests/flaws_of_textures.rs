@@ -44,7 +44,7 @@ fn meet(scene: &Scene, ray: &Ray) -> Option<(SurfaceInteraction, Vec3)> {
 fn bsdf_at(scene: &Scene, x: f32, y: f32) -> Bsdf {
     let ray = Ray::new(vec3(x, y, 5.0), -Vec3::Z);
     let (at, _) = meet(scene, &ray).expect("the ray meets a shape");
-    scene.bsdf(&at, ray.direction, || Footprint::point(at.uv), &mut None).clone()
+    scene.bsdf(&at, ray.direction, || Footprint::point(at.uv)).into_owned()
 }
 
 /// Codes of the base colour taken for light; or the curve applied to roughness too.

@@ -1,11 +1,15 @@
 //! Guided paths: the same picture, and the same bits for any number of threads.
 
+use std::sync::atomic::AtomicBool;
+
 use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
 use steradian::error::Error;
 use steradian::film::{Image, LayerKind};
-use steradian::render::{self, Overrides, RenderResult, Silent};
+use steradian::math::Rng;
+use steradian::render::{self, Overrides, RenderResult, RenderState, Shard, Silent, StateFile};
 
+use crate::checkpoints::{self, Kit, StopAfter, bits};
 use crate::util::render::{assert_blocks_agree, block_means, prepare, render_with};
 
 fn quad(material: &str, origin: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Value {
@@ -168,4 +172,127 @@ fn what_guiding_cannot_do_is_refused() {
     let accel = accel::build(AccelKind::EMBREE, &prepared.scene.geometry, 1).unwrap();
     let error = render::replay(&prepared.scene, &*accel, &prepared.settings, [1, 1], 0).unwrap_err();
     assert!(error.to_string().contains("--guiding off"), "{error}");
+}
+
+fn kit(scene: &Value, spp: u32) -> Kit {
+    Kit::new(scene, &Overrides { guiding: Some(true), spp: Some(spp), threads: Some(2), ..Overrides::default() })
+}
+
+/// Renders until a tile of a random pass is done; the state is what a file has kept of it.
+fn part(kit: &Kit, state: RenderState, tiles: usize, file: &StateFile) -> RenderState {
+    let stop = AtomicBool::new(false);
+    let progress = StopAfter { tiles: (1 + tiles as u32).into(), stop: &stop };
+    kit.kept(&kit.go_on(state, &progress, &stop), file)
+}
+
+/// Interrupted while the guide learns, at the ends of iterations and within them, and after guiding was given up.
+#[test]
+fn a_resumed_guided_render_has_the_bits_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = StateFile::take(&folder.path().join("a.state")).unwrap();
+    let mut rng = Rng::new(7);
+    for scene in [room(), checkpoints::scene("mitchell")] {
+        let kit = kit(&scene, 37);
+        let reference = kit.render(Shard::WHOLE);
+        assert!(reference.complete && reference.done == 37);
+        let tiles = reference.film.tiles().len();
+        let mut interruptions = std::collections::BTreeSet::new();
+        for passes in [1, 2, 3, 5] {
+            let mut state = kit.start(Shard::WHOLE);
+            while !state.complete {
+                state = part(&kit, state, rng.below(passes * tiles), &file);
+                interruptions.insert(state.done);
+            }
+            assert!(bits(&state.film) == bits(&reference.film), "{passes}");
+            assert_eq!((state.rays, state.film.dropped()), (reference.rays, reference.film.dropped()));
+            assert!(state.film.resolve() == reference.film.resolve());
+        }
+        assert!(interruptions.len() > 5, "{interruptions:?}");
+    }
+}
+
+/// What is there of a guided render is a picture of the same brightness, from its checkpoint too; the number of samples is part of what it is.
+#[test]
+fn an_interrupted_guided_render_has_a_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = StateFile::take(&folder.path().join("a.state")).unwrap();
+    let kit = kit(&room(), 64);
+    let mut state = kit.start(Shard::WHOLE);
+    while state.done < 5 {
+        state = part(&kit, state, 0, &file);
+    }
+    let picture = state.picture(&kit.prepared.settings);
+    let plain = run(&room(), false, &Overrides { spp: Some(64), ..Overrides::default() }).image;
+    let means = [&picture, &plain].map(|image| block_means(image).iter().sum::<f64>());
+    assert!((means[0] / means[1] - 1.0).abs() < 0.2, "{means:?}");
+    let merged = render::merge(&[file.path().to_owned()], true).unwrap();
+    assert_eq!(merged.state.done, state.done);
+    assert!(merged.state.film.resolve() == state.whole_film().resolve());
+
+    let more = self::kit(&room(), 65);
+    let refused = RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings).unwrap_err();
+    assert!(refused.to_string().contains("spp: 64 in the checkpoint, 65 asked for"), "{refused}");
+}
+
+/// The last block of a state, which has the guide.
+fn with_guide(state: &[u8], change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let length = |at: usize| u64::from_le_bytes(state[at..at + 8].try_into().unwrap()) as usize;
+    let end = state.len() - 40;
+    let mut at = 16 + u32::from_le_bytes(state[12..16].try_into().unwrap()) as usize;
+    while at + 8 + length(at) < end {
+        at += 8 + length(at);
+    }
+    let mut guide = state[at + 8..end].to_vec();
+    change(&mut guide);
+    let mut out = [&state[..at], &(guide.len() as u64).to_le_bytes(), &guide, &state[end..end + 8]].concat();
+    out.extend(blake3::hash(&out).as_bytes());
+    out
+}
+
+/// States come from anywhere: guides that no render can have learned are refused, and none that is taken is a panic.
+#[test]
+fn damaged_guides_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = StateFile::take(&folder.path().join("a.state")).unwrap();
+    let mut small = room();
+    small["film"] = json!({ "width": 12, "height": 12 });
+    let kit = kit(&small, 16);
+    let mut state = kit.start(Shard::WHOLE);
+    while state.done < 5 {
+        state = part(&kit, state, 0, &file);
+    }
+    let bytes = std::fs::read(file.path()).unwrap();
+    let read = |bytes: &[u8]| {
+        let path = folder.path().join("b.state");
+        std::fs::write(&path, bytes).unwrap();
+        RenderState::read(&path, &kit.header(Shard::WHOLE), &kit.prepared.scene, &kit.prepared.settings)
+    };
+    assert!(read(&with_guide(&bytes, |_| {})).is_ok());
+    let refused = |change: &dyn Fn(&mut Vec<u8>)| {
+        let error = read(&with_guide(&bytes, change)).unwrap_err();
+        assert_eq!(error.kind(), steradian::ErrorKind::Checkpoint);
+        assert!(error.to_string().contains("b.state: the guide is not what was saved of it"), "{error}");
+    };
+    refused(&Vec::clear);
+    refused(&|guide| guide.push(0));
+    // Samples that have a weight: as many as no iteration ends with.
+    refused(&|guide| guide[8] = 3);
+    refused(&|guide| guide[8..16].fill(255));
+    let mut rng = Rng::new(4);
+    for _ in 0..50 {
+        let cut = rng.below(10_000);
+        refused(&|guide| guide.truncate(cut % guide.len()));
+    }
+    let mut taken = 0;
+    for _ in 0..60 {
+        let (place, value) = (rng.bits() as usize, rng.bits() as u8);
+        let changed = with_guide(&bytes, |guide| {
+            let place = place % guide.len();
+            guide[place] = value;
+        });
+        if let Ok(state) = read(&changed) {
+            taken += 1;
+            assert!(taken > 6 || kit.go_on(state, &Silent, &AtomicBool::new(false)).complete);
+        }
+    }
 }

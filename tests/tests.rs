@@ -106,7 +106,7 @@ mod terminator;
 mod texture_filtering;
 /// Images on every shape, at seams and poles too.
 mod textures;
-/// Layers, file lengths, unsafe code, printing.
+/// Layers, lengths of files and functions, parameters, public names, unsafe code, printing.
 mod tidy;
 /// What files may do: set what a picture is, but load, overwrite and connect to nothing.
 mod trust;

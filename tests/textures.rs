@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
 use steradian::geometry::SurfaceInteraction;
 use steradian::integrator::World;
-use steradian::material::{ColorInput, Material, Varying};
+use steradian::material::{ColorInput, Material, TexturedMaterial};
 use steradian::math::{DVec3, Ray, Vec2, vec2};
 use steradian::scene::Scene;
 use steradian::texture::Texture;
@@ -36,9 +36,9 @@ fn look(scene: &Scene, origin: DVec3, target: DVec3) -> Option<SurfaceInteractio
 
 /// The colour of the texture on the diffuse shape that a ray meets.
 fn texel(scene: &Scene, at: &SurfaceInteraction) -> steradian::color::Rgb {
-    let Material::Varying(varying) = scene.material(at.shape) else { panic!("constant") };
+    let Material::Textured(varying) = scene.material(at.shape) else { panic!("constant") };
     match &**varying {
-        Varying::Diffuse { albedo: ColorInput::Texture(id), .. } => scene.textures[id.index()].color(at.uv),
+        TexturedMaterial::Diffuse { albedo: ColorInput::Texture(id), .. } => scene.textures[id.index()].color(at.uv),
         other => panic!("{other:?}"),
     }
 }

@@ -9,18 +9,23 @@ use super::bvh::{Bvh, BvhOptions};
 use super::kdtree::{KdTree, KdTreeOptions};
 use super::octree::Octree;
 use super::tree::TwoLevel;
-use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel};
+use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel, PacketBvh};
 use crate::error::Result;
 use crate::geometry::Geometry;
 
 /// An accelerator with its options. Its name, also when serialized, is `KIND` or `KIND:OPTION+OPTION`; [`AccelKind::CHOICES`] lists both.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum AccelKind {
+    /// [`Packets`](Self::Packets) for scenes of few primitives at rest, else Embree.
+    #[default]
+    Auto,
     /// Embree.
     Embree(EmbreeOptions),
     /// A bounding volume hierarchy of ours.
     Bvh(BvhOptions),
+    /// A bounding volume hierarchy for packets of rays.
+    Packets,
     /// A kd-tree.
     KdTree(KdTreeOptions),
     /// An octree.
@@ -29,32 +34,29 @@ pub enum AccelKind {
     Linear,
 }
 
-impl Default for AccelKind {
-    fn default() -> Self {
-        Self::EMBREE
-    }
-}
-
 impl AccelKind {
     /// Embree with default options.
     pub const EMBREE: Self = Self::Embree(EmbreeOptions { quality: EmbreeQuality::Medium, robust: true, compact: false });
 
-    /// Every kind with default options, with the name users choose it by.
-    pub const ALL: [(Self, &'static str); 5] = [
+    /// Every structure with default options, with the name users choose it by.
+    pub const ALL: [(Self, &'static str); 6] = [
         (Self::EMBREE, "embree"),
         (Self::Bvh(BvhOptions { binary: false }), "bvh"),
         (Self::KdTree(KdTreeOptions { median: false }), "kdtree"),
         (Self::Octree, "octree"),
         (Self::Linear, "linear"),
+        (Self::Packets, "packets"),
     ];
 
     /// Every kind and every option, with what it is.
     pub const CHOICES: &'static [(&'static str, &'static str)] = &[
-        ("embree", "Embree: fastest; build quality medium, robust"),
+        ("auto", "packets where a scene has at most 40 primitives, all at rest and without holes; else embree"),
+        ("embree", "Embree: fastest for large scenes; build quality medium, robust"),
         ("embree:low", "built faster, traced slower"),
         ("embree:high", "spatial splits: built slower, traced faster"),
         ("embree:fast", "not robust: rays may slip through edges; for comparisons"),
         ("embree:compact", "less memory, traced slower"),
+        ("packets", "bounding volume hierarchy traversed by up to 16 rays at once: fastest for few primitives"),
         ("bvh", "bounding volume hierarchy: binned surface area heuristic, eight boxes a node, SIMD"),
         ("bvh:binary", "two boxes a node, no SIMD"),
         ("kdtree", "kd-tree: surface area heuristic with a bonus for empty space"),
@@ -76,6 +78,8 @@ impl fmt::Display for AccelKind {
                 let flags = [(!o.robust).then_some("fast"), o.compact.then_some("compact")];
                 ("embree", quality.into_iter().chain(flags.into_iter().flatten()).collect())
             }
+            Self::Auto => ("auto", Vec::new()),
+            Self::Packets => ("packets", Vec::new()),
             Self::Bvh(o) => {
                 let flags = [o.binary.then_some("binary")];
                 ("bvh", flags.into_iter().flatten().collect())
@@ -100,7 +104,7 @@ pub struct UnknownAccel {
 }
 
 fn kinds() -> String {
-    AccelKind::ALL.map(|(_, name)| name).join(", ")
+    format!("auto, {}", AccelKind::ALL.map(|(_, name)| name).join(", "))
 }
 
 impl FromStr for AccelKind {
@@ -109,7 +113,8 @@ impl FromStr for AccelKind {
     fn from_str(name: &str) -> std::result::Result<Self, UnknownAccel> {
         let unknown = || UnknownAccel { name: name.to_owned() };
         let (kind, options) = name.split_once(':').unwrap_or((name, ""));
-        let mut accel = Self::ALL.into_iter().find(|(_, n)| *n == kind).ok_or_else(unknown)?.0;
+        let mut all = Self::ALL.into_iter().chain([(Self::Auto, "auto")]);
+        let mut accel = all.find(|(_, n)| *n == kind).ok_or_else(unknown)?.0;
         for option in options.split('+').filter(|_| name.contains(':')) {
             match (&mut accel, option) {
                 (Self::Embree(o), "low") => o.quality = EmbreeQuality::Low,
@@ -145,7 +150,10 @@ impl TryFrom<String> for AccelKind {
 /// If Embree reports an error, such as a lack of memory.
 pub fn build(kind: AccelKind, geometry: &Geometry, threads: usize) -> Result<Box<dyn Accelerator + '_>> {
     Ok(match kind {
+        AccelKind::Auto if PacketBvh::suits(geometry) => Box::new(PacketBvh::new(geometry, threads)),
+        AccelKind::Auto => build(AccelKind::EMBREE, geometry, threads)?,
         AccelKind::Embree(options) => Box::new(EmbreeAccel::with_options(geometry, threads, options)?),
+        AccelKind::Packets => Box::new(PacketBvh::new(geometry, threads)),
         AccelKind::Bvh(options) => Box::new(TwoLevel::<Bvh>::new(geometry, &options, threads)),
         AccelKind::KdTree(options) => Box::new(TwoLevel::<KdTree>::new(geometry, &options, threads)),
         AccelKind::Octree => Box::new(TwoLevel::<Octree>::new(geometry, &(), threads)),
@@ -166,14 +174,14 @@ mod tests {
             assert_eq!((kind.to_string().as_str(), name.parse().as_ref()), (name, Ok(&kind)));
         }
         assert_eq!("embree:compact+low".parse::<AccelKind>().unwrap().to_string(), "embree:low+compact");
-        assert_eq!(AccelKind::default(), AccelKind::EMBREE);
+        assert_eq!(AccelKind::default(), AccelKind::Auto);
     }
 
     #[test]
     fn other_names_are_refused_with_those_there_are() {
-        for name in ["", "embre", "embree:", "embree:hi", "bvh:median", "linear:fast", "octree:"] {
+        for name in ["", "embre", "embree:", "embree:hi", "bvh:median", "auto:high", "linear:fast", "octree:"] {
             let error = name.parse::<AccelKind>().unwrap_err().to_string();
-            assert!(error.contains("embree, bvh, kdtree, octree, linear"), "{error}");
+            assert!(error.contains("auto, embree, bvh, kdtree, octree, linear, packets"), "{error}");
         }
     }
 }

@@ -7,6 +7,7 @@ mod kdtree;
 mod kind;
 mod linear;
 mod octree;
+mod packet;
 mod rows;
 mod tree;
 
@@ -16,6 +17,7 @@ pub use embree::{EmbreeAccel, EmbreeInfo, EmbreeOptions, EmbreeQuality, EmbreeRe
 pub use kdtree::KdTreeOptions;
 pub use kind::{AccelKind, UnknownAccel, build};
 pub use linear::LinearAccel;
+pub use packet::PacketBvh;
 pub use rows::HitRows;
 
 use crate::geometry::Hit;

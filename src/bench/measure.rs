@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::agreement::{self, Agreement};
 use super::machine::{memory_in_use, reset_peak_memory};
 use super::{RayKind, RaySet, Watch, epo, median_and_range};
-use crate::accel::inspect::{StructureStats, TraversalCounts};
+use crate::accel::inspect::{Inspect, StructureStats, TraversalCounts};
 use crate::accel::{self, AccelKind, Accelerator, Coherence, HitRows, LinearAccel};
 use crate::error::{Error, Result};
 use crate::geometry::Geometry;
@@ -178,7 +178,7 @@ const ORACLE_TESTS: u64 = 200_000_000;
 /// If an accelerator cannot be built.
 pub fn bench_scene(name: &str, geometry: &Geometry, sets: &[RaySet], options: &Options, watch: &dyn Watch) -> Result<SceneReport> {
     let primitives: usize = geometry.shapes.iter().map(crate::geometry::Shape::prim_count).sum();
-    let mut accels: Vec<(AccelReport, Box<dyn Accelerator + '_>)> = Vec::new();
+    let mut accels: Vec<Measured> = Vec::new();
     for &kind in &options.accels {
         if watch.is_stopped() {
             break;
@@ -197,13 +197,14 @@ pub fn bench_scene(name: &str, geometry: &Geometry, sets: &[RaySet], options: &O
         accels: Vec::new(),
         interrupted: false,
     };
+    let replay = Replay { name, geometry, primitives, proxy: oracle, options, watch };
     let mut compared = 0;
     for set in sets {
         if watch.is_stopped() {
             report.interrupted = true;
             break;
         }
-        compared += replay_kind(name, geometry, set, &mut accels, oracle, primitives, options, watch)?;
+        compared += replay.replay(set, &mut accels)?;
     }
     report.oracle = match oracle {
         None => format!("linear, on {compared} rays"),
@@ -215,12 +216,7 @@ pub fn bench_scene(name: &str, geometry: &Geometry, sets: &[RaySet], options: &O
     Ok(report)
 }
 
-fn build<'g>(
-    kind: AccelKind,
-    geometry: &'g Geometry,
-    primitives: usize,
-    options: &Options,
-) -> Result<(AccelReport, Box<dyn Accelerator + 'g>)> {
+fn build<'g>(kind: AccelKind, geometry: &'g Geometry, primitives: usize, options: &Options) -> Result<Measured<'g>> {
     let can_reset = reset_peak_memory();
     let before = memory_in_use();
     let first = Instant::now();
@@ -271,96 +267,117 @@ fn build<'g>(
 }
 
 /// The accelerator that stands in for the oracle on rays that would take the oracle too long: one of ours, which is checked against it.
-fn choose_oracle(accels: &[(AccelReport, Box<dyn Accelerator + '_>)]) -> Option<usize> {
+fn choose_oracle(accels: &[Measured]) -> Option<usize> {
     accels.iter().position(|(report, accel)| accel.inspect().is_some() && report.name.starts_with("bvh"))
 }
 
-/// Replays one kind of ray; gives the number of rays that were compared with the oracle itself.
-#[allow(clippy::too_many_arguments)]
-fn replay_kind(
-    name: &str,
-    geometry: &Geometry,
-    set: &RaySet,
-    accels: &mut [(AccelReport, Box<dyn Accelerator + '_>)],
-    proxy: Option<usize>,
+/// An accelerator with what is known of it.
+type Measured<'g> = (AccelReport, Box<dyn Accelerator + 'g>);
+
+/// Rates of an accelerator by mode and threads, one for each round.
+type Rates = Vec<(Mode, usize, Vec<f64>)>;
+
+/// Replays rays in a scene.
+struct Replay<'a> {
+    name: &'a str,
+    geometry: &'a Geometry,
     primitives: usize,
-    options: &Options,
-    watch: &dyn Watch,
-) -> Result<usize> {
-    let any_hit = set.kind.is_any_hit();
-    let affordable = |tests: u64| ((tests / primitives.max(1) as u64) as usize).clamp(16, set.rays.len().max(16)).min(set.rays.len());
+    /// The accelerator that stands in for the oracle, see [`choose_oracle`].
+    proxy: Option<usize>,
+    options: &'a Options,
+    watch: &'a dyn Watch,
+}
 
-    watch.step(&format!("{name}: {} rays, agreement", set.kind.name()));
-    let linear = LinearAccel::new(geometry);
-    let checked = &set.rays[..affordable(ORACLE_TESTS)];
-    let rest = &set.rays[checked.len()..];
-    let expected = agreement::answers(&linear, checked, any_hit);
-    let mut agreements: Vec<Agreement> =
-        accels.iter().map(|(_, accel)| agreement::compare(geometry, &expected, &**accel, checked)).collect();
-    if let Some(proxy) = proxy.filter(|&i| agreements[i].identical == checked.len() && !rest.is_empty()) {
-        let expected = agreement::answers(&*accels[proxy].1, rest, any_hit);
-        for (i, (report, accel)) in accels.iter().enumerate() {
-            if i != proxy && report.name != "linear" {
-                agreements[i].add(agreement::compare(geometry, &expected, &**accel, rest));
+impl Replay<'_> {
+    /// The number of rays of a set that take so many primitive tests one by one.
+    fn affordable(&self, set: &RaySet, tests: u64) -> usize {
+        ((tests / self.primitives.max(1) as u64) as usize).clamp(16, set.rays.len().max(16)).min(set.rays.len())
+    }
+
+    /// Replays one kind of ray; gives the number of rays that were compared with the oracle itself.
+    fn replay(&self, set: &RaySet, accels: &mut [Measured]) -> Result<usize> {
+        let checked = self.affordable(set, ORACLE_TESTS);
+        let agreements = self.agreements(set, accels, checked);
+        let rays_of = |report: &AccelReport| {
+            if report.name == "linear" { self.affordable(set, self.options.linear_tests) } else { set.rays.len() }
+        };
+        let counts: Vec<usize> = accels.iter().map(|(report, _)| rays_of(report)).collect();
+        let rates = self.rates(set, accels, &counts)?;
+        for ((((report, accel), agreement), rates), rays) in accels.iter_mut().zip(agreements).zip(rates).zip(counts) {
+            let counted = accel.inspect().map(|inspect| work_per_ray(inspect, &set.rays[..rays.min(COUNTED)], set.kind.is_any_hit()));
+            let rates = rates.iter().map(|(mode, threads, rates)| RateReport {
+                mode: *mode,
+                threads: *threads,
+                mrays_per_second: median_and_range(rates),
+            });
+            report.kinds.push(KindReport {
+                kind: set.kind,
+                rays,
+                rates: rates.collect(),
+                nodes_per_ray: counted.map(|c| c[0]),
+                prims_per_ray: counted.map(|c| c[1]),
+                agreement,
+            });
+        }
+        Ok(checked)
+    }
+
+    /// Compares the hits of the first `checked` rays with the oracle's, of the others with the proxy's.
+    fn agreements(&self, set: &RaySet, accels: &[Measured], checked: usize) -> Vec<Agreement> {
+        let (geometry, any_hit) = (self.geometry, set.kind.is_any_hit());
+        self.watch.step(&format!("{}: {} rays, agreement", self.name, set.kind.name()));
+        let (checked, rest) = set.rays.split_at(checked);
+        let expected = agreement::answers(&LinearAccel::new(geometry), checked, any_hit);
+        let mut agreements: Vec<Agreement> =
+            accels.iter().map(|(_, accel)| agreement::compare(geometry, &expected, &**accel, checked)).collect();
+        if let Some(proxy) = self.proxy.filter(|&i| agreements[i].identical == checked.len() && !rest.is_empty()) {
+            let expected = agreement::answers(&*accels[proxy].1, rest, any_hit);
+            for (i, (report, accel)) in accels.iter().enumerate() {
+                if i != proxy && report.name != "linear" {
+                    agreements[i].add(agreement::compare(geometry, &expected, &**accel, rest));
+                }
             }
         }
+        agreements
     }
 
-    // Every accelerator in turn, again and again, so that whatever else the machine does falls on all alike.
-    let mut times: Vec<Vec<(Mode, usize, Vec<f64>)>> = accels
-        .iter()
-        .map(|(report, _)| {
-            let of_threads = |mode: Mode| options.threads.iter().map(move |&threads| (mode, threads, Vec::new()));
-            modes(set.kind, &report.name).iter().flat_map(|&mode| of_threads(mode)).collect()
-        })
-        .collect();
-    let counts: Vec<usize> =
-        accels.iter().map(|(report, _)| if report.name == "linear" { affordable(options.linear_tests) } else { set.rays.len() }).collect();
-    for round in 0..=options.rounds {
-        watch.step(&format!("{name}: {} rays, round {round} of {}", set.kind.name(), options.rounds));
-        for (i, (_, accel)) in accels.iter().enumerate() {
-            for (mode, threads, rates) in &mut times[i] {
-                if watch.is_stopped() && round > 1 {
-                    continue;
-                }
-                let rays = &set.rays[..counts[i]];
-                let seconds = replay(&**accel, rays, *mode, any_hit, *threads)?;
-                // The first round warms caches and page tables up.
-                if round > 0 {
-                    rates.push(rays.len() as f64 / seconds * 1e-6);
+    /// Times every accelerator in turn, again and again, so that whatever else the machine does falls on all alike.
+    fn rates(&self, set: &RaySet, accels: &[Measured], counts: &[usize]) -> Result<Vec<Rates>> {
+        let Self { name, options, watch, .. } = self;
+        let of_threads = |mode: Mode| options.threads.iter().map(move |&threads| (mode, threads, Vec::new()));
+        let mut times: Vec<Rates> =
+            accels.iter().map(|(report, _)| modes(set.kind, &report.name).iter().flat_map(|&mode| of_threads(mode)).collect()).collect();
+        for round in 0..=options.rounds {
+            watch.step(&format!("{name}: {} rays, round {round} of {}", set.kind.name(), options.rounds));
+            for (i, (_, accel)) in accels.iter().enumerate() {
+                for (mode, threads, rates) in &mut times[i] {
+                    if watch.is_stopped() && round > 1 {
+                        continue;
+                    }
+                    let rays = &set.rays[..counts[i]];
+                    let seconds = replay(&**accel, rays, *mode, set.kind.is_any_hit(), *threads)?;
+                    // The first round warms caches and page tables up.
+                    if round > 0 {
+                        rates.push(rays.len() as f64 / seconds * 1e-6);
+                    }
                 }
             }
         }
+        Ok(times)
     }
+}
 
-    for (i, (report, accel)) in accels.iter_mut().enumerate() {
-        let counted = accel.inspect().map(|inspect| {
-            let rays = &set.rays[..counts[i].min(COUNTED)];
-            let mut work = TraversalCounts::default();
-            for ray in rays {
-                if any_hit {
-                    inspect.occluded_counted(ray, &mut work);
-                } else {
-                    inspect.intersect_counted(ray, &mut work);
-                }
-            }
-            [work.nodes, work.prims].map(|n| n as f64 / rays.len().max(1) as f64)
-        });
-        let rates = times[i].iter().map(|(mode, threads, rates)| RateReport {
-            mode: *mode,
-            threads: *threads,
-            mrays_per_second: median_and_range(rates),
-        });
-        report.kinds.push(KindReport {
-            kind: set.kind,
-            rays: counts[i],
-            rates: rates.collect(),
-            nodes_per_ray: counted.map(|c| c[0]),
-            prims_per_ray: counted.map(|c| c[1]),
-            agreement: std::mem::take(&mut agreements[i]),
-        });
+/// Nodes visited and primitives tested per ray.
+fn work_per_ray(inspect: &dyn Inspect, rays: &[Ray], any_hit: bool) -> [f64; 2] {
+    let mut work = TraversalCounts::default();
+    for ray in rays {
+        if any_hit {
+            inspect.occluded_counted(ray, &mut work);
+        } else {
+            inspect.intersect_counted(ray, &mut work);
+        }
     }
-    Ok(checked.len())
+    [work.nodes, work.prims].map(|n| n as f64 / rays.len().max(1) as f64)
 }
 
 /// How an accelerator can be asked. Only Embree traces the rays of a batch side by side.

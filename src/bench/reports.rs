@@ -1,5 +1,5 @@
-//! Three comparisons that course reports quote, repeated: accelerators as such reports wrote them, beside ours and Embree, on pictures of normals
-//! and on path-traced ones.
+//! Three comparisons that course reports quote, repeated: accelerators as such reports wrote them, beside ours and
+//! Embree, on pictures of normals and on path-traced ones.
 
 mod frames;
 
@@ -13,7 +13,7 @@ use crate::accel::{self, AccelKind, Accelerator};
 use crate::error::Result;
 use crate::geometry::{Geometry, Mesh};
 use crate::math::Ray;
-use frames::{Kind, measure};
+use frames::{FrameBenchmark, Kind, measure};
 
 /// How much is done.
 #[derive(Clone, Copy, Debug)]
@@ -271,7 +271,8 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
 
 fn compare(title: &'static str, mesh: &Mesh, entries: &[Entry], options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     let triangles = mesh.triangles().len();
-    let [normals, paths] = [Kind::Normals, Kind::Paths].map(|kind| measure(title, kind, mesh, entries, options, watch));
+    let benchmark = FrameBenchmark { title, mesh, entries, options, watch };
+    let [normals, paths] = [Kind::Normals, Kind::Paths].map(|kind| measure(benchmark, kind));
     let (normals, paths) = (normals?, paths?);
     let rows = entries.iter().zip(normals).zip(paths).map(|((Entry(name, reported, ..), of_normals), of_paths)| Row {
         name: (*name).to_owned(),

@@ -17,7 +17,8 @@ const RAYS: usize = 200_000;
 pub struct ScalingReport {
     /// Measured costs.
     pub points: Vec<ScalingPoint>,
-    /// By accelerator: slopes of the logarithms of the time per ray and of the time of a build over the logarithm of the number of triangles.
+    /// By accelerator: slopes of the logarithms of the time per ray and of the time of a build over the logarithm of
+    /// the number of triangles.
     pub slopes: Vec<(String, f64, f64)>,
 }
 

@@ -18,7 +18,7 @@
 use std::f32::consts::{FRAC_1_PI, FRAC_2_SQRT_PI};
 
 use super::energy::Energy;
-use super::microfacet::{FacetReflection, Microfacets, usable};
+use super::microfacet::{FacetReflection, Microfacets, clamp_alpha};
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec2, Vec3, vec2, vec3};
 
@@ -55,7 +55,7 @@ const SQRT_PI: f32 = 2.0 / FRAC_2_SQRT_PI;
 impl Beckmann {
     /// The distribution for `alpha` within `[0, 1]`; smooth where [`Ggx::new`](super::Ggx::new) is.
     pub fn new(alpha: [f32; 2]) -> Self {
-        Self { alpha: usable(alpha) }
+        Self { alpha: clamp_alpha(alpha) }
     }
 
     #[inline]
@@ -113,9 +113,9 @@ impl Microfacets for Beckmann {
         }
     }
 
-    /// Where alpha is divided out, slopes are Gaussian, and of those that lean by `z` towards `o` the fraction `(a + z) / a` is seen that is
-    /// seen of level ones. Within `a` either way that leaves a Gaussian, once `z` is paired with `-z`; beyond, `a exp(-z²)` and `z exp(-z²)`
-    /// are sampled each for itself.
+    /// Where alpha is divided out, slopes are Gaussian, and of those that lean by `z` towards `o` the fraction `(a + z)
+    /// / a` is seen that is seen of level ones. Within `a` either way that leaves a Gaussian, once `z` is paired with
+    /// `-z`; beyond, `a exp(-z²)` and `z exp(-z²)` are sampled each for itself.
     fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
         let Visible { toward, slope, erf, core, tail, leaning } = self.visible(o);
         let at = u[0] * (core + tail + leaning);
@@ -141,7 +141,7 @@ impl Microfacets for Beckmann {
         vec3(self.alpha[0] * slopes.x, self.alpha[1] * slopes.y, 1.0).normalize()
     }
 
-    fn sampled_shadowing(&self, _o: Vec3, i: Vec3) -> f32 {
+    fn g2_over_g1(&self, _o: Vec3, i: Vec3) -> f32 {
         self.g1(i)
     }
 

@@ -1,11 +1,11 @@
 //! A clear dielectric coat: what it reflects, and how much it leaves to what is below.
 
-use super::Ggx;
 use super::dielectric::refract;
 use super::energy::table::COAT_NODES as NODES;
 use super::energy::{coat_albedo, coat_average};
 use super::fresnel;
 use super::microfacet::{FacetReflection, Microfacets, reflect};
+use super::{BsdfFlags, Ggx};
 use crate::math::{Vec3, sin_cos_turns, vec3};
 
 /// A coat of clear dielectric with microfacets distributed by `D`, smooth or rough, seen from outside; directions are of the upper side.
@@ -16,8 +16,9 @@ pub struct Coat<D = Ggx> {
     facets: D,
     /// Share of diffuse light below the coat that it reflects back down.
     internal: f32,
-    /// What a rough coat does not let through, its albedo `E` where nothing is lost, in units of 1/65535, at equal steps of the square root of the
-    /// cosine: it is steepest at grazing angles. An anisotropic coat has half as many pairs, for directions above the x and the y axis.
+    /// What a rough coat does not let through, its albedo `E` where nothing is lost, in units of 1/65535, at equal
+    /// steps of the square root of the cosine: it is steepest at grazing angles. An anisotropic coat has half as many
+    /// pairs, for directions above the x and the y axis.
     reflected: [u16; NODES],
 }
 
@@ -25,8 +26,8 @@ pub struct Coat<D = Ggx> {
 const BEND: f32 = 0.35;
 
 impl Coat<Ggx> {
-    /// A coat with index of refraction `ior` over the outside, within `[1, 10]`, that loses no light; smooth where [`Ggx::new`] is. A rough coat
-    /// costs some milliseconds here.
+    /// A coat with index of refraction `ior` over the outside, within `[1, 10]`, that loses no light; smooth where
+    /// [`Ggx::new`] is. A rough coat costs some milliseconds here.
     pub fn new(ior: f32, alpha: [f32; 2]) -> Self {
         let ggx = Ggx::new(alpha);
         if ggx.is_smooth() {
@@ -59,8 +60,8 @@ impl<D: Microfacets> Coat<D> {
         Self { ior, facets, internal: internal_reflectance(ior, fresnel::dielectric_average(ior)), reflected: [0; NODES] }
     }
 
-    /// A coat that loses the light that its microfacets scatter several times, whatever side it comes from. `mean` is the mean of a function of the
-    /// cosine under diffuse light. Costs some milliseconds.
+    /// A coat that loses the light that its microfacets scatter several times, whatever side it comes from. `mean` is
+    /// the mean of a function of the cosine under diffuse light. Costs some milliseconds.
     pub fn single_scattering(ior: f32, facets: D, mean: fn(&dyn Fn(f32) -> f32) -> f32) -> Self {
         if facets.is_smooth() {
             return Self::smooth(ior, facets);
@@ -103,6 +104,12 @@ impl<D: Microfacets> Coat<D> {
         if self.is_anisotropic() { 2 } else { 1 }
     }
 
+    /// Its lobe.
+    #[inline]
+    pub fn flags(&self) -> BsdfFlags {
+        self.facets.flags() | BsdfFlags::REFLECTION
+    }
+
     /// Whether the coat is rougher along one tangent than along the other.
     #[inline]
     pub fn is_anisotropic(&self) -> bool {
@@ -132,9 +139,10 @@ impl<D: Microfacets> Coat<D> {
         self.ior
     }
 
-    /// What crosses the coat upwards of diffuse light below it, after `reflectance` of what the coat throws back has been reflected again, any number of
-    /// times: `1 / (ior² (1 - reflectance R))`. With `reflectance` 1 and a coat that loses nothing, `1 / (1 - E_avg)`.
-    #[inline]
+    /// What crosses the coat upwards of diffuse light below it, after `reflectance` of what the coat throws back has
+    /// been reflected again, any number of times: `1 / (ior² (1 - reflectance R))`. With `reflectance` 1 and a coat
+    /// that loses nothing, `1 / (1 - E_avg)`.
+    #[inline(always)]
     pub(super) fn interreflection(&self, reflectance: f32) -> f32 {
         1.0 / (self.ior * self.ior * (1.0 - reflectance * self.internal)).max(1e-6)
     }
@@ -142,24 +150,29 @@ impl<D: Microfacets> Coat<D> {
     /// The fraction of the light from `w` that the coat does not let through, which is what it reflects but for losses.
     #[inline]
     pub(super) fn albedo(&self, w: Vec3) -> f32 {
-        if self.facets.is_smooth() {
-            return fresnel::dielectric(w.z.min(1.0), self.ior).reflectance;
+        match (self.is_smooth(), self.is_anisotropic()) {
+            (true, _) => self.smooth_albedo(w),
+            (false, false) => self.isotropic_albedo(w),
+            (false, true) => self.anisotropic_albedo(w),
         }
-        let axes = self.axes();
-        let last = NODES / axes - 1;
-        let at = w.z.sqrt() * last as f32;
-        let node = (at as usize).min(last - 1);
-        let part = (at - node as f32).min(1.0);
-        let lookup = |axis: usize| {
-            let (before, after) = (f32::from(self.reflected[node * axes + axis]), f32::from(self.reflected[(node + 1) * axes + axis]));
-            (before + (after - before) * part) * (1.0 / 65_535.0)
-        };
-        let above_x = lookup(0);
-        if axes == 1 {
-            return above_x;
-        }
-        // Between the axes the inverse is quadratic in the squared sine of the azimuth, about, and the steeper the nearer it is to the smoother.
-        let above_y = lookup(1);
+    }
+
+    /// [`albedo`](Self::albedo) of a smooth coat.
+    #[inline(always)]
+    pub(super) fn smooth_albedo(&self, w: Vec3) -> f32 {
+        fresnel::dielectric(w.z.min(1.0), self.ior).reflectance
+    }
+
+    /// [`albedo`](Self::albedo) of a rough isotropic coat.
+    #[inline(always)]
+    pub(super) fn isotropic_albedo(&self, w: Vec3) -> f32 {
+        self.look_up::<1>(w.z, 0)
+    }
+
+    fn anisotropic_albedo(&self, w: Vec3) -> f32 {
+        let [above_x, above_y] = [self.look_up::<2>(w.z, 0), self.look_up::<2>(w.z, 1)];
+        // Between the axes the inverse is quadratic in the squared sine of the azimuth, about, and the steeper the
+        // nearer it is to the smoother.
         let (x2, y2) = (w.x * w.x, w.y * w.y);
         if x2 + y2 <= 0.0 || above_x.min(above_y) <= 0.0 {
             return above_x.min(above_y);
@@ -171,23 +184,34 @@ impl<D: Microfacets> Coat<D> {
         above_x * above_y / (above_y + (above_x - above_y) * towards_y)
     }
 
+    /// The table between its nodes, for a cosine above one of its axes.
+    #[inline(always)]
+    fn look_up<const AXES: usize>(&self, cos: f32, axis: usize) -> f32 {
+        let last = NODES / AXES - 1;
+        let at = cos.sqrt() * last as f32;
+        let node = (at as usize).min(last - 1);
+        let part = (at - node as f32).min(1.0);
+        let (before, after) = (f32::from(self.reflected[node * AXES + axis]), f32::from(self.reflected[(node + 1) * AXES + axis]));
+        (before + (after - before) * part) * (1.0 / 65_535.0)
+    }
+
     /// Reflection by a rough coat, the Fresnel factor included, and the density of [`Coat::sample`].
-    #[inline]
+    #[inline(always)]
     pub(super) fn eval(&self, o: Vec3, i: Vec3) -> (f32, f32) {
         let FacetReflection { value, pdf, cos } = self.facets.reflection(o, i);
         (fresnel::dielectric(cos, self.ior).reflectance * value, pdf)
     }
 
     /// A direction that a rough coat reflects `o` to; below the surface now and then.
-    #[inline]
+    #[inline(always)]
     pub(super) fn sample(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
         let m = self.facets.sample_visible_normal(o, u);
         reflect(o, m, o.dot(m))
     }
 }
 
-/// Share of diffuse light below a coat that it reflects back down, where it reflects `average` of diffuse light from above and loses nothing: light
-/// crosses both ways alike, compressed by `ior²` below.
+/// Share of diffuse light below a coat that it reflects back down, where it reflects `average` of diffuse light from
+/// above and loses nothing: light crosses both ways alike, compressed by `ior²` below.
 fn internal_reflectance(ior: f32, average: f32) -> f32 {
     1.0 - (1.0 - average) / (ior * ior)
 }
@@ -208,7 +232,8 @@ pub(super) struct FirstEncounter {
     pub transmitted: f32,
 }
 
-/// Light from the upper `o`, for the index of refraction `eta` beyond the surface over that on this side, by quadrature over visible normals.
+/// Light from the upper `o`, for the index of refraction `eta` beyond the surface over that on this side, by quadrature
+/// over visible normals.
 pub(super) fn first_encounter(eta: f32, facets: &impl Microfacets, o: Vec3) -> FirstEncounter {
     // A Fibonacci lattice.
     const POINTS: u32 = 1597;
@@ -221,11 +246,11 @@ pub(super) fn first_encounter(eta: f32, facets: &impl Microfacets, o: Vec3) -> F
         let refraction = fresnel::dielectric(cos_m, eta);
         let up = reflect(o, m, cos_m);
         if up.z > 0.0 {
-            reflected += refraction.reflectance * facets.sampled_shadowing(o, up);
+            reflected += refraction.reflectance * facets.g2_over_g1(o, up);
         }
         let down = refract(o, m, cos_m, refraction.cos_t, eta);
         if down.z < 0.0 {
-            transmitted += (1.0 - refraction.reflectance) * facets.sampled_shadowing(o, vec3(down.x, down.y, -down.z));
+            transmitted += (1.0 - refraction.reflectance) * facets.g2_over_g1(o, vec3(down.x, down.y, -down.z));
         }
     }
     FirstEncounter { reflected: (reflected / POINTS as f32).clamp(0.0, 1.0), transmitted: (transmitted / POINTS as f32).clamp(0.0, 1.0) }
@@ -238,8 +263,8 @@ pub fn diffuse_mean(f: &dyn Fn(f32) -> f32) -> f32 {
     2.0 * cosines.map(|cos| cos * f(cos)).sum::<f32>() / STEPS as f32
 }
 
-/// [`diffuse_mean`] as Mitsuba 3 computes it for `roughplastic`: 64 cosines from 0 to 1, both ends included, weighted alike. It is about 1/64 too
-/// small, so that colours below rough coats are up to 2.4 % darker than below smooth ones.
+/// [`diffuse_mean`] as Mitsuba 3 computes it for `roughplastic`: 64 cosines from 0 to 1, both ends included, weighted
+/// alike. It is about 1/64 too small, so that colours below rough coats are up to 2.4 % darker than below smooth ones.
 pub fn mitsuba_diffuse_mean(f: &dyn Fn(f32) -> f32) -> f32 {
     const NODES: usize = 64;
     let cosines = (0..NODES).map(|node| (node as f32 / (NODES - 1) as f32).max(1e-6));

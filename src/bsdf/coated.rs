@@ -4,20 +4,22 @@
 //!
 //! ```text
 //! f = coat + tint^((1 / cos_t(wo) + 1 / cos_t(wi)) / 2) g(wo, wi) base
-//! g = (1 - E(wo)) (1 - E(wi)) / (1 - E_avg)     over a diffuse base, as for plastic (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled
+//! g = (1 - E(wo)) (1 - E(wi)) / (1 - E_avg)     over a diffuse base, as for plastic (Kelemen and Szirmay-Kalos, "A
+//! Microfacet Based Coupled
 //!                                              Specular-Matte BRDF Model with Importance Sampling")
 //! g = 1 - max(E(wo), E(wi))                    over any other
 //! ```
 //!
 //! with `cos_t` the cosine of the refracted direction in the coat. Both are reciprocal and scatter no more than they receive; the first
-//! loses nothing over a diffuse base, the second nothing over a mirror, and up to `E_avg - E(wo)` over a base that spreads light widely. The
-//! base sees directions as they are outside: what the coat bends on the way in it bends back on the way out.
+//! loses nothing over a diffuse base, the second nothing over a mirror, and up to `E_avg - E(wo)` over a base that
+//! spreads light widely. The base sees directions as they are outside: what the coat bends on the way in it bends back
+//! on the way out.
 
 use super::fresnel;
 use super::microfacet::MIN_COSINE;
 use super::regularize::widened;
 use super::split::share;
-use super::{Bsdf, BsdfEval, BsdfSample, Coat, Eon};
+use super::{Bsdf, BsdfEval, BsdfFlags, BsdfSample, Coat, Eon};
 use crate::color::Rgb;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec3, vec3};
@@ -151,15 +153,10 @@ impl Coated {
         self.eval_from(wo, wi, coat_o, probability).sampled(wi)
     }
 
-    /// Whether coat or base are rougher along one tangent than along the other.
-    pub fn is_anisotropic(&self) -> bool {
-        self.coat.is_anisotropic() || self.base.is_anisotropic()
-    }
-
-    /// Whether both are smooth.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        self.coat.is_smooth() && self.base.is_delta()
+    pub fn flags(&self) -> BsdfFlags {
+        self.coat.flags() | self.base.flags()
     }
 
     /// What coat and base reflect together, about.

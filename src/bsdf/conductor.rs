@@ -7,7 +7,7 @@ use super::energy::{Energy, multiple_color};
 use super::fresnel::ComplexIndex;
 use super::microfacet::{MIN_COSINE, Microfacets, reflect};
 use super::rows::LaneBsdf;
-use super::{BsdfEval, BsdfSample, Ggx};
+use super::{BsdfEval, BsdfFlags, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
@@ -47,9 +47,9 @@ impl Conductor<Ggx> {
         if self.facets.is_smooth() || average.is_black() {
             return self;
         }
-        let lost = Energy::new(&self.facets).mirrors_lost();
-        let color = average.map(|f| multiple_color(f, 1.0 - lost));
-        Self { multiple: color / (PI * lost), share: color.mean() / average.mean(), ..self }
+        let missing_energy = Energy::new(&self.facets).average_missing_energy();
+        let color = average.map(|f| multiple_color(f, 1.0 - missing_energy));
+        Self { multiple: color / (PI * missing_energy), share: color.mean() / average.mean(), ..self }
     }
 
     /// The same metal with other roughness and tint.
@@ -84,17 +84,17 @@ impl<D: Microfacets> Conductor<D> {
         self.tint * Rgb::new(r.reflectance(cos), g.reflectance(cos), b.reflectance(cos))
     }
 
-    /// What perfect mirrors would scatter at once, where multiple scattering is known.
+    /// Directional albedo of perfectly reflecting microfacets; 1 where multiple scattering is left out.
     #[inline]
-    fn at_once(&self, w: Vec3) -> f32 {
-        self.facets.energy().map_or(1.0, |energy| energy.mirrors(w))
+    fn directional_albedo(&self, w: Vec3) -> f32 {
+        self.facets.energy().map_or(1.0, |energy| energy.directional_albedo(w))
     }
 
     /// Probability of sampling light scattered several times, for what microfacets scatter at once.
     #[inline]
-    fn multiple_probability(&self, at_once: f32) -> f32 {
-        let multiple = self.share * (1.0 - at_once);
-        multiple / (at_once + multiple)
+    fn multiple_probability(&self, directional_albedo: f32) -> f32 {
+        let multiple = self.share * (1.0 - directional_albedo);
+        multiple / (directional_albedo + multiple)
     }
 
     /// `F D G2 / (4 |cos wo|)` and light scattered several times for directions on the same side of a rough metal, zero for a smooth one.
@@ -107,7 +107,7 @@ impl<D: Microfacets> Conductor<D> {
         if self.share == 0.0 {
             return self.eval_once(o, i);
         }
-        self.eval_upper(o, i, self.at_once(o))
+        self.eval_upper(o, i, self.directional_albedo(o))
     }
 
     /// One encounter with a microfacet, for directions on the upper side.
@@ -119,12 +119,12 @@ impl<D: Microfacets> Conductor<D> {
 
     /// With multiple scattering, for what microfacets scatter at once of the light from `o`.
     #[inline]
-    fn eval_upper(&self, o: Vec3, i: Vec3, at_once: f32) -> BsdfEval {
+    fn eval_upper(&self, o: Vec3, i: Vec3, directional_albedo: f32) -> BsdfEval {
         let facet = self.facets.reflection(o, i);
-        let probability = self.multiple_probability(at_once);
-        let lost = (1.0 - at_once) * (1.0 - self.at_once(i));
+        let probability = self.multiple_probability(directional_albedo);
+        let missing_energy = (1.0 - directional_albedo) * (1.0 - self.directional_albedo(i));
         BsdfEval {
-            value: self.reflectance(facet.cos) * facet.value + self.multiple * (lost * i.z),
+            value: self.reflectance(facet.cos) * facet.value + self.multiple * (missing_energy * i.z),
             pdf: (1.0 - probability) * facet.pdf + probability * FRAC_1_PI * i.z,
         }
     }
@@ -142,14 +142,14 @@ impl<D: Microfacets> Conductor<D> {
         if self.share == 0.0 {
             return self.sample_once(wo, u);
         }
-        let at_once = self.at_once(o);
-        if u_lobe < self.multiple_probability(at_once) {
-            return self.weigh(wo, o, warp::cosine_hemisphere(u), at_once);
+        let directional_albedo = self.directional_albedo(o);
+        if u_lobe < self.multiple_probability(directional_albedo) {
+            return self.weighted_sample(wo, o, warp::cosine_hemisphere(u), directional_albedo);
         }
         let m = self.facets.sample_visible_normal(o, u);
         let cos = o.dot(m);
         let wi = reflect(o, m, cos);
-        if cos > 0.0 && wi.z > 0.0 { self.weigh(wo, o, wi, at_once) } else { None }
+        if cos > 0.0 && wi.z > 0.0 { self.weighted_sample(wo, o, wi, directional_albedo) } else { None }
     }
 
     /// One encounter with a microfacet.
@@ -160,7 +160,7 @@ impl<D: Microfacets> Conductor<D> {
         let cos = o.dot(m);
         let mut wi = reflect(o, m, cos);
         let is_valid = (o.z > MIN_COSINE) & (cos > 0.0) & (wi.z > 0.0);
-        let weight = self.reflectance(cos.min(1.0)) * self.facets.sampled_shadowing(o, wi);
+        let weight = self.reflectance(cos.min(1.0)) * self.facets.g2_over_g1(o, wi);
         let pdf = self.facets.reflection_pdf(o, m);
         wi.z = wi.z.copysign(wo.z);
         is_valid.then_some(BsdfSample { wi, weight, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
@@ -173,8 +173,8 @@ impl<D: Microfacets> Conductor<D> {
 
     /// The sample for a direction of the upper side, all lobes counted.
     #[inline]
-    fn weigh(&self, wo: Vec3, o: Vec3, i: Vec3, at_once: f32) -> Option<BsdfSample> {
-        self.eval_upper(o, i, at_once).sampled(vec3(i.x, i.y, i.z.copysign(wo.z))).filter(|_| i.z > 0.0)
+    fn weighted_sample(&self, wo: Vec3, o: Vec3, i: Vec3, directional_albedo: f32) -> Option<BsdfSample> {
+        self.eval_upper(o, i, directional_albedo).sampled(vec3(i.x, i.y, i.z.copysign(wo.z))).filter(|_| i.z > 0.0)
     }
 
     /// Alpha along both tangents.
@@ -182,15 +182,10 @@ impl<D: Microfacets> Conductor<D> {
         self.facets.alpha()
     }
 
-    /// Whether the surface is rougher along one tangent than along the other.
-    pub fn is_anisotropic(&self) -> bool {
-        self.facets.alpha()[0] != self.facets.alpha()[1]
-    }
-
-    /// Whether the metal is smooth.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        self.facets.is_smooth()
+    pub fn flags(&self) -> BsdfFlags {
+        self.facets.flags() | BsdfFlags::REFLECTION
     }
 
     /// The reflectance of the plane.

@@ -10,20 +10,21 @@
 //! pdf   = (1 - F) (visible normals) eta² |wi·m| / |h|²
 //! ```
 //!
-//! What GGX microfacets lose is shared out to both sides by two lobes as in [`energy`](super::energy): with `L` what is lost of diffuse light from
-//! each side and `F` the mean reflectance from the thinner one, `(1 - F) min(L, L') / L` of what is lost on the thinner side crosses, and
-//! `1 / ior²` times that with `L'` on the denser one, so that nothing is lost and what crosses is reciprocal. What anisotropic microfacets
-//! lose is not known closely enough, and stays lost.
+//! What GGX microfacets lose is shared out to both sides by two lobes as in [`energy`](super::energy): with `L` what is
+//! lost of diffuse light from each side and `F` the mean reflectance from the thinner one, `(1 - F) min(L, L') / L` of
+//! what is lost on the thinner side crosses, and `1 / ior²` times that with `L'` on the denser one, so that nothing is
+//! lost and what crosses is reciprocal. What anisotropic microfacets lose is not known closely enough, and stays lost.
 //!
-//! Reflection and refraction by GGX microfacets share the height-correlated G2, as in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition.
+//! Reflection and refraction by GGX microfacets share the height-correlated G2, as in Pharr, Jakob and Humphreys,
+//! "Physically Based Rendering", 4th edition.
 
 use std::f32::consts::FRAC_1_PI;
 
 use super::energy::Energy;
 use super::fresnel;
-use super::microfacet::{MIN_COSINE, Microfacets, reflect, usable};
+use super::microfacet::{MIN_COSINE, Microfacets, clamp_alpha, reflect};
 use super::rows::LaneBsdf;
-use super::{BsdfEval, BsdfSample, Ggx};
+use super::{BsdfEval, BsdfFlags, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec3, vec3};
@@ -48,7 +49,7 @@ const CLEAR: [Rgb; 2] = [Rgb::WHITE; 2];
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Multiple {
     /// What is lost of diffuse light from this side.
-    lost: f32,
+    missing_energy: f32,
     /// How much of it crosses.
     crossing: f32,
 }
@@ -56,31 +57,31 @@ struct Multiple {
 /// What is lost and where it goes, for light from outside and from inside.
 fn multiple_scattering(ior: f32, ggx: &Ggx) -> [Multiple; 2] {
     let energy = Energy::new(ggx);
-    let [outside, inside] = [ior, 1.0 / ior].map(|eta| energy.glass_lost(eta));
+    let [outside, inside] = [ior, 1.0 / ior].map(|eta| energy.dielectric_average_missing_energy(eta));
     let dense = ior.max(1.0 / ior);
     // Kulla and Conty's fit of the mean reflectance.
     let transmitted = 1.0 - (dense - 1.0) / (4.085_67 + 1.000_71 * dense);
     let common = transmitted * outside.min(inside);
     let [from_outside, from_inside] = if ior >= 1.0 { [1.0, dense * dense] } else { [dense * dense, 1.0] };
     [
-        Multiple { lost: outside, crossing: common / (outside * from_outside) },
-        Multiple { lost: inside, crossing: common / (inside * from_inside) },
+        Multiple { missing_energy: outside, crossing: common / (outside * from_outside) },
+        Multiple { missing_energy: inside, crossing: common / (inside * from_inside) },
     ]
 }
 
 /// Alpha as a boundary with this relative index of refraction uses it, zero for a smooth one. Since refraction turns directions by about
 /// `|ior - 1|` times the slope, that also multiplies alpha before it is compared with the limit.
-fn usable_across(ior: f32, alpha: [f32; 2]) -> [f32; 2] {
+fn clamp_alpha_for_ior(ior: f32, alpha: [f32; 2]) -> [f32; 2] {
     let turn = (ior - 1.0).abs().min(1.0);
-    let is_smooth = usable(alpha.map(|a| a * turn))[0] == 0.0;
+    let is_smooth = clamp_alpha(alpha.map(|a| a * turn))[0] == 0.0;
     if is_smooth { [0.0; 2] } else { alpha }
 }
 
 impl Dielectric<Ggx> {
-    /// A boundary with the index of refraction `ior` inside over outside, positive; smooth where the rays that cross it would hardly show its
-    /// roughness.
+    /// A boundary with the index of refraction `ior` inside over outside, positive; smooth where the rays that cross it
+    /// would hardly show its roughness.
     pub fn new(ior: f32, alpha: [f32; 2]) -> Self {
-        let ggx = Ggx::new(usable_across(ior, alpha));
+        let ggx = Ggx::new(clamp_alpha_for_ior(ior, alpha));
         if ggx.is_smooth() { Self { ior, facets: ggx, multiple: None, tints: CLEAR } } else { Self::rough(ior, ggx, true) }
     }
 
@@ -107,7 +108,7 @@ impl Dielectric<Ggx> {
 impl<D: Microfacets> Dielectric<D> {
     /// As [`Dielectric::new`], with the microfacets that `facets` makes of an alpha, and without multiple scattering.
     pub fn with_facets(ior: f32, alpha: [f32; 2], facets: impl FnOnce([f32; 2]) -> D) -> Self {
-        Self { ior, facets: facets(usable_across(ior, alpha)), multiple: None, tints: CLEAR }
+        Self { ior, facets: facets(clamp_alpha_for_ior(ior, alpha)), multiple: None, tints: CLEAR }
     }
 
     /// With another roughness, for single scattering.
@@ -135,8 +136,8 @@ impl<D: Microfacets> Dielectric<D> {
 
     /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over that on its side.
     #[inline]
-    fn lost(&self, eta: f32, w: Vec3) -> f32 {
-        self.facets.energy().map_or(0.0, |energy| 1.0 - energy.glass(eta, w)).clamp(0.0, 1.0)
+    fn missing_energy(&self, eta: f32, w: Vec3) -> f32 {
+        self.facets.energy().map_or(0.0, |energy| 1.0 - energy.dielectric_albedo(eta, w)).clamp(0.0, 1.0)
     }
 
     /// Index of refraction beyond the surface over that on the side of `wo`.
@@ -167,16 +168,19 @@ impl<D: Microfacets> Dielectric<D> {
     fn eval_all(&self, multiple: &[Multiple; 2], wo: Vec3, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
         let [near, far] = if wo.z > 0.0 { [multiple[0], multiple[1]] } else { [multiple[1], multiple[0]] };
         let once = self.eval_once(o, i, eta);
-        let lost = self.lost(eta, o);
+        let missing_energy = self.missing_energy(eta, o);
         let cosine_pdf = FRAC_1_PI * i.z.abs();
         let (value, fraction) = if i.z > 0.0 {
             let fraction = 1.0 - near.crossing;
-            (fraction * lost * self.lost(eta, i) / near.lost, fraction)
+            (fraction * missing_energy * self.missing_energy(eta, i) / near.missing_energy, fraction)
         } else {
-            let beyond = self.lost(1.0 / eta, vec3(i.x, i.y, -i.z));
-            (near.crossing * lost * beyond / (far.lost * eta * eta), near.crossing)
+            let beyond = self.missing_energy(1.0 / eta, vec3(i.x, i.y, -i.z));
+            (near.crossing * missing_energy * beyond / (far.missing_energy * eta * eta), near.crossing)
         };
-        BsdfEval { value: once.value + Rgb::splat(value * cosine_pdf), pdf: (1.0 - lost) * once.pdf + lost * fraction * cosine_pdf }
+        BsdfEval {
+            value: once.value + Rgb::splat(value * cosine_pdf),
+            pdf: (1.0 - missing_energy) * once.pdf + missing_energy * fraction * cosine_pdf,
+        }
     }
 
     /// One encounter with a microfacet, without the tints; `o` on the upper side.
@@ -231,15 +235,15 @@ impl<D: Microfacets> Dielectric<D> {
     #[inline]
     fn sample_all(&self, multiple: &[Multiple; 2], wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let (o, eta) = (vec3(wo.x, wo.y, wo.z.abs()), self.eta(wo));
-        let lost = self.lost(eta, o);
+        let missing_energy = self.missing_energy(eta, o);
         let side = 1f32.copysign(wo.z);
-        let wi = if u_lobe < lost {
+        let wi = if u_lobe < missing_energy {
             let near = multiple[usize::from(wo.z < 0.0)];
             let i = warp::cosine_hemisphere(u);
-            let z = if u_lobe < lost * near.crossing { -i.z } else { i.z };
+            let z = if u_lobe < missing_energy * near.crossing { -i.z } else { i.z };
             vec3(i.x, i.y, z * side)
         } else {
-            self.sample_once(wo, ((u_lobe - lost) / (1.0 - lost)).min(ONE_MINUS_EPSILON), u)?.wi
+            self.sample_once(wo, ((u_lobe - missing_energy) / (1.0 - missing_energy)).min(ONE_MINUS_EPSILON), u)?.wi
         };
         if wi.z.abs() <= MIN_COSINE {
             return None;
@@ -262,7 +266,7 @@ impl<D: Microfacets> Dielectric<D> {
         let (reflected, refracted) = (reflect(o, m, cos), refract(o, m, cos, refraction.cos_t, eta));
         let mut wi = if is_transmission { refracted } else { reflected };
         let is_valid = (cos > 0.0) & if is_transmission { wi.z < 0.0 } else { wi.z > 0.0 };
-        let shadowing = self.facets.sampled_shadowing(o, vec3(wi.x, wi.y, wi.z.abs()));
+        let shadowing = self.facets.g2_over_g1(o, vec3(wi.x, wi.y, wi.z.abs()));
         // |h| = |cos - eta cos_t|; the reflection's density holds 1 / (4 cos), which the Jacobian of refraction replaces.
         let across = cos - eta * refraction.cos_t;
         let jacobian = eta * eta * refraction.cos_t / (across * across);
@@ -307,15 +311,10 @@ impl<D: Microfacets> Dielectric<D> {
         !self.facets.is_smooth() && self.multiple.is_none()
     }
 
-    /// Whether the surface is rougher along one tangent than along the other.
-    pub fn is_anisotropic(&self) -> bool {
-        self.facets.alpha()[0] != self.facets.alpha()[1]
-    }
-
-    /// Whether the boundary is smooth.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        self.facets.is_smooth()
+    pub fn flags(&self) -> BsdfFlags {
+        self.facets.flags() | BsdfFlags::REFLECTION | BsdfFlags::TRANSMISSION
     }
 
     /// What a plane reflects and lets through.

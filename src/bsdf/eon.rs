@@ -4,7 +4,7 @@
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::microfacet::MIN_COSINE;
-use super::{BsdfEval, BsdfSample};
+use super::{BsdfEval, BsdfFlags, BsdfSample};
 use crate::color::Rgb;
 use crate::math::{Vec3, sin_cos_turns, vec3};
 
@@ -116,8 +116,8 @@ impl Eon {
         let s = o.x * i.x + o.y * i.y;
         let facing = if s > 0.0 { s / o.z.max(i.z) } else { s };
         let once = (1.0 + self.roughness * facing) / (1.0 + ENERGY * self.roughness);
-        let lost = (1.0 - self.single_albedo(o.z)) * (1.0 - self.single_albedo(i.z)) / (1.0 - self.average_albedo()).max(1e-7);
-        let value = (self.albedo * once + self.multiple() * lost) * (FRAC_1_PI * i.z);
+        let missing_energy = (1.0 - self.single_albedo(o.z)) * (1.0 - self.single_albedo(i.z)) / (1.0 - self.average_albedo()).max(1e-7);
+        let value = (self.albedo * once + self.multiple() * missing_energy) * (FRAC_1_PI * i.z);
         let uniform = self.uniform_probability(o.z.min(1.0));
         let pdf = uniform * 0.5 * FRAC_1_PI + (1.0 - uniform) * Transformed::new(o, self.roughness).pdf(i);
         BsdfEval { value, pdf }
@@ -143,10 +143,10 @@ impl Eon {
         self.eval_upper(o, i).sampled(vec3(i.x, i.y, i.z.copysign(wo.z)))
     }
 
-    /// Never.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        false
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::DIFFUSE | BsdfFlags::REFLECTION
     }
 
     /// What is reflected once and more often.

@@ -1,7 +1,7 @@
 //! A diffuse part beside a GGX highlight: what Phong's and Cook and Torrance's models of older scenes come to.
 //!
 //! ```text
-//! f = diffuse / pi + F D G2 / (4 |cos wo| |cos wi|),    F = ahead + (grazing - ahead) (1 - cos)^5
+//! f = diffuse / pi + F D G2 / (4 |cos wo| |cos wi|),    F = f0 + (f90 - f0) (1 - cos)^5
 //! ```
 //!
 //! Both parts always count in full, so that diffuse and grazing reflectance together must not exceed 1 in any channel.
@@ -11,7 +11,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::energy::schlick_weight;
 use super::microfacet::{MIN_COSINE, Microfacets, reflect};
 use super::split::share;
-use super::{BsdfEval, BsdfSample, Ggx};
+use super::{BsdfEval, BsdfFlags, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
@@ -20,9 +20,9 @@ use crate::sampling::warp;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Glossy {
     diffuse: Rgb,
-    /// Reflectance of the highlight ahead and at grazing angles.
-    ahead: Rgb,
-    grazing: Rgb,
+    /// Reflectance of the highlight at normal incidence and at grazing angles.
+    f0: Rgb,
+    f90: Rgb,
     ggx: Ggx,
 }
 
@@ -30,9 +30,9 @@ pub struct Glossy {
 const MIN_ALPHA: f32 = 1e-3;
 
 impl Glossy {
-    /// With Schlick's Fresnel term from `ahead` to `grazing` and a GGX `alpha` within `[0, 1]`, of which at least 0.001 counts.
-    pub fn new(diffuse: Rgb, ahead: Rgb, grazing: Rgb, alpha: f32) -> Self {
-        Self { diffuse, ahead, grazing, ggx: Ggx::new([alpha.max(MIN_ALPHA); 2]) }
+    /// With Schlick's Fresnel term from `f0` to `f90` and a GGX `alpha` within `[0, 1]`, of which at least 0.001 counts.
+    pub fn new(diffuse: Rgb, f0: Rgb, f90: Rgb, alpha: f32) -> Self {
+        Self { diffuse, f0, f90, ggx: Ggx::new([alpha.max(MIN_ALPHA); 2]) }
     }
 
     /// Alpha along both tangents.
@@ -53,7 +53,7 @@ impl Glossy {
 
     #[inline]
     fn reflectance(&self, cos: f32) -> Rgb {
-        self.ahead + (self.grazing - self.ahead) * schlick_weight(cos.min(1.0))
+        self.f0 + (self.f90 - self.f0) * schlick_weight(cos.min(1.0))
     }
 
     /// Probability of the highlight: by what the parts reflect, about.
@@ -104,10 +104,10 @@ impl Glossy {
         self.eval(wo, wi).sampled(wi)
     }
 
-    /// Never.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        false
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::DIFFUSE | BsdfFlags::GLOSSY | BsdfFlags::REFLECTION
     }
 
     /// Both parts; what microfacets lose is left out.

@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::{BsdfEval, BsdfSample};
+use super::{BsdfEval, BsdfFlags, BsdfSample};
 use crate::color::Rgb;
 use crate::math::Vec3;
 use crate::sampling::warp;
@@ -53,10 +53,10 @@ impl Lambert {
         DiffuseDirection { wi, pdf, is_valid }
     }
 
-    /// Never.
-    #[inline(always)]
-    pub fn is_delta(&self) -> bool {
-        false
+    /// The lobes.
+    #[inline]
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::DIFFUSE | BsdfFlags::REFLECTION
     }
 
     /// The albedo.

@@ -13,6 +13,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
+use super::BsdfFlags;
 use super::energy::Energy;
 use crate::math::{Vec3, sin_cos_turns, vec3};
 
@@ -31,7 +32,7 @@ pub trait Microfacets: Copy {
     fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3;
 
     /// `G2(o, i) / G1(o)`: what is left to weigh a sample of visible normals with.
-    fn sampled_shadowing(&self, o: Vec3, i: Vec3) -> f32;
+    fn g2_over_g1(&self, o: Vec3, i: Vec3) -> f32;
 
     /// Reflection between two directions of the upper side.
     fn reflection(&self, o: Vec3, i: Vec3) -> FacetReflection;
@@ -44,6 +45,14 @@ pub trait Microfacets: Copy {
 
     /// How much of the light the microfacets scatter at once, where that is known.
     fn energy(&self) -> Option<Energy>;
+
+    /// Specular or glossy, and whether anisotropic.
+    #[inline(always)]
+    fn flags(&self) -> BsdfFlags {
+        let [ax, ay] = self.alpha();
+        let lobe = if self.is_smooth() { BsdfFlags::SPECULAR } else { BsdfFlags::GLOSSY };
+        if ax == ay { lobe } else { lobe | BsdfFlags::ANISOTROPIC }
+    }
 
     /// Whether the surface is a plane mirror; no other method may then be called.
     #[inline(always)]
@@ -78,7 +87,7 @@ pub struct FacetReflection {
 }
 
 /// Alphas within `[0, 1]` as they are used: both zero, or both within `[SMOOTH_ALPHA, 1]`.
-pub(super) fn usable(alpha: [f32; 2]) -> [f32; 2] {
+pub(super) fn clamp_alpha(alpha: [f32; 2]) -> [f32; 2] {
     let is_smooth = alpha[0].max(alpha[1]) < SMOOTH_ALPHA;
     if is_smooth { [0.0; 2] } else { alpha.map(|a| a.clamp(SMOOTH_ALPHA, 1.0)) }
 }
@@ -86,7 +95,7 @@ pub(super) fn usable(alpha: [f32; 2]) -> [f32; 2] {
 impl Ggx {
     /// The distribution for `alpha` within `[0, 1]`; smooth if both are below [`SMOOTH_ALPHA`].
     pub fn new(alpha: [f32; 2]) -> Self {
-        Self { alpha: usable(alpha) }
+        Self { alpha: clamp_alpha(alpha) }
     }
 
     /// Length of `w` stretched by alpha.
@@ -151,7 +160,7 @@ impl Microfacets for Ggx {
     }
 
     #[inline(always)]
-    fn sampled_shadowing(&self, o: Vec3, i: Vec3) -> f32 {
+    fn g2_over_g1(&self, o: Vec3, i: Vec3) -> f32 {
         let length = self.stretched_length(o);
         i.z * (o.z + length) / (length * i.z + self.stretched_length(i) * o.z)
     }
@@ -187,8 +196,8 @@ impl Microfacets for Ggx {
     }
 }
 
-/// GGX whose two sides are masked independently of each other, `G2(o, i) = G1(o) G1(i)`, for agreement with Mitsuba; what several encounters
-/// scatter is lost.
+/// GGX whose two sides are masked independently of each other, `G2(o, i) = G1(o) G1(i)`, for agreement with Mitsuba;
+/// what several encounters scatter is lost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeparableGgx(Ggx);
 
@@ -226,7 +235,7 @@ impl Microfacets for SeparableGgx {
     }
 
     #[inline(always)]
-    fn sampled_shadowing(&self, _o: Vec3, i: Vec3) -> f32 {
+    fn g2_over_g1(&self, _o: Vec3, i: Vec3) -> f32 {
         self.0.g1(i)
     }
 

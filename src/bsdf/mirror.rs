@@ -1,6 +1,6 @@
 //! Ideal specular reflection.
 
-use super::{BsdfEval, BsdfSample};
+use super::{BsdfEval, BsdfFlags, BsdfSample};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 
@@ -27,10 +27,10 @@ impl Mirror {
         Some(BsdfSample::mirrored(wo, self.reflectance, 1.0))
     }
 
-    /// Always.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        true
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::SPECULAR | BsdfFlags::REFLECTION
     }
 
     /// The reflectance.

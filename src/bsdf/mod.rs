@@ -10,6 +10,7 @@ mod conductor;
 mod dielectric;
 mod energy;
 mod eon;
+mod flags;
 pub mod fresnel;
 mod glossy;
 mod lambert;
@@ -33,6 +34,7 @@ pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use energy::bake as bake_energy_tables;
 pub use eon::Eon;
+pub use flags::BsdfFlags;
 pub use glossy::Glossy;
 pub use lambert::{DiffuseDirection, Lambert};
 pub use microfacet::{Ggx, Microfacets, SMOOTH_ALPHA, SeparableGgx};
@@ -166,49 +168,10 @@ impl Bsdf {
         each!(self, bsdf => bsdf.sample(wo, u_lobe, u))
     }
 
-    /// Whether every lobe is a delta: light sampling is then pointless.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        each!(self, bsdf => bsdf.is_delta())
-    }
-
-    /// Whether scattering depends on the direction of the frame's tangents.
-    pub fn is_anisotropic(&self) -> bool {
-        match self {
-            Self::Lambert(_)
-            | Self::Eon(_)
-            | Self::DiffuseTransmission(_)
-            | Self::Mirror(_)
-            | Self::ThinDielectric(_)
-            | Self::Glossy(_)
-            | Self::Phong(_) => false,
-            Self::Conductor(bsdf) => bsdf.is_anisotropic(),
-            Self::Dielectric(bsdf) => bsdf.is_anisotropic(),
-            Self::Plastic(bsdf) => bsdf.is_anisotropic(),
-            Self::Principled(bsdf) => bsdf.is_anisotropic(),
-            Self::Coated(bsdf) => bsdf.is_anisotropic(),
-            Self::Beckmann(bsdf) => bsdf.is_anisotropic(),
-            Self::SeparableGgx(bsdf) => bsdf.is_anisotropic(),
-        }
-    }
-
-    /// Whether light may cross the surface; otherwise nothing arrives but from the side of `wo`.
-    #[inline]
-    pub fn transmits(&self) -> bool {
-        match self {
-            Self::Dielectric(_) | Self::ThinDielectric(_) | Self::DiffuseTransmission(_) => true,
-            Self::Principled(bsdf) => bsdf.transmits(),
-            Self::Beckmann(bsdf) => bsdf.transmits(),
-            Self::SeparableGgx(bsdf) => bsdf.transmits(),
-            Self::Lambert(_)
-            | Self::Eon(_)
-            | Self::Mirror(_)
-            | Self::Conductor(_)
-            | Self::Plastic(_)
-            | Self::Glossy(_)
-            | Self::Phong(_)
-            | Self::Coated(_) => false,
-        }
+    pub fn flags(&self) -> BsdfFlags {
+        each!(self, bsdf => bsdf.flags())
     }
 
     /// An estimate of the fraction of light scattered, for the albedo layer.

@@ -1,18 +1,19 @@
-//! A diffuse part beside Phong's cosine lobe: the modified Phong model (Lafortune and Willems, "Using the Modified Phong Reflectance Model for
-//! Physically Based Rendering").
+//! A diffuse part beside Phong's cosine lobe: the modified Phong model (Lafortune and Willems, "Using the Modified
+//! Phong Reflectance Model for Physically Based Rendering").
 //!
 //! ```text
 //! f = diffuse / pi + specular (n + 2) / (2 pi) cos^n alpha
 //! ```
 //!
-//! with `alpha` the angle between `wi` and the mirror direction of `wo`: reciprocal, and the lobe reflects `specular` of the light from ahead
-//! and less at an angle, where a part of it is below the horizon. Diffuse and specular together must not exceed 1 in any channel.
+//! with `alpha` the angle between `wi` and the mirror direction of `wo`: reciprocal, and the lobe reflects `specular`
+//! of the light from ahead and less at an angle, where a part of it is below the horizon. Diffuse and specular together
+//! must not exceed 1 in any channel.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use super::microfacet::MIN_COSINE;
 use super::split::share;
-use super::{BsdfEval, BsdfSample};
+use super::{BsdfEval, BsdfFlags, BsdfSample};
 use crate::color::Rgb;
 use crate::math::{Frame, Vec3, sin_cos_turns, vec3};
 use crate::sampling::warp;
@@ -41,8 +42,8 @@ impl Phong {
         if specular + diffuse > 0.0 { specular / (specular + diffuse) } else { 0.0 }
     }
 
-    /// `cos^n` of the angle between `i` and the mirror direction of `o`, 0 from a right angle on. The cosine is 1 less half the squared distance,
-    /// which a large exponent does not blur.
+    /// `cos^n` of the angle between `i` and the mirror direction of `o`, 0 from a right angle on. The cosine is 1 less
+    /// half the squared distance, which a large exponent does not blur.
     #[inline]
     fn power(&self, o: Vec3, i: Vec3) -> f32 {
         let below_one = 0.5 * (i - vec3(-o.x, -o.y, o.z)).length_squared();
@@ -92,10 +93,10 @@ impl Phong {
         self.eval(wo, wi).sampled(wi)
     }
 
-    /// Never.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        false
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::DIFFUSE | BsdfFlags::GLOSSY | BsdfFlags::REFLECTION
     }
 
     /// Both parts; what the lobe loses at an angle is left out.

@@ -1,24 +1,26 @@
 //! A diffuse base under a clear dielectric coat.
 //!
-//! With `T(w)` the fraction of the light from `w` that the coat lets through, `R` what it reflects back down of diffuse light below it, and `r` the
-//! colour of the base,
+//! With `T(w)` the fraction of the light from `w` that the coat lets through, `R` what it reflects back down of diffuse
+//! light below it, and `r` the colour of the base,
 //!
 //! ```text
 //! f = coat + T(wo) T(wi) / (eta² (1 - r' R)) r / pi
 //! ```
 //!
-//! where `r'` is `r` if the base is nonlinear: its colour deepens each time that light is thrown back. Otherwise `r'` is 1: the light keeps the colour
-//! of one scattering. For a smooth coat these are the formulas of Mitsuba's `plastic`. A rough coat that loses nothing has `T = 1 - E`, with
-//! `E` the single-scattering albedo of its microfacets, and `eta² (1 - R)` is then `1 - E_avg`, with `E_avg` the mean of `E` under diffuse light. A
-//! white base loses nothing, whatever the coat (for an anisotropic one `E` between its axes is approximate: within a hundredth or two unless
-//! its alphas differ more than four times), and the base is reciprocal (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled
+//! where `r'` is `r` if the base is nonlinear: its colour deepens each time that light is thrown back. Otherwise `r'`
+//! is 1: the light keeps the colour of one scattering. For a smooth coat these are the formulas of Mitsuba's `plastic`.
+//! A rough coat that loses nothing has `T = 1 - E`, with `E` the single-scattering albedo of its microfacets, and `eta²
+//! (1 - R)` is then `1 - E_avg`, with `E_avg` the mean of `E` under diffuse light. A white base loses nothing, whatever
+//! the coat (for an anisotropic one `E` between its axes is approximate: within a hundredth or two unless its alphas
+//! differ more than four times), and the base is reciprocal (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled
 //! Specular-Matte BRDF Model with Importance Sampling").
 
 use std::f32::consts::FRAC_1_PI;
 
 use super::microfacet::{MIN_COSINE, Microfacets};
+use super::rows::LaneBsdf;
 use super::split::share;
-use super::{BsdfEval, BsdfSample, Coat, Ggx};
+use super::{BsdfEval, BsdfFlags, BsdfSample, Coat, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
@@ -45,8 +47,71 @@ impl Plastic {
 }
 
 impl<D: Microfacets> Plastic<D> {
-    /// Probability of choosing the coat: by what the lobes scatter.
+    /// Base and rough coat for directions on the same side.
     #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        match (self.coat.is_smooth(), self.coat.flags().is_anisotropic()) {
+            (true, _) => SmoothPlastic(self).eval(wo, wi),
+            (false, false) => IsotropicPlastic(self).eval(wo, wi),
+            (false, true) => self.eval_with::<false>(wo, wi, |w| self.coat.albedo(w)),
+        }
+    }
+
+    /// A direction from the coat or the base, chosen by what they scatter.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        match (self.coat.is_smooth(), self.coat.flags().is_anisotropic()) {
+            (true, _) => SmoothPlastic(self).sample(wo, u_lobe, u),
+            (false, false) => IsotropicPlastic(self).sample(wo, u_lobe, u),
+            (false, true) => self.sample_with::<false>(wo, u_lobe, u, |w| self.coat.albedo(w)),
+        }
+    }
+
+    /// [`eval`](Self::eval) where it is known whether the coat is smooth, with its albedo.
+    #[inline(always)]
+    fn eval_with<const SMOOTH: bool>(&self, wo: Vec3, wi: Vec3, albedo: impl Fn(Vec3) -> f32) -> BsdfEval {
+        let eval = self.eval_upper::<SMOOTH>(upper(wo), upper(wi), albedo);
+        if wo.z * wi.z > 0.0 { eval } else { BsdfEval::default() }
+    }
+
+    #[inline(always)]
+    fn eval_upper<const SMOOTH: bool>(&self, o: Vec3, i: Vec3, albedo: impl Fn(Vec3) -> f32) -> BsdfEval {
+        let (coat_o, coat_i) = (albedo(o), albedo(i));
+        let probability = self.coat_probability(coat_o);
+        let cosine_pdf = FRAC_1_PI * i.z;
+        let value = self.base([coat_o, coat_i], cosine_pdf);
+        let pdf = (1.0 - probability) * cosine_pdf;
+        if SMOOTH {
+            return BsdfEval { value, pdf };
+        }
+        let (reflected, density) = self.coat.eval(o, i);
+        BsdfEval { value: value + self.tint * reflected, pdf: pdf + probability * density }
+    }
+
+    /// [`sample`](Self::sample) where it is known whether the coat is smooth, with its albedo.
+    #[inline(always)]
+    fn sample_with<const SMOOTH: bool>(
+        &self,
+        wo: Vec3,
+        u_lobe: f32,
+        u: [f32; 2],
+        albedo: impl Fn(Vec3) -> f32 + Copy,
+    ) -> Option<BsdfSample> {
+        let o = upper(wo);
+        let coat_albedo = albedo(o);
+        let probability = self.coat_probability(coat_albedo);
+        let is_coat = u_lobe < probability;
+        let from_base = warp::cosine_hemisphere(u);
+        let i = if SMOOTH || !is_coat { from_base } else { self.coat.sample(o, u) };
+        let eval = self.eval_upper::<SMOOTH>(o, i, albedo);
+        let sample = eval.sampled(vec3(i.x, i.y, i.z.copysign(wo.z))).filter(|_| i.z > 0.0);
+        let mirrored = BsdfSample::mirrored(wo, self.tint * (coat_albedo / probability), probability);
+        let sample = if SMOOTH && is_coat { Some(mirrored) } else { sample };
+        sample.filter(|_| wo.z.abs() > MIN_COSINE)
+    }
+
+    /// Probability of choosing the coat: by what the lobes scatter.
+    #[inline(always)]
     fn coat_probability(&self, coat_albedo: f32) -> f32 {
         let base = (1.0 - coat_albedo) * self.diffuse.mean();
         let coat = coat_albedo * self.tint.mean();
@@ -54,32 +119,8 @@ impl<D: Microfacets> Plastic<D> {
         if sum > 0.0 { coat / sum } else { 0.0 }
     }
 
-    /// Base and rough coat for directions on the same side.
-    #[inline]
-    pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        if wo.z * wi.z <= 0.0 {
-            return BsdfEval::default();
-        }
-        self.eval_upper(vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()))
-    }
-
-    #[inline]
-    fn eval_upper(&self, o: Vec3, i: Vec3) -> BsdfEval {
-        let coat = &self.coat;
-        let (coat_o, coat_i) = (coat.albedo(o), coat.albedo(i));
-        let probability = self.coat_probability(coat_o);
-        let cosine_pdf = FRAC_1_PI * i.z;
-        let value = self.base([coat_o, coat_i], cosine_pdf);
-        let pdf = (1.0 - probability) * cosine_pdf;
-        if coat.is_smooth() {
-            return BsdfEval { value, pdf };
-        }
-        let (reflected, density) = coat.eval(o, i);
-        BsdfEval { value: value + self.tint * reflected, pdf: pdf + probability * density }
-    }
-
     /// What the base scatters below a coat with these albedos.
-    #[inline]
+    #[inline(always)]
     fn base(&self, [coat_o, coat_i]: [f32; 2], cosine_pdf: f32) -> Rgb {
         let through = (1.0 - coat_o) * (1.0 - coat_i) * cosine_pdf;
         if self.nonlinear {
@@ -90,51 +131,59 @@ impl<D: Microfacets> Plastic<D> {
 
     /// As [`Bsdf::diffuse_fraction`](super::Bsdf::diffuse_fraction).
     pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
+        let (o, i) = (upper(wo), upper(wi));
         if self.coat.is_smooth() {
             return Rgb::WHITE;
         }
-        share(self.base([self.coat.albedo(o), self.coat.albedo(i)], FRAC_1_PI * i.z), self.eval_upper(o, i).value)
+        let albedo = |w| self.coat.albedo(w);
+        share(self.base([albedo(o), albedo(i)], FRAC_1_PI * i.z), self.eval_upper::<false>(o, i, albedo).value)
     }
 
-    /// A direction from the coat or the base, chosen by what they scatter.
+    /// The lobes.
     #[inline]
-    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        if wo.z.abs() <= MIN_COSINE {
-            return None;
-        }
-        let coat = &self.coat;
-        let o = vec3(wo.x, wo.y, wo.z.abs());
-        let coat_albedo = coat.albedo(o);
-        let probability = self.coat_probability(coat_albedo);
-        let i = if u_lobe < probability {
-            if coat.is_smooth() {
-                return Some(BsdfSample::mirrored(wo, self.tint * (coat_albedo / probability), probability));
-            }
-            coat.sample(o, u)
-        } else {
-            warp::cosine_hemisphere(u)
-        };
-        if i.z <= 0.0 {
-            return None;
-        }
-        self.eval_upper(o, i).sampled(vec3(i.x, i.y, i.z.copysign(wo.z)))
-    }
-
-    /// Whether the coat is rougher along one tangent than along the other.
-    pub fn is_anisotropic(&self) -> bool {
-        self.coat.is_anisotropic()
-    }
-
-    /// Never: the base is diffuse.
-    #[inline]
-    pub fn is_delta(&self) -> bool {
-        false
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::DIFFUSE | self.coat.flags()
     }
 
     /// What coat and base reflect together.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
-        let coat = self.coat.albedo(vec3(wo.x, wo.y, wo.z.abs()));
+        let coat = self.coat.albedo(upper(wo));
         self.tint * coat + self.diffuse * (1.0 - coat)
+    }
+}
+
+/// The same direction on the upper side.
+#[inline(always)]
+fn upper(w: Vec3) -> Vec3 {
+    vec3(w.x, w.y, w.z.abs())
+}
+
+/// Plastic with a smooth coat, for vector code.
+pub(super) struct SmoothPlastic<'a, D>(pub &'a Plastic<D>);
+
+impl<D: Microfacets> LaneBsdf for SmoothPlastic<'_, D> {
+    #[inline(always)]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        self.0.eval_with::<true>(wo, wi, |w| self.0.coat.smooth_albedo(w))
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        self.0.sample_with::<true>(wo, u_lobe, u, |w| self.0.coat.smooth_albedo(w))
+    }
+}
+
+/// Plastic with a rough isotropic coat, for vector code.
+pub(super) struct IsotropicPlastic<'a, D>(pub &'a Plastic<D>);
+
+impl<D: Microfacets> LaneBsdf for IsotropicPlastic<'_, D> {
+    #[inline(always)]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        self.0.eval_with::<false>(wo, wi, |w| self.0.coat.isotropic_albedo(w))
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        self.0.sample_with::<false>(wo, u_lobe, u, |w| self.0.coat.isotropic_albedo(w))
     }
 }

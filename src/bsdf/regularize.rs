@@ -1,5 +1,5 @@
-//! Rough surfaces made rougher, for paths whose light would come through too narrow a lobe (Kaplanyan and Dachsbacher, "Path Space Regularization for
-//! Holistic and Robust Light Transport").
+//! Rough surfaces made rougher, for paths whose light would come through too narrow a lobe (Kaplanyan and Dachsbacher,
+//! "Path Space Regularization for Holistic and Robust Light Transport").
 
 use super::{Bsdf, Microfacets, SingleScatteringBsdf};
 

@@ -2,11 +2,12 @@
 
 use super::conductor::SingleScattering as Metal;
 use super::dielectric::{SingleScattering as Glass, Smooth as SmoothGlass};
+use super::plastic::{IsotropicPlastic, SmoothPlastic};
 use super::{Bsdf, BsdfEval, BsdfSample, SingleScatteringBsdf};
 use crate::color::Rgb;
 use crate::math::Vec3;
 use crate::math::rows::{BATCH, soa};
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 
 soa! {
     /// Arguments of [`Bsdf::eval`] and of [`Bsdf::sample`].
@@ -93,8 +94,12 @@ macro_rules! lanes {
         }
         match $bsdf {
             Bsdf::Conductor(bsdf) if bsdf.is_rough_single() => with!(Metal(bsdf)),
-            Bsdf::Dielectric(bsdf) if bsdf.is_delta() => with!(SmoothGlass(bsdf)),
+            Bsdf::Dielectric(bsdf) if bsdf.flags().is_delta() => with!(SmoothGlass(bsdf)),
             Bsdf::Dielectric(bsdf) if bsdf.is_rough_single() => with!(Glass(bsdf)),
+            Bsdf::Plastic(bsdf) if bsdf.coat.is_smooth() => with!(SmoothPlastic(bsdf)),
+            Bsdf::Plastic(bsdf) if !bsdf.flags().is_anisotropic() => with!(IsotropicPlastic(bsdf)),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if bsdf.coat.is_smooth() => with!(SmoothPlastic(bsdf)),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if !bsdf.flags().is_anisotropic() => with!(IsotropicPlastic(bsdf)),
             Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(bsdf)) if bsdf.is_rough_single() => with!(Metal(bsdf)),
             Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(bsdf)) if bsdf.is_rough_single() => with!(Glass(bsdf)),
             _ => $otherwise,
@@ -105,7 +110,7 @@ macro_rules! lanes {
 impl Bsdf {
     /// [`eval`](Self::eval) for the first `count` queries, at most [`BATCH`].
     pub fn eval_rows(&self, queries: &BsdfQueryRows, count: usize, out: &mut BsdfEvalRows) {
-        lanes!(self, bsdf => vectorize(Eval { bsdf, queries, out, count }), {
+        lanes!(self, bsdf => vectorize!(eval(&bsdf, queries, out, count)), {
             for i in 0..count.min(BATCH) {
                 out.set(i, &self.eval(queries.wo.get(i), queries.wi.get(i)));
             }
@@ -114,27 +119,11 @@ impl Bsdf {
 
     /// [`sample`](Self::sample) for the first `count` queries, at most [`BATCH`].
     pub fn sample_rows(&self, queries: &BsdfQueryRows, count: usize, out: &mut BsdfSampleRows) {
-        lanes!(self, bsdf => vectorize(Sample { bsdf, queries, out, count }), {
+        lanes!(self, bsdf => vectorize!(sample(&bsdf, queries, out, count)), {
             for i in 0..count.min(BATCH) {
                 out.set(i, self.sample(queries.wo.get(i), queries.u_lobe[i], [queries.u[i], queries.v[i]]));
             }
         });
-    }
-}
-
-struct Eval<'a, B> {
-    bsdf: B,
-    queries: &'a BsdfQueryRows,
-    out: &'a mut BsdfEvalRows,
-    count: usize,
-}
-
-impl<B: LaneBsdf> Kernel for Eval<'_, B> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        eval(&self.bsdf, self.queries, self.out, self.count);
     }
 }
 
@@ -143,22 +132,6 @@ impl<B: LaneBsdf> Kernel for Eval<'_, B> {
 fn eval<B: LaneBsdf>(bsdf: &B, queries: &BsdfQueryRows, out: &mut BsdfEvalRows, count: usize) {
     for i in 0..count.next_multiple_of(LANES).min(BATCH) {
         out.set(i, &bsdf.eval(queries.wo.get(i), queries.wi.get(i)));
-    }
-}
-
-struct Sample<'a, B> {
-    bsdf: B,
-    queries: &'a BsdfQueryRows,
-    out: &'a mut BsdfSampleRows,
-    count: usize,
-}
-
-impl<B: LaneBsdf> Kernel for Sample<'_, B> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        sample(&self.bsdf, self.queries, self.out, self.count);
     }
 }
 

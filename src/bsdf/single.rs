@@ -1,12 +1,12 @@
 //! Materials whose microfacets scatter light once, for agreement with other renderers.
 
 use super::microfacet::Microfacets;
-use super::{BsdfEval, BsdfSample, Conductor, Dielectric, Plastic};
+use super::{BsdfEval, BsdfFlags, BsdfSample, Conductor, Dielectric, Plastic};
 use crate::color::Rgb;
 use crate::math::Vec3;
 
-/// A material with microfacets distributed by `D`, which lose light that they scatter several times. Apart from the others, so that their code
-/// stays as it is.
+/// A material with microfacets distributed by `D`, which lose light that they scatter several times. Apart from the
+/// others, so that their code stays as it is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SingleScatteringBsdf<D> {
     /// Metal.
@@ -40,19 +40,10 @@ impl<D: Microfacets> SingleScatteringBsdf<D> {
         each!(self, bsdf => bsdf.sample(wo, u_lobe, u))
     }
 
-    /// As [`Bsdf::is_delta`](super::Bsdf::is_delta).
-    pub fn is_delta(&self) -> bool {
-        each!(self, bsdf => bsdf.is_delta())
-    }
-
-    /// As [`Bsdf::is_anisotropic`](super::Bsdf::is_anisotropic).
-    pub fn is_anisotropic(&self) -> bool {
-        each!(self, bsdf => bsdf.is_anisotropic())
-    }
-
-    /// As [`Bsdf::transmits`](super::Bsdf::transmits).
-    pub fn transmits(&self) -> bool {
-        matches!(self, Self::Dielectric(_))
+    /// The lobes.
+    #[inline]
+    pub fn flags(&self) -> BsdfFlags {
+        each!(self, bsdf => bsdf.flags())
     }
 
     /// As [`Bsdf::diffuse_fraction`](super::Bsdf::diffuse_fraction).

@@ -5,9 +5,9 @@ use crate::color::Rgb;
 use crate::math::Vec3;
 
 impl Bsdf {
-    /// The share, by channel, of diffuse reflection in the value of [`eval`](Self::eval), for directions on the same side: within `[0, 1]`, 0
-    /// where all of it is specular. The sheen counts as diffuse, and light that microfacets scatter several times as specular. Delta lobes,
-    /// which have no value, are specular.
+    /// The share, by channel, of diffuse reflection in the value of [`eval`](Self::eval), for directions on the same
+    /// side: within `[0, 1]`, 0 where all of it is specular. The sheen counts as diffuse, and light that microfacets
+    /// scatter several times as specular. Delta lobes, which have no value, are specular.
     pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
         match self {
             Self::Lambert(_) | Self::Eon(_) | Self::DiffuseTransmission(_) => Rgb::WHITE,

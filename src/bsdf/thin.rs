@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use super::fresnel;
-use super::{BsdfEval, BsdfSample};
+use super::{BsdfEval, BsdfFlags, BsdfSample};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
@@ -52,10 +52,10 @@ impl ThinDielectric {
         Some(BsdfSample { wi: -wo, weight: self.transmission_tint, pdf, is_delta: true, is_transmission: true, eta: 1.0 })
     }
 
-    /// Always.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        true
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::SPECULAR | BsdfFlags::REFLECTION | BsdfFlags::TRANSMISSION
     }
 
     /// What is reflected and what passes.
@@ -126,10 +126,10 @@ impl DiffuseTransmission {
         })
     }
 
-    /// Never.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        false
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::DIFFUSE | BsdfFlags::REFLECTION | BsdfFlags::TRANSMISSION
     }
 
     /// What leaves on both sides.

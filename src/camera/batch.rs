@@ -2,7 +2,7 @@
 
 use super::{Camera, Projection};
 use crate::math::rows::{BATCH, Row, pair};
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 use crate::math::{RayRows, Vec2};
 
 impl Camera {
@@ -12,36 +12,29 @@ impl Camera {
         matches!(self.projection, Projection::Perspective { lens: None, .. }) && !self.is_moving()
     }
 
-    /// The [rays](Camera::ray) through the first `count` points of the `film`, in pixels from the upper left corner of a picture of `size` pixels.
-    /// Their times stay as they are.
+    /// The [rays](Camera::ray) through the first `count` points of the `film`, in pixels from the upper left corner of
+    /// a picture of `size` pixels. Their times stay as they are.
     pub fn pinhole_rays(&self, size: [u32; 2], film: &[Row; 2], rays: &mut RayRows, count: usize) {
         if let Projection::Perspective { half_height, .. } = self.projection {
-            vectorize(PinholeRays { camera: self, half_height, size, film, rays, count });
+            vectorize!(pinhole_rays(self, Picture { size, half_height }, film, rays, count));
         }
     }
 }
 
-struct PinholeRays<'a> {
-    camera: &'a Camera,
-    half_height: f64,
+/// A picture's pixels, and half its height one unit before a pinhole.
+#[derive(Clone, Copy)]
+struct Picture {
     size: [u32; 2],
-    film: &'a [Row; 2],
-    rays: &'a mut RayRows,
-    count: usize,
+    half_height: f64,
 }
 
-impl Kernel for PinholeRays<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { camera, half_height, size, film, rays, count } = self;
-        for i in 0..count.min(BATCH) {
-            let toward = camera.on_picture(Vec2::from(pair(film, i)), size, half_height);
-            let start = camera.pinhole_start(toward);
-            rays.origin.set(i, camera.world_from_camera.point(start).as_vec3());
-            rays.direction.set(i, camera.world_from_camera.vector(toward).normalize().as_vec3());
-            (rays.t_min[i], rays.t_max[i]) = (0.0, f32::INFINITY);
-        }
+#[inline(always)]
+fn pinhole_rays(camera: &Camera, picture: Picture, film: &[Row; 2], rays: &mut RayRows, count: usize) {
+    for i in 0..count.min(BATCH) {
+        let toward = camera.on_picture(Vec2::from(pair(film, i)), picture.size, picture.half_height);
+        let start = camera.pinhole_start(toward);
+        rays.origin.set(i, camera.world_from_camera.point(start).as_vec3());
+        rays.direction.set(i, camera.world_from_camera.vector(toward).normalize().as_vec3());
+        (rays.t_min[i], rays.t_max[i]) = (0.0, f32::INFINITY);
     }
 }

@@ -11,9 +11,9 @@ impl Camera {
         rounded(self.world_to_view())
     }
 
-    /// World to a picture of `size` pixels as OpenEXR has it when the shutter opens: after division by the fourth component, x and y go from 0
-    /// to 1 over the picture, y downwards, and z grows with the depth: 1 - 1 / depth with perspective, the depth without. `None` for environment
-    /// cameras, which no matrix describes.
+    /// World to a picture of `size` pixels as OpenEXR has it when the shutter opens: after division by the fourth
+    /// component, x and y go from 0 to 1 over the picture, y downwards, and z grows with the depth: 1 - 1 / depth with
+    /// perspective, the depth without. `None` for environment cameras, which no matrix describes.
     pub fn world_to_ndc(&self, size: [u32; 2]) -> Option<[[f32; 4]; 4]> {
         let [width, height] = size.map(f64::from);
         let [right, up] = self.framing.shift;

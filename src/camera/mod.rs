@@ -95,8 +95,9 @@ impl Camera {
         Self { shutter, ..self }
     }
 
-    /// This camera on the way of `motion`, which rotates and translates (and takes the place of where it stood). Its times are shares of the
-    /// shutter interval; a constant one makes the camera rest. `None` if the motion is singular.
+    /// This camera on the way of `motion`, which rotates and translates (and takes the place of where it stood). Its
+    /// times are shares of the shutter interval; a constant one makes the camera rest. `None` if the motion is
+    /// singular.
     pub fn with_motion(self, motion: Motion) -> Option<Self> {
         let world_from_camera = Transform::new(motion.map_at(0.0))?;
         let motion = motion.as_constant().is_none().then(|| Box::new(motion));
@@ -219,8 +220,8 @@ impl Camera {
         if self.near > 0.0 { DVec3::ZERO + toward * (self.near / -toward.z) } else { DVec3::ZERO }
     }
 
-    /// The cone of a pixel around one of the camera's rays, which may start further along: as wide as the root of the pixel's area across the
-    /// ray, without what a lens or the camera's motion adds.
+    /// The cone of a pixel around one of the camera's rays, which may start further along: as wide as the root of the
+    /// pixel's area across the ray, without what a lens or the camera's motion adds.
     pub fn pixel_cone(&self, ray: &Ray, size: [u32; 2]) -> RayCone {
         let (width, height) = (f64::from(size[0]), f64::from(size[1]));
         let from_pinhole = |spread: f64| {

@@ -20,14 +20,15 @@ impl Camera {
         }
     }
 
-    /// How far, in pixels to the right and down, the picture of a point moves that is at `open` when the shutter opens and at `close` when it
-    /// closes. Zero where the camera does not see both; the shorter way round in an environment camera's picture.
+    /// How far, in pixels to the right and down, the picture of a point moves that is at `open` when the shutter opens
+    /// and at `close` when it closes. Zero where the camera does not see both; the shorter way round in an environment
+    /// camera's picture.
     pub fn film_motion(&self, [open, close]: [DVec3; 2], size: [u32; 2]) -> Vec2 {
         self.way([self.film_point(open, size, 0.0), self.film_point(close, size, 1.0)], size)
     }
 
-    /// [`film_motion`](Self::film_motion) of what lies infinitely far away in a direction: that of the camera alone. Zero for an orthographic
-    /// camera.
+    /// [`film_motion`](Self::film_motion) of what lies infinitely far away in a direction: that of the camera alone.
+    /// Zero for an orthographic camera.
     pub fn film_motion_at_infinity(&self, direction: DVec3, size: [u32; 2]) -> Vec2 {
         if !self.is_moving() {
             return Vec2::ZERO;

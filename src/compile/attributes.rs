@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use super::materials::{Look, MaterialTable};
-use super::prepared::PreparedEmission;
+use super::materials::MaterialTable;
+use super::prepared::{PreparedEmission, PreparedSurface};
 use super::{Builder, meshes};
 use crate::attribute::{Attribute, AttributeValues, is_of_faces};
 use crate::color::Rgb;
@@ -23,7 +23,8 @@ struct Taken {
 
 impl MaterialTable {
     /// What textures of a surface take. `material` is what the scene calls its material.
-    fn taken(&self, look: &Look, emission: Option<&PreparedEmission>, material: Option<&str>) -> Vec<Taken> {
+    fn taken(&self, surface: &PreparedSurface, material: Option<&str>) -> Vec<Taken> {
+        let PreparedSurface { look, emission, .. } = surface;
         let of = |id: TextureId, by: &str, largest: f32| {
             let taken = move |(id, scale)| Taken { by: by.to_owned(), id, scale, largest };
             self.textures.get(id).attributes().into_iter().map(taken).collect::<Vec<_>>()
@@ -39,7 +40,7 @@ impl MaterialTable {
         found.extend(look.opacity.into_iter().flat_map(|id| of(id, "the opacity", 1.0)));
         // Products with the radiance stay finite.
         let largest = |radiance: Rgb| f32::MAX / radiance.max_channel().max(1.0);
-        found.extend(emission.into_iter().flat_map(|PreparedEmission { emission, .. }| {
+        found.extend(emission.iter().flat_map(|PreparedEmission { emission, .. }| {
             emission.texture.map_or(Vec::new(), |id| of(id, "the emission", largest(emission.radiance)))
         }));
         found
@@ -47,17 +48,17 @@ impl MaterialTable {
 }
 
 impl Builder {
-    /// Refuses a surface that takes attributes which its shape does not have, or with values that make no sense; drops those that it does not
-    /// take.
+    /// Refuses a surface that takes attributes which its shape does not have, or with values that make no sense; drops
+    /// those that it does not take.
     pub(super) fn check_attributes(
         &self,
         path: &str,
         file: Option<&str>,
-        look: (&Look, Option<&PreparedEmission>, Option<&str>),
+        surface: &PreparedSurface,
+        material: Option<&str>,
         given: Option<&mut BTreeMap<String, AttributeValues>>,
     ) -> Result<()> {
-        let (look, emission, material) = look;
-        let taken = self.materials.taken(look, emission, material);
+        let taken = self.materials.taken(surface, material);
         let names = &self.materials.textures.attributes;
         let refuse = |message: String| -> Error { meshes::refusal(&self.files, path, file, message) };
         let mut nothing = BTreeMap::new();

@@ -1,6 +1,6 @@
 //! The camera.
 
-use super::Files;
+use super::CompileContext;
 use super::transforms::Shutter;
 use crate::camera::{Blades, Camera, Framing, Lens, Projection, lens_equation};
 use crate::desc::{CameraDesc, CameraKindDesc, KeyframeDesc, LensDesc};
@@ -13,7 +13,7 @@ const DEFAULT_FOV_DEGREES: f64 = 40.0;
 const MAX_BLADES: u32 = 64;
 
 /// The camera, placed by a rotation and a translation.
-pub fn compile(files: &Files, desc: &CameraDesc) -> Result<Camera> {
+pub fn compile(files: &CompileContext, desc: &CameraDesc) -> Result<Camera> {
     refuse_foreign_keys(files, desc)?;
     let fov = desc.vertical_fov_degrees.unwrap_or(DEFAULT_FOV_DEGREES);
     if !(fov > 0.0 && fov < 180.0) {
@@ -42,7 +42,7 @@ pub fn compile(files: &Files, desc: &CameraDesc) -> Result<Camera> {
 }
 
 /// The camera in a render space.
-pub fn place_in(files: &Files, desc: &CameraDesc, camera: Camera, space: RenderSpace) -> Result<Camera> {
+pub fn place_in(files: &CompileContext, desc: &CameraDesc, camera: Camera, space: RenderSpace) -> Result<Camera> {
     let place = if desc.position.is_some() { "camera.position" } else { "camera.transform" };
     let position = camera.position();
     files.reachable(place, position, &space)?;
@@ -50,7 +50,7 @@ pub fn place_in(files: &Files, desc: &CameraDesc, camera: Camera, space: RenderS
 }
 
 /// When the shutter is open.
-pub fn shutter(files: &Files, desc: &CameraDesc) -> Result<Shutter> {
+pub fn shutter(files: &CompileContext, desc: &CameraDesc) -> Result<Shutter> {
     let [open, close] = desc.shutter;
     if !(open.is_finite() && close.is_finite() && open <= close && (close - open).is_finite()) {
         return Err(files.error("camera.shutter", format!("must be finite and not close before it opens, not {:?}", desc.shutter)));
@@ -59,7 +59,7 @@ pub fn shutter(files: &Files, desc: &CameraDesc) -> Result<Shutter> {
 }
 
 /// How the camera moves from where `map` puts it.
-fn motion(files: &Files, keyframes: &[KeyframeDesc], map: &DAffine3, shutter: Shutter) -> Result<Motion> {
+fn motion(files: &CompileContext, keyframes: &[KeyframeDesc], map: &DAffine3, shutter: Shutter) -> Result<Motion> {
     for (i, keyframe) in keyframes.iter().enumerate() {
         let path = format!("camera.motion[{i}].transform");
         let step = files.transform(&path, &keyframe.transform, &DAffine3::IDENTITY)?;
@@ -71,7 +71,7 @@ fn motion(files: &Files, keyframes: &[KeyframeDesc], map: &DAffine3, shutter: Sh
 }
 
 /// Keys that mean nothing to this type of camera.
-fn refuse_foreign_keys(files: &Files, desc: &CameraDesc) -> Result<()> {
+fn refuse_foreign_keys(files: &CompileContext, desc: &CameraDesc) -> Result<()> {
     use CameraKindDesc::{Environment, Orthographic, Perspective};
     let keys: [(&str, bool, &[CameraKindDesc]); 5] = [
         ("vertical_fov_degrees", desc.vertical_fov_degrees.is_some(), &[Perspective]),
@@ -93,7 +93,7 @@ fn refuse_foreign_keys(files: &Files, desc: &CameraDesc) -> Result<()> {
     Ok(())
 }
 
-fn framing(files: &Files, desc: &CameraDesc) -> Result<Framing> {
+fn framing(files: &CompileContext, desc: &CameraDesc) -> Result<Framing> {
     let pixel_aspect = files.within("camera.pixel_aspect", desc.pixel_aspect.unwrap_or(1.0), 0.01, 100.0)?;
     let shift = desc.shift.unwrap_or_default();
     for share in shift {
@@ -102,7 +102,7 @@ fn framing(files: &Files, desc: &CameraDesc) -> Result<Framing> {
     Ok(Framing { pixel_aspect, shift })
 }
 
-fn placement(files: &Files, desc: &CameraDesc) -> Result<DAffine3> {
+fn placement(files: &CompileContext, desc: &CameraDesc) -> Result<DAffine3> {
     match (&desc.transform, desc.position, desc.look_at) {
         (None, Some(position), Some(look_at)) => files.look_at("camera", position, look_at, desc.up.unwrap_or([0.0, 1.0, 0.0])),
         (Some(transform), None, None) if desc.up.is_none() => {
@@ -128,7 +128,7 @@ fn rigid(map: &DAffine3) -> Option<DAffine3> {
     })
 }
 
-fn compile_lens(files: &Files, desc: &LensDesc, camera: &Transform, half_height: f64) -> Result<Lens> {
+fn compile_lens(files: &CompileContext, desc: &LensDesc, camera: &Transform, half_height: f64) -> Result<Lens> {
     let positive = |key: &str, value: Option<f64>| value.map(|v| files.positive(&format!("camera.lens.{key}"), v)).transpose();
     let (radius, f_number) = (positive("radius", desc.radius)?, positive("f_number", desc.f_number)?);
     let focal_length = positive("focal_length", desc.focal_length)?;
@@ -180,7 +180,7 @@ fn compile_lens(files: &Files, desc: &LensDesc, camera: &Transform, half_height:
 }
 
 /// The focus if it is given.
-fn focus_distance(files: &Files, desc: &LensDesc, camera: &Transform) -> Result<Option<f64>> {
+fn focus_distance(files: &CompileContext, desc: &LensDesc, camera: &Transform) -> Result<Option<f64>> {
     match (desc.focus_distance, desc.focus_point) {
         (None, None) => Ok(None),
         (Some(distance), None) => files.positive("camera.lens.focus_distance", distance).map(Some),
@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     fn camera(json: &str) -> Result<Camera> {
-        compile(&Files::new("s.json"), &serde_json::from_str(json).unwrap())
+        compile(&CompileContext::new("s.json"), &serde_json::from_str(json).unwrap())
     }
 
     fn lens(json: &str) -> Lens {

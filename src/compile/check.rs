@@ -1,6 +1,6 @@
 //! Checks of numbers: finite, and within the range that makes sense.
 
-use super::Files;
+use super::CompileContext;
 use crate::error::Result;
 use crate::math::{DVec3, RenderSpace};
 
@@ -10,7 +10,7 @@ pub(super) const BRIGHTEST: f32 = 1e36;
 /// How far away a point can be in render space for rays to start there or end there.
 const FARTHEST: f64 = (1u64 << 56) as f64;
 
-impl Files {
+impl CompileContext {
     /// A point or vector, finite.
     pub(super) fn vector(&self, path: &str, value: [f64; 3]) -> Result<DVec3> {
         let vector = DVec3::from(value);

@@ -43,8 +43,8 @@ impl Builder {
     }
 }
 
-/// Looks for triangles with the same three corners, among the shapes of the world and among those of each object, that differ in orientation
-/// or, where they belong to different shapes, do not `look_alike`.
+/// Looks for triangles with the same three corners, among the shapes of the world and among those of each object, that
+/// differ in orientation or, where they belong to different shapes, do not `look_alike`.
 fn find(geometry: &Geometry, look_alike: impl Fn(ShapeId, ShapeId) -> bool) -> Option<Coincident> {
     let groups = std::iter::once(&geometry.world).chain(geometry.objects.iter().map(|object| &object.shapes));
     let meshes = groups.enumerate().flat_map(|(group, shapes)| shapes.iter().map(move |&id| (group, id)));

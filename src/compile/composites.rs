@@ -6,7 +6,7 @@ use super::materials::{Compiler, MaterialTable};
 use crate::desc::{MaterialDesc, SceneDesc};
 use crate::error::Result;
 use crate::id::MaterialId;
-use crate::material::{CoatInput, ColorInput, Material, Varying};
+use crate::material::{CoatInput, ColorInput, Material, TexturedMaterial};
 
 /// A coat and its colour.
 struct Coating {
@@ -106,7 +106,7 @@ impl MaterialTable {
                 let [front, back] = [front, back].map(|part| self.coated_part(part, coating, done));
                 Material::TwoSided { front, back }
             }
-            base => Varying::Coated { coat: coating.coat.clone(), tint: coating.tint, base }.into(),
+            base => TexturedMaterial::Coated { coat: coating.coat.clone(), tint: coating.tint, base }.into(),
         }
     }
 
@@ -122,7 +122,7 @@ impl MaterialTable {
 
     /// Whether light may cross the material or a part of it.
     pub(super) fn transmits(&self, id: MaterialId) -> bool {
-        self.any_part(id, &|id| self.materials[id.index()].transmits())
+        self.any_part(id, &|id| self.materials[id.index()].flags().transmits())
     }
 
     /// That neither a material nor a part of it has a relief.

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use super::Files;
+use super::CompileContext;
 use crate::desc::{InstanceDesc, SceneDesc, ShapeDesc};
 use crate::film::{Identities, Label, NameId, PlacementId, ShapeIdentity};
 
@@ -59,7 +59,7 @@ impl IdentityTable {
     }
 
     /// What a shape is called that is the one with this number of its list.
-    pub fn shape(&mut self, files: &Files, number: usize, desc: &ShapeDesc) -> ShapeIdentity {
+    pub fn shape(&mut self, files: &CompileContext, number: usize, desc: &ShapeDesc) -> ShapeIdentity {
         let common = desc.common();
         let stem = match desc {
             // What only stands for a file has a name that nobody knows.

@@ -1,6 +1,6 @@
 //! Keyframes: transforms as written at several times become one motion.
 
-use super::Files;
+use super::CompileContext;
 use super::transforms::Shutter;
 use crate::desc::{KeyframeDesc, TransformDesc, TransformStepDesc};
 use crate::error::Result;
@@ -9,7 +9,7 @@ use crate::math::{DAffine3, DVec3, Motion};
 /// The steps in one place of the lists of all keyframes; `None` where a keyframe lacks it.
 type Column<'a> = Vec<Option<&'a TransformStepDesc>>;
 
-impl Files {
+impl CompileContext {
     /// The motion of keyframes after `map`, its times as shares of the shutter interval; just `map` if there are none.
     pub(super) fn motion(&self, path: &str, keyframes: &[KeyframeDesc], map: &DAffine3, shutter: Shutter) -> Result<Motion> {
         let constant = Motion::constant(*map);
@@ -139,7 +139,7 @@ mod tests {
 
     fn motion(json: &str) -> Motion {
         let keyframes: Vec<KeyframeDesc> = serde_json::from_str(json).unwrap();
-        Files::new("s.json").motion("m", &keyframes, &DAffine3::IDENTITY, OPEN).unwrap()
+        CompileContext::new("s.json").motion("m", &keyframes, &DAffine3::IDENTITY, OPEN).unwrap()
     }
 
     #[track_caller]
@@ -206,7 +206,7 @@ mod tests {
         let keyframes: Vec<KeyframeDesc> =
             serde_json::from_str(&format!(r#"[{{ "time": 0 }}, {{ "time": 2, "transform": [{TURN}] }}]"#)).unwrap();
         let shutter = Shutter { open: 1.0, close: 1.0 };
-        let motion = Files::new("s.json").motion("m", &keyframes, &DAffine3::IDENTITY, shutter).unwrap();
+        let motion = CompileContext::new("s.json").motion("m", &keyframes, &DAffine3::IDENTITY, shutter).unwrap();
         let map = motion.as_constant().unwrap();
         let seen = map.transform_vector3(DVec3::X) - around_y(60.0).transform_vector3(DVec3::X);
         assert!(seen.length() < 1e-12, "{map:?}");

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Files;
+use super::CompileContext;
 use super::textures::TextureTable;
 use crate::color::Rgb;
 use crate::desc::{EnvironmentLightDesc, IesLightDesc, LightDesc, ProjectorLightDesc};
@@ -10,7 +10,8 @@ use crate::error::Result;
 use crate::id::{LightGroupId, LightId};
 use crate::import::{AssetError, read_ies, read_rgb_image};
 use crate::light::{
-    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, Projection, Projector, SpotLight,
+    DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, Projector, SpotLight,
+    TextureProjection,
 };
 use crate::math::{DAffine3, DMat3, DVec3, RenderSpace, Vec2};
 use crate::texture::Texture;
@@ -29,7 +30,7 @@ pub struct LightTable {
 
 impl LightTable {
     /// The id of a group's name; a new one if it is new.
-    pub fn group(&mut self, files: &Files, path: &str, name: Option<&str>) -> Result<Option<LightGroupId>> {
+    pub fn group(&mut self, files: &CompileContext, path: &str, name: Option<&str>) -> Result<Option<LightGroupId>> {
         let Some(name) = name.filter(|name| *name != LightGroups::OF_THE_REST) else { return Ok(None) };
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             let message = format!("\"{name}\" must be made of letters, digits and underscores: it becomes the name of a layer");
@@ -61,7 +62,7 @@ impl LightTable {
 }
 
 /// One entry of `lights`, placed into `space`.
-pub fn compile(files: &Files, path: &str, desc: &LightDesc, space: &RenderSpace, textures: &TextureTable) -> Result<Light> {
+pub fn compile(files: &CompileContext, path: &str, desc: &LightDesc, space: &RenderSpace, textures: &TextureTable) -> Result<Light> {
     let at = |key: &str| format!("{path}.{key}");
     Ok(match desc {
         LightDesc::Point(light) => Light::Point(PointLight {
@@ -86,7 +87,7 @@ pub fn compile(files: &Files, path: &str, desc: &LightDesc, space: &RenderSpace,
             }
             let texture = textures.of_light(files, &at("texture"), name, intensity)?;
             let half = Vec2::splat(cutoff.to_radians().tan() as f32);
-            let projection = Projection::new(Some(texture), axis, files.up(&at("up"), light.up, axis)?, half);
+            let projection = TextureProjection::new(Some(texture), axis, files.up(&at("up"), light.up, axis)?, half);
             Light::Spot(Box::new(spot.with_texture(projection, &textures.textures)))
         }
         LightDesc::Projector(light) => Light::Projector(Box::new(projector(files, path, light, space, textures)?)),
@@ -104,7 +105,7 @@ pub fn compile(files: &Files, path: &str, desc: &LightDesc, space: &RenderSpace,
     })
 }
 
-impl Files {
+impl CompileContext {
     /// A point of the world, placed into `space`.
     fn placed(&self, path: &str, value: [f64; 3], space: &RenderSpace) -> Result<DVec3> {
         let world = self.position(path, value)?;
@@ -131,7 +132,13 @@ impl Files {
     }
 }
 
-fn projector(files: &Files, path: &str, desc: &ProjectorLightDesc, space: &RenderSpace, textures: &TextureTable) -> Result<Projector> {
+fn projector(
+    files: &CompileContext,
+    path: &str,
+    desc: &ProjectorLightDesc,
+    space: &RenderSpace,
+    textures: &TextureTable,
+) -> Result<Projector> {
     let at = |key: &str| format!("{path}.{key}");
     let position = files.placed(&at("position"), desc.position, space)?;
     let toward = files.position(&at("look_at"), desc.look_at)? - files.position(&at("position"), desc.position)?;
@@ -152,11 +159,11 @@ fn projector(files: &Files, path: &str, desc: &ProjectorLightDesc, space: &Rende
     if !(aspect > 0.0 && half.min_element() > 0.0 && half.is_finite()) {
         return Err(files.error(&at("aspect"), format!("must be above 0 and of a picture that can be thrown, not {aspect}")));
     }
-    let projection = Projection::new(texture, axis, files.up(&at("up"), desc.up, axis)?, half);
+    let projection = TextureProjection::new(texture, axis, files.up(&at("up"), desc.up, axis)?, half);
     Ok(Projector::new(position, irradiance, projection, &textures.textures))
 }
 
-fn ies(files: &Files, path: &str, desc: &IesLightDesc, space: &RenderSpace) -> Result<IesLight> {
+fn ies(files: &CompileContext, path: &str, desc: &IesLightDesc, space: &RenderSpace) -> Result<IesLight> {
     let at = format!("{path}.position");
     let (world, position) = (files.position(&at, desc.position)?, files.placed(&at, desc.position, space)?);
     let nadir = match desc.look_at {
@@ -179,7 +186,7 @@ fn ies(files: &Files, path: &str, desc: &IesLightDesc, space: &RenderSpace) -> R
     Ok(IesLight::new(position, nadir, desc.rotation_degrees.to_radians(), intensity, Arc::new(profile)))
 }
 
-fn environment(files: &Files, path: &str, desc: &EnvironmentLightDesc) -> Result<Environment> {
+fn environment(files: &CompileContext, path: &str, desc: &EnvironmentLightDesc) -> Result<Environment> {
     let scale = files.emitted(&format!("{path}.scale"), [desc.scale; 3])?[0];
     let rotation = match &desc.transform {
         None => DMat3::IDENTITY,

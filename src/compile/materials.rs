@@ -3,23 +3,25 @@
 use std::collections::HashMap;
 use std::fmt::Debug;
 
-use super::Files;
+use super::CompileContext;
 use super::textures::{TextureTable, TextureUse};
 use crate::bsdf::{Beckmann, Coat, Conductor, Dielectric, Ggx, Lambert, Mirror, Plastic, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
 use crate::color::Rgb;
 use crate::desc::{
-    ColorDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc, SceneDesc, UsedNames,
+    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc,
+    SceneDesc, UsedNames,
 };
 use crate::error::Result;
 use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
-use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, Varying};
+use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial};
 use crate::medium::{Media, Medium};
 use crate::relief::Relief;
 use crate::texture::Texture;
 
-/// Real and imaginary part of the index of refraction for red, green and blue (650, 550 and 450 nm; refractiveindex.info: Johnson and Christy
-/// for noble metals, iron, chromium and titanium; Rakic for aluminium and tungsten; Querry for brass).
+/// Real and imaginary part of the index of refraction for red, green and blue (650, 550 and 450 nm;
+/// refractiveindex.info: Johnson and Christy for noble metals, iron, chromium and titanium; Rakic for aluminium and
+/// tungsten; Querry for brass).
 const METALS: &[(&str, [f32; 3], [f32; 3])] = &[
     ("aluminium", [1.657, 0.880, 0.521], [9.224, 6.270, 4.837]),
     ("brass", [0.444, 0.527, 1.094], [3.695, 2.765, 1.829]),
@@ -41,21 +43,21 @@ pub struct MaterialTable {
     pub media: Media,
     /// Reliefs of materials of the scene file that have one.
     pub(super) by_material: HashMap<MaterialId, ReliefId>,
-    names: HashMap<String, Look>,
+    names: HashMap<String, MaterialBinding>,
     /// The medium of each material that has one.
     pub(super) medium_of: HashMap<MaterialId, Medium>,
 }
 
 /// How a shape looks: what a material of the scene file comes to.
 #[derive(Clone, Copy, Debug)]
-pub struct Look {
+pub struct MaterialBinding {
     pub material: MaterialId,
     pub relief: Option<ReliefId>,
     /// How much of the surface is there, if not all of it.
     pub opacity: Option<TextureId>,
 }
 
-impl Look {
+impl MaterialBinding {
     /// A material alone.
     pub fn plain(material: MaterialId) -> Self {
         Self { material, relief: None, opacity: None }
@@ -66,7 +68,7 @@ impl MaterialTable {
     /// The id of the material for shapes that name none: diffuse, albedo 1/2.
     pub const DEFAULT: MaterialId = MaterialId(0);
 
-    pub fn new(files: &Files, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
+    pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
         let textures = TextureTable::new(files, desc, used)?;
         let default = Material::from(Lambert { albedo: Rgb::splat(0.5) });
         let mut table = Self {
@@ -111,7 +113,7 @@ impl MaterialTable {
         self.medium_of.extend(medium.map(|medium| (id, medium)));
         let relief = compiler.relief(desc, &path, &desc.materials[name])?.map(|relief| self.push_relief(relief));
         self.by_material.extend(relief.map(|relief| (id, relief)));
-        self.names.insert(name.to_owned(), Look { relief, ..Look::plain(id) });
+        self.names.insert(name.to_owned(), MaterialBinding { relief, ..MaterialBinding::plain(id) });
         Ok(id)
     }
 
@@ -122,7 +124,7 @@ impl MaterialTable {
     }
 
     /// Whether a surface without uv cannot look so.
-    pub fn needs_uv(&self, look: &Look) -> bool {
+    pub fn needs_uv(&self, look: &MaterialBinding) -> bool {
         let cut_out = look.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
         let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.relief_of(id).is_some();
         cut_out || look.relief.is_some() || self.any_part(look.material, &needs)
@@ -133,15 +135,15 @@ impl MaterialTable {
     }
 
     /// Whether a surface's normals come from a normal map.
-    pub fn has_normal_map(&self, look: &Look) -> bool {
+    pub fn has_normal_map(&self, look: &MaterialBinding) -> bool {
         let is_map = |relief: Option<ReliefId>| relief.is_some_and(|id| matches!(self.reliefs[id.index()], Relief::NormalMap { .. }));
         is_map(look.relief) || self.any_part(look.material, &|id| is_map(self.relief_of(id)))
     }
 
     /// What a name stands for, or the default.
-    pub fn find(&self, files: &Files, path: &str, name: Option<&str>) -> Result<Look> {
+    pub fn find(&self, files: &CompileContext, path: &str, name: Option<&str>) -> Result<MaterialBinding> {
         let Some(name) = name else {
-            return Ok(Look::plain(Self::DEFAULT));
+            return Ok(MaterialBinding::plain(Self::DEFAULT));
         };
         let found = self.names.get(name).copied();
         found.ok_or_else(|| files.unknown(&format!("{path}.material"), "material", name, self.names.keys().map(String::as_str)))
@@ -149,7 +151,7 @@ impl MaterialTable {
 }
 
 pub(super) struct Compiler<'a> {
-    pub(super) files: &'a Files,
+    pub(super) files: &'a CompileContext,
     pub(super) textures: &'a TextureTable,
 }
 
@@ -157,44 +159,37 @@ impl Compiler<'_> {
     fn material(&self, path: &str, desc: &MaterialDesc) -> Result<Material> {
         let files = self.files;
         Ok(match desc {
-            MaterialDesc::Diffuse { albedo, roughness } => Varying::Diffuse {
+            MaterialDesc::Diffuse { albedo, roughness } => TexturedMaterial::Diffuse {
                 albedo: self.color(&format!("{path}.albedo"), albedo)?,
                 roughness: self.scalar(&format!("{path}.roughness"), roughness)?,
             }
             .into(),
             MaterialDesc::DiffuseTransmission { reflectance, transmittance } => {
-                let [reflectance, transmittance] = self.sum_to_one(path, ("reflectance", reflectance), ("transmittance", transmittance))?;
-                Varying::DiffuseTransmission { reflectance, transmittance }.into()
+                let [reflectance, transmittance] = self.sum_to_one(path, ["reflectance", "transmittance"], [reflectance, transmittance])?;
+                TexturedMaterial::DiffuseTransmission { reflectance, transmittance }.into()
             }
             MaterialDesc::Mirror { reflectance } => {
-                Varying::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
+                TexturedMaterial::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
             }
             MaterialDesc::Conductor { metal, eta, k, roughness, alpha, distribution, tint, multiscatter } => {
                 let (eta, k) = self.metal(path, metal.as_deref(), *eta, *k)?;
                 let metal = Conductor::new(eta.into(), k.into(), [0.0; 2], Rgb::WHITE);
                 let tint = self.color(&format!("{path}.tint"), tint)?;
                 let alpha = self.alpha(path, roughness.as_ref(), alpha.as_ref())?;
-                Varying::Conductor { metal, tint, alpha, facets: facets(*distribution, *multiscatter) }.into()
+                TexturedMaterial::Conductor { metal, tint, alpha, facets: facets(*distribution, *multiscatter) }.into()
             }
-            MaterialDesc::Dielectric(glass) => {
-                let ior = self.glass_ior(path, &glass.ior)?;
-                let alpha = self.alpha(path, glass.roughness.as_ref(), glass.alpha.as_ref())?;
-                let tints = self.tints(path, &glass.reflection_tint, &glass.transmission_tint)?;
-                let boundary = Varying::Dielectric { ior, alpha, facets: facets(glass.distribution, glass.multiscatter), tints };
-                // The relative index at a medium's surface depends on what is around it.
-                if glass.is_medium() { Material::Varying(Box::new(boundary)) } else { boundary.into() }
-            }
+            MaterialDesc::Dielectric(desc) => self.dielectric(path, desc)?,
             MaterialDesc::ThinDielectric { ior, reflection_tint, transmission_tint } => {
                 let tints = self.tints(path, reflection_tint, transmission_tint)?;
-                Varying::ThinDielectric { ior: self.ior(path, ior, 0.1)?, tints }.into()
+                TexturedMaterial::ThinDielectric { ior: self.ior(path, ior, 0.1)?, tints }.into()
             }
             MaterialDesc::Phong { diffuse, specular, exponent, lobe } => {
                 let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
                     let is_sound = exponent >= 0.0 && exponent.is_finite();
                     if is_sound { Ok(()) } else { Err(files.error(path, format!("must be finite and not negative, not {exponent}"))) }
                 })?;
-                let [diffuse, specular] = self.sum_to_one(path, ("diffuse", diffuse), ("specular", specular))?;
-                Varying::Phong { diffuse, specular, exponent, cosine: *lobe == PhongLobeDesc::Cosine }.into()
+                let [diffuse, specular] = self.sum_to_one(path, ["diffuse", "specular"], [diffuse, specular])?;
+                TexturedMaterial::Phong { diffuse, specular, exponent, cosine: *lobe == PhongLobeDesc::Cosine }.into()
             }
             MaterialDesc::CookTorrance { albedo, d, s, m, f0 } => {
                 let albedo = self.color(&format!("{path}.albedo"), albedo)?;
@@ -206,19 +201,31 @@ impl Compiler<'_> {
                 {
                     return Err(files.error(path, format!("`d` and `s` must not exceed 1 together, but are {d} and {s}")));
                 }
-                Varying::CookTorrance { albedo, d, s, m, f0 }.into()
+                TexturedMaterial::CookTorrance { albedo, d, s, m, f0 }.into()
             }
             MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } | MaterialDesc::Relief { .. } => {
                 return Err(files.error(path, "cannot be part of a material"));
             }
-            MaterialDesc::Plastic(desc) => Varying::Plastic {
-                coat: self.plastic_coat(path, desc)?,
-                albedo: self.color(&format!("{path}.albedo"), &desc.albedo)?,
-                tint: self.color(&format!("{path}.coat_tint"), &desc.coat_tint)?,
-                nonlinear: desc.nonlinear,
-            }
-            .into(),
-            MaterialDesc::Principled(desc) => Varying::Principled(self.principled(path, desc)?).into(),
+            MaterialDesc::Plastic(desc) => self.plastic(path, desc)?.into(),
+            MaterialDesc::Principled(desc) => TexturedMaterial::Principled(self.principled(path, desc)?).into(),
+        })
+    }
+
+    fn dielectric(&self, path: &str, desc: &DielectricDesc) -> Result<Material> {
+        let ior = self.glass_ior(path, &desc.ior)?;
+        let alpha = self.alpha(path, desc.roughness.as_ref(), desc.alpha.as_ref())?;
+        let tints = self.tints(path, &desc.reflection_tint, &desc.transmission_tint)?;
+        let boundary = TexturedMaterial::Dielectric { ior, alpha, facets: facets(desc.distribution, desc.multiscatter), tints };
+        // The relative index at a medium's surface depends on what is around it.
+        Ok(if desc.is_medium() { Material::Textured(Box::new(boundary)) } else { boundary.into() })
+    }
+
+    fn plastic(&self, path: &str, desc: &PlasticDesc) -> Result<TexturedMaterial> {
+        Ok(TexturedMaterial::Plastic {
+            coat: self.plastic_coat(path, desc)?,
+            albedo: self.color(&format!("{path}.albedo"), &desc.albedo)?,
+            tint: self.color(&format!("{path}.coat_tint"), &desc.coat_tint)?,
+            nonlinear: desc.nonlinear,
         })
     }
 
@@ -279,15 +286,13 @@ impl Compiler<'_> {
     }
 
     /// Two colours that do not exceed 1 together; of textures only the lookup can tell.
-    fn sum_to_one(&self, path: &str, a: (&str, &ColorDesc), b: (&str, &ColorDesc)) -> Result<[ColorInput; 2]> {
-        let inputs = [self.color(&format!("{path}.{}", a.0), a.1)?, self.color(&format!("{path}.{}", b.0), b.1)?];
+    fn sum_to_one(&self, path: &str, [a, b]: [&str; 2], [x, y]: [&ColorDesc; 2]) -> Result<[ColorInput; 2]> {
+        let inputs = [self.color(&format!("{path}.{a}"), x)?, self.color(&format!("{path}.{b}"), y)?];
         if let [ColorInput::Constant(x), ColorInput::Constant(y)] = inputs
             && (x + y).max_channel() > 1.0 + 1e-6
         {
-            let message = format!(
-                "`{}` and `{}` must not exceed 1 together in any channel: a surface cannot scatter more than it receives",
-                a.0, b.0
-            );
+            let message =
+                format!("`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it receives");
             return Err(self.files.error(path, message));
         }
         Ok(inputs)

@@ -1,6 +1,6 @@
 //! Media: which material has which.
 
-use super::Files;
+use super::CompileContext;
 use super::materials::{Compiler, MaterialTable};
 use crate::color::Rgb;
 use crate::desc::{AbsorptionDesc, MaterialDesc};
@@ -56,7 +56,7 @@ impl MaterialTable {
     }
 
     /// The medium of a material that consists of others: whatever crosses its surface must end up in the same.
-    pub(super) fn medium_within(&self, files: &Files, path: &str, material: &Material) -> Result<Option<Medium>> {
+    pub(super) fn medium_within(&self, files: &CompileContext, path: &str, material: &Material) -> Result<Option<Medium>> {
         let Some(parts) = material.parts() else { return Ok(None) };
         let medium = |id: MaterialId| self.medium_of.get(&id).copied();
         match parts.map(|id| self.transmits(id)) {

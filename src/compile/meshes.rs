@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::normals::{self, Smoothing};
-use super::{Files, attributes};
+use super::{CompileContext, attributes};
 use crate::attribute::{AttributeValues, VERTEX_COLOR, is_of_faces};
 use crate::desc::{AttributeDesc, MeshDesc, MeshShadingDesc, SceneDesc, ShapeDesc, UsedNames};
 use crate::error::{Error, Result};
@@ -31,7 +31,7 @@ pub struct MeshStore {
 
 impl MeshStore {
     /// Reads the files of all meshes that are used.
-    pub fn read(files: &Files, desc: &SceneDesc, used: &UsedNames) -> Self {
+    pub fn read(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> Self {
         let meshes = desc.used_shapes(used).filter_map(|(path, shape)| match shape {
             ShapeDesc::Mesh(mesh) if mesh.file.is_some() => Some((path, mesh)),
             _ => None,
@@ -43,12 +43,12 @@ impl MeshStore {
     }
 
     /// The meshes of the shape at `path`: several where an OBJ has several materials.
-    pub fn take(&mut self, files: &Files, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
+    pub fn take(&mut self, files: &CompileContext, path: &str, desc: &MeshDesc) -> Result<Vec<LoadedMesh>> {
         self.loaded.remove(path).unwrap_or_else(|| load(files, path, desc, &self.attributes))
     }
 }
 
-fn load(files: &Files, path: &str, desc: &MeshDesc, attributes: &BTreeSet<String>) -> Result<Vec<LoadedMesh>> {
+fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeSet<String>) -> Result<Vec<LoadedMesh>> {
     for (key, times) in [("deform_files", desc.deform_files.len()), ("deform_positions", desc.deform_positions.len())] {
         if times >= Mesh::MAX_STEPS {
             let message = format!("{times} further times: there can be {}", Mesh::MAX_STEPS - 1);
@@ -101,7 +101,7 @@ fn load(files: &Files, path: &str, desc: &MeshDesc, attributes: &BTreeSet<String
 }
 
 /// The attributes of a mesh without a file, its colours among them.
-fn inline_attributes(files: &Files, path: &str, desc: &MeshDesc) -> Result<BTreeMap<String, AttributeValues>> {
+fn inline_attributes(files: &CompileContext, path: &str, desc: &MeshDesc) -> Result<BTreeMap<String, AttributeValues>> {
     let mut attributes = BTreeMap::new();
     for (name, values) in &desc.attributes {
         let place = format!("{path}.attributes.{name}");
@@ -121,7 +121,13 @@ fn inline_attributes(files: &Files, path: &str, desc: &MeshDesc) -> Result<BTree
     Ok(attributes)
 }
 
-fn load_file(files: &Files, place: &str, file: &str, with_materials: bool, attributes: &BTreeSet<String>) -> Result<Vec<LoadedMesh>> {
+fn load_file(
+    files: &CompileContext,
+    place: &str,
+    file: &str,
+    with_materials: bool,
+    attributes: &BTreeSet<String>,
+) -> Result<Vec<LoadedMesh>> {
     let plain = |data, material| LoadedMesh { data, later: Vec::new(), material };
     if let Some(data) = files.assets.meshes.get(file) {
         return Ok(vec![plain(data.clone(), None)]);
@@ -141,6 +147,8 @@ fn load_file(files: &Files, place: &str, file: &str, with_materials: bool, attri
 /// How a mesh is placed.
 #[derive(Clone, Copy)]
 pub struct Placement<'a> {
+    /// Where the mesh came from.
+    pub file: Option<&'a str>,
     pub transform: &'a Transform,
     pub shading: MeshShadingDesc,
     pub smoothing: Smoothing,
@@ -152,7 +160,7 @@ pub struct Placement<'a> {
 }
 
 /// The error about a mesh, in its file if it has one.
-pub fn refusal(files: &Files, path: &str, file: Option<&str>, message: String) -> Error {
+pub fn refusal(files: &CompileContext, path: &str, file: Option<&str>, message: String) -> Error {
     match file {
         Some(file) => files.asset_error(&format!("{path}.file"), &files.asset(file), AssetError::Malformed(message)),
         None => files.error(path, message),
@@ -160,16 +168,9 @@ pub fn refusal(files: &Files, path: &str, file: Option<&str>, message: String) -
 }
 
 /// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the front. Triangles
-/// without area are dropped with a warning. `None`, with a warning too, if no triangles are left. `file` is where the mesh came from.
-pub fn place(
-    files: &Files,
-    path: &str,
-    file: Option<&str>,
-    data: MeshData,
-    later: Vec<MeshData>,
-    placement: Placement,
-) -> Result<Option<Mesh>> {
-    let refuse = |error: MeshError| refusal(files, path, file, error.to_string());
+/// without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
+pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<MeshData>, placement: Placement) -> Result<Option<Mesh>> {
+    let refuse = |error: MeshError| refusal(files, path, placement.file, error.to_string());
     let count = data.positions.len();
     if let Some((triangle, index)) = out_of_range(&data) {
         return Err(refuse(MeshError::Index { triangle, index, count }));
@@ -177,7 +178,8 @@ pub fn place(
     if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
         return Err(refuse(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }));
     }
-    attributes::check_counts(&data.attributes, count, data.triangles.len()).map_err(|message| refusal(files, path, file, message))?;
+    attributes::check_counts(&data.attributes, count, data.triangles.len())
+        .map_err(|message| refusal(files, path, placement.file, message))?;
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
     let place_positions = |mut positions: Vec<[f32; 3]>, origin: [f64; 3]| {
@@ -189,29 +191,20 @@ pub fn place(
         positions
     };
     let positions = place_positions(data.positions, data.origin);
-    let mut triangles = data.triangles;
-    if transform.swaps_handedness() != placement.reverse_normal {
-        triangles.iter_mut().for_each(|t| t.swap(1, 2));
-    }
-    let before = triangles.len();
     let by_face = data.attributes.keys().any(|name| is_of_faces(name) == Some(true));
-    // The numbers that triangles have in the file, where something goes by them.
-    let mut numbers: Option<Vec<u32>> = by_face.then(|| (0..before as u32).collect());
+    let mut faces = Faces::new(data.triangles, by_face);
+    if transform.swaps_handedness() != placement.reverse_normal {
+        faces.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
     // What deforms may get an area later.
     let is_kept = |t: &[u32; 3]| !later.is_empty() || has_area(t.map(|i| Vec3::from(positions[i as usize])));
-    retain(&mut triangles, &mut numbers, is_kept);
-    let dropped = before - triangles.len();
-    if triangles.is_empty() {
-        let why = if before == 0 { "the mesh has no triangles".into() } else { format!("all {before} triangles of the mesh have no area") };
-        files.warn(path, format_args!("{why}: the shape is skipped"));
+    if !faces.drop_degenerate(files, path, is_kept) {
         return Ok(None);
     }
-    if dropped > 0 {
-        files.warn(path, format_args!("{dropped} of {before} triangles have no area and were dropped"));
-    }
     if placement.emits {
-        drop_coincident(files, path, &positions, &mut triangles, &mut numbers);
+        faces.drop_coincident(files, path, &positions);
     }
+    let Faces { mut triangles, numbers } = faces;
 
     let mut steps = vec![MeshStep { positions, normals: data.normals }];
     for step in later {
@@ -269,34 +262,62 @@ fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement
     }
 }
 
-/// Keeps the triangles of which something is true, and their numbers.
-fn retain(triangles: &mut Vec<[u32; 3]>, numbers: &mut Option<Vec<u32>>, mut is_kept: impl FnMut(&[u32; 3]) -> bool) {
-    let Some(numbers) = numbers else { return triangles.retain(is_kept) };
-    let kept: Vec<bool> = triangles.iter().map(&mut is_kept).collect();
-    let mut of_triangles = kept.iter();
-    triangles.retain(|_| of_triangles.next() == Some(&true));
-    let mut of_numbers = kept.iter();
-    numbers.retain(|_| of_numbers.next() == Some(&true));
+/// The triangles of a mesh, with the numbers that they have in its file where attributes go by them.
+struct Faces {
+    triangles: Vec<[u32; 3]>,
+    numbers: Option<Vec<u32>>,
 }
 
-/// Of triangles of an emitter that are in one place, keeps the first, with a warning: which of them a ray meets, and so which side shines, is
-/// otherwise left to the accelerator.
-fn drop_coincident(files: &Files, path: &str, positions: &[[f32; 3]], triangles: &mut Vec<[u32; 3]>, numbers: &mut Option<Vec<u32>>) {
-    let before = triangles.len();
-    let mut places = HashSet::with_capacity(before);
-    retain(triangles, numbers, |t| {
-        // Adding zero makes a negative zero positive.
-        let mut corners = t.map(|i| positions[i as usize].map(|x| (x + 0.0).to_bits()));
-        corners.sort_unstable();
-        places.insert(corners)
-    });
-    let dropped = before - triangles.len();
-    if dropped > 0 {
-        let file = files.scene.display();
-        tracing::warn!(
-            "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped (for both sides: \
-             emission.two_sided)"
-        );
+impl Faces {
+    fn new(triangles: Vec<[u32; 3]>, numbered: bool) -> Self {
+        let numbers = numbered.then(|| (0..triangles.len() as u32).collect());
+        Self { triangles, numbers }
+    }
+
+    /// Keeps the triangles of which something is true, and their numbers.
+    fn retain(&mut self, mut is_kept: impl FnMut(&[u32; 3]) -> bool) {
+        let Some(numbers) = &mut self.numbers else { return self.triangles.retain(is_kept) };
+        let kept: Vec<bool> = self.triangles.iter().map(&mut is_kept).collect();
+        let mut of_triangles = kept.iter();
+        self.triangles.retain(|_| of_triangles.next() == Some(&true));
+        let mut of_numbers = kept.iter();
+        numbers.retain(|_| of_numbers.next() == Some(&true));
+    }
+
+    /// Drops triangles without area, with a warning; false, with a warning too, if none are left.
+    fn drop_degenerate(&mut self, files: &CompileContext, path: &str, has_area: impl FnMut(&[u32; 3]) -> bool) -> bool {
+        let before = self.triangles.len();
+        self.retain(has_area);
+        let dropped = before - self.triangles.len();
+        if self.triangles.is_empty() {
+            let why =
+                if before == 0 { "the mesh has no triangles".into() } else { format!("all {before} triangles of the mesh have no area") };
+            files.warn(path, format_args!("{why}: the shape is skipped"));
+        } else if dropped > 0 {
+            files.warn(path, format_args!("{dropped} of {before} triangles have no area and were dropped"));
+        }
+        !self.triangles.is_empty()
+    }
+
+    /// Of triangles of an emitter that are in one place, keeps the first, with a warning: which of them a ray meets, and
+    /// so which side shines, is otherwise left to the accelerator.
+    fn drop_coincident(&mut self, files: &CompileContext, path: &str, positions: &[[f32; 3]]) {
+        let before = self.triangles.len();
+        let mut places = HashSet::with_capacity(before);
+        self.retain(|t| {
+            // Adding zero makes a negative zero positive.
+            let mut corners = t.map(|i| positions[i as usize].map(|x| (x + 0.0).to_bits()));
+            corners.sort_unstable();
+            places.insert(corners)
+        });
+        let dropped = before - self.triangles.len();
+        if dropped > 0 {
+            let file = files.scene.display();
+            tracing::warn!(
+                "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped (for both sides: \
+                 emission.two_sided)"
+            );
+        }
     }
 }
 
@@ -360,9 +381,8 @@ mod tests {
     fn of_coincident_triangles_of_an_emitter_the_first_is_kept() {
         let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.0, 1.0, -0.0], [1.0, 1.0, 0.0]];
         // The same, turned, turned over, and with another vertex at the same place; the last shares an edge alone.
-        let mut triangles = vec![[0, 1, 2], [1, 2, 0], [2, 1, 0], [3, 1, 0], [1, 4, 2]];
-        let mut numbers = Some((0..5).collect());
-        drop_coincident(&Files::new("s.json"), "shapes[0]", &positions, &mut triangles, &mut numbers);
-        assert_eq!((triangles, numbers), (vec![[0, 1, 2], [1, 4, 2]], Some(vec![0, 4])));
+        let mut faces = Faces::new(vec![[0, 1, 2], [1, 2, 0], [2, 1, 0], [3, 1, 0], [1, 4, 2]], true);
+        faces.drop_coincident(&CompileContext::new("s.json"), "shapes[0]", &positions);
+        assert_eq!((faces.triangles, faces.numbers), (vec![[0, 1, 2], [1, 4, 2]], Some(vec![0, 4])));
     }
 }

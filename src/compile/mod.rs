@@ -43,7 +43,7 @@ use crate::import::{AssetError, Assets, Imported};
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::math::{Bounds, RenderSpace};
-use crate::scene::{Features, Scene, Surface};
+use crate::scene::{Scene, SceneFeatures, Surface};
 use crate::texture::Texture;
 
 use identities::IdentityTable;
@@ -57,7 +57,7 @@ use transforms::Shutter;
 /// # Errors
 /// [`Error::Scene`], [`Error::Asset`] or [`Error::Missing`], each with the place in the scene.
 pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
-    compile_with(desc, Files::new(scene_file))
+    compile_with(desc, CompileContext::new(scene_file))
 }
 
 /// Compiles a scene that was read from a file of any kind; errors name the places in that file.
@@ -65,10 +65,10 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
 /// # Errors
 /// As [`compile`].
 pub fn compile_imported(imported: &Imported, scene_file: &Path) -> Result<Scene> {
-    compile_with(&imported.desc, Files::of(imported, scene_file))
+    compile_with(&imported.desc, CompileContext::of(imported, scene_file))
 }
 
-fn compile_with(desc: &SceneDesc, files: Files) -> Result<Scene> {
+fn compile_with(desc: &SceneDesc, files: CompileContext) -> Result<Scene> {
     settings::check(desc, &files)?;
     let shutter = camera::shutter(&files, &desc.camera)?;
     let camera = camera::compile(&files, &desc.camera)?;
@@ -106,7 +106,7 @@ const SINGULAR: &str = "the transform is singular: it flattens the shape, or is 
 
 /// Where the scene lies; makes errors and finds assets.
 #[derive(Clone, Debug)]
-struct Files {
+struct CompileContext {
     scene: PathBuf,
     /// What is named like a file and has none.
     assets: Arc<Assets>,
@@ -114,7 +114,7 @@ struct Files {
     places: Arc<BTreeMap<String, String>>,
 }
 
-impl Files {
+impl CompileContext {
     /// A scene whose assets are all files.
     fn new(scene: impl Into<PathBuf>) -> Self {
         Self { scene: scene.into(), assets: Arc::default(), places: Arc::default() }
@@ -142,7 +142,8 @@ impl Files {
         }
     }
 
-    /// An error about a scene of this format that is surely a mistake; a warning where the renderer that a scene was written for renders it.
+    /// An error about a scene of this format that is surely a mistake; a warning where the renderer that a scene was
+    /// written for renders it.
     fn refuse_own(&self, path: &str, message: &str) -> Result<()> {
         if self.places.is_empty() {
             return Err(self.error(path, message));
@@ -184,7 +185,7 @@ fn ends_a_name(rest: &str) -> bool {
 
 /// A scene under construction.
 struct Builder {
-    files: Files,
+    files: CompileContext,
     /// Read, and not placed yet.
     meshes: MeshStore,
     shutter: Shutter,
@@ -213,7 +214,7 @@ impl Builder {
             self.materials.media.rescale(1.0 / self.space.scale());
             self.materials.reliefs.iter_mut().for_each(|relief| relief.rescale(self.space.scale()));
         }
-        self.geometry.cutouts = opacity::cutouts(&self.opacities, &self.materials.textures);
+        self.geometry.cutouts = opacity::cutouts(&self.geometry.shapes, &self.opacities, &self.materials.textures);
         let light_groups = self.lights.groups();
         let lights = LightSet::new(self.lights.lights, &self.geometry);
         let sky = !lights.at_infinity().is_empty();
@@ -227,9 +228,9 @@ impl Builder {
         let part_reliefs = self.materials.part_reliefs();
         let materials = self.materials.materials;
         let reliefs = !part_reliefs.is_empty() || self.surfaces.iter().any(|surface| surface.relief.is_some());
-        let anisotropic = materials.iter().any(Material::is_anisotropic);
+        let anisotropic = materials.iter().any(|material| material.flags().is_anisotropic());
         let smooth = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.has_normals());
-        let features = Features {
+        let features = SceneFeatures {
             lights: !lights.is_empty(),
             environment: sky,
             analytic_shapes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Analytic(_))),
@@ -241,7 +242,7 @@ impl Builder {
             reliefs,
             shading_normals: reliefs || self.geometry.shapes.iter().any(smooth),
             parameters: anisotropic || !self.materials.textures.textures.is_empty(),
-            delta_materials: materials.iter().any(Material::is_delta),
+            delta_materials: materials.iter().any(|material| material.flags().is_delta()),
             media: self.surfaces.iter().any(|surface| surface.medium.is_some()),
             anisotropic,
             lens: camera.lens().is_some(),

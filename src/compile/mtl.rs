@@ -1,6 +1,6 @@
 //! Materials of OBJ files with their texture maps.
 
-use super::materials::{Look, from_mtl};
+use super::materials::{MaterialBinding, from_mtl};
 use super::textures::TextureUse;
 use super::{Builder, meshes};
 use crate::bsdf::{Bsdf, Plastic};
@@ -9,21 +9,21 @@ use crate::error::Result;
 use crate::id::TextureId;
 use crate::import::{ObjMap, ObjMaterial};
 use crate::light::Emission;
-use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, ScalarInput, Varying};
+use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, ScalarInput, TexturedMaterial};
 use crate::math::Vec2;
 use crate::relief::Relief;
 use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
 
 /// What a material of an MTL comes to.
-pub struct MtlLook {
-    pub look: Look,
+pub struct MtlBinding {
+    pub look: MaterialBinding,
     /// Light given off, if not black.
     pub emission: Option<Emission>,
 }
 
 impl Builder {
     /// What the faces with a material of an OBJ file look like; maps need uv. `path` is the shape, `file` the OBJ.
-    pub(super) fn mtl_look(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlLook> {
+    pub(super) fn mtl_look(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlBinding> {
         let maps = &mtl.maps;
         let every = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity, &maps.specular, &maps.emission];
         let has_maps = every.iter().any(|map| map.is_some());
@@ -59,7 +59,7 @@ impl Builder {
         if !unused.is_empty() {
             tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.scene.display(), mtl.name, unused.join(", "));
         }
-        let mut look = Look::plain(self.materials.push(material));
+        let mut look = MaterialBinding::plain(self.materials.push(material));
         // Glass lets through what it does not reflect.
         if !is_glass {
             look.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
@@ -72,7 +72,7 @@ impl Builder {
         look.relief = relief.map(|relief| self.materials.push_relief(relief));
         let texture = emission.map(|map| self.emission_map(path, &map)).transpose()?;
         let emission = surface.radiance.map(|radiance| Emission { texture, ..Emission::constant(radiance) });
-        Ok(MtlLook { look, emission })
+        Ok(MtlBinding { look, emission })
     }
 
     fn map_texture(&mut self, path: &str, map: &ObjMap, wanted: TextureUse) -> Result<Bitmap> {
@@ -153,10 +153,10 @@ fn specular_tint(material: &Material) -> Option<Rgb> {
 /// The material with a texture for the colour of its reflection, where it has one.
 fn with_specular(material: Material, color: ColorInput) -> Material {
     match material {
-        Material::Constant(Bsdf::Mirror(_)) => Varying::Mirror { reflectance: color }.into(),
+        Material::Constant(Bsdf::Mirror(_)) => TexturedMaterial::Mirror { reflectance: color }.into(),
         Material::Constant(Bsdf::Conductor(metal)) => {
             let alpha = AlphaInput { axes: metal.alpha().map(ScalarInput::Constant), squared: false };
-            Varying::Conductor { metal, tint: color, alpha, facets: Facets::Ggx }.into()
+            TexturedMaterial::Conductor { metal, tint: color, alpha, facets: Facets::Ggx }.into()
         }
         other => other,
     }
@@ -165,10 +165,10 @@ fn with_specular(material: Material, color: ColorInput) -> Material {
 /// The material with a texture for its diffuse colour, where it has one.
 fn with_albedo(material: Material, albedo: ColorInput) -> Material {
     match material {
-        Material::Constant(Bsdf::Lambert(_)) => Varying::Diffuse { albedo, roughness: ScalarInput::Constant(0.0) }.into(),
+        Material::Constant(Bsdf::Lambert(_)) => TexturedMaterial::Diffuse { albedo, roughness: ScalarInput::Constant(0.0) }.into(),
         Material::Constant(Bsdf::Plastic(Plastic { coat, nonlinear, tint, .. })) => {
             let coat = PlasticCoat::Ggx(CoatInput::Constant(coat));
-            Varying::Plastic { coat, albedo, tint: ColorInput::Constant(tint), nonlinear }.into()
+            TexturedMaterial::Plastic { coat, albedo, tint: ColorInput::Constant(tint), nonlinear }.into()
         }
         other => other,
     }

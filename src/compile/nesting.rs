@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::Files;
+use super::CompileContext;
 use crate::desc::{InstanceDesc, SceneDesc};
 use crate::error::Result;
 
@@ -28,7 +28,7 @@ pub struct Nesting<'a> {
 
 impl<'a> Nesting<'a> {
     /// Checks every object, used or not.
-    pub fn new(files: &Files, desc: &'a SceneDesc) -> Result<Self> {
+    pub fn new(files: &CompileContext, desc: &'a SceneDesc) -> Result<Self> {
         let mut nesting = Self { extents: HashMap::new() };
         let mut placed = 0u64;
         for (i, instance) in desc.instances.iter().enumerate() {
@@ -51,7 +51,7 @@ impl<'a> Nesting<'a> {
 
     fn visit_instance(
         &mut self,
-        files: &Files,
+        files: &CompileContext,
         desc: &'a SceneDesc,
         path: &str,
         instance: &'a InstanceDesc,
@@ -65,7 +65,14 @@ impl<'a> Nesting<'a> {
     }
 
     /// The extent of the object `name`; `inside` are the objects that lead here.
-    fn visit(&mut self, files: &Files, desc: &'a SceneDesc, name: &'a str, path: &str, inside: &mut Vec<&'a str>) -> Result<Extent> {
+    fn visit(
+        &mut self,
+        files: &CompileContext,
+        desc: &'a SceneDesc,
+        name: &'a str,
+        path: &str,
+        inside: &mut Vec<&'a str>,
+    ) -> Result<Extent> {
         if let Some(extent) = self.extents.get(name) {
             return Ok(*extent);
         }

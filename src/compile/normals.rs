@@ -32,8 +32,8 @@ struct Facet {
 }
 
 impl Facet {
-    /// By the angle at the corner (Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets"), by area, or all the same (Gouraud,
-    /// "Continuous Shading of Curved Surfaces").
+    /// By the angle at the corner (Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets"), by area, or
+    /// all the same (Gouraud, "Continuous Shading of Curved Surfaces").
     fn new(corners: [DVec3; 3], weight: NormalWeightDesc) -> Self {
         let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let Some(n) = cross.try_normalize() else {
@@ -78,8 +78,9 @@ pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]], weight: NormalWeig
     shared.iter().map(|&i| sums[i].normalize_or_zero().as_vec3().to_array()).collect()
 }
 
-/// Splits a mesh at creases: at each corner the normal is averaged over the triangles around its vertex that differ from the corner's own by no
-/// more than the crease. `steps` has the positions at each time; the first ones decide where creases are.
+/// Splits a mesh at creases: at each corner the normal is averaged over the triangles around its vertex that differ
+/// from the corner's own by no more than the crease. `steps` has the positions at each time; the first ones decide
+/// where creases are.
 pub fn split(steps: &[&[[f32; 3]]], triangles: &[[u32; 3]], weight: NormalWeightDesc, by: SmoothByDesc, crease_cosine: f64) -> Split {
     let shared = shared_vertices(steps[0], by);
     let by_step: Vec<Vec<Facet>> = steps.iter().map(|positions| facets(positions, triangles, weight)).collect();

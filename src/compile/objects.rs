@@ -1,5 +1,5 @@
-//! Objects and instances. Instances of objects inside objects are flattened to one level; what emits inside an object is placed in the world
-//! once per instance, so that every light is a shape of its own.
+//! Objects and instances. Instances of objects inside objects are flattened to one level; what emits inside an object
+//! is placed in the world once per instance, so that every light is a shape of its own.
 
 use std::collections::BTreeMap;
 
@@ -145,7 +145,7 @@ impl Builder {
 
     /// The shapes of an object: what neither emits nor moves goes into a group for all instances.
     fn share(&mut self, shapes: Vec<PreparedShape>) -> Result<PreparedObject> {
-        let (emitters, others): (Vec<_>, Vec<_>) = shapes.into_iter().partition(|shape| shape.emission.is_some());
+        let (emitters, others): (Vec<_>, Vec<_>) = shapes.into_iter().partition(|shape| shape.surface.emission.is_some());
         let (moving, resting): (Vec<_>, Vec<_>) = others.into_iter().partition(|shape| shape.motion.is_some());
         let shared = self.group(resting)?;
         let mut movers = Vec::new();
@@ -212,7 +212,7 @@ impl Builder {
                     self.files.error(&format!("{path}.motion"), format!("object \"{name}\" gives off light and cannot move"))
                 })?;
                 let mut emitter = emitter.clone();
-                emitter.identity.placement = placement;
+                emitter.surface.identity.placement = placement;
                 let id = self.place(emitter, &outer, &{ self.space })?;
                 self.geometry.world.extend(id);
             }

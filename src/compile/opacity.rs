@@ -7,7 +7,7 @@ use super::textures::{TextureTable, TextureUse};
 use crate::color::Rgb;
 use crate::desc::{OpacityDesc, ShapeCommon};
 use crate::error::Result;
-use crate::geometry::Cutouts;
+use crate::geometry::{AlphaMasks, Shape};
 use crate::id::TextureId;
 use crate::opacity::Opacity;
 use crate::texture::{Bitmap, Channel, Texture};
@@ -51,10 +51,10 @@ impl Builder {
 }
 
 /// The holes of shapes with these opacities.
-pub(super) fn cutouts(opacities: &[Option<TextureId>], textures: &TextureTable) -> Cutouts {
+pub(super) fn cutouts(shapes: &[Shape], opacities: &[Option<TextureId>], textures: &TextureTable) -> AlphaMasks {
     if opacities.iter().all(Option::is_none) {
-        return Cutouts::default();
+        return AlphaMasks::default();
     }
     let by_shape = opacities.iter().map(|id| id.map(|id| textures.get(id).clone())).collect();
-    Cutouts::new(Arc::new(Opacity::new(by_shape)))
+    AlphaMasks::new(Arc::new(Opacity::new(shapes, by_shape)))
 }

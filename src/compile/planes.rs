@@ -1,13 +1,13 @@
 //! Planes without end: squares that reach far beyond everything else.
 
-use super::Files;
+use super::CompileContext;
 use crate::desc::{PlaneDesc, ShapeCommon};
 use crate::error::Result;
 use crate::geometry::Quad;
 use crate::math::{Bounds, DAffine3, DVec3};
 
-/// How many times as far a plane reaches as everything else: the horizon is off by a hundredth of a degree, and nothing comes near the limits
-/// of 32-bit numbers.
+/// How many times as far a plane reaches as everything else: the horizon is off by a hundredth of a degree, and nothing
+/// comes near the limits of 32-bit numbers.
 const REACH: f64 = 1e4;
 
 /// A plane of the scene file.
@@ -19,7 +19,7 @@ pub(super) struct Plane {
 }
 
 /// Checks a plane.
-pub(super) fn compile(files: &Files, path: &str, desc: &PlaneDesc, common: &ShapeCommon) -> Result<Plane> {
+pub(super) fn compile(files: &CompileContext, path: &str, desc: &PlaneDesc, common: &ShapeCommon) -> Result<Plane> {
     if common.emission.is_some() {
         return Err(files.error(
             &format!("{path}.emission"),
@@ -38,8 +38,8 @@ pub(super) fn compile(files: &Files, path: &str, desc: &PlaneDesc, common: &Shap
     Ok(Plane { point, normal: files.direction(&format!("{path}.normal"), desc.normal)? })
 }
 
-/// The part of a plane that reaches [`REACH`] times as far as a box in the world, as a parallelogram in the plane's own space. `map` is regular;
-/// `None` if the numbers become too large.
+/// The part of a plane that reaches [`REACH`] times as far as a box in the world, as a parallelogram in the plane's own
+/// space. `map` is regular; `None` if the numbers become too large.
 pub(super) fn square(plane: &Plane, map: &DAffine3, surroundings: &Bounds) -> Option<Quad> {
     let Plane { point, normal } = *plane;
     let (center, radius) = (0.5 * (surroundings.min + surroundings.max), 0.5 * (surroundings.max - surroundings.min).length());

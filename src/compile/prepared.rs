@@ -1,6 +1,6 @@
 //! Shapes of the scene file: loaded and checked once, placed once or (emitters of objects) once per instance.
 
-use super::materials::Look;
+use super::materials::MaterialBinding;
 use super::normals::Smoothing;
 use super::planes::{self, Plane};
 use super::{Builder, meshes, shapes};
@@ -19,19 +19,25 @@ use crate::scene::Surface;
 /// A shape that knows everything but its final place.
 #[derive(Clone, Debug)]
 pub struct PreparedShape {
-    form: Form,
+    form: ShapeSource,
     /// The shape's own transform.
     map: DAffine3,
     /// How it moves, its own transform included.
     pub motion: Option<Motion>,
     reverse_normal: bool,
-    look: Look,
+    pub surface: PreparedSurface,
+    /// Where the scene has it.
+    path: String,
+}
+
+/// The surface of a shape.
+#[derive(Clone, Copy, Debug)]
+pub struct PreparedSurface {
+    pub look: MaterialBinding,
     /// Light that it gives off, not black.
     pub emission: Option<PreparedEmission>,
     /// What it is called.
     pub identity: ShapeIdentity,
-    /// Where the scene has it.
-    path: String,
 }
 
 /// The least size of a mesh in render space: below, cross products of its edges leave `f32`.
@@ -46,7 +52,7 @@ pub struct PreparedEmission {
 }
 
 #[derive(Clone, Debug)]
-enum Form {
+enum ShapeSource {
     Analytic(Analytic),
     /// Placed when everything else has been.
     Plane(Plane),
@@ -67,7 +73,7 @@ const TOO_LARGE: &str = "the shape reaches to infinity: its size or place is too
 impl PreparedShape {
     /// Whether its extent depends on that of everything else.
     pub fn is_plane(&self) -> bool {
-        matches!(self.form, Form::Plane(_))
+        matches!(self.form, ShapeSource::Plane(_))
     }
 
     /// Where the scene has it.
@@ -78,9 +84,9 @@ impl PreparedShape {
     /// Bounds in the space that it is placed in; at rest if it moves, as [`Builder::place`] leaves it.
     pub fn bounds_at_rest(&self) -> Bounds {
         let own = match &self.form {
-            Form::Analytic(surface) => surface.bounds(),
-            Form::Plane(_) => Bounds::EMPTY,
-            Form::Mesh { data, later, .. } => {
+            ShapeSource::Analytic(surface) => surface.bounds(),
+            ShapeSource::Plane(_) => Bounds::EMPTY,
+            ShapeSource::Mesh { data, later, .. } => {
                 std::iter::once(data).chain(later).map(MeshData::bounds).fold(Bounds::EMPTY, |all, b| all.union(&b))
             }
         };
@@ -95,8 +101,8 @@ impl PreparedShape {
 }
 
 impl Builder {
-    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may bring several. Where it is not used,
-    /// its files are not read.
+    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may bring several.
+    /// Where it is not used, its files are not read.
     pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc, is_used: bool) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
         let identity = self.identities.shape(&self.files, number, desc);
@@ -110,8 +116,9 @@ impl Builder {
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
         }
+        let surface = PreparedSurface { look, emission, identity };
         if !matches!(desc, ShapeDesc::Mesh(_)) {
-            self.check_attributes(path, None, (&look, emission.as_ref(), common.material), None)?;
+            self.check_attributes(path, None, &surface, common.material, None)?;
         }
         let form = match desc {
             ShapeDesc::Mesh(mesh) if !is_used && mesh.file.is_some() => {
@@ -122,47 +129,44 @@ impl Builder {
                 }
                 return Ok(Vec::new());
             }
-            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), look, emission, identity),
-            ShapeDesc::Cube(_) => Form::Mesh {
+            ShapeDesc::Mesh(mesh) => return self.prepare_mesh(path, mesh, &map, motion.as_ref(), surface),
+            ShapeDesc::Cube(_) => ShapeSource::Mesh {
                 data: meshes::cube(),
                 shading: MeshShadingDesc::Flat,
                 smoothing: Smoothing::default(),
                 later: Vec::new(),
                 file: None,
             },
-            ShapeDesc::Plane(plane) => Form::Plane(planes::compile(&self.files, path, plane, &common)?),
+            ShapeDesc::Plane(plane) => ShapeSource::Plane(planes::compile(&self.files, path, plane, &common)?),
             _ => match shapes::compile(&self.files, path, desc)? {
-                Some(surface) => Form::Analytic(surface),
+                Some(surface) => ShapeSource::Analytic(surface),
                 None => return Ok(Vec::new()),
             },
         };
         let reverse_normal = common.reverse_normal;
-        Ok(vec![PreparedShape { form, map, motion, reverse_normal, look, emission, identity, path: path.into() }])
+        Ok(vec![PreparedShape { form, map, motion, reverse_normal, surface, path: path.into() }])
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn prepare_mesh(
         &mut self,
         path: &str,
         desc: &MeshDesc,
         map: &DAffine3,
         motion: Option<&Motion>,
-        look: Look,
-        emission: Option<PreparedEmission>,
-        identity: ShapeIdentity,
+        surface: PreparedSurface,
     ) -> Result<Vec<PreparedShape>> {
         let smoothing = self.smoothing(path, desc)?;
         let mut prepared = Vec::new();
         for mut loaded in self.meshes.take(&self.files, path, desc)? {
             let moves = motion.is_some() || !loaded.later.is_empty();
-            let (mut look, mut emission, mut identity) = (look, emission, identity);
+            let PreparedSurface { mut look, mut emission, mut identity } = surface;
             let has_uvs = loaded.data.uvs.is_some();
             if let Some(mtl) = &loaded.material {
                 identity.material = self.identities.name(&mtl.name);
                 let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
                 // What the scene says of the shape counts.
                 let given = if desc.opacity.is_some() { look.opacity } else { from_mtl.look.opacity };
-                look = Look { opacity: given, ..from_mtl.look };
+                look = MaterialBinding { opacity: given, ..from_mtl.look };
                 emission = emission.or(from_mtl.emission.map(|emission| PreparedEmission { emission, group: None }));
             }
             if !has_uvs && self.materials.needs_uv(&look) {
@@ -173,19 +177,24 @@ impl Builder {
                     "the material or the opacity has textures, but the mesh has no uv".into(),
                 ));
             }
-            let taken = (&look, emission.as_ref(), desc.material.as_deref());
-            self.check_attributes(path, desc.file.as_deref(), taken, Some(&mut loaded.data.attributes))?;
+            let surface = PreparedSurface { look, emission, identity };
+            let attributes = &mut loaded.data.attributes;
+            self.check_attributes(path, desc.file.as_deref(), &surface, desc.material.as_deref(), Some(attributes))?;
             if moves && emission.is_some() {
                 return Err(self.files.error(path, "a shape that gives off light cannot move"));
             }
             prepared.push(PreparedShape {
-                form: Form::Mesh { data: loaded.data, shading: desc.shading, smoothing, later: loaded.later, file: desc.file.clone() },
+                form: ShapeSource::Mesh {
+                    data: loaded.data,
+                    shading: desc.shading,
+                    smoothing,
+                    later: loaded.later,
+                    file: desc.file.clone(),
+                },
                 map: *map,
                 motion: motion.cloned(),
                 reverse_normal: desc.reverse_normal,
-                look,
-                emission,
-                identity,
+                surface,
                 path: path.into(),
             });
         }
@@ -221,10 +230,25 @@ impl Builder {
         Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
-    /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`; `None` if it is a mesh of which nothing has an area.
-    /// One that emits must end up in the world's.
+    /// Refuses a placed shape that is too large or too small for `f32`.
+    fn check_size(&self, path: &str, shape: &Shape, space: &RenderSpace) -> Result<()> {
+        let bounds = shape.bounds();
+        if !bounds.min.is_finite() || !bounds.max.is_finite() {
+            return Err(self.files.error(path, TOO_LARGE));
+        }
+        let size = f64::from(bounds.size().max_element());
+        if matches!(shape, Shape::Mesh(_)) && size > 0.0 && size < SMALLEST_MESH {
+            let [size, least] = [size, SMALLEST_MESH].map(|length| space.world_length(length));
+            let message = format!("the mesh measures {size:e}: beside the rest of the scene, at least {least:e} can be rendered");
+            return Err(self.files.error(path, message));
+        }
+        Ok(())
+    }
+
+    /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`; `None` if it is a mesh of
+    /// which nothing has an area. One that emits must end up in the world's.
     pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3, space: &RenderSpace) -> Result<Option<ShapeId>> {
-        let PreparedShape { form, map, motion, reverse_normal, look, emission, identity, path } = prepared;
+        let PreparedShape { form, map, motion, reverse_normal, surface: PreparedSurface { look, emission, identity }, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform =
@@ -235,31 +259,28 @@ impl Builder {
             Shape::Analytic(placed)
         };
         let shape = match form {
-            Form::Analytic(surface) => analytic(surface),
-            Form::Plane(plane) => {
+            ShapeSource::Analytic(surface) => analytic(surface),
+            ShapeSource::Plane(plane) => {
                 let quad = planes::square(&plane, &transform.world_from_object, &self.surroundings);
                 analytic(Analytic::Quad(quad.ok_or_else(|| self.files.error(&path, TOO_LARGE))?))
             }
-            Form::Mesh { data, shading, smoothing, later, file } => {
-                let emits = emission.is_some();
-                let attributes = &self.materials.textures.attributes;
-                let placement = meshes::Placement { transform: &transform, shading, smoothing, reverse_normal, emits, attributes };
-                let Some(mesh) = meshes::place(&self.files, &path, file.as_deref(), data, later, placement)? else {
+            ShapeSource::Mesh { data, shading, smoothing, later, file } => {
+                let placement = meshes::Placement {
+                    file: file.as_deref(),
+                    transform: &transform,
+                    shading,
+                    smoothing,
+                    reverse_normal,
+                    emits: emission.is_some(),
+                    attributes: &self.materials.textures.attributes,
+                };
+                let Some(mesh) = meshes::place(&self.files, &path, data, later, placement)? else {
                     return Ok(None);
                 };
                 Shape::Mesh(if self.materials.has_normal_map(&look) { mesh.with_tangents() } else { mesh })
             }
         };
-        let bounds = shape.bounds();
-        if !bounds.min.is_finite() || !bounds.max.is_finite() {
-            return Err(self.files.error(&path, TOO_LARGE));
-        }
-        let size = f64::from(bounds.size().max_element());
-        if matches!(shape, Shape::Mesh(_)) && size > 0.0 && size < SMALLEST_MESH {
-            let [size, least] = [size, SMALLEST_MESH].map(|length| space.world_length(length));
-            let message = format!("the mesh measures {size:e}: beside the rest of the scene, at least {least:e} can be rendered");
-            return Err(self.files.error(&path, message));
-        }
+        self.check_size(&path, &shape, space)?;
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
         let medium = self.materials.medium(look.material);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::{Files, camera};
+use super::{CompileContext, camera};
 use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, MAX_FILTER_RADIUS, OutputDesc, SceneDesc};
 use crate::error::Result;
 use crate::import::Imported;
@@ -17,7 +17,7 @@ const MAX_SIZE: u32 = 65_536;
 /// # Errors
 /// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.
 pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
-    check(desc, &Files::new(scene_file))
+    check(desc, &CompileContext::new(scene_file))
 }
 
 /// As [`check_settings`], for a scene that was read from a file of any kind; errors name the places in that file.
@@ -25,7 +25,7 @@ pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
 /// # Errors
 /// As [`check_settings`].
 pub fn check_imported_settings(imported: &Imported, scene_file: &Path) -> Result<()> {
-    check(&imported.desc, &Files::of(imported, scene_file))
+    check(&imported.desc, &CompileContext::of(imported, scene_file))
 }
 
 /// As [`check_settings`], for a film and an integrator alone that `file` holds.
@@ -33,13 +33,13 @@ pub fn check_imported_settings(imported: &Imported, scene_file: &Path) -> Result
 /// # Errors
 /// As [`check_settings`].
 pub fn check_film_and_integrator(film: &FilmDesc, integrator: &IntegratorDesc, file: &Path) -> Result<()> {
-    let files = Files::new(file);
+    let files = CompileContext::new(file);
     check_film(&files, film)?;
     check_integrator(&files, integrator)
 }
 
 /// As [`check_settings`], for the scene of `files`.
-pub(super) fn check(desc: &SceneDesc, files: &Files) -> Result<()> {
+pub(super) fn check(desc: &SceneDesc, files: &CompileContext) -> Result<()> {
     check_film(files, &desc.film)?;
     if desc.sampler.spp == 0 {
         return Err(files.error("sampler.spp", "must be at least 1"));
@@ -57,7 +57,7 @@ pub(super) fn check(desc: &SceneDesc, files: &Files) -> Result<()> {
     Ok(())
 }
 
-fn check_film(files: &Files, film: &FilmDesc) -> Result<()> {
+fn check_film(files: &CompileContext, film: &FilmDesc) -> Result<()> {
     for (key, value) in [("film.width", film.width), ("film.height", film.height)] {
         if value == 0 || value > MAX_SIZE {
             return Err(files.error(key, format!("must be from 1 to {MAX_SIZE}, not {value}")));
@@ -95,7 +95,7 @@ fn check_film(files: &Files, film: &FilmDesc) -> Result<()> {
     Ok(())
 }
 
-fn check_integrator(files: &Files, integrator: &IntegratorDesc) -> Result<()> {
+fn check_integrator(files: &CompileContext, integrator: &IntegratorDesc) -> Result<()> {
     match *integrator {
         IntegratorDesc::Path { max_depth: 0, .. } => return Err(files.error("integrator.max_depth", "must be at least 1")),
         IntegratorDesc::Path { rr_depth: 0, .. } => return Err(files.error("integrator.rr_depth", "must be at least 1")),
@@ -116,7 +116,7 @@ fn check_integrator(files: &Files, integrator: &IntegratorDesc) -> Result<()> {
     Ok(())
 }
 
-fn check_output(files: &Files, path: &str, output: &OutputDesc) -> Result<()> {
+fn check_output(files: &CompileContext, path: &str, output: &OutputDesc) -> Result<()> {
     let extension = Path::new(&output.file).extension().map(|e| e.to_string_lossy().to_lowercase());
     if !matches!(extension.as_deref(), Some("exr" | "png")) {
         return Err(files.error(&format!("{path}.file"), format!("\"{}\" must end in .exr or .png", output.file)));

@@ -1,12 +1,12 @@
 //! Analytic shapes: parameters in degrees to surfaces.
 
-use super::Files;
+use super::CompileContext;
 use crate::desc::{ProfileDesc, ProfileParameterDesc, ShapeDesc};
 use crate::error::Result;
 use crate::geometry::{Analytic, Disk, Frustum, Profile, ProfileParameter, Quad, Revolution, ShapeError, Sphere};
 
 /// The analytic surface of a shape; `None` for meshes, cubes, and planes (whose extent depends on the scene).
-pub fn compile(files: &Files, path: &str, desc: &ShapeDesc) -> Result<Option<Analytic>> {
+pub fn compile(files: &CompileContext, path: &str, desc: &ShapeDesc) -> Result<Option<Analytic>> {
     let surface = match desc {
         ShapeDesc::Mesh(_) | ShapeDesc::Cube(_) | ShapeDesc::Plane(_) => return Ok(None),
         ShapeDesc::Sphere(s) => {

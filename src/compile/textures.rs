@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
-use super::Files;
+use super::CompileContext;
 use crate::attribute::{VERTEX_COLOR, is_of_faces};
 use crate::color::Rgb;
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, UsedNames, WrapDesc, WrapModeDesc};
@@ -15,7 +15,7 @@ use crate::id::{AttributeId, TextureId};
 use crate::import::{AssetError, ImageData, Samples, read_image};
 use crate::material::ColorInput;
 use crate::math::Vec2;
-use crate::texture::{Bitmap, Channel, Checker, Decoding, Filter, Image, Texture, UvTransform, Wrap};
+use crate::texture::{Bitmap, Channel, Checker, Decoding, Texture, TextureFilter, TextureImage, UvTransform, Wrap};
 
 /// Products of textures are nested at most this deep.
 const MAX_DEPTH: usize = 64;
@@ -23,7 +23,7 @@ const MAX_DEPTH: usize = 64;
 /// Textures and colours that a product has at most, those of the products in it counted: each is looked up at every point.
 const MAX_LOOKUPS: usize = 256;
 
-/// What a texture is asked for.
+/// What a texture is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
     /// A colour: whole numbers are sRGB unless the texture says otherwise.
@@ -39,7 +39,7 @@ pub struct TextureTable {
     /// Names of attributes of meshes, by [`AttributeId`].
     pub attributes: Vec<String>,
     names: BTreeMap<String, Entry>,
-    images: HashMap<PathBuf, Arc<Image>>,
+    images: HashMap<PathBuf, Arc<TextureImage>>,
 }
 
 /// A texture for each use; the same one if the use makes no difference.
@@ -50,7 +50,7 @@ struct Entry {
 
 impl TextureTable {
     /// The textures of a scene; images of those that are not used are not read.
-    pub fn new(files: &Files, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
+    pub fn new(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> Result<Self> {
         let mut table = Self::default();
         let images = read_all(files, desc, used);
         let mut loader = Loader {
@@ -88,7 +88,7 @@ impl TextureTable {
     }
 
     /// The texture that `path` names.
-    pub fn find(&self, files: &Files, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
+    pub fn find(&self, files: &CompileContext, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
         let entry = self.names.get(name).ok_or_else(|| files.unknown(path, "texture", name, self.names.keys().map(String::as_str)))?;
         Ok(match wanted {
             TextureUse::Color => entry.color,
@@ -97,7 +97,7 @@ impl TextureTable {
     }
 
     /// The texture that `path` names, for something that knows nothing of a surface but uv.
-    pub fn find_by_uv(&self, files: &Files, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
+    pub fn find_by_uv(&self, files: &CompileContext, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
         let id = self.find(files, path, name, wanted)?;
         if !self.get(id).attributes().is_empty() {
             let message = format!(
@@ -109,7 +109,7 @@ impl TextureTable {
     }
 
     /// The texture that `path` names, for a fraction of light: no channel is below 0 or above 1.
-    pub fn reflectance(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
+    pub fn reflectance(&self, files: &CompileContext, path: &str, name: &str) -> Result<ColorInput> {
         let id = self.find(files, path, name, TextureUse::Color)?;
         self.check_reflectance(id).map_err(|message| files.error(path, format!("the texture \"{name}\" {message}")))?;
         Ok(match self.get(id) {
@@ -119,7 +119,7 @@ impl TextureTable {
     }
 
     /// The texture that `path` names, for light given off: no channel is below 0.
-    pub fn radiance(&self, files: &Files, path: &str, name: &str) -> Result<ColorInput> {
+    pub fn radiance(&self, files: &CompileContext, path: &str, name: &str) -> Result<ColorInput> {
         let id = self.find(files, path, name, TextureUse::Color)?;
         let [min, _] = self.get(id).range();
         if min < 0.0 {
@@ -132,7 +132,7 @@ impl TextureTable {
     }
 
     /// The texture that `path` names, for a light that is no shape, of which it multiplies `radiance`.
-    pub fn of_light(&self, files: &Files, path: &str, name: &str, radiance: Rgb) -> Result<TextureId> {
+    pub fn of_light(&self, files: &CompileContext, path: &str, name: &str, radiance: Rgb) -> Result<TextureId> {
         let id = self.find_by_uv(files, path, name, TextureUse::Color)?;
         let [min, max] = self.get(id).range();
         if min < 0.0 {
@@ -152,16 +152,16 @@ impl TextureTable {
     }
 
     /// The image in a file that is no texture of the scene's own, read unless it has been; `place` is where the scene leads to it.
-    pub fn image(&mut self, files: &Files, place: &str, asset: &Path) -> Result<Arc<Image>> {
+    pub fn image(&mut self, files: &CompileContext, place: &str, asset: &Path) -> Result<Arc<TextureImage>> {
         load_image(&mut self.images, files, place, asset)
     }
 }
 
 struct Loader<'a> {
-    files: &'a Files,
+    files: &'a CompileContext,
     descs: &'a BTreeMap<String, TextureDesc>,
     used: &'a BTreeSet<String>,
-    images: HashMap<PathBuf, Arc<Image>>,
+    images: HashMap<PathBuf, Arc<TextureImage>>,
     attributes: Vec<String>,
     /// The textures on the way to the one being made.
     open: Vec<String>,
@@ -212,6 +212,17 @@ impl Loader<'_> {
         AttributeId::new(at)
     }
 
+    fn mesh_attribute(&mut self, path: &str, name: &str, scale: f32) -> Result<Texture> {
+        if is_of_faces(name).is_none() {
+            let message = format!("\"{name}\" is no name of an attribute: it begins with vertex_ or face_");
+            return Err(self.files.error(&format!("{path}.name"), message));
+        }
+        if !(scale.is_finite() && scale >= 0.0) {
+            return Err(self.files.error(&format!("{path}.scale"), format!("must be finite and not below 0, not {scale}")));
+        }
+        Ok(Texture::Attribute(self.attribute(name), scale))
+    }
+
     /// The product of these factors.
     fn product(&mut self, path: &str, factors: &[ColorDesc], wanted: TextureUse) -> Result<Made> {
         let files = self.files;
@@ -259,16 +270,7 @@ impl Loader<'_> {
                 Texture::Checker(Checker { colors, scale: files.uv(&format!("{path}.scale"), *scale)? })
             }
             TextureDesc::VertexColor => Texture::Attribute(self.attribute(VERTEX_COLOR), 1.0),
-            TextureDesc::MeshAttribute { name, scale } => {
-                if is_of_faces(name).is_none() {
-                    let message = format!("\"{name}\" is no name of an attribute: it begins with vertex_ or face_");
-                    return Err(files.error(&format!("{path}.name"), message));
-                }
-                if !(scale.is_finite() && *scale >= 0.0) {
-                    return Err(files.error(&format!("{path}.scale"), format!("must be finite and not below 0, not {scale}")));
-                }
-                Texture::Attribute(self.attribute(name), *scale)
-            }
+            TextureDesc::MeshAttribute { name, scale } => self.mesh_attribute(path, name, *scale)?,
             TextureDesc::Product { factors } => return self.product(path, factors, wanted),
             TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert } => {
                 let scale = files.uv(&format!("{path}.scale"), *scale)?;
@@ -292,9 +294,9 @@ impl Loader<'_> {
                     },
                     image,
                     filter: match filter {
-                        TextureFilterDesc::Nearest => Filter::Nearest,
-                        TextureFilterDesc::Bilinear => Filter::Bilinear,
-                        TextureFilterDesc::Trilinear => Filter::Trilinear,
+                        TextureFilterDesc::Nearest => TextureFilter::Nearest,
+                        TextureFilterDesc::Bilinear => TextureFilter::Bilinear,
+                        TextureFilterDesc::Trilinear => TextureFilter::Trilinear,
                     },
                     wrap: match wrap {
                         WrapDesc::Both(mode) => [wrap_mode(*mode); 2],
@@ -329,7 +331,7 @@ fn blank() -> ImageData {
 }
 
 /// The images of all used files that can be read, in parallel; what is wrong with the others is found when they are asked for.
-fn read_all(files: &Files, desc: &SceneDesc, used: &UsedNames) -> HashMap<PathBuf, Arc<Image>> {
+fn read_all(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> HashMap<PathBuf, Arc<TextureImage>> {
     let file = |texture: &TextureDesc| match texture {
         TextureDesc::Image { file, .. } if !files.assets.images.contains_key(file) => files.asset(file).canonicalize().ok(),
         _ => None,
@@ -337,36 +339,47 @@ fn read_all(files: &Files, desc: &SceneDesc, used: &UsedNames) -> HashMap<PathBu
     let names: BTreeSet<PathBuf> =
         desc.textures.iter().filter(|(name, _)| used.textures.contains(*name)).filter_map(|(_, texture)| file(texture)).collect();
     let read = |asset: PathBuf| {
-        let image = Image::new(read_image(&asset).ok()?).ok()?;
+        let image = TextureImage::new(read_image(&asset).ok()?).ok()?;
         Some((asset, Arc::new(image)))
     };
     names.into_par_iter().filter_map(read).collect()
 }
 
 /// An image that has no file, from `images` if it has been asked for before.
-fn kept_image(images: &mut HashMap<PathBuf, Arc<Image>>, files: &Files, place: &str, name: &str, data: &ImageData) -> Result<Arc<Image>> {
+fn kept_image(
+    images: &mut HashMap<PathBuf, Arc<TextureImage>>,
+    files: &CompileContext,
+    place: &str,
+    name: &str,
+    data: &ImageData,
+) -> Result<Arc<TextureImage>> {
     let asset = PathBuf::from(name);
     if let Some(image) = images.get(&asset) {
         return Ok(Arc::clone(image));
     }
-    let image = Image::new(data.clone()).map_err(|e| files.asset_error(place, &asset, AssetError::Malformed(e.to_string())))?;
+    let image = TextureImage::new(data.clone()).map_err(|e| files.asset_error(place, &asset, AssetError::Malformed(e.to_string())))?;
     Ok(Arc::clone(images.entry(asset).or_insert(Arc::new(image))))
 }
 
 /// The image in a file, from `images` if it has been read before.
-fn load_image(images: &mut HashMap<PathBuf, Arc<Image>>, files: &Files, place: &str, asset: &Path) -> Result<Arc<Image>> {
+fn load_image(
+    images: &mut HashMap<PathBuf, Arc<TextureImage>>,
+    files: &CompileContext,
+    place: &str,
+    asset: &Path,
+) -> Result<Arc<TextureImage>> {
     let key = asset.canonicalize().unwrap_or_else(|_| asset.into());
     if let Some(image) = images.get(&key) {
         return Ok(Arc::clone(image));
     }
     let fault = |e| files.asset_error(place, asset, e);
     let data = read_image(asset).map_err(fault)?;
-    let image = Arc::new(Image::new(data).map_err(|e| fault(AssetError::Malformed(e.to_string())))?);
+    let image = Arc::new(TextureImage::new(data).map_err(|e| fault(AssetError::Malformed(e.to_string())))?);
     images.insert(key, Arc::clone(&image));
     Ok(image)
 }
 
-impl Files {
+impl CompileContext {
     /// Two finite numbers along u and v.
     fn uv(&self, path: &str, value: [f32; 2]) -> Result<Vec2> {
         let uv = Vec2::from(value);

@@ -1,6 +1,6 @@
 //! Transforms: steps in the order written become one map.
 
-use super::Files;
+use super::CompileContext;
 use crate::desc::{ScaleDesc, TransformDesc, TransformStepDesc};
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3, Transform};
@@ -22,7 +22,7 @@ impl Shutter {
     }
 }
 
-impl Files {
+impl CompileContext {
     /// The product of the steps: the first acts first.
     pub(super) fn affine(&self, path: &str, desc: &TransformDesc) -> Result<DAffine3> {
         let mut map = DAffine3::IDENTITY;
@@ -104,8 +104,8 @@ fn rotation(axis: DVec3, degrees: f64) -> DMat3 {
 mod tests {
     use super::*;
 
-    fn files() -> Files {
-        Files::new("s.json")
+    fn files() -> CompileContext {
+        CompileContext::new("s.json")
     }
 
     fn affine(json: &str) -> Result<DAffine3> {

@@ -1,5 +1,5 @@
-//! Configuration files: `steradian.toml` of a project and `config.toml` of a user, whose keys are the options of `render`. Whether there is such
-//! an option, and whether it takes the value, the command line's definition decides.
+//! Configuration files: `steradian.toml` of a project and `config.toml` of a user, whose keys are the options of
+//! `render`. Whether there is such an option, and whether it takes the value, the command line's definition decides.
 
 mod trust;
 
@@ -62,8 +62,8 @@ fn user_file() -> Option<PathBuf> {
     folder.map(|folder| folder.join("steradian").join("config.toml"))
 }
 
-/// The entries of a file by their lines, for a process of `user`; a warning if the file belongs to somebody else, who is neither the user nor
-/// root: it is not read.
+/// The entries of a file by their lines, for a process of `user`; a warning if the file belongs to somebody else, who
+/// is neither the user nor root: it is not read.
 ///
 /// # Errors
 /// [`Error::Usage`] with file and line for what is no TOML, no value of an option, or not for such a file to set.

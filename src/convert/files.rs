@@ -108,8 +108,8 @@ impl<'a> Files<'a> {
         (1..).map(name).find(|name| !taken(name)).unwrap_or_default()
     }
 
-    /// Where `new`, which comes of `original` at `path` in the scene, is to be written, with its folder made; `None` if it is there already, or
-    /// nothing is written.
+    /// Where `new`, which comes of `original` at `path` in the scene, is to be written, with its folder made; `None` if
+    /// it is there already, or nothing is written.
     fn place(&mut self, path: &str, original: Option<&Path>, new: &str) -> Result<Option<PathBuf>> {
         let place = self.target_folder.join(new);
         if let Some(original) = original

@@ -5,8 +5,9 @@ use std::io::{Result, Write};
 use crate::attribute::{AttributeValues, is_of_faces};
 use crate::import::MeshData;
 
-/// Writes a mesh as a binary little-endian PLY file: x y z (as doubles if they are far from the origin), nx ny nz and u v where the mesh has
-/// them, triangles, and attributes such that they are read with their names: colours called `color` as linear r g b, others as `NAME_0` and so on.
+/// Writes a mesh as a binary little-endian PLY file: x y z (as doubles if they are far from the origin), nx ny nz and u
+/// v where the mesh has them, triangles, and attributes such that they are read with their names: colours called
+/// `color` as linear r g b, others as `NAME_0` and so on.
 ///
 /// # Errors
 /// If writing fails.

@@ -1,10 +1,9 @@
 //! Denoising of EXR files, anyone's: everything that is not denoised stays as it is.
 
-use std::io::Write;
 use std::path::Path;
 
 use ::exr::meta::attribute::{AttributeValue, Text};
-use ::exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers, WritableImage, f16, read};
+use ::exr::prelude::{AnyChannel, FlatImage, FlatSamples, ReadChannels, ReadLayers, f16, read};
 
 use super::layers::{Layers, Rgb};
 use super::oidn::Triple;
@@ -15,7 +14,7 @@ use crate::file::exr_blocks::{Place, check_memory};
 use crate::file::exr_headers::read_headers;
 use crate::file::{self, write_atomically};
 use crate::film::{LayerKind, Source};
-use crate::output::finish_headers;
+use crate::output::write_image;
 
 /// Names of layers that hold albedo, in lower case, the best first: ours, then those of Blender, pbrt, Mitsuba.
 const ALBEDO: [&str; 4] = ["feature_albedo", "denoising albedo", "albedo", "diffuse_albedo"];
@@ -58,10 +57,7 @@ pub fn denoise_file(denoiser: &Denoiser, input: &Path, output: &Path, options: &
     let mut file: FlatImage = reader.from_unbuffered(source).map_err(|e| malformed(e.to_string()))?;
     let plan = Plan::new(&file, options).map_err(malformed)?;
     let report = plan.run(denoiser, &mut file)?;
-    write_atomically(output, |out| {
-        file.write().to_buffered(&mut *out).map_err(|e| e.to_string())?;
-        out.flush().and_then(|()| finish_headers(out.get_mut())).map_err(|e| e.to_string())
-    })?;
+    write_atomically(output, |out| write_image(&file, out))?;
     Ok(report)
 }
 
@@ -102,7 +98,7 @@ impl Plan {
         }
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
         let groups: Vec<_> = layers.all_of(color).filter(|(name, _)| last(name).starts_with(LIGHT_GROUP)).collect();
-        let is_kind = |name: &str| LayerKind::ALL.iter().any(|info| matches!(info.source, Source::Part(_)) && info.name == last(name));
+        let is_kind = |name: &str| LayerKind::ALL.iter().any(|info| matches!(info.source, Source::LightAov(_)) && info.name == last(name));
         let kinds: Vec<_> = layers.all_of(color).filter(|(name, _)| is_kind(name)).collect();
         let mut sets = Vec::new();
         for (set, what) in [(groups, "light groups"), (kinds, "kinds of light")].into_iter().filter(|(set, _)| !set.is_empty()) {

@@ -61,7 +61,7 @@ fn kinds_of_light(image: &Image) -> Vec<usize> {
 }
 
 fn is_kind_of_light(kind: LayerKind) -> bool {
-    matches!(kind.info().source, Source::Part(_))
+    matches!(kind.info().source, Source::LightAov(_))
 }
 
 /// A layer's name in a file.

@@ -5,7 +5,7 @@ use ::exr::prelude::{FlatImage, Vec2};
 use crate::file::exr_blocks::Place;
 
 /// Three channels of one part.
-pub type Rgb = [Place; 3];
+pub(crate) type Rgb = [Place; 3];
 
 /// How three channels may be called.
 const TRIPLES: [[&str; 3]; 3] = [["r", "g", "b"], ["x", "y", "z"], ["red", "green", "blue"]];

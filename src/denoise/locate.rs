@@ -18,7 +18,7 @@ const INSIDE: [&str; 4] = ["", "lib", "oidn/lib", "pyoidn/oidn/lib"];
 
 /// What of the process' environment matters.
 #[derive(Clone, Debug, Default)]
-pub struct Environment {
+pub struct ProcessEnvironment {
     /// [`VARIABLE`]; empty counts as absent.
     pub variable: Option<OsString>,
     /// `VIRTUAL_ENV`: the active environment of Python.
@@ -29,7 +29,7 @@ pub struct Environment {
     pub home: Option<PathBuf>,
 }
 
-impl Environment {
+impl ProcessEnvironment {
     /// That of the process.
     pub fn of_process() -> Self {
         let given = |name| env::var_os(name).filter(|value| !value.is_empty());
@@ -93,7 +93,7 @@ fn inside(folder: &Path) -> Option<PathBuf> {
 /// [`Error::Missing`] if what is named is not there or not the library, or if none is found: with where was looked and how to get it.
 pub fn open_first<T>(
     named: Option<&Path>,
-    environment: &Environment,
+    environment: &ProcessEnvironment,
     mut open: impl FnMut(&Path) -> std::result::Result<T, Unusable>,
 ) -> Result<T> {
     let variable = environment.variable.as_ref().map(Path::new);
@@ -181,7 +181,7 @@ mod tests {
             fs::create_dir_all(root.join(folder)).unwrap();
             fs::write(root.join(folder).join("python3"), "").unwrap();
         }
-        let environment = Environment {
+        let environment = ProcessEnvironment {
             variable: None,
             virtual_env: Some(root.join("venv")),
             path: ["nowhere", "pyenv/shims", "usr/bin"].map(|folder| root.join(folder)).to_vec(),
@@ -203,7 +203,7 @@ mod tests {
         let root = folder.path().canonicalize().unwrap();
         let one = place(&root.join("one/lib/python3.11/site-packages/pyoidn/oidn/lib"));
         let two = place(&root.join("two"));
-        let environment = Environment { variable: Some(two.clone().into()), ..Environment::default() };
+        let environment = ProcessEnvironment { variable: Some(two.clone().into()), ..ProcessEnvironment::default() };
         let mut tried = Vec::new();
         let text = message(open_first(Some(&root.join("one")), &environment, refuse(&mut tried)));
         assert_eq!(tried, [one]);
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn without_python_the_message_says_so() {
-        let text = message(open_first(None, &Environment::default(), refuse(&mut Vec::new())));
+        let text = message(open_first(None, &ProcessEnvironment::default(), refuse(&mut Vec::new())));
         assert!(text.contains("where the system keeps libraries, in Python's packages, of which there are none"), "{text}");
     }
 }

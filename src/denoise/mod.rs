@@ -15,7 +15,7 @@ mod split;
 
 pub use file::{FileOptions, denoise_file};
 pub use image::{FEATURE_LAYERS, add_features, denoise_image};
-pub use locate::{Environment, FILE_NAME, VARIABLE};
+pub use locate::{FILE_NAME, ProcessEnvironment, VARIABLE};
 
 use std::path::Path;
 
@@ -28,13 +28,13 @@ pub struct Denoiser {
 }
 
 impl Denoiser {
-    /// Opens the library: the file or folder `named`, else the one that the environment variable [`VARIABLE`] names, else the system's, else
-    /// that of Python's package `pyoidn`. Works with `threads` threads; 0 stands for all.
+    /// Opens the library: the file or folder `named`, else the one that the environment variable [`VARIABLE`] names,
+    /// else the system's, else that of Python's package `pyoidn`. Works with `threads` threads; 0 stands for all.
     ///
     /// # Errors
     /// [`Error::Missing`](crate::Error::Missing) if there is no library that can be used: where was looked, and how to get it.
     pub fn open(named: Option<&Path>, threads: usize) -> Result<Self> {
-        let device = locate::open_first(named, &Environment::of_process(), |file| Device::open(file, threads))?;
+        let device = locate::open_first(named, &ProcessEnvironment::of_process(), |file| Device::open(file, threads))?;
         Ok(Self { device })
     }
 

@@ -98,7 +98,8 @@ fn default_shutter() -> [f64; 2] {
 /// The aperture is a `radius`, or an `f_number`, which needs the focal length. The focus is a `focus_distance` or a `focus_point`; or it
 /// follows from `focal_length` and the distance of the sensor by the lens equation 1 / f = 1 / a + 1 / b (f the focal length, a the
 /// distance from the lens to the sensor, b that to the plane in focus). Where the focus and the sensor are given but no `focal_length`, the
-/// same equation gives it. The sensor is given by `sensor_distance`, or by `sensor_height`, from which the angle of view gives its distance.
+/// same equation gives it. The sensor is given by `sensor_distance`, or by `sensor_height`, from which the angle of
+/// view gives its distance.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LensDesc {

@@ -66,8 +66,8 @@ pub struct SpotLightDesc {
     /// Half-angle in degrees within which the intensity is full. Default: three quarters of the cutoff.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam_angle_degrees: Option<f64>,
-    /// A texture by name that multiplies the intensity, in perspective: its unit square of uv lies around the cone, whose cutoff is then below
-    /// 90 degrees. u grows to the right and v upward for one who looks along the axis.
+    /// A texture by name that multiplies the intensity, in perspective: its unit square of uv lies around the cone,
+    /// whose cutoff is then below 90 degrees. u grows to the right and v upward for one who looks along the axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub texture: Option<String>,
     /// For the texture: a direction that is up, not that of the axis. Default: +Y (-Z if the axis lies along Y).
@@ -78,8 +78,8 @@ pub struct SpotLightDesc {
     pub group: Option<String>,
 }
 
-/// A light that throws a picture in perspective, as a projector does: on a plane across its axis at distance d, the irradiance is that of the
-/// picture over d².
+/// A light that throws a picture in perspective, as a projector does: on a plane across its axis at distance d, the
+/// irradiance is that of the picture over d².
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProjectorLightDesc {

@@ -49,8 +49,9 @@ pub enum RangedDesc {
     },
 }
 
-/// Roughness of microfacets: a number, `[along u, along v]` for an anisotropic surface, `{ "texture": "name" }`, of which the luminance counts,
-/// clamped to `[0, 1]`, or `{ "u": ..., "v": ... }` with a number or a texture for each. The distribution's alpha is its square.
+/// Roughness of microfacets: a number, `[along u, along v]` for an anisotropic surface, `{ "texture": "name" }`, of
+/// which the luminance counts, clamped to `[0, 1]`, or `{ "u": ..., "v": ... }` with a number or a texture for each.
+/// The distribution's alpha is its square.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(
     untagged,
@@ -83,8 +84,9 @@ pub enum PhongLobeDesc {
     /// A GGX lobe of the same width, alpha = sqrt(2 / (exponent + 2)): like a rough surface, longer at an angle.
     #[default]
     Ggx,
-    /// Phong's own, `(exponent + 2) / (2 pi) cos^exponent` of the angle to the mirror direction, normalised (the modified Phong model of Lafortune
-    /// and Willems): at an angle a part of it is lost below the horizon. An exponent of 1e6 counts at most.
+    /// Phong's own, `(exponent + 2) / (2 pi) cos^exponent` of the angle to the mirror direction, normalised (the
+    /// modified Phong model of Lafortune and Willems): at an angle a part of it is lost below the horizon. An exponent
+    /// of 1e6 counts at most.
     Cosine,
 }
 
@@ -95,11 +97,11 @@ pub enum DistributionDesc {
     /// GGX, with long tails, as of most real surfaces.
     #[default]
     Ggx,
-    /// GGX, for agreement with scenes of Mitsuba: both sides are masked independently of each other, and light that microfacets scatter several
-    /// times is lost, whatever `multiscatter` is.
+    /// GGX, for agreement with scenes of Mitsuba: both sides are masked independently of each other, and light that
+    /// microfacets scatter several times is lost, whatever `multiscatter` is.
     GgxSeparable,
-    /// Beckmann's, for agreement with scenes of other renderers: both sides are masked independently of each other, and light that microfacets
-    /// scatter several times is lost, whatever `multiscatter` is.
+    /// Beckmann's, for agreement with scenes of other renderers: both sides are masked independently of each other, and
+    /// light that microfacets scatter several times is lost, whatever `multiscatter` is.
     Beckmann,
 }
 
@@ -182,9 +184,9 @@ pub enum MaterialDesc {
     },
     /// A diffuse base under a clear dielectric coat.
     Plastic(Box<PlasticDesc>),
-    /// A clear dielectric coat over any opaque material: lacquer over metal or wood, a car's paint. It reflects as `plastic` does and is `plastic`
-    /// over a diffuse base; over any other the base keeps `1 - max` of what the coat reflects of the light in and out, so that nothing is
-    /// gained. Smooth unless `roughness` or `alpha` is given.
+    /// A clear dielectric coat over any opaque material: lacquer over metal or wood, a car's paint. It reflects as
+    /// `plastic` does and is `plastic` over a diffuse base; over any other the base keeps `1 - max` of what the coat
+    /// reflects of the light in and out, so that nothing is gained. Smooth unless `roughness` or `alpha` is given.
     Coated {
         /// The material below, by name: opaque, and without relief.
         base: String,
@@ -209,7 +211,8 @@ pub enum MaterialDesc {
         /// Diffuse reflectance, kd. Default: 0.5.
         #[serde(default = "half")]
         diffuse: ColorDesc,
-        /// Reflectance of the highlight, ks; with `diffuse` at most 1 in each channel, the rest is taken from a textured `diffuse`. Default: 0.
+        /// Reflectance of the highlight, ks; with `diffuse` at most 1 in each channel, the rest is taken from a
+        /// textured `diffuse`. Default: 0.
         #[serde(default = "black")]
         specular: ColorDesc,
         /// Exponent of the highlight, at least 0. Default: 32.
@@ -219,8 +222,8 @@ pub enum MaterialDesc {
         #[serde(default, skip_serializing_if = "is_ggx_lobe")]
         lobe: PhongLobeDesc,
     },
-    /// Cook and Torrance's model, by its parameters: `d albedo / pi + s D F G / (4 |cos wo| |cos wi|)` with the GGX distribution of alpha `m`,
-    /// Smith's `G` and Schlick's `F`.
+    /// Cook and Torrance's model, by its parameters: `d albedo / pi + s D F G / (4 |cos wo| |cos wi|)` with the GGX
+    /// distribution of alpha `m`, Smith's `G` and Schlick's `F`.
     CookTorrance {
         /// Colour of the diffuse part. Default: 0.5.
         #[serde(default = "half")]
@@ -283,8 +286,8 @@ pub struct PlasticDesc {
     /// GGX alpha itself, in place of `roughness`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha: Option<RoughnessDesc>,
-    /// How the normals of the coat's microfacets are distributed; with another than `ggx`, `ior`, `roughness` and `alpha` are numbers, one for both
-    /// axes. Default: `ggx`.
+    /// How the normals of the coat's microfacets are distributed; with another than `ggx`, `ior`, `roughness` and
+    /// `alpha` are numbers, one for both axes. Default: `ggx`.
     #[serde(default, skip_serializing_if = "DistributionDesc::is_ggx")]
     pub distribution: DistributionDesc,
     /// Factor on what the coat reflects, within `[0, 1]`. Default: 1.
@@ -294,8 +297,8 @@ pub struct PlasticDesc {
     /// reflection.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub nonlinear: bool,
-    /// Whether light that a rough coat's microfacets scatter several times is kept. If not, `ior`, `roughness` and `alpha` are numbers, one for both
-    /// axes. Default: true.
+    /// Whether light that a rough coat's microfacets scatter several times is kept. If not, `ior`, `roughness` and
+    /// `alpha` are numbers, one for both axes. Default: true.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub multiscatter: bool,
 }
@@ -306,16 +309,17 @@ pub struct PlasticDesc {
 ///
 /// With any of them it is a medium, which fills the closed surfaces that have the material (or a mix of it with opaque materials, such as a
 /// label). Surfaces of media may overlap, as that of a drink must overlap the inner side of its glass: each point belongs to the medium of
-/// the highest `priority` among those around it, at equal priorities to the one of the higher `ior`, then to the one that absorbs more. Light
-/// is reflected and refracted only where the medium changes, by the ratio of both indices; elsewhere it passes as if no surface were there,
-/// which then does not show in the layers either. Materials with the same `ior`, `priority`, `absorption` and `abbe` are one medium, rough
-/// or not. Up to eight different media overlap. A hollow is a surface with `reverse_normal`, or one of a medium of `ior` 1 and a higher
-/// priority. The camera may stand in a medium; `near` belongs to what is not seen, and absorbs nothing.
+/// the highest `priority` among those around it, at equal priorities to the one of the higher `ior`, then to the one
+/// that absorbs more. Light is reflected and refracted only where the medium changes, by the ratio of both indices;
+/// elsewhere it passes as if no surface were there, which then does not show in the layers either. Materials with the
+/// same `ior`, `priority`, `absorption` and `abbe` are one medium, rough or not. Up to eight different media overlap. A
+/// hollow is a surface with `reverse_normal`, or one of a medium of `ior` 1 and a higher priority. The camera may stand
+/// in a medium; `near` belongs to what is not seen, and absorbs nothing.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DielectricDesc {
-    /// Index of refraction of the inside over that of the outside, from 1/10 to 10; that of a medium is over that of empty space. No texture,
-    /// for what is inside has one index. Default: 1.5.
+    /// Index of refraction of the inside over that of the outside, from 1/10 to 10; that of a medium is over that of
+    /// empty space. No texture, for what is inside has one index. Default: 1.5.
     #[serde(default = "glass_ior")]
     pub ior: RangedDesc,
     /// Roughness within `[0, 1]`; alpha is its square.
@@ -342,9 +346,9 @@ pub struct DielectricDesc {
     /// What the medium absorbs. Default: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub absorption: Option<AbsorptionDesc>,
-    /// Dispersion: the Abbe number, from 1 to 1000 (60 for window glass, 30 for flint glass, 55 for diamond), the lower the more colours part;
-    /// `ior` is then that of yellow light (587.6 nm). `path` follows one of red, green and blue from the first such boundary on, which takes
-    /// more samples; `whitted` shows no dispersion. Default: none.
+    /// Dispersion: the Abbe number, from 1 to 1000 (60 for window glass, 30 for flint glass, 55 for diamond), the lower
+    /// the more colours part; `ior` is then that of yellow light (587.6 nm). `path` follows one of red, green and blue
+    /// from the first such boundary on, which takes more samples; `whitted` shows no dispersion. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub abbe: Option<f32>,
 }
@@ -367,8 +371,9 @@ pub struct AbsorptionDesc {
     pub distance: f32,
 }
 
-/// An image of normals in tangent space: red along u, green along v (upward in the image), blue along the normal, each as `2 x - 1` of a linear
-/// value. On meshes the frame is MikkTSpace's, with the mesh's normals; on other shapes it is that of u and v.
+/// An image of normals in tangent space: red along u, green along v (upward in the image), blue along the normal, each
+/// as `2 x - 1` of a linear value. On meshes the frame is MikkTSpace's, with the mesh's normals; on other shapes it is
+/// that of u and v.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NormalMapDesc {

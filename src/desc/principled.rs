@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{ColorDesc, RangedDesc, ScalarDesc};
 
-/// Disney's principled model ("Physically Based Shading at Disney" and its extension to transmission): a clear coat over a blend of metal, a
-/// diffuse base below a dielectric layer, and glass. Every number is within `[0, 1]` unless it says otherwise and may come from a texture. It
-/// never scatters more than it receives.
+/// Disney's principled model ("Physically Based Shading at Disney" and its extension to transmission): a clear coat
+/// over a blend of metal, a diffuse base below a dielectric layer, and glass. Every number is within `[0, 1]` unless it
+/// says otherwise and may come from a texture. It never scatters more than it receives.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PrincipledDesc {
@@ -71,8 +71,8 @@ pub enum PrincipledModelDesc {
     /// Burley's, with lobes limited so that nothing is gained.
     #[default]
     Burley,
-    /// Those of Mitsuba 3's `principled`, for agreement with its scenes: the lobes are added whatever their sum, and light that microfacets scatter several
-    /// times is lost, whatever `multiscatter` is.
+    /// Those of Mitsuba 3's `principled`, for agreement with its scenes: the lobes are added whatever their sum, and
+    /// light that microfacets scatter several times is lost, whatever `multiscatter` is.
     Mitsuba,
 }
 

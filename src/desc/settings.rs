@@ -21,8 +21,8 @@ pub struct FilmDesc {
     pub overscan: u32,
     /// The pixel filter.
     pub filter: FilterDesc,
-    /// Do not show light from infinity to the camera: the picture is black with an alpha of 0 there. Otherwise its alpha is 1 wherever the camera
-    /// sees a surface or a background. Default: false.
+    /// Do not show light from infinity to the camera: the picture is black with an alpha of 0 there. Otherwise its
+    /// alpha is 1 wherever the camera sees a surface or a background. Default: false.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub transparent: bool,
 }
@@ -105,8 +105,8 @@ pub const MAX_FILTER_RADIUS: f32 = 64.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FilterSamplesDesc {
-    /// Each sample counts for all pixels whose filter reaches it: the weighted mean of the samples around a pixel. Filters with a radius of at most
-    /// half a pixel or above 4 pixels are importance sampled instead.
+    /// Each sample counts for all pixels whose filter reaches it: the weighted mean of the samples around a pixel.
+    /// Filters with a radius of at most half a pixel or above 4 pixels are importance sampled instead.
     Shared,
     /// The filter is importance sampled: each sample counts for one pixel. Noise is higher, but independent between pixels.
     Importance,
@@ -215,17 +215,19 @@ pub enum IntegratorDesc {
         /// channel more than this, above 0. Default: no limit, no bias.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         clamp: Option<f32>,
-        /// Takes the noise of caustics that paths find by rare chance, and some of their sharpness with it: the least alpha of microfacets, within `(0, 1]`, at
-        /// surfaces that a path meets after one that is not ideally smooth, for a pixel's first sample. It falls with the sixth root of the sample's
-        /// number, so that the bias vanishes as samples are added. Default: none, no bias.
+        /// Takes the noise of caustics that paths find by rare chance, and some of their sharpness with it: the least
+        /// alpha of microfacets, within `(0, 1]`, at surfaces that a path meets after one that is not ideally smooth,
+        /// for a pixel's first sample. It falls with the sixth root of the sample's number, so that the bias vanishes
+        /// as samples are added. Default: none, no bias.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         regularize: Option<f32>,
-        /// Whether what gives off light is hidden from the camera: its rays pass through emitting shapes, both sides of them, and show no light from
-        /// infinity, where alpha is 0. Light, mirror images and what is seen through glass stay. Default: false.
+        /// Whether what gives off light is hidden from the camera: its rays pass through emitting shapes, both sides of
+        /// them, and show no light from infinity, where alpha is 0. Light, mirror images and what is seen through glass
+        /// stay. Default: false.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         hide_emitters: bool,
-        /// Whether paths learn from earlier ones where light comes from: less noise where most of it comes by few ways, such as through a door ajar,
-        /// for some time of learning. Default: false.
+        /// Whether paths learn from earlier ones where light comes from: less noise where most of it comes by few ways,
+        /// such as through a door ajar, for some time of learning. Default: false.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         guiding: bool,
     },

@@ -16,8 +16,8 @@ macro_rules! shapes {
             #[serde(deny_unknown_fields)]
             pub struct $name {
                 $($(#[$field_doc])* pub $field: $type,)*
-                /// What the shape is called in layers that pick objects; those of the same name are picked together. Default: its file or its kind
-                /// with the place in the list, as in `sphere_3`.
+                /// What the shape is called in layers that pick objects; those of the same name are picked together.
+                /// Default: its file or its kind with the place in the list, as in `sphere_3`.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub name: Option<String>,
                 /// A material by name. Default: diffuse with albedo 0.5.
@@ -29,8 +29,8 @@ macro_rules! shapes {
                 /// How the shape moves, after `transform`. Default: not at all.
                 #[serde(default, skip_serializing_if = "Vec::is_empty")]
                 pub motion: Vec<KeyframeDesc>,
-                /// How much of the surface is there: a number from 0 to 1, or `{ "texture": "name" }`. Rays, shadow rays too, pass through the
-                /// rest. Default: 1, or what an MTL says. Not with `emission`.
+                /// How much of the surface is there: a number from 0 to 1, or `{ "texture": "name" }`. Rays, shadow
+                /// rays too, pass through the rest. Default: 1, or what an MTL says. Not with `emission`.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub opacity: Option<OpacityDesc>,
                 /// Light that the shape gives off.
@@ -135,14 +135,15 @@ pub struct ShapeCommonMut<'a> {
 shapes! {
     /// A triangle mesh from a file, or inline by `positions` and `triangles`.
     Mesh(MeshDesc) {
-        /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ brings those of its MTL: `illum`
-        /// 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular colour Ks with an exponent Ns has alpha =
-        /// sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic with base Kd otherwise; all else is diffuse with Kd. Ke is
-        /// radiance given off. `map_Kd` is a texture times Kd (times 1 if Kd is black), where the faces have uv, and so are `map_Ke` times Ke
-        /// and, on mirrors and metals, `map_Ks` times Ks; `norm` is a normal map, `bump`
-        /// and `map_Bump` are one if their image has colours, else heights in world units times `-bm`. `d` (or 1 - `Tr`) is the opacity of what
-        /// is not glass, times `map_d` (its alpha, else its luminance) or the alpha of `map_Kd`. Of the options of maps, `-s`, `-o`, `-clamp`,
-        /// `-bm` and `-imfchan` count. Other maps are not used.
+        /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ brings
+        /// those of its MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular colour
+        /// Ks with an exponent Ns has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic
+        /// with base Kd otherwise; all else is diffuse with Kd. Ke is radiance given off. `map_Kd` is a texture times
+        /// Kd (times 1 if Kd is black), where the faces have uv, and so are `map_Ke` times Ke and, on mirrors and
+        /// metals, `map_Ks` times Ks; `norm` is a normal map, `bump` and `map_Bump` are one if their image has colours,
+        /// else heights in world units times `-bm`. `d` (or 1 - `Tr`) is the opacity of what is not glass, times
+        /// `map_d` (its alpha, else its luminance) or the alpha of `map_Kd`. Of the options of maps, `-s`, `-o`,
+        /// `-clamp`, `-bm` and `-imfchan` count. Other maps are not used.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         file: Option<String>,
         /// Inline: positions of the vertices.
@@ -164,8 +165,9 @@ shapes! {
         /// `mesh_attribute`.
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         attributes: BTreeMap<String, AttributeDesc>,
-        /// A mesh that deforms: the files with its vertices at further times, evenly spaced until the shutter closes, as many and in the same
-        /// order as in `file`, which has those at its opening. Between them vertices move along straight lines.
+        /// A mesh that deforms: the files with its vertices at further times, evenly spaced until the shutter closes,
+        /// as many and in the same order as in `file`, which has those at its opening. Between them vertices move along
+        /// straight lines.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         deform_files: Vec<String>,
         /// Inline: as `deform_files`, the positions at further times.
@@ -201,8 +203,9 @@ shapes! {
         #[serde(default = "full_turn")]
         phi_max_degrees: f64,
     }
-    /// A parallelogram; the normal is `edge_u` x `edge_v`. Default: the square `[-1, 1]²` at z = 0 with normal +z. u and v run from 0 to 1 along
-    /// the edges, so a texture with a `scale` of the edges' lengths over that of a tile shows tiles.
+    /// A parallelogram; the normal is `edge_u` x `edge_v`. Default: the square `[-1, 1]²` at z = 0 with normal +z. u
+    /// and v run from 0 to 1 along the edges, so a texture with a `scale` of the edges' lengths over that of a tile
+    /// shows tiles.
     Quad(QuadDesc) {
         /// One corner.
         #[serde(default = "quad_origin")]
@@ -214,8 +217,9 @@ shapes! {
         #[serde(default = "quad_edge_v")]
         edge_v: [f64; 3],
     }
-    /// A plane through `point`, without end: a square that reaches 10,000 times as far as everything else in the scene and the camera. u and v
-    /// are lengths from `point`: textures repeat. It stands in the world, not in an object, and can neither move nor give off light.
+    /// A plane through `point`, without end: a square that reaches 10,000 times as far as everything else in the scene
+    /// and the camera. u and v are lengths from `point`: textures repeat. It stands in the world, not in an object, and
+    /// can neither move nor give off light.
     Plane(PlaneDesc) {
         /// A point of the plane, where u and v are 0. Default: the origin.
         #[serde(default)]
@@ -414,8 +418,9 @@ pub enum OpacityDesc {
     Texture {
         /// The texture's name. An image with alpha that names no `channel` stands for its alpha, other textures for their luminance.
         texture: String,
-        /// Where the texture is below this number within `[0, 1]` there is a hole, elsewhere all of the surface: an alpha test, of the texture as
-        /// filtered. Default: none, the texture is the fraction of light that the surface stops.
+        /// Where the texture is below this number within `[0, 1]` there is a hole, elsewhere all of the surface: an
+        /// alpha test, of the texture as filtered. Default: none, the texture is the fraction of light that the surface
+        /// stops.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         threshold: Option<f32>,
     },

@@ -28,8 +28,9 @@ pub enum TextureDesc {
     },
     /// An image, which fills the unit square of uv.
     Image {
-        /// A PNG, JPEG, TGA, Radiance HDR or OpenEXR file of any size with grey or red, green and blue, with or without alpha, in 8 or 16 bits
-        /// or floats; relative to the scene file. Colours are taken as they are stored, not divided by alpha.
+        /// A PNG, JPEG, TGA, Radiance HDR or OpenEXR file of any size with grey or red, green and blue, with or without
+        /// alpha, in 8 or 16 bits or floats; relative to the scene file. Colours are taken as they are stored, not
+        /// divided by alpha.
         file: String,
         /// How whole numbers become colours. Default: `auto`.
         #[serde(default)]
@@ -40,8 +41,8 @@ pub enum TextureDesc {
         /// What lies beyond the edges: one word, or one for u and one for v. Default: `repeat`.
         #[serde(default)]
         wrap: WrapDesc,
-        /// The image is looked up at `offset + R (scale * uv)`, where R turns from u towards v by `rotation_degrees`. So a scale of 2 shows it
-        /// twice along each axis, and -1 mirrors it. Default: 1, 1.
+        /// The image is looked up at `offset + R (scale * uv)`, where R turns from u towards v by `rotation_degrees`.
+        /// So a scale of 2 shows it twice along each axis, and -1 mirrors it. Default: 1, 1.
         #[serde(default = "unit_scale")]
         scale: [f32; 2],
         /// See `scale`. Default: 0.
@@ -50,8 +51,8 @@ pub enum TextureDesc {
         /// See `scale`. Default: 0, 0.
         #[serde(default)]
         offset: [f32; 2],
-        /// One number of each pixel in place of its colour. Default: where a colour is asked for, the colour; where a number is asked for, its
-        /// luminance.
+        /// One number of each pixel in place of its colour. Default: where a colour is asked for, the colour; where a
+        /// number is asked for, its luminance.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         channel: Option<ChannelDesc>,
         /// Whether 1 minus the value is meant. Default: false.
@@ -59,16 +60,18 @@ pub enum TextureDesc {
         invert: bool,
     },
     /// The colour of the surface itself: between those of a mesh's vertices, which may have any. In a PLY file these are `red`, `green` and
-    /// `blue` (or `r`, `g` and `b`) of the vertices, linear as floats and sRGB as whole numbers; in an OBJ file three numbers behind those of a
-    /// position, sRGB. The same as `mesh_attribute` with the name `vertex_color`.
+    /// `blue` (or `r`, `g` and `b`) of the vertices, linear as floats and sRGB as whole numbers; in an OBJ file three
+    /// numbers behind those of a position, sRGB. The same as `mesh_attribute` with the name `vertex_color`.
     VertexColor,
-    /// An attribute of the mesh itself: numbers or colours, between those of its vertices or one for each face. Opacity and what is no colour
-    /// take the luminance of a colour. For parameters of materials, opacity and emission, on meshes that have it.
+    /// An attribute of the mesh itself: numbers or colours, between those of its vertices or one for each face. Opacity
+    /// and what is no colour take the luminance of a colour. For parameters of materials, opacity and emission, on
+    /// meshes that have it.
     MeshAttribute {
-        /// `vertex_NAME` or `face_NAME`. A PLY file has it if consecutive properties of its vertices or faces are called `NAME_0` (a number) or
-        /// `NAME_0`, `NAME_1`, `NAME_2` (a colour; as well from `_1`, or with `_x`, `_y`, `_z`; with `_r`, `_g`, `_b` it is `NAME_color`); `r`,
-        /// `g`, `b` and `red`, `green`, `blue` are `vertex_color` or `face_color`, linear as floats and sRGB as whole numbers. All others are
-        /// taken as they are. Inline meshes have `attributes`.
+        /// `vertex_NAME` or `face_NAME`. A PLY file has it if consecutive properties of its vertices or faces are
+        /// called `NAME_0` (a number) or `NAME_0`, `NAME_1`, `NAME_2` (a colour; as well from `_1`, or with `_x`, `_y`,
+        /// `_z`; with `_r`, `_g`, `_b` it is `NAME_color`); `r`, `g`, `b` and `red`, `green`, `blue` are `vertex_color`
+        /// or `face_color`, linear as floats and sRGB as whole numbers. All others are taken as they are. Inline meshes
+        /// have `attributes`.
         name: String,
         /// Factor on the values; with it they are from 0 to 1, of emission not below 0. Default: 1.
         #[serde(default = "one", skip_serializing_if = "is_one")]
@@ -94,11 +97,13 @@ pub enum ColorSpaceDesc {
     Linear,
 }
 
-/// What stands between the middles of an image's pixels, and what is seen where they are smaller than what a sample of the picture stands for.
+/// What stands between the middles of an image's pixels, and what is seen where they are smaller than what a sample of
+/// the picture stands for.
 ///
-/// A sample stands for its pixel divided by the samples per pixel that the render has been asked for, seen through mirrors and glass too; after
-/// other surfaces, for the part of the light that they gather from. So pictures have less noise, and what is blurred vanishes as the samples
-/// become more. Opacity, normal and bump maps, emission and the amount of a mix are always looked up as `bilinear` does it.
+/// A sample stands for its pixel divided by the samples per pixel that the render has been asked for, seen through
+/// mirrors and glass too; after other surfaces, for the part of the light that they gather from. So pictures have less
+/// noise, and what is blurred vanishes as the samples become more. Opacity, normal and bump maps, emission and the
+/// amount of a mix are always looked up as `bilinear` does it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TextureFilterDesc {

@@ -48,8 +48,8 @@ pub fn openjd_template(job: &Job) -> Value {
     })
 }
 
-/// An action that runs a text with bash. Numbers are filled in, but strings come as arguments, so that nothing in them is a command: program,
-/// scene, folder of the work, and `further`.
+/// An action that runs a text with bash. Numbers are filled in, but strings come as arguments, so that nothing in them
+/// is a command: program, scene, folder of the work, and `further`.
 fn script(text: &str, further: &[String]) -> Value {
     let strings = ["Program", "Scene", "Work"].into_iter().chain(further.iter().map(String::as_str));
     let args: Vec<String> =

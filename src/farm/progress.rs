@@ -38,7 +38,7 @@ pub enum Event<'a> {
 
 /// A format of progress.
 #[derive(Debug)]
-pub struct Format {
+pub struct ProgressFormat {
     /// Its name on the command line.
     pub name: &'static str,
     /// Who reads it.
@@ -48,17 +48,17 @@ pub struct Format {
 }
 
 /// Every format.
-pub static FORMATS: [Format; 7] = [
-    Format { name: "human", readers: "people at a terminal: a bar; elsewhere as plain", lines: plain },
-    Format { name: "plain", readers: "people who read a log", lines: plain },
-    Format { name: "json", readers: "scripts: one JSON object a line", lines: json_line },
-    Format { name: "openjd", readers: "Open Job Description, AWS Deadline Cloud", lines: openjd },
-    Format { name: "alf", readers: "Tractor, Alfred", lines: alf },
-    Format { name: "deadline", readers: "Deadline 10", lines: deadline },
-    Format { name: "afanasy", readers: "Afanasy (CGRU)", lines: afanasy },
+pub static FORMATS: [ProgressFormat; 7] = [
+    ProgressFormat { name: "human", readers: "people at a terminal: a bar; elsewhere as plain", lines: plain },
+    ProgressFormat { name: "plain", readers: "people who read a log", lines: plain },
+    ProgressFormat { name: "json", readers: "scripts: one JSON object a line", lines: json_line },
+    ProgressFormat { name: "openjd", readers: "Open Job Description, AWS Deadline Cloud", lines: openjd },
+    ProgressFormat { name: "alf", readers: "Tractor, Alfred", lines: alf },
+    ProgressFormat { name: "deadline", readers: "Deadline 10", lines: deadline },
+    ProgressFormat { name: "afanasy", readers: "Afanasy (CGRU)", lines: afanasy },
 ];
 
-impl Format {
+impl ProgressFormat {
     /// The format of this name.
     pub fn by_name(name: &str) -> Option<&'static Self> {
         FORMATS.iter().find(|format| format.name == name)
@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     fn lines(name: &str, event: &Event) -> Vec<String> {
-        (Format::by_name(name).unwrap().lines)(event)
+        (ProgressFormat::by_name(name).unwrap().lines)(event)
     }
 
     /// 42.59 % of a sequence, 85.18 % of its frame 7.

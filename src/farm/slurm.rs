@@ -31,7 +31,8 @@ pub type Script = (&'static str, String);
 /// by itself is rendered again some times, unless its exit code says that this is of no use.
 ///
 /// # Errors
-/// [`Error::Usage`] if what stands in a directive for `sbatch`, which is a comment of the shell, has a control character such as a line break.
+/// [`Error::Usage`] if what stands in a directive for `sbatch`, which is a comment of the shell, has a control
+/// character such as a line break.
 pub fn slurm_scripts(job: &Job, options: &SlurmOptions) -> Result<[Script; 3]> {
     check_directives(job, options)?;
     // In names of logs, `%` begins a pattern.

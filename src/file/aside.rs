@@ -1,5 +1,5 @@
-//! A file that is written beside its place: without a name where the file system has such files, so that nothing stays of a killed process; else
-//! under a name that the next writer of the same file on the same machine removes.
+//! A file that is written beside its place: without a name where the file system has such files, so that nothing stays
+//! of a killed process; else under a name that the next writer of the same file on the same machine removes.
 
 use std::fs::{self, File};
 use std::io;

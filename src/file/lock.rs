@@ -50,7 +50,8 @@ impl Lock {
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => return Err(Refusal::Held(text.trim().to_owned())),
-                // A file system without locks: better no lock than no render. NOLCK is what network file systems without a lock service report.
+                // A file system without locks: better no lock than no render. NOLCK is what network file systems
+                // without a lock service report.
                 Err(TryLockError::Error(e))
                     if e.kind() == io::ErrorKind::Unsupported || e.raw_os_error() == Some(Errno::NOLCK.raw_os_error()) => {}
                 Err(TryLockError::Error(e)) => return Err(Refusal::System(e)),

@@ -1,5 +1,6 @@
-//! Files, the one way in and the one way out: inputs are regular files (or, where the user names one stream, a pipe), outputs appear whole or not at
-//! all. What is no regular file, such as `/dev/null` or a pipe, is written to and never replaced.
+//! Files, the one way in and the one way out: inputs are regular files (or, where the user names one stream, a pipe),
+//! outputs appear whole or not at all. What is no regular file, such as `/dev/null` or a pipe, is written to and never
+//! replaced.
 
 mod aside;
 pub mod exr_blocks;

@@ -72,8 +72,8 @@ pub fn resolve(path: &Path) -> Result<PathBuf> {
     }
 }
 
-/// Writes a file beside `path` and puts it there when it is complete; what was there stays until then. Symbolic links stay, and so do pipes and
-/// devices, which get the bytes when all are there.
+/// Writes a file beside `path` and puts it there when it is complete; what was there stays until then. Symbolic links
+/// stay, and so do pipes and devices, which get the bytes when all are there.
 ///
 /// # Errors
 /// [`Error::Output`] if that fails; nothing is left behind.
@@ -166,8 +166,8 @@ pub fn append(path: &Path) -> Result<File> {
     place(path).and_then(|place| open_stream(&place)).map_err(|e| failed(path, e))
 }
 
-/// Checks that a file can be written to `path`: an existing folder and the right to create files there, or a pipe or device that may be written
-/// to. Removes what killed processes left on their way to it.
+/// Checks that a file can be written to `path`: an existing folder and the right to create files there, or a pipe or
+/// device that may be written to. Removes what killed processes left on their way to it.
 ///
 /// # Errors
 /// [`Error::Output`] if not.

@@ -2,8 +2,9 @@
 
 use super::filter::Taps;
 
-/// The entries of a tile: its pixels in square cells, each with a border of entries for pixels of other cells that its samples reach. All samples of
-/// a cell's pixels are as many. Without a border, there is one cell, and its entries are the pixels.
+/// The entries of a tile: its pixels in square cells, each with a border of entries for pixels of other cells that its
+/// samples reach. All samples of a cell's pixels are as many. Without a border, there is one cell, and its entries are
+/// the pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cells {
     /// Width of the tile in pixels.

@@ -52,9 +52,9 @@ fn samples_that_are_not_finite_are_dropped_and_counted() {
     }
     assert!(!tile.add(pixel, 90, &gray(1.0), f32::NAN));
     let bad_depth = SurfaceSample { depth: f32::NAN, ..SurfaceSample::default() };
-    assert!(!tile.add(pixel, 91, Sample { pixel: &gray(1.0), surface: Some(&bad_depth), parts: &[] }, 1.0));
+    assert!(!tile.add(pixel, 91, Sample { pixel: &gray(1.0), surface: Some(&bad_depth), light_aovs: &[] }, 1.0));
     let bad_part = Rgb::new(0.0, f32::NAN, 0.0);
-    assert!(!tile.add(pixel, 92, Sample { pixel: &gray(1.0), surface: None, parts: &[bad_part] }, 1.0));
+    assert!(!tile.add(pixel, 92, Sample { pixel: &gray(1.0), surface: None, light_aovs: &[bad_part] }, 1.0));
     for i in 0..100 {
         tile.add(0, i, &gray(f32::NAN), 1.0);
     }
@@ -82,7 +82,7 @@ fn data_is_that_of_the_nearest_sample_and_albedo_is_a_mean() {
     let miss = (PixelSample::default(), SurfaceSample { motion: [5.0, 6.0], ..SurfaceSample::default() });
     for (pixel, samples) in [(0, [(gray(1.0), far), miss, (gray(1.0), near)].as_slice()), (1, &[miss])] {
         for (i, (value, surface)) in (0..).zip(samples) {
-            assert!(tile.add(pixel, i, Sample { pixel: value, surface: Some(surface), parts: &[] }, 1.0));
+            assert!(tile.add(pixel, i, Sample { pixel: value, surface: Some(surface), light_aovs: &[] }, 1.0));
         }
     }
     let image = film.resolve();
@@ -124,16 +124,16 @@ fn merged_films_weigh_their_samples() {
         for (i, &v) in (0..).zip(values) {
             let tile = &mut film.tiles_mut()[0];
             assert!(tile.add(0, i, &gray(v), 1.0));
-            tile.add_group(0, [f64::from(v); 3]);
+            tile.add_moments(0, [f64::from(v); 3]);
         }
         film
     };
     let (a, b) = (film(&[1.0, 3.0]), film(&[2.0, 4.0, 6.0, 8.0]));
     let mut merged = one_pixel(layers);
-    merged.tiles_mut()[0].merge_weighed(&a.tiles()[0], 1.0);
+    merged.tiles_mut()[0].merge_inverse_variance(&a.tiles()[0], 1.0);
     assert_eq!(color(&merged)[0], 2.0);
     assert_eq!(merged.resolve().pixel(LayerKind::Variance, 0, 0), a.resolve().pixel(LayerKind::Variance, 0, 0));
-    merged.tiles_mut()[0].merge_weighed(&b.tiles()[0], 3.0);
+    merged.tiles_mut()[0].merge_inverse_variance(&b.tiles()[0], 3.0);
     // Two samples that count once and four that count three times.
     assert!((color(&merged)[0] - (4.0 + 3.0 * 20.0) / 14.0).abs() < 1e-6, "{:?}", color(&merged));
     let of = |film: &Film| film.tiles()[0].group_statistics(0).unwrap().1[0];
@@ -157,7 +157,7 @@ fn shared(desc: FilterDesc, crop: Crop, block_size: Option<u32>, samples: impl F
             for sample in 0..samples(x, y) {
                 let place = filter.sample([rng.unit_f32(), rng.unit_f32()]);
                 let value = gray(x as f32 + 100.0 * y as f32 + 10.0 * rng.unit_f32());
-                assert!(tile.splat((pixel, sample), &value, &filter, place, &mut splats));
+                assert!(tile.splat(pixel, sample, &value, &filter.splat_taps(place), &mut splats));
                 tile.flush(pixel, &mut splats);
             }
         }

@@ -1,7 +1,8 @@
 //! Pixel filters: shared samples, or importance sampled as in "Filter Importance Sampling" (Ernst, Stamminger and Greiner, 2006).
 //!
-//! All filters are separable and even, so one axis is described on `[0, radius]`. With shared samples, points are uniform within each pixel and a
-//! sample is weighted for every pixel whose filter reaches it. For importance sampling, a random number picks a side and a distance.
+//! All filters are separable and even, so one axis is described on `[0, radius]`. With shared samples, points are
+//! uniform within each pixel and a sample is weighted for every pixel whose filter reaches it. For importance sampling,
+//! a random number picks a side and a distance.
 
 use std::f64::consts::TAU;
 
@@ -32,8 +33,8 @@ pub struct Filter {
     shared: Option<Box<SharedWeights>>,
 }
 
-/// The weights of shared samples by offset from their pixel's centre, along one axis; linear within a cell of offsets, so that kinks and ends of
-/// the filter within a cell (none at the usual radii) are smoothed.
+/// The weights of shared samples by offset from their pixel's centre, along one axis; linear within a cell of offsets,
+/// so that kinks and ends of the filter within a cell (none at the usual radii) are smoothed.
 #[derive(Clone, Debug)]
 struct SharedWeights {
     /// As [`Filter::border`].
@@ -55,9 +56,10 @@ pub struct FilterSample {
     pub weight: f32,
 }
 
-/// The weights of a shared sample for the pixels along one axis. Over all offsets within a pixel, the weights of a sample have a mean sum of 1.
+/// The weights of a shared sample for the pixels along one axis. Over all offsets within a pixel, the weights of a
+/// sample have a mean sum of 1.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Taps {
+pub struct Taps {
     /// The first pixel, counted from the sample's own.
     pub first: i32,
     /// How many pixels; the weights beyond are 0.
@@ -66,10 +68,11 @@ pub(super) struct Taps {
     pub weights: [f32; MAX_TAPS],
 }
 
-/// How the noise of pixels' own samples becomes that of the filtered picture. Along one axis, for the pixels `-border ..= border` around a pixel.
+/// How the noise of pixels' own samples becomes that of the filtered picture. Along one axis, for the pixels `-border
+/// ..= border` around a pixel.
 ///
-/// Of independent samples at positions that do not correlate with their values, with the variance `v` of the mean of a pixel's own samples, the
-/// filtered picture has the variance `sum(squares * v) / sum(means)^2`.
+/// Of independent samples at positions that do not correlate with their values, with the variance `v` of the mean of a
+/// pixel's own samples, the filtered picture has the variance `sum(squares * v) / sum(means)^2`.
 #[derive(Clone, Debug)]
 pub struct VarianceKernel {
     /// Integral of the filter over each pixel.
@@ -182,6 +185,12 @@ impl Filter {
                 _ => shared.taps::<MAX_TAPS>(offset),
             },
         }
+    }
+
+    /// The weights along both axes of a shared sample.
+    #[inline]
+    pub fn splat_taps(&self, place: FilterSample) -> [Taps; 2] {
+        [self.taps(place.offset.x), self.taps(place.offset.y)]
     }
 
     /// How noise of pixels becomes that of the filtered picture.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Part, SurfaceSample};
+use super::{LightAov, SurfaceSample};
 use crate::desc::LayerDesc;
 
 /// A layer of a picture.
@@ -24,21 +24,21 @@ pub enum LayerKind {
     Motion,
     /// Fraction of light scattered.
     Albedo,
-    /// [`Part::DiffuseDirect`].
+    /// [`LightAov::DiffuseDirect`].
     DiffuseDirect,
-    /// [`Part::DiffuseIndirect`].
+    /// [`LightAov::DiffuseIndirect`].
     DiffuseIndirect,
-    /// [`Part::SpecularDirect`].
+    /// [`LightAov::SpecularDirect`].
     SpecularDirect,
-    /// [`Part::SpecularIndirect`].
+    /// [`LightAov::SpecularIndirect`].
     SpecularIndirect,
-    /// [`Part::TransmissionDirect`].
+    /// [`LightAov::TransmissionDirect`].
     TransmissionDirect,
-    /// [`Part::TransmissionIndirect`].
+    /// [`LightAov::TransmissionIndirect`].
     TransmissionIndirect,
-    /// [`Part::Emission`].
+    /// [`LightAov::Emission`].
     Emission,
-    /// [`Part::Background`].
+    /// [`LightAov::Background`].
     Background,
     /// What each group of lights gives to the picture: a layer for each.
     LightGroups,
@@ -74,7 +74,7 @@ pub enum Source {
     /// First surfaces: how a sample's values are read, one for each channel, and how those of samples are put together.
     Surface(fn(&SurfaceSample, &mut [f32]), Filtering),
     /// A part of the radiance.
-    Part(Part),
+    LightAov(LightAov),
     /// The parts by groups of lights.
     LightGroups,
     /// Counts of the film.
@@ -143,7 +143,7 @@ macro_rules! part {
             LayerKind::$part,
             $name,
             &[concat!($name, ".R"), concat!($name, ".G"), concat!($name, ".B")],
-            Source::Part(Part::$part),
+            Source::LightAov(LightAov::$part),
             concat!($name, ": ", $comment),
         )
     };
@@ -372,10 +372,10 @@ impl LayerSet {
         self.bits & layers_from!(Source::Coverage) != 0
     }
 
-    /// Whether any layer is part of the set that is a [`Part`] of the radiance.
+    /// Whether any layer is part of the set that is a [`LightAov`] of the radiance.
     #[inline]
-    pub const fn needs_parts(self) -> bool {
-        self.bits & layers_from!(Source::Part(_)) != 0
+    pub const fn needs_light_aovs(self) -> bool {
+        self.bits & layers_from!(Source::LightAov(_)) != 0
     }
 
     /// The layers of first surfaces that are filtered so, in the table's order.
@@ -455,6 +455,6 @@ mod tests {
         assert!(!LayerSet::from_iter(&[LayerDesc::Variance, LayerDesc::Samples]).needs_surface());
         assert_eq!(LayerSet::FULL.iter().count(), LayerKind::ALL.len() - 1);
         assert!(LayerSet::from_iter(&[LayerDesc::CryptoObject]).needs_coverage() && !set.needs_coverage());
-        assert!(LayerSet::from_iter(&[LayerDesc::Emission]).needs_parts() && !set.needs_parts());
+        assert!(LayerSet::from_iter(&[LayerDesc::Emission]).needs_light_aovs() && !set.needs_light_aovs());
     }
 }

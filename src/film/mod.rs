@@ -1,7 +1,8 @@
 //! The film: samples go in, weighted by a pixel filter, and a picture with its layers comes out.
 //!
-//! A sample counts for all pixels that the filter reaches from it; tiles have borders for what reaches other tiles, so they share nothing. Sums do
-//! not depend on the order of their terms. So any number of threads gives the same picture, and so does any split of the samples.
+//! A sample counts for all pixels that the filter reaches from it; tiles have borders for what reaches other tiles, so
+//! they share nothing. Sums do not depend on the order of their terms. So any number of threads gives the same picture,
+//! and so does any split of the samples.
 
 mod cells;
 mod coverage;
@@ -19,11 +20,11 @@ mod tile;
 mod tiles;
 
 pub use coverage::{Coverage, CoverageCounts};
-pub use filter::{Filter, FilterSample, VarianceKernel};
+pub use filter::{Filter, FilterSample, Taps, VarianceKernel};
 pub use identities::{Identities, Label, NameId, PlacementId, ShapeIdentity};
 pub use image::{Crop, Image, Layer};
 pub use layer::{Filtering, LayerInfo, LayerKind, LayerSet, Source};
-pub use sample::{Part, PartNeeds, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};
+pub use sample::{LightAov, LightAovRequest, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};
 pub use splats::Splats;
 pub use sum::Sums;
 pub use tile::{DroppedSample, FilmTile};

@@ -6,7 +6,8 @@ use super::{Filtering, LayerSet, ShapeKey, Source, SurfaceSample};
 /// Most channels of such layers.
 const MAX_DATA: usize = channels_of(Filtering::Nearest);
 
-/// By pixel, the sample that counts: of those that hit something the nearest, of samples equally near (and where nothing was hit) the first.
+/// By pixel, the sample that counts: of those that hit something the nearest, of samples equally near (and where
+/// nothing was hit) the first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Nearest {
     channels: usize,

@@ -7,11 +7,13 @@ use super::{Coverage, Film, Filtering, Image, Layer, LayerInfo, LayerKind, Layou
 /// Depth where nothing was hit.
 const MISS_DEPTH: f32 = 1e10;
 
-/// The estimate of a pixel from the samples around it: a weighted mean, linear in the values of the samples, so that parts of the radiance sum to the whole.
+/// The estimate of a pixel from the samples around it: a weighted mean, linear in the values of the samples, so that
+/// parts of the radiance sum to the whole.
 ///
-/// With the weights `w` of the samples `v` that reach the pixel, the mean is `sum(w v) / sum(w)`. Of a filter with negative lobes the sum of weights
-/// may be near zero; with its expected value `n` and the plain mean `m` of the pixel's own samples, the estimate is then `m + sum(w (v - m)) / n`.
-/// Both keep constants exactly and have a bias of order `1 / samples`.
+/// With the weights `w` of the samples `v` that reach the pixel, the mean is `sum(w v) / sum(w)`. Of a filter with
+/// negative lobes the sum of weights may be near zero; with its expected value `n` and the plain mean `m` of the
+/// pixel's own samples, the estimate is then `m + sum(w (v - m)) / n`. Both keep constants exactly and have a bias of
+/// order `1 / samples`.
 struct Estimator<'a> {
     film: &'a Film,
     /// The pixel's own tile and the pixel's index there.
@@ -121,11 +123,11 @@ impl<'a> Estimator<'a> {
 impl Film {
     /// The picture of the samples so far; a pixel without samples is black and without a surface.
     ///
-    /// Colour, its parts, albedo and features are means that the filter gives (a miss counts as black); the other layers of surfaces are those of
-    /// the pixel's nearest sample. Coverage has the filter's absolute value as weight.
+    /// Colour, its parts, albedo and features are means that the filter gives (a miss counts as black); the other
+    /// layers of surfaces are those of the pixel's nearest sample. Coverage has the filter's absolute value as weight.
     pub fn resolve(&self) -> Image {
         let crop = self.grid().crop;
-        let (mut layers, mut firsts, mut nearest, mut mean) = (Vec::new(), Vec::new(), 0, 3 * self.parts().count());
+        let (mut layers, mut firsts, mut nearest, mut mean) = (Vec::new(), Vec::new(), 0, 3 * self.light_aovs().count());
         for (kind, group) in self.stored() {
             let info = kind.info();
             let channels = info.channels.len();
@@ -136,8 +138,8 @@ impl Film {
             });
             let take = |next: &mut usize| std::mem::replace(next, *next + channels);
             firsts.push(match info.source {
-                Source::Part(part) => 3 * part as usize,
-                Source::LightGroups => 3 * (self.parts().first_group() + group.unwrap_or_default()),
+                Source::LightAov(part) => 3 * part as usize,
+                Source::LightGroups => 3 * (self.light_aovs().first_group() + group.unwrap_or_default()),
                 Source::Surface(_, Filtering::Nearest) => take(&mut nearest),
                 Source::Surface(_, Filtering::Mean) => take(&mut mean),
                 _ => 0,
@@ -157,7 +159,7 @@ impl Film {
                 let out = &mut layer.data[start..];
                 match info.source {
                     Source::Color => estimator.color(out),
-                    Source::Part(_) | Source::LightGroups | Source::Surface(_, Filtering::Mean) => estimator.channels(first, out),
+                    Source::LightAov(_) | Source::LightGroups | Source::Surface(_, Filtering::Mean) => estimator.channels(first, out),
                     Source::Surface(_, Filtering::Nearest) => estimator.data(info, first, out),
                     Source::Film if info.kind == LayerKind::Samples => out[0] = estimator.own.0.samples[estimator.own.1] as f32,
                     Source::Film => out.copy_from_slice(&self.variance(&kernel, x, y).map(to_f32)),
@@ -188,7 +190,7 @@ impl Film {
         let all = self.layout.set.iter().filter(|info| !matches!(info.source, Source::Coverage | Source::Denoiser));
         all.flat_map(|info| {
             let is_group = matches!(info.source, Source::LightGroups);
-            let groups = if is_group { self.layout.parts.light_groups as usize } else { 1 };
+            let groups = if is_group { self.layout.light_aovs.light_groups as usize } else { 1 };
             (0..groups).map(move |group| (info.kind, is_group.then_some(group)))
         })
     }

@@ -47,8 +47,8 @@ pub struct SurfaceSample {
     pub position: Vec3,
     /// Surface parameters.
     pub uv: [f32; 2],
-    /// How far the point moves in the picture while the shutter is open, in pixels to the right and down. Not zero where a moving camera sees no
-    /// surface.
+    /// How far the point moves in the picture while the shutter is open, in pixels to the right and down. Not zero
+    /// where a moving camera sees no surface.
     pub motion: [f32; 2],
     /// Fraction of light scattered.
     pub albedo: Rgb,
@@ -62,7 +62,7 @@ pub struct SurfaceSample {
 
 /// A part of the picture's radiance, by how the light came to the camera. The parts of a sample sum to its radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum LightAov {
     /// Scattered once, by diffuse reflection.
     DiffuseDirect,
     /// Scattered more than once, the last time before the camera by diffuse reflection.
@@ -81,21 +81,21 @@ pub enum Part {
     Background,
 }
 
-impl Part {
+impl LightAov {
     /// How many there are.
     pub const COUNT: usize = 8;
 }
 
-/// Which [parts](SampleBatch::parts) samples have.
+/// Which [light AOVs](SampleBatch::light_aovs) samples have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PartNeeds {
-    /// Those of [`Part`].
+pub struct LightAovRequest {
+    /// Those of [`LightAov`].
     pub by_scattering: bool,
     /// How many groups of lights there are, the last for lights in no group; 0 if they are not wanted.
     pub light_groups: u32,
 }
 
-impl PartNeeds {
+impl LightAovRequest {
     /// Parts of each sample.
     #[inline]
     pub const fn count(self) -> usize {
@@ -105,7 +105,7 @@ impl PartNeeds {
     /// The place of the first group of lights among the parts.
     #[inline]
     pub const fn first_group(self) -> usize {
-        if self.by_scattering { Part::COUNT } else { 0 }
+        if self.by_scattering { LightAov::COUNT } else { 0 }
     }
 }
 
@@ -116,37 +116,41 @@ pub struct SampleBatch {
     pub pixels: Vec<PixelSample>,
     /// For layers of surfaces; empty if there are none.
     pub surfaces: Vec<SurfaceSample>,
-    /// For each sample, its [`parts_per_sample`](Self::parts_per_sample) parts: those of [`Part`], then those of groups of lights; each only if
-    /// wanted.
-    pub parts: Vec<Rgb>,
+    /// For each sample, its [`light_aovs_per_sample`](Self::light_aovs_per_sample) parts: those of [`LightAov`], then
+    /// those of groups of lights; each only if wanted.
+    pub light_aovs: Vec<Rgb>,
     /// How many parts each sample has.
-    pub parts_per_sample: usize,
+    pub light_aovs_per_sample: usize,
 }
 
 impl SampleBatch {
     /// Makes place for `count` samples, which bring nothing yet.
-    pub fn reset(&mut self, count: usize, surfaces: bool, parts: PartNeeds) {
+    pub fn reset(&mut self, count: usize, surfaces: bool, light_aovs: LightAovRequest) {
         self.pixels.clear();
         self.pixels.resize(count, PixelSample::default());
         self.surfaces.clear();
         self.surfaces.resize(if surfaces { count } else { 0 }, SurfaceSample::default());
-        self.parts_per_sample = parts.count();
-        self.parts.clear();
-        self.parts.resize(count * self.parts_per_sample, Rgb::BLACK);
+        self.light_aovs_per_sample = light_aovs.count();
+        self.light_aovs.clear();
+        self.light_aovs.resize(count * self.light_aovs_per_sample, Rgb::BLACK);
     }
 
     /// What the sample with this index brings.
     #[inline]
     pub fn sample(&self, index: usize) -> Sample<'_> {
-        let first = index * self.parts_per_sample;
-        Sample { pixel: &self.pixels[index], surface: self.surfaces.get(index), parts: &self.parts[first..first + self.parts_per_sample] }
+        let first = index * self.light_aovs_per_sample;
+        Sample {
+            pixel: &self.pixels[index],
+            surface: self.surfaces.get(index),
+            light_aovs: &self.light_aovs[first..first + self.light_aovs_per_sample],
+        }
     }
 
     /// The parts of the sample with this index.
     #[inline]
-    pub fn parts_mut(&mut self, index: usize) -> &mut [Rgb] {
-        let first = index * self.parts_per_sample;
-        &mut self.parts[first..first + self.parts_per_sample]
+    pub fn light_aovs_mut(&mut self, index: usize) -> &mut [Rgb] {
+        let first = index * self.light_aovs_per_sample;
+        &mut self.light_aovs[first..first + self.light_aovs_per_sample]
     }
 }
 
@@ -157,12 +161,12 @@ pub struct Sample<'a> {
     pub pixel: &'a PixelSample,
     /// For layers of surfaces, if there are any.
     pub surface: Option<&'a SurfaceSample>,
-    /// As in [`SampleBatch::parts`].
-    pub parts: &'a [Rgb],
+    /// As in [`SampleBatch::light_aovs`].
+    pub light_aovs: &'a [Rgb],
 }
 
 impl<'a> From<&'a PixelSample> for Sample<'a> {
     fn from(pixel: &'a PixelSample) -> Self {
-        Self { pixel, surface: None, parts: &[] }
+        Self { pixel, surface: None, light_aovs: &[] }
     }
 }

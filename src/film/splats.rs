@@ -5,8 +5,8 @@ use super::filter::Taps;
 use super::sum::{Sums, slice};
 use super::tile::{Accumulator, Values};
 
-/// Sums over few samples of one cell, in the order in which they come: a pass over the cell. Sums of passes then go into exact sums, so that each
-/// sample touches several pixels at little cost.
+/// Sums over few samples of one cell, in the order in which they come: a pass over the cell. Sums of passes then go
+/// into exact sums, so that each sample touches several pixels at little cost.
 #[derive(Clone, Debug, Default)]
 pub struct Splats {
     /// By entry: weighted red, green, blue and alpha, then the weight.

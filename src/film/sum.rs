@@ -1,8 +1,9 @@
 //! Sums that do not depend on the order of their terms.
 //!
 //! Each is an unevaluated pair of `f64`: what adding to the high part rounds away goes into the low one, exactly (the error-free sum of two
-//! floats of Knuth, "The Art of Computer Programming", volume 2, 4.2.2). Terms with the 24 bits of an `f32` are summed exactly as long as the sum
-//! is less than 2^65 times the smallest of 2^17 terms, so that films of any parts of the samples merge to the same bits.
+//! floats of Knuth, "The Art of Computer Programming", volume 2, 4.2.2). Terms with the 24 bits of an `f32` are summed
+//! exactly as long as the sum is less than 2^65 times the smallest of 2^17 terms, so that films of any parts of the
+//! samples merge to the same bits.
 
 /// `N` sums side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use super::layer::channels_of;
 use super::nearest::Nearest;
 use super::splats::Splats;
 use super::sum::{Sums, slice};
-use super::{CoverageCounts, Crop, Filter, FilterSample, Filtering, LayerKind, Layout, PixelSample, Sample, Source, SurfaceSample};
+use super::{CoverageCounts, Crop, Filtering, LayerKind, Layout, PixelSample, Sample, Source, SurfaceSample, Taps};
 use crate::color::Rgb;
 
 /// How many dropped samples a tile remembers; it counts all of them.
@@ -24,7 +24,7 @@ pub struct DroppedSample {
 
 /// How far groups of a pixel's samples lie apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Spread {
+pub(super) struct SampleMoments {
     pub groups: u32,
     pub sums: Sums<3>,
     pub squares: Sums<3>,
@@ -32,7 +32,7 @@ pub(super) struct Spread {
 
 /// A pixel of samples that do not all count the same.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Weighed {
+pub(super) struct InverseVarianceSums {
     pub count: f64,
     pub variance: [f64; 3],
 }
@@ -41,7 +41,7 @@ pub(super) struct Weighed {
 pub(super) struct Values<'a> {
     /// Radiance and alpha.
     pub color: [f32; 4],
-    parts: &'a [Rgb],
+    light_aovs: &'a [Rgb],
     /// Of layers of surfaces that are averaged.
     means: [f32; MAX_MEANS],
     /// Channels of parts, and of these layers.
@@ -70,7 +70,7 @@ impl Values<'_> {
     #[inline]
     pub fn for_each_channel(&self, mut f: impl FnMut(usize, f32)) {
         // Most parts of a sample are black.
-        for (i, part) in self.parts.iter().enumerate().filter(|(_, part)| !part.is_black()) {
+        for (i, part) in self.light_aovs.iter().enumerate().filter(|(_, part)| !part.is_black()) {
             part.to_array().into_iter().enumerate().for_each(|(k, value)| f(3 * i + k, value));
         }
         let means = &self.means[..self.counts[1]];
@@ -86,7 +86,8 @@ const MAX_MEANS: usize = channels_of(Filtering::Mean);
 pub(super) struct Accumulator {
     /// Radiance and alpha.
     pub color: Vec<Sums<4>>,
-    /// The channels beside the colour that are averaged: those of parts, then those of surfaces; an entry's [values](mod@slice) side by side.
+    /// The channels beside the colour that are averaged: those of parts, then those of surfaces; an entry's
+    /// [values](mod@slice) side by side.
     pub channels: Vec<f64>,
 }
 
@@ -124,8 +125,8 @@ impl Accumulator {
     }
 }
 
-/// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own; what shared samples bring to pixels of other tiles is
-/// in the borders of the tile's cells until the picture is made.
+/// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own; what shared samples
+/// bring to pixels of other tiles is in the borders of the tile's cells until the picture is made.
 ///
 /// [`Sums`] do not depend on the order of samples: whoever adds the same samples gets the same picture, in one tile or merged from several.
 #[derive(Clone, Debug)]
@@ -147,9 +148,9 @@ pub struct FilmTile {
     /// By entry of the cells; only of layers that need it.
     pub(super) coverage: Option<CoverageCounts>,
     /// Empty unless the variance is asked for.
-    pub(super) spread: Vec<Spread>,
+    pub(super) spread: Vec<SampleMoments>,
     /// What each pixel's samples count together and the variance of their mean. Empty while each counts once.
-    pub(super) weighed: Vec<Weighed>,
+    pub(super) weighed: Vec<InverseVarianceSums>,
     pub(super) dropped_count: u64,
     pub(super) dropped: Vec<DroppedSample>,
 }
@@ -170,7 +171,7 @@ impl FilmTile {
             samples: vec![0; pixels],
             nearest: Nearest::new(pixels, layout.data_channels),
             coverage: layout.set.needs_coverage().then(|| CoverageCounts::new(entries)),
-            spread: vec![Spread::default(); if layout.set.contains(LayerKind::Variance) { pixels } else { 0 }],
+            spread: vec![SampleMoments::default(); if layout.set.contains(LayerKind::Variance) { pixels } else { 0 }],
             weighed: Vec::new(),
             dropped_count: 0,
             dropped: Vec::new(),
@@ -203,8 +204,8 @@ impl FilmTile {
         (y - self.area.y) as usize * self.area.width as usize + (x - self.area.x) as usize
     }
 
-    /// Adds a sample to the pixel with this index (row by row within the tile) alone; `sample` is the sample's index, `weight` the filter's.
-    /// A sample that is not finite is dropped and counted, and `false` returned.
+    /// Adds a sample to the pixel with this index (row by row within the tile) alone; `sample` is the sample's index,
+    /// `weight` the filter's. A sample that is not finite is dropped and counted, and `false` returned.
     #[inline]
     pub fn add<'a>(&mut self, pixel: usize, sample: u32, value: impl Into<Sample<'a>>, weight: f32) -> bool {
         let value = value.into();
@@ -237,25 +238,18 @@ impl FilmTile {
         true
     }
 
-    /// As [`add`](Self::add), to all pixels that a shared sample at this offset from the pixel's centre reaches. `splats` collects samples of one cell,
-    /// and [`flush`](Self::flush) adds them to the tile.
+    /// As [`add`](Self::add), to all pixels that a shared sample reaches, with the weights of
+    /// [`Filter::splat_taps`](super::Filter::splat_taps).
+    /// `splats` collects samples of one cell, and [`flush`](Self::flush) adds them to the tile.
     #[inline]
-    pub fn splat<'a>(
-        &mut self,
-        (pixel, sample): (usize, u32),
-        value: impl Into<Sample<'a>>,
-        filter: &Filter,
-        FilterSample { offset, .. }: FilterSample,
-        splats: &mut Splats,
-    ) -> bool {
+    pub fn splat<'a>(&mut self, pixel: usize, sample: u32, value: impl Into<Sample<'a>>, taps: &[Taps; 2], splats: &mut Splats) -> bool {
         let value = value.into();
         // A sum of as many terms as a pixel has neighbours is to be finite, too.
         let Some(values) = self.take(pixel, sample, value, Splats::MOST_TERMS) else { return false };
-        let taps = [filter.taps(offset.x), filter.taps(offset.y)];
         let first = self.cells.entry_of(pixel);
-        splats.add(&self.cells, first, &taps, &values);
+        splats.add(&self.cells, first, taps, &values);
         if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
-            self.cells.for_each_tap(first, &taps, |entry, weight| {
+            self.cells.for_each_tap(first, taps, |entry, weight| {
                 coverage.add(entry, surface.shown, (f64::from(weight.abs()) * COVERAGE_UNITS).round() as u64);
             });
         }
@@ -270,13 +264,13 @@ impl FilmTile {
     /// Adds a sample to what is kept of its own pixel and returns what is filtered; `None` if it is not finite.
     #[inline(always)]
     fn take<'a>(&mut self, pixel: usize, sample: u32, value: Sample<'a>, weight: f32) -> Option<Values<'a>> {
-        let Sample { pixel: PixelSample { radiance, alpha }, surface, parts } = value;
+        let Sample { pixel: PixelSample { radiance, alpha }, surface, light_aovs } = value;
         let mut values =
-            Values { color: [radiance.r, radiance.g, radiance.b, *alpha], parts: &[], means: [0.0; MAX_MEANS], counts: [0; 2] };
+            Values { color: [radiance.r, radiance.g, radiance.b, *alpha], light_aovs: &[], means: [0.0; MAX_MEANS], counts: [0; 2] };
         let mut finite = is_finite(weight, *radiance, *alpha);
         if self.layout.beside_color() {
-            values.parts = &parts[..self.layout.parts.count().min(parts.len())];
-            values.counts = [3 * self.layout.parts.count(), self.layout.mean_channels];
+            values.light_aovs = &light_aovs[..self.layout.light_aovs.count().min(light_aovs.len())];
+            values.counts = [3 * self.layout.light_aovs.count(), self.layout.mean_channels];
             values.read_means(self.layout, surface);
             values.for_each_channel(|_, value| finite &= (weight * value).is_finite());
             finite = finite && surface.is_none_or(|surface| self.nearest.add(pixel, sample, surface, self.layout.set));
@@ -292,19 +286,20 @@ impl FilmTile {
         Some(values)
     }
 
-    /// Adds a group of the pixel's samples, which have been added, by their mean radiance, if the variance is asked for. The better the samples of a
-    /// group are spread, the less is their variance overestimated; all groups of a pixel are of one size.
+    /// Adds a group of the pixel's samples, which have been added, by their mean radiance, if the variance is asked
+    /// for. The better the samples of a group are spread, the less is their variance overestimated; all groups of a
+    /// pixel are of one size.
     #[inline]
-    pub fn add_group(&mut self, pixel: usize, radiance: [f64; 3]) {
+    pub fn add_moments(&mut self, pixel: usize, radiance: [f64; 3]) {
         let Some(spread) = self.spread.get_mut(pixel) else { return };
         spread.groups += 1;
         spread.sums.add(radiance);
         spread.squares.add(radiance.map(|value| value * value));
     }
 
-    /// Whether [`add_group`](Self::add_group) does anything.
+    /// Whether [`add_moments`](Self::add_moments) does anything.
     #[inline]
-    pub fn wants_groups(&self) -> bool {
+    pub fn tracks_variance(&self) -> bool {
         !self.spread.is_empty()
     }
 
@@ -348,16 +343,16 @@ impl FilmTile {
     pub fn merge(&mut self, other: &Self) {
         self.merge_sums(other, 1.0);
         for (spread, others) in self.spread.iter_mut().zip(&other.spread) {
-            spread.groups += others.groups;
+            spread.groups = spread.groups.saturating_add(others.groups);
             spread.sums.merge(&others.sums);
             spread.squares.merge(&others.squares);
         }
     }
 
-    /// Adds all samples of another tile of the same pixels and layers, each counted `factor` times as much as a single one, except in layers of data and
-    /// of coverage. Nothing may be added to this tile but by this.
-    pub fn merge_weighed(&mut self, other: &Self, factor: f64) {
-        self.weighed.resize(self.samples.len(), Weighed::default());
+    /// Adds all samples of another tile of the same pixels and layers, each counted `factor` times as much as a single
+    /// one, except in layers of data and of coverage. Nothing may be added to this tile but by this.
+    pub fn merge_inverse_variance(&mut self, other: &Self, factor: f64) {
+        self.weighed.resize(self.samples.len(), InverseVarianceSums::default());
         for (pixel, weighed) in self.weighed.iter_mut().enumerate() {
             let count = f64::from(other.samples[pixel]) * factor;
             let (ours, theirs) = (weighed.count, count);
@@ -383,13 +378,13 @@ impl FilmTile {
             if factor == 1.0 { sum.merge(others) } else { sum.add(others.values().map(|sum| factor * sum)) }
         }
         for (sum, count) in self.samples.iter_mut().zip(&other.samples) {
-            *sum += count;
+            *sum = sum.saturating_add(*count);
         }
         self.nearest.merge(&other.nearest);
         if let (Some(coverage), Some(other)) = (&mut self.coverage, &other.coverage) {
             coverage.merge(other);
         }
-        self.dropped_count += other.dropped_count;
+        self.dropped_count = self.dropped_count.saturating_add(other.dropped_count);
         self.dropped.extend(other.dropped.iter().take(DROPPED_KEPT - self.dropped.len().min(DROPPED_KEPT)));
     }
 

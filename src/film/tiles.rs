@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::sum::Sums;
-use super::tile::{DROPPED_KEPT, DroppedSample, FilmTile, Spread};
-use super::{Crop, Filter, Filtering, LayerKind, LayerSet, PartNeeds, VarianceKernel};
+use super::tile::{DROPPED_KEPT, DroppedSample, FilmTile, SampleMoments};
+use super::{Crop, Filter, Filtering, LayerKind, LayerSet, LightAovRequest, VarianceKernel};
 use crate::desc::FilterDesc;
 use crate::error::{Error, Result};
 
@@ -48,8 +48,9 @@ impl FilmShape {
     }
 }
 
-/// Where the pixels of a film are on the grid of its tiles. The grid's corner is a multiple of the tiles' size above and left of the pixel that the camera
-/// sees in its upper left corner, so a pixel has the same place within a tile, whatever the overscan and the margin.
+/// Where the pixels of a film are on the grid of its tiles. The grid's corner is a multiple of the tiles' size above
+/// and left of the pixel that the camera sees in its upper left corner, so a pixel has the same place within a tile,
+/// whatever the overscan and the margin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FilmGrid {
     /// Place of the full picture's first pixel, along both axes.
@@ -83,7 +84,7 @@ impl FilmGrid {
 pub(super) struct Layout {
     pub set: LayerSet,
     /// The parts of the radiance.
-    pub parts: PartNeeds,
+    pub light_aovs: LightAovRequest,
     /// Channels of the layers of surfaces that are averaged.
     pub mean_channels: usize,
     /// Channels of the layers of surfaces that are data.
@@ -99,22 +100,22 @@ pub(super) struct Layout {
 impl Layout {
     fn new(set: LayerSet, light_groups: usize, filter: &Filter, cell_size: u32) -> Self {
         let light_groups = if set.contains(LayerKind::LightGroups) { light_groups as u32 } else { 0 };
-        let parts = PartNeeds { by_scattering: set.needs_parts(), light_groups };
+        let light_aovs = LightAovRequest { by_scattering: set.needs_light_aovs(), light_groups };
         let channels = |filtering| set.surfaces(filtering).map(|info| info.channels.len()).sum();
         let (mean_channels, data_channels) = (channels(Filtering::Mean), channels(Filtering::Nearest));
-        Self { set, parts, mean_channels, data_channels, cell_size, border: filter.border(), signed: filter.is_signed() }
+        Self { set, light_aovs, mean_channels, data_channels, cell_size, border: filter.border(), signed: filter.is_signed() }
     }
 
     /// Numbers that the averaged channels beside the colour take.
     #[inline]
     pub fn channel_stride(&self) -> usize {
-        2 * (3 * self.parts.count() + self.mean_channels)
+        2 * (3 * self.light_aovs.count() + self.mean_channels)
     }
 
     /// Whether samples bring more than colour.
     #[inline]
     pub fn beside_color(&self) -> bool {
-        self.set.needs_surface() || self.parts.count() > 0
+        self.set.needs_surface() || self.light_aovs.count() > 0
     }
 
     /// Whether weights differ from 1.
@@ -140,7 +141,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// A black film. Tiles of `tile_size` pixels (at least 1) lie on the full picture's grid, so a pixel's tile does not depend on the crop.
+    /// A black film. Tiles of `tile_size` pixels (at least 1) lie on the full picture's grid, so a pixel's tile does
+    /// not depend on the crop.
     ///
     /// # Errors
     /// [`Error::Usage`] if the crop is empty or reaches beyond the picture; [`Error::OutOfMemory`] if the film cannot be held.
@@ -188,8 +190,8 @@ impl Film {
     }
 
     /// Which parts of the radiance are stored.
-    pub fn parts(&self) -> PartNeeds {
-        self.layout.parts
+    pub fn light_aovs(&self) -> LightAovRequest {
+        self.layout.light_aovs
     }
 
     /// How the noise of pixels' own samples becomes that of the picture.
@@ -253,7 +255,7 @@ fn pixel_bytes(layout: Layout) -> usize {
     let filtered = size_of::<Sums<4>>() + size_of::<f64>() * layout.channel_stride();
     let weights = if layout.is_weighted() { size_of::<Sums<1>>() } else { 0 };
     let own = if layout.signed { filtered } else { 0 };
-    let spread = if layout.set.contains(LayerKind::Variance) { size_of::<Spread>() } else { 0 };
+    let spread = if layout.set.contains(LayerKind::Variance) { size_of::<SampleMoments>() } else { 0 };
     let lists = if layout.set.needs_coverage() { size_of::<Vec<()>>() } else { 0 };
     let data = if layout.data_channels > 0 { size_of::<f32>() * (2 + layout.data_channels) } else { 0 };
     filtered + weights + own + spread + lists + data + size_of::<u32>()

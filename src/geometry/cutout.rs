@@ -7,26 +7,26 @@ use super::{Detail, Hit, Shape};
 use crate::id::ShapeId;
 use crate::math::Ray;
 
-/// How much of a surface is there, decided hit by hit while a ray is on its way.
+/// Opacity of surfaces, decided stochastically hit by hit during traversal.
 ///
-/// A hit counts if a number in `[0, 1)`, hashed from the ray, the ids and the side, lies below the coverage. So the answer is the same in any order of
-/// visits, for closest and any hits, and a ray that looks again meets the same surfaces.
-pub trait Coverage: Debug + Send + Sync {
-    /// The shapes with holes; all others are never asked about.
+/// A hit counts if a number in `[0, 1)`, hashed from the ray, the ids and the side, lies below alpha. So the answer is
+/// the same in any order of visits, for closest and any hits, and a ray that looks again meets the same surfaces.
+pub trait AlphaMask: Debug + Send + Sync {
+    /// Whether a shape has holes; [`alpha`](Self::alpha) is evaluated on no other.
     fn has_holes(&self, shape: ShapeId) -> bool;
 
-    /// The fraction of the surface that is there, from 0 to 1, where `ray` (in the space the shape is placed in) hits it.
-    fn coverage(&self, shape: &Shape, ray: &Ray, hit: &Hit) -> f32;
+    /// Opacity from 0 to 1 where `ray` (in the space the shape is placed in) hits it.
+    fn alpha(&self, shape: &Shape, ray: &Ray, hit: &Hit) -> f32;
 }
 
-/// [`Coverage`] of the shapes of a [`Geometry`](super::Geometry), or of none.
+/// [`AlphaMask`] of the shapes of a [`Geometry`](super::Geometry), or of none.
 #[derive(Clone, Debug, Default)]
-pub struct Cutouts(Option<Arc<dyn Coverage>>);
+pub struct AlphaMasks(Option<Arc<dyn AlphaMask>>);
 
-impl Cutouts {
-    /// Shapes have the holes that `coverage` says.
-    pub fn new(coverage: Arc<dyn Coverage>) -> Self {
-        Self(Some(coverage))
+impl AlphaMasks {
+    /// The mask of a scene's shapes.
+    pub fn new(mask: Arc<dyn AlphaMask>) -> Self {
+        Self(Some(mask))
     }
 
     /// Whether no shape has holes.
@@ -38,7 +38,7 @@ impl Cutouts {
     /// Whether this shape has holes.
     #[inline(always)]
     pub fn has_holes(&self, shape: ShapeId) -> bool {
-        self.0.as_ref().is_some_and(|coverage| coverage.has_holes(shape))
+        self.0.as_ref().is_some_and(|mask| mask.has_holes(shape))
     }
 
     /// The key of a world-space ray for [`counts`](Self::counts); the ends of the ray do not matter.
@@ -51,9 +51,9 @@ impl Cutouts {
     #[inline(always)]
     pub fn counts(&self, shapes: &[Shape], key: u32, ray: &Ray, hit: &Hit) -> bool {
         match &self.0 {
-            Some(coverage) if coverage.has_holes(hit.shape) => {
+            Some(mask) if mask.has_holes(hit.shape) => {
                 let shape = &shapes[hit.shape.index()];
-                is_covered(coverage.coverage(shape, ray, hit), key ^ side(shape, ray, hit), hit)
+                is_covered(mask.alpha(shape, ray, hit), key ^ side(shape, ray, hit), hit)
             }
             _ => true,
         }
@@ -79,8 +79,11 @@ fn ray_key(ray: &Ray) -> u32 {
 
 #[inline(never)]
 fn is_covered(coverage: f32, key: u32, hit: &Hit) -> bool {
+    if coverage <= 0.0 || coverage >= 1.0 {
+        return coverage > 0.0;
+    }
     let hash = [hit.instance.0, hit.shape.0, hit.prim.0].iter().fold(key, |hash, word| mix(hash ^ word));
-    // 24 bits fill the mantissa; full coverage exceeds every number.
+    // 24 bits fill the mantissa.
     (hash >> 8) as f32 * (1.0 / 16_777_216.0) < coverage
 }
 

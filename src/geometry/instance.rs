@@ -55,8 +55,8 @@ impl Instance {
         squared_norm(&world_from_object.matrix3) * squared_norm(&object_from_world.matrix3) > 9.0 * 16.0
     }
 
-    /// How far rays are moved by the inverse of the transform, found by cofactors in `f32` as Embree finds it; `None` if that is not finite,
-    /// leaves no room for any ray, or its determinant is denormal.
+    /// How far rays are moved by the inverse of the transform, found by cofactors in `f32` as Embree finds it; `None`
+    /// if that is not finite, leaves no room for any ray, or its determinant is denormal.
     pub fn inverse_reach(&self) -> Option<InverseReach> {
         let m = &self.transform.world_from_object;
         let (x, y, z) = (m.matrix3.x_axis.as_vec3(), m.matrix3.y_axis.as_vec3(), m.matrix3.z_axis.as_vec3());

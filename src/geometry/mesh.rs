@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use super::attributes::weights;
 use super::tangents::{self, CornerTangents};
 pub use super::triangle::TrianglePoints;
+use super::uv::{derivatives, interpolated_uv, uv_area};
 use super::{Detail, Hit, SurfaceInteraction};
 use crate::attribute::Attribute;
 use crate::id::PrimId;
@@ -136,8 +137,8 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// This mesh deforming: its own vertices are those at the opening of the shutter, `later` has those at further times, evenly spaced to the
-    /// closing. Between them vertices move along straight lines.
+    /// This mesh deforming: its own vertices are those at the opening of the shutter, `later` has those at further
+    /// times, evenly spaced to the closing. Between them vertices move along straight lines.
     ///
     /// # Errors
     /// If a number is not finite, or there are more or fewer than this mesh has.
@@ -282,11 +283,18 @@ impl Mesh {
         Some([Vec3::from(normals[a as usize]), Vec3::from(normals[b as usize]), Vec3::from(normals[c as usize])])
     }
 
+    /// The uv of three vertices; without uvs those whose interpolation gives the barycentric coordinates.
+    #[inline(always)]
+    pub(crate) fn vertex_uvs(&self, [a, b, c]: [u32; 3]) -> [Vec2; 3] {
+        match &self.uvs {
+            Some(uvs) => [Vec2::from(uvs[a as usize]), Vec2::from(uvs[b as usize]), Vec2::from(uvs[c as usize])],
+            None => [Vec2::ZERO, Vec2::X, Vec2::Y],
+        }
+    }
+
     /// The uv at barycentric coordinates `u`, `v` of a triangle's second and third vertex; without uvs these coordinates themselves.
     pub fn uv(&self, prim: PrimId, u: f32, v: f32) -> Vec2 {
-        let Some(uvs) = &self.uvs else { return Vec2::new(u, v) };
-        let [a, b, c] = corner_uvs(uvs, self.triangles[prim.index()]);
-        a * (1.0 - u - v) + b * u + c * v
+        interpolated_uv(self.vertex_uvs(self.triangles[prim.index()]), [u, v])
     }
 
     /// Bounds of all triangles.
@@ -323,7 +331,7 @@ impl Mesh {
         let points = self.triangle_points_at(hit.prim, ray.time);
 
         let place = points.place(ray.origin, ray.direction);
-        if !place.is_ahead() {
+        if !place.is_valid() {
             return None;
         }
         let (p, n_g, mut error) = (place.p, place.n_g, place.error);
@@ -361,7 +369,14 @@ impl Mesh {
     /// The point `p` of a triangle moved to the surface that the corners' normals suggest (Hanika, "Hacking the Shadow Terminator"): to the
     /// mean of its projections onto the planes through the corners at right angles to their normals. Only outwards on the side of `toward`;
     /// `None` where it stays. `p` and `toward` are in the world, where `placement` puts the mesh.
-    pub(super) fn raised(&self, prim: PrimId, p: DVec3, toward: DVec3, time: f32, placement: Option<&Transform>) -> Option<DVec3> {
+    pub(super) fn terminator_point(
+        &self,
+        prim: PrimId,
+        p: DVec3,
+        toward: DVec3,
+        time: f32,
+        placement: Option<&Transform>,
+    ) -> Option<DVec3> {
         let normals = self.corner_normals(prim, time)?.map(|n| {
             let n = n.as_dvec3();
             placement.map_or(n, |t| t.normal(n)).normalize_or_zero()
@@ -382,31 +397,22 @@ impl Mesh {
     #[inline(never)]
     fn parameters(&self, hit: &Hit, points: &TrianglePoints, n_s: Vec3, length: f32, time: f32) -> Parameters {
         let corners = self.triangles[hit.prim.index()];
-        let (u, v) = (hit.u, hit.v);
-        let w = 1.0 - u - v;
-
         let (edge_b, edge_c) = (points.b - points.a, points.c - points.a);
-        let Some(uvs) = &self.uvs else {
-            return Parameters { dp_du: edge_b, dp_dv: edge_c, uv: Vec2::new(u, v) };
-        };
-        let [uv_a, uv_b, uv_c] = corner_uvs(uvs, corners);
-        let uv = uv_a * w + uv_b * u + uv_c * v;
-        if let Some((tangent, side)) = self.tangent(hit.prim, [w, u, v], time) {
+        let uvs = self.vertex_uvs(corners);
+        let uv = interpolated_uv(uvs, [hit.u, hit.v]);
+        if let Some((tangent, side)) = self.tangent(hit.prim, [1.0 - hit.u - hit.v, hit.u, hit.v], time) {
             // MikkTSpace's frame is that of the interpolated vectors before they are normalised, up to a factor common to all three.
             return Parameters { dp_du: tangent / length, dp_dv: n_s.cross(tangent) * side, uv };
         }
-        let [dp_du, dp_dv] = derivatives([edge_b, edge_c], [uv_b - uv_a, uv_c - uv_a]);
+        let [dp_du, dp_dv] = derivatives([edge_b, edge_c], uvs);
         let (dp_du, dp_dv) = if dp_du.is_finite() && dp_dv.is_finite() { (dp_du, dp_dv) } else { (edge_b, edge_c) };
         Parameters { dp_du, dp_dv, uv }
     }
 
-    /// Changes of the point with u and v at a hit, whatever tangents normal maps have; not finite where uv do not span the triangle.
-    pub(super) fn uv_derivatives(&self, hit: &Hit, time: f32) -> [Vec3; 2] {
-        let points = self.triangle_points_at(hit.prim, time);
-        let edges = [points.b - points.a, points.c - points.a];
-        let Some(uvs) = &self.uvs else { return edges };
-        let [a, b, c] = corner_uvs(uvs, self.triangles[hit.prim.index()]);
-        derivatives(edges, [b - a, c - a])
+    /// Two edges of a triangle, and the area in uv of the parallelogram between them, with the sign of their order.
+    pub(super) fn edges_and_uv_area(&self, prim: PrimId, time: f32) -> ([Vec3; 2], f32) {
+        let points = self.triangle_points_at(prim, time);
+        ([points.b - points.a, points.c - points.a], uv_area(self.vertex_uvs(self.triangles[prim.index()])))
     }
 
     /// The interpolated tangent for normal maps and the side of the bitangent; `None` where the mesh has none.
@@ -421,12 +427,6 @@ impl Mesh {
         let ((from, side), (to, _)) = (at(first)?, at(second)?);
         Some((from * (1.0 - s) + to * s, side))
     }
-}
-
-/// The uvs of three vertices.
-#[inline(always)]
-fn corner_uvs(uvs: &[[f32; 2]], [a, b, c]: [u32; 3]) -> [Vec2; 3] {
-    [Vec2::from(uvs[a as usize]), Vec2::from(uvs[b as usize]), Vec2::from(uvs[c as usize])]
 }
 
 /// The unit shading normal where the corners' normals have these weights but the first one's, and the length of the interpolated vector.
@@ -445,13 +445,6 @@ pub(crate) fn interpolated_normal([n_a, n_b, n_c]: [Vec3; 3], [u, v]: [f32; 2], 
     } else {
         (n, length)
     }
-}
-
-/// Changes of the point with u and v on a triangle with these edges in space and in uv.
-#[inline]
-fn derivatives([edge_b, edge_c]: [Vec3; 2], [d1, d2]: [Vec2; 2]) -> [Vec3; 2] {
-    let inverse = 1.0 / (d1.x * d2.y - d1.y * d2.x);
-    [(edge_b * d2.y - edge_c * d1.y) * inverse, (edge_c * d1.x - edge_b * d2.x) * inverse]
 }
 
 #[derive(Default)]

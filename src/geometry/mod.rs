@@ -20,8 +20,9 @@ mod tangents;
 #[cfg(test)]
 mod testing;
 mod triangle;
+mod uv;
 
-pub use cutout::{Coverage, Cutouts};
+pub use cutout::{AlphaMask, AlphaMasks};
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use hit::Hit;
@@ -39,7 +40,9 @@ pub use revolution::{ProfileParameter, Revolution};
 pub use sector::Sector;
 pub use shape_error::ShapeError;
 pub use sphere::Sphere;
-pub use triangle::{TriangleHit, TrianglePlace, TriangleRay, TriangleSample};
+pub use triangle::{TriangleHit, TriangleIntersection, TriangleRay, TriangleSample};
+
+pub(crate) use uv::{interpolated_uv, uv_area, uv_density};
 
 use crate::id::{InstanceId, ObjectId, PrimId, ShapeId};
 use crate::math::float::step_past;
@@ -120,7 +123,7 @@ pub struct Geometry {
     /// Placements of objects in the world.
     pub instances: Vec<Instance>,
     /// Which shapes have holes.
-    pub cutouts: Cutouts,
+    pub cutouts: AlphaMasks,
 }
 
 impl Geometry {
@@ -148,8 +151,8 @@ impl Geometry {
         self.shapes.iter().any(deforming) || self.instances.iter().any(|instance| instance.motion.is_some())
     }
 
-    /// The first hit that counts of `ray` with one primitive. `ray` is in the space the shape is placed in, through `instance`; `key` is that
-    /// of the world-space ray. Any-hit queries use this very function.
+    /// The first hit that counts of `ray` with one primitive. `ray` is in the space the shape is placed in, through
+    /// `instance`; `key` is that of the world-space ray. Any-hit queries use this very function.
     #[inline]
     pub fn intersect_prim(&self, ray: &Ray, key: u32, id: ShapeId, prim: PrimId, instance: InstanceId) -> Option<Hit> {
         let shape = self.shape(id);
@@ -208,15 +211,16 @@ impl Geometry {
         }
     }
 
-    /// The point of the surface that a smooth mesh's normals suggest above a point of a facet, on the side of `toward`; `None` where it is not
-    /// above the facet, and on other shapes.
-    pub fn raised(&self, at: &SurfaceInteraction, toward: Vec3) -> Option<DVec3> {
+    /// The point of the surface that a smooth mesh's normals suggest above a point of a facet, on the side of `toward`;
+    /// `None` where it is not above the facet, and on other shapes.
+    pub fn terminator_point(&self, at: &SurfaceInteraction, toward: Vec3) -> Option<DVec3> {
         let Shape::Mesh(mesh) = self.shape(at.shape) else { return None };
         let placement = at.is_instanced().then(|| self.instance(at.instance).transform_at(at.time));
-        mesh.raised(at.prim, at.p, toward.as_dvec3(), at.time, placement.as_deref())
+        mesh.terminator_point(at.prim, at.p, toward.as_dvec3(), at.time, placement.as_deref())
     }
 
-    /// Change of the point with v at a hit of `ray`, as [`SurfaceInteraction::dp_du`]; apart from the interaction, for few surfaces need it.
+    /// Change of the point with v at a hit of `ray`, as [`SurfaceInteraction::dp_du`]; apart from the interaction, for
+    /// few surfaces need it.
     #[inline(never)]
     pub fn dp_dv(&self, ray: &Ray, hit: &Hit) -> Vec3 {
         let local = |ray: &Ray| {
@@ -234,21 +238,25 @@ impl Geometry {
         instance::finite_or_zero(instance.transform_at(ray.time).vector(dp_dv.as_dvec3()).as_vec3())
     }
 
-    /// Changes of the point with u and v at a hit of `ray`, as uv has them even where normal maps have tangents of their own. Not finite, or
-    /// zero, where uv do not span the surface.
+    /// Area in uv per area of the surface at a hit of `ray`. Not finite, or zero, where uv do not span the surface.
     #[inline(never)]
-    pub fn uv_derivatives(&self, ray: &Ray, hit: &Hit) -> [Vec3; 2] {
+    pub fn uv_density(&self, ray: &Ray, hit: &Hit) -> f32 {
         let local = |ray: &Ray| match self.shape(hit.shape) {
-            Shape::Mesh(mesh) => mesh.uv_derivatives(hit, ray.time),
+            Shape::Mesh(mesh) => mesh.edges_and_uv_area(hit.prim, ray.time),
             Shape::Analytic(placed) => {
-                placed.interaction_and_dp_dv(Detail::Full, ray, hit).map_or([Vec3::ZERO; 2], |(at, dp_dv)| [at.dp_du, dp_dv])
+                let found = placed.interaction_and_dp_dv(Detail::Full, ray, hit);
+                (found.map_or([Vec3::ZERO; 2], |(at, dp_dv)| [at.dp_du, dp_dv]), 1.0)
             }
         };
-        if hit.instance == Hit::NO_INSTANCE {
-            return local(ray);
-        }
-        let instance = self.instance(hit.instance);
-        let transform = instance.transform_at(ray.time);
-        local(&instance.object_ray(ray)).map(|derivative| transform.vector(derivative.as_dvec3()).as_vec3())
+        let ([a, b], uv_area) = if hit.instance == Hit::NO_INSTANCE {
+            let (edges, uv_area) = local(ray);
+            (edges.map(Vec3::as_dvec3), uv_area)
+        } else {
+            let instance = self.instance(hit.instance);
+            let transform = instance.transform_at(ray.time);
+            let (edges, uv_area) = local(&instance.object_ray(ray));
+            (edges.map(|edge| transform.vector(edge.as_dvec3())), uv_area)
+        };
+        uv_density(uv_area, a.cross(b).length())
     }
 }

@@ -14,7 +14,7 @@ pub use points::{PlacedNormalRows, PlacedPointRows, PlacedSampleRows};
 use super::{Detail, Disk, Frustum, Hit, Quad, Revolution, Sphere, SurfaceInteraction};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
 use crate::math::rows::{BATCH, Row};
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 use crate::math::{Bounds, DAffine3, DVec3, Ray, RayF64, RayRows, Transform, Vec2, Vec3};
 
 /// A surface given by a formula.
@@ -202,14 +202,15 @@ impl Placed {
         CenteredRay { ray, shift }
     }
 
-    /// Whether [`intersect_packet`](Self::intersect_packet) decides anything: surfaces of revolution are intersected with one ray at a time.
+    /// Whether [`intersect_packet`](Self::intersect_packet) decides anything: surfaces of revolution are intersected
+    /// with one ray at a time.
     pub fn intersects_packets(&self) -> bool {
         !matches!(self.shape, Analytic::Revolution(_))
     }
 
     /// [`intersect`](Self::intersect) for the rays of a packet, side by side.
     pub fn intersect_packet(&self, rays: &RayPacket) -> PacketHits {
-        vectorize(IntersectPacket { placed: self, rays })
+        vectorize!(intersect_packet(self, rays))
     }
 
     /// The first hit of a ray in the space the shape is placed in.
@@ -418,41 +419,31 @@ pub struct PacketHits {
     pub is_undecided: [u32; PACKET_SIZE],
 }
 
-struct IntersectPacket<'a> {
-    placed: &'a Placed,
-    rays: &'a RayPacket,
-}
-
-impl Kernel for IntersectPacket<'_> {
-    type Output = PacketHits;
-
-    #[inline(always)]
-    fn call(self) -> PacketHits {
-        let Self { placed, rays } = self;
-        let mut hits = PacketHits { t: [-1.0; PACKET_SIZE], is_undecided: [1; PACKET_SIZE] };
-        // A macro: closures are not always inlined.
-        macro_rules! intersect {
-            ($shape:ident) => {
-                for i in 0..PACKET_SIZE {
-                    let ray = rays.get(i);
-                    let CenteredRay { ray: local, shift } = placed.centered_ray(&ray);
-                    let t = $shape.distance(&local) + shift;
-                    // False for a NaN.
-                    hits.t[i] = if t >= 0.0 { t as f32 } else { -1.0 };
-                    // The start of the interval is lost in the shift.
-                    hits.is_undecided[i] = u32::from(t < f64::from(ray.t_min));
-                }
-            };
-        }
-        match &placed.shape {
-            Analytic::Sphere(sphere) => intersect!(sphere),
-            Analytic::Quad(quad) => intersect!(quad),
-            Analytic::Disk(disk) => intersect!(disk),
-            Analytic::Frustum(frustum) => intersect!(frustum),
-            Analytic::Revolution(_) => {}
-        }
-        hits
+#[inline(always)]
+fn intersect_packet(placed: &Placed, rays: &RayPacket) -> PacketHits {
+    let mut hits = PacketHits { t: [-1.0; PACKET_SIZE], is_undecided: [1; PACKET_SIZE] };
+    // A macro: closures are not always inlined.
+    macro_rules! intersect {
+        ($shape:ident) => {
+            for i in 0..PACKET_SIZE {
+                let ray = rays.get(i);
+                let CenteredRay { ray: local, shift } = placed.centered_ray(&ray);
+                let t = $shape.distance(&local) + shift;
+                // False for a NaN.
+                hits.t[i] = if t >= 0.0 { t as f32 } else { -1.0 };
+                // The start of the interval is lost in the shift.
+                hits.is_undecided[i] = u32::from(t < f64::from(ray.t_min));
+            }
+        };
     }
+    match &placed.shape {
+        Analytic::Sphere(sphere) => intersect!(sphere),
+        Analytic::Quad(quad) => intersect!(quad),
+        Analytic::Disk(disk) => intersect!(disk),
+        Analytic::Frustum(frustum) => intersect!(frustum),
+        Analytic::Revolution(_) => {}
+    }
+    hits
 }
 
 /// The first of two distances in ascending order that is accepted; NaN if neither is.

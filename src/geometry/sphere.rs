@@ -2,8 +2,9 @@
 //!
 //! Object space: `|p| = radius`, `z_min <= z <= z_max`, `0 <= phi <= phi_max` with phi from +x towards +y. The normal points outward.
 //!
-//! `u = phi / phi_max`. `v = (theta_max - theta) / (theta_max - theta_min)` where theta is the angle from +z, so v is 0 at the bottom and 1 at
-//! the top of the part that is kept: a map of the world in latitude and longitude stands upright on it.
+//! `u = phi / phi_max`. `v = (theta_max - theta) / (theta_max - theta_min)` where theta is the angle from +z, so v is 0
+//! at the bottom and 1 at the top of the part that is kept: a map of the world in latitude and longitude stands upright
+//! on it.
 
 use std::f64::consts::PI;
 

@@ -30,21 +30,23 @@ pub struct TriangleHit {
 
 /// Where a ray meets the plane of a triangle.
 #[derive(Clone, Copy, Debug)]
-pub struct TrianglePlace {
+pub struct TriangleIntersection {
     /// The point.
     pub p: DVec3,
-    /// Distance in units of the ray's direction; only a hit if it is [ahead](Self::is_ahead).
+    /// Distance in units of the ray's direction; only a hit if it is [valid](Self::is_valid).
     pub t: f64,
     /// Unit geometric normal, towards the front.
     pub n_g: Vec3,
     /// As [`SurfaceInteraction::error`](super::SurfaceInteraction::error), for a triangle at rest.
     pub error: f32,
+    /// Twice the triangle's area.
+    pub double_area: f64,
 }
 
-impl TrianglePlace {
+impl TriangleIntersection {
     /// Whether the distance is positive and finite: else the hit was a rounding artefact.
     #[inline(always)]
-    pub fn is_ahead(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         self.t > 0.0 && self.t < f64::INFINITY
     }
 }
@@ -72,15 +74,16 @@ impl TrianglePoints {
 
     /// Where a ray meets the plane of the triangle, in `f64`.
     #[inline(always)]
-    pub fn place(&self, origin: Vec3, direction: Vec3) -> TrianglePlace {
+    pub fn place(&self, origin: Vec3, direction: Vec3) -> TriangleIntersection {
         let cross = self.cross();
         let t = cross.dot(self.a.as_dvec3() - origin.as_dvec3()) / cross.dot(direction.as_dvec3());
         let p = origin.as_dvec3() + direction.as_dvec3() * t;
-        let n_g = (cross / cross.length()).as_vec3();
+        let double_area = cross.length();
+        let n_g = (cross / double_area).as_vec3();
         // Embree subtracts the origin from the corners and forms the normal in f32: 4 units of roundoff of the extent seen from here.
         let p32 = p.as_vec3();
         let reach = (self.a - p32).abs().max((self.b - p32).abs()).max((self.c - p32).abs());
-        TrianglePlace { p, t, n_g, error: 4.0 * UNIT_ROUNDOFF as f32 * reach.max_element() }
+        TriangleIntersection { p, t, n_g, error: 4.0 * UNIT_ROUNDOFF as f32 * reach.max_element(), double_area }
     }
 
     /// Twice the area times the normal, in `f64`.
@@ -90,8 +93,8 @@ impl TrianglePoints {
         (self.b.as_dvec3() - a).cross(self.c.as_dvec3() - a)
     }
 
-    /// The inverse sine of the angle between the two shortest edges, at least 1: a normal computed from them in `f32` is off by so many units
-    /// of roundoff.
+    /// The inverse sine of the angle between the two shortest edges, at least 1: a normal computed from them in `f32`
+    /// is off by so many units of roundoff.
     pub fn flatness(&self) -> f64 {
         let [a, b, c] = [self.a, self.b, self.c].map(Vec3::as_dvec3);
         let [ab, bc, ca] = [b - a, c - b, a - c].map(DVec3::length);

@@ -1,11 +1,13 @@
-//! Learning where light comes from while a picture is made ("Practical Path Guiding for Efficient Light-Transport Simulation", 2017, and
-//! "'Practical Path Guiding' in Production", 2019).
+//! Learning where light comes from while a picture is made ("Practical Path Guiding for Efficient Light-Transport
+//! Simulation", 2017, and "'Practical Path Guiding' in Production", 2019).
 //!
-//! For surfaces that face each of six sides, a binary tree divides space; each of its leaves has a distribution of directions, in proportion to
-//! what light from them has brought to paths that were scattered there. Paths record into sums of whole numbers, so what is learned does not
-//! depend on threads. From time to time leaves with many records are divided, and the directions of each where the light is.
+//! For surfaces that face each of six sides, a binary tree divides space; each of its leaves has a distribution of
+//! directions, in proportion to what light from them has brought to paths that were scattered there. Paths record into
+//! sums of whole numbers, so what is learned does not depend on threads. From time to time leaves with many records are
+//! divided, and the directions of each where the light is.
 
 mod quadtree;
+mod state;
 #[cfg(test)]
 mod tests;
 
@@ -24,8 +26,8 @@ const RECORDS_TO_DIVIDE: f64 = 4000.0;
 /// Leaves at most.
 const MAX_LEAVES: usize = 1 << 13;
 
-/// Nodes of all distributions together at most. One takes 80 bytes, with its part of the records: 80 MiB, and twice as much while they are
-/// refined.
+/// Nodes of all distributions together at most. One takes 80 bytes, with its part of the records: 80 MiB, and twice as
+/// much while they are refined.
 const MAX_NODES: usize = 1 << 20;
 
 /// Nodes of a single distribution at most: its indices have 16 bits.
@@ -43,10 +45,12 @@ const LARGEST: f32 = 1_048_576.0;
 /// The share of directions that surfaces choose where nothing says what is better; the light chooses the others.
 const SURFACE_SHARE: f32 = 0.5;
 
-/// The shares that are tried instead. With smaller ones, light that the guide does not know of would weigh too much when a path meets it.
+/// The shares that are tried instead. With smaller ones, light that the guide does not know of would weigh too much
+/// when a path meets it.
 const OTHER_SHARES: [f32; 4] = [0.3, 0.4, 0.7, 0.9];
 
-/// A node of the tree over space: the index of the first of two children or, with [`IS_LEAF`], that of a leaf. Small, for paths ask at every turn.
+/// A node of the tree over space: the index of the first of two children or, with [`IS_LEAF`], that of a leaf. Small,
+/// for paths ask at every turn.
 #[derive(Clone, Copy, Debug)]
 struct Node(u32);
 
@@ -60,8 +64,8 @@ impl Node {
     }
 }
 
-/// What has been learned of a part of space. Apart from what is being learned: a thread that writes one would slow down those that read the
-/// other.
+/// What has been learned of a part of space. Apart from what is being learned: a thread that writes one would slow down
+/// those that read the other.
 #[derive(Clone, Debug)]
 struct Learned {
     directions: Option<Arc<Directions>>,
@@ -125,31 +129,36 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Knows nothing yet. `typical` is how much light a typical record has, about: records far below it are lost, far above are cut. Without it
-    /// (zero), only places are learned, not light.
+    /// Knows nothing yet. `typical` is how much light a typical record has, about: records far below it are lost, far
+    /// above are cut. Without it (zero), only places are learned, not light.
     pub fn new(bounds: Aabb, typical: f32) -> Self {
-        let size = bounds.size().max_element();
-        let known = size > 0.0 && size < f32::INFINITY && bounds.min.is_finite();
-        let (corner, inverse_size) = if known { (bounds.min, 1.0 / size) } else { (Vec3::ZERO, 0.0) };
-        Self {
-            corner,
-            inverse_size,
+        let mut guide = Self {
+            corner: Vec3::ZERO,
+            inverse_size: 0.0,
             nodes: (0..6).map(|leaf| Node(leaf | IS_LEAF)).collect(),
             learned: vec![Learned { directions: None, surface_share: SURFACE_SHARE }; 6],
             leaves: (0..6).map(|_| Leaf::default()).collect(),
             scale: scale_of(typical),
             learns: true,
-        }
+        };
+        guide.set_bounds(bounds);
+        guide
     }
 
-    /// With another [typical](Self::new) light.
-    #[must_use]
-    pub fn with_typical(self, typical: f32) -> Self {
-        Self { scale: scale_of(typical), ..self }
+    /// Sets the box around the scene, on which regions lie. Those of a guide that has learned keep their data.
+    pub fn set_bounds(&mut self, bounds: Aabb) {
+        let size = bounds.size().max_element();
+        let is_known = size > 0.0 && size < f32::INFINITY && bounds.min.is_finite();
+        (self.corner, self.inverse_size) = if is_known { (bounds.min, 1.0 / size) } else { (Vec3::ZERO, 0.0) };
+    }
+
+    /// Sets the [typical](Self::new) light.
+    pub fn set_typical(&mut self, typical: f32) {
+        self.scale = scale_of(typical);
     }
 
     /// Whether light is learned, not places alone.
-    pub fn knows_brightness(&self) -> bool {
+    pub fn has_radiance_scale(&self) -> bool {
         self.scale > 0.0
     }
 
@@ -158,10 +167,9 @@ impl Guide {
         self.learns
     }
 
-    /// Takes no more records.
-    #[must_use]
-    pub fn finished(self) -> Self {
-        Self { learns: false, ..self }
+    /// Sets whether records are taken.
+    pub fn set_learning(&mut self, learns: bool) {
+        self.learns = learns;
     }
 
     /// What is known of the light at a surface whose normal, on the side of the path, is `n`; `None` if nothing.

@@ -1,7 +1,9 @@
-//! Distributions of directions that are learned: quadtrees over the unit square, which an octahedron maps to the sphere.
+//! Distributions of directions that are learned: quadtrees over the unit square, which an octahedron maps to the
+//! sphere.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
+use crate::bytes::{ByteReader, ByteWriter};
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec3, vec3};
 
@@ -55,7 +57,8 @@ fn quarter([u, v]: [f32; 2]) -> (usize, [f32; 2]) {
     (usize::from(right) + 2 * usize::from(lower), [if right { u - 1.0 } else { u }, if lower { v - 1.0 } else { v }])
 }
 
-/// Four quarters with their shares of the node's light, in whole numbers, and their own nodes. Small, for all of them are visited at random.
+/// Four quarters with their shares of the node's light, in whole numbers, and their own nodes. Small, for all of them
+/// are visited at random.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     shares: [u16; 4],
@@ -75,6 +78,19 @@ impl Node {
     fn shares(&self) -> [f32; 4] {
         self.shares.map(f32::from)
     }
+}
+
+/// Whether these are the children of the nodes of a forest in the order in which trees are refined: every child comes
+/// after its parent and after the children before it.
+fn is_forest(children: impl ExactSizeIterator<Item = [u32; 4]>) -> bool {
+    let count = children.len() as u32;
+    let mut last = 0;
+    (0..count).zip(children).all(|(parent, children)| {
+        children
+            .into_iter()
+            .filter(|&child| child != LEAF)
+            .all(|child| child > std::mem::replace(&mut last, child).max(parent) && child < count)
+    })
 }
 
 /// A distribution of directions, constant on each cell of a quadtree over the square.
@@ -127,6 +143,29 @@ impl Directions {
         }
     }
 
+    /// Writes the tree.
+    pub(super) fn write(&self, out: &mut ByteWriter) {
+        let words = |node: &Node| node.shares.into_iter().chain(node.children).map(u32::from).collect::<Vec<_>>();
+        out.integers(&self.nodes.iter().flat_map(words).collect::<Vec<_>>());
+    }
+
+    /// Reads what [`write`](Self::write) gave; `None` if it is no distribution: a direction is then found by at most so
+    /// many steps as there are nodes.
+    pub(super) fn read(data: &mut ByteReader, max_nodes: usize) -> Option<Self> {
+        let words = data.integers()?.into_iter().map(|word| u16::try_from(word).ok()).collect::<Option<Vec<u16>>>()?;
+        let (words, rest) = words.as_chunks();
+        let node = |&[a, b, c, d, e, f, g, h]: &[u16; 8]| Node { shares: [a, b, c, d], children: [e, f, g, h] };
+        let nodes: Vec<Node> = words.iter().map(node).collect();
+        let is_tree =
+            rest.is_empty() && (1..=max_nodes).contains(&nodes.len()) && is_forest(nodes.iter().map(|node| node.children.map(u32::from)));
+        let has_light = |index: usize| nodes[index].shares != [0; 4];
+        let enters_light = |node: &Node| {
+            let mut quarters = node.shares.iter().zip(node.children).filter(|(_, child)| u32::from(*child) != LEAF);
+            quarters.all(|(&share, child)| share > 0 && has_light(usize::from(child)))
+        };
+        (is_tree && has_light(0) && nodes.iter().all(enters_light)).then_some(Self { nodes })
+    }
+
     /// Nodes of the tree.
     pub fn len(&self) -> usize {
         self.nodes.len()
@@ -162,7 +201,8 @@ struct Held {
     count: f64,
 }
 
-/// Light by direction as it is recorded. Sums are whole numbers, so they do not depend on the order in which threads add.
+/// Light by direction as it is recorded. Sums are whole numbers, so they do not depend on the order in which threads
+/// add.
 #[derive(Debug)]
 pub struct Records {
     nodes: Vec<RecordNode>,
@@ -176,7 +216,8 @@ impl Default for Records {
 }
 
 impl Records {
-    /// Adds light from a direction, moved at random (`jitter` in `[0, 1)²`) by up to half a cell, for a cell tells of its neighbours too.
+    /// Adds light from a direction, moved at random (`jitter` in `[0, 1)²`) by up to half a cell, for a cell tells of
+    /// its neighbours too.
     #[inline]
     pub fn add(&self, direction: Vec3, jitter: [f32; 2], amount: u64) {
         let (at, _) = square_of(direction);
@@ -235,8 +276,8 @@ impl Records {
         Some(Directions { nodes })
     }
 
-    /// The same records, for each of so many parts of space, in a tree of at most so many nodes that is divided where the light is: every quarter
-    /// with more than a hundredth of it, if enough records tell so.
+    /// The same records, for each of so many parts of space, in a tree of at most so many nodes that is divided where
+    /// the light is: every quarter with more than a hundredth of it, if enough records tell so.
     pub fn refined(&self, most: usize, parts: usize) -> Self {
         let held = self.held();
         let threshold = DIVIDED_SHARE * held[0].iter().map(|h| h.light).sum::<f64>();
@@ -264,6 +305,31 @@ impl Records {
             index += 1;
         }
         Self { nodes }
+    }
+
+    /// Writes the tree.
+    pub(super) fn write(&self, out: &mut ByteWriter) {
+        let words = |node: &RecordNode| {
+            let sums = node.sums.each_ref().map(|sum| sum.load(Ordering::Relaxed));
+            let sums = sums.into_iter().flat_map(|sum| [sum as u32, (sum >> 32) as u32]);
+            let counts = node.counts.each_ref().map(|count| count.load(Ordering::Relaxed));
+            sums.chain(counts).chain(node.children).collect::<Vec<_>>()
+        };
+        out.integers(&self.nodes.iter().flat_map(words).collect::<Vec<_>>());
+    }
+
+    /// Reads what [`write`](Self::write) gave; `None` if it is no tree.
+    pub(super) fn read(data: &mut ByteReader, max_nodes: usize) -> Option<Self> {
+        let words = data.integers()?;
+        let (words, rest) = words.as_chunks::<16>();
+        let node = |words: &[u32; 16]| RecordNode {
+            sums: [0, 1, 2, 3].map(|k| AtomicU64::new(u64::from(words[2 * k]) | u64::from(words[2 * k + 1]) << 32)),
+            counts: [8, 9, 10, 11].map(|k| AtomicU32::new(words[k])),
+            children: [12, 13, 14, 15].map(|k| words[k]),
+        };
+        let nodes: Vec<RecordNode> = words.iter().map(node).collect();
+        let is_tree = rest.is_empty() && (1..=max_nodes).contains(&nodes.len()) && is_forest(nodes.iter().map(|node| node.children));
+        is_tree.then_some(Self { nodes })
     }
 
     /// A copy.

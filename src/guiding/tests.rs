@@ -1,5 +1,6 @@
 use super::*;
 
+use crate::bytes::{ByteReader, ByteWriter};
 use crate::math::Rng;
 use crate::math::random::mix;
 use crate::sampling::statistics::compare_directions;
@@ -147,12 +148,14 @@ fn no_record_can_poison_the_guide() {
 fn nothing_known_is_said_and_brightness_may_come_later() {
     let guide = Guide::new(unit_box(), 0.0);
     guide.record(&record(Vec3::splat(0.5), Vec3::X, 1.0));
-    let guide = guide.refined(1);
-    assert!(!guide.knows_brightness() && guide.at(Vec3::splat(0.5), Vec3::Z).is_none());
-    let guide = guide.with_typical(1.0);
+    let mut guide = guide.refined(1);
+    assert!(!guide.has_radiance_scale() && guide.at(Vec3::splat(0.5), Vec3::Z).is_none());
+    guide.set_typical(1.0);
     guide.record(&record(Vec3::splat(0.5), Vec3::X, 1.0));
-    assert!(guide.knows_brightness() && guide.refined(2).at(Vec3::splat(0.5), Vec3::Z).is_some());
-    assert!(guide.learns() && !guide.finished().learns());
+    assert!(guide.has_radiance_scale() && guide.refined(2).at(Vec3::splat(0.5), Vec3::Z).is_some());
+    assert!(guide.learns());
+    guide.set_learning(false);
+    assert!(!guide.learns());
 }
 
 #[test]
@@ -176,4 +179,66 @@ fn shares_follow_what_explains_the_light() {
         }
         assert_eq!(guide.refined(1).at(Vec3::splat(0.5), Vec3::Z).unwrap().surface_share, expected);
     }
+}
+
+fn saved(guide: &Guide) -> Vec<u8> {
+    let mut out = ByteWriter::default();
+    guide.write(&mut out);
+    out.into_bytes()
+}
+
+fn read(bytes: &[u8]) -> Option<Guide> {
+    let mut data = ByteReader::new(bytes);
+    let mut guide = Guide::read(&mut data).filter(|_| data.is_empty())?;
+    guide.set_bounds(unit_box());
+    Some(guide)
+}
+
+#[test]
+fn guides_come_back_from_bytes_and_go_on_learning_alike() {
+    for guide in [Guide::new(unit_box(), 1.0), taught(1, 30_000, 0), taught(5, 30_000, 0)] {
+        let bytes = saved(&guide);
+        let back = read(&bytes).unwrap();
+        assert!(saved(&back) == bytes && saved(&guide.clone()) == bytes);
+        let mut rng = Rng::new(8);
+        for _ in 0..20_000 {
+            let direction = rng.direction().as_vec3();
+            let record = record(random_place(&mut rng), direction, lobes(direction));
+            guide.record(&record);
+            back.record(&record);
+        }
+        assert!(saved(&guide.refined(40)) == saved(&back.refined(40)));
+    }
+}
+
+/// Whatever is taken can be sampled, and learns.
+#[test]
+fn bytes_that_are_no_guide_are_refused() {
+    let bytes = saved(&taught(2, 3000, 0));
+    let mut rng = Rng::new(6);
+    for _ in 0..200 {
+        assert!(read(&bytes[..rng.below(bytes.len())]).is_none());
+    }
+    assert!(read(&[&bytes[..], &[0]].concat()).is_none());
+    let mut refused = 0;
+    for _ in 0..2000 {
+        let mut other = bytes.clone();
+        for _ in 0..1 + rng.below(3) {
+            let place = rng.below(other.len());
+            other[place] = rng.bits() as u8;
+        }
+        let Some(guide) = read(&other) else {
+            refused += 1;
+            continue;
+        };
+        for _ in 0..20 {
+            let (p, direction) = (random_place(&mut rng), rng.direction().as_vec3());
+            if let Some(region) = guide.at(p, direction) {
+                let _ = region.directions.pdf(region.directions.sample(rng.pair()).direction);
+            }
+            guide.record(&Record { n: direction, ..record(p, direction, 1.0) });
+        }
+        let _ = guide.refined(3);
+    }
+    assert!(refused > 100, "{refused}");
 }

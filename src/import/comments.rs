@@ -2,8 +2,8 @@
 
 /// A text without comments.
 pub struct Blanked {
-    /// The text with every comment (and a byte order mark) replaced by spaces, byte by byte; line breaks stay, so that positions in messages
-    /// are right.
+    /// The text with every comment (and a byte order mark) replaced by spaces, byte by byte; line breaks stay, so that
+    /// positions in messages are right.
     pub text: String,
     /// Where a comment begins that never ends.
     pub open_comment: Option<usize>,

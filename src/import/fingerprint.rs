@@ -75,8 +75,8 @@ pub fn scene_fingerprint(imported: &Imported, scene_file: &Path) -> Result<Scene
     Ok(SceneFingerprint::of(scene, assets))
 }
 
-/// The files that a scene is made of beside its own: those that its description names, each with the place, materials and images of OBJ files, and
-/// those that were read to import it. Whether they can be read does not matter.
+/// The files that a scene is made of beside its own: those that its description names, each with the place, materials
+/// and images of OBJ files, and those that were read to import it. Whether they can be read does not matter.
 pub fn files_of_scene(imported: &Imported, scene_file: &Path) -> Vec<(PathBuf, String)> {
     let folder = scene_file.parent().unwrap_or(Path::new(""));
     let mut desc = imported.desc.clone();

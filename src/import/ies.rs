@@ -67,6 +67,24 @@ impl Numbers<'_> {
         }
         Ok(angles)
     }
+
+    fn vertical_angles(&mut self, count: usize) -> Result<Vec<f32>, String> {
+        let vertical = self.angles(count, "vertical angle")?;
+        if vertical[0] < 0.0 || vertical[vertical.len() - 1] > 180.0 {
+            return Err("vertical angles of type C must lie within 0 and 180".into());
+        }
+        Ok(vertical)
+    }
+
+    fn horizontal_angles(&mut self, count: usize) -> Result<Vec<f32>, String> {
+        let horizontal = self.angles(count, "horizontal angle")?;
+        let range = (horizontal[0], horizontal[horizontal.len() - 1]);
+        if ![(0.0, 0.0), (0.0, 90.0), (0.0, 180.0), (0.0, 360.0), (90.0, 270.0)].contains(&range) {
+            let message = "horizontal angles must be 0 alone, or run from 0 to 90, 180 or 360, or from 90 to 270";
+            return Err(format!("{message}, not from {} to {}", range.0, range.1));
+        }
+        Ok(horizontal)
+    }
 }
 
 fn parse(text: &str) -> Result<IesData, String> {
@@ -109,16 +127,7 @@ fn parse(text: &str) -> Result<IesData, String> {
     if vertical_count.saturating_mul(horizontal_count) > MAX_VALUES {
         return Err(format!("{vertical_count} x {horizontal_count} directions are too many"));
     }
-    let vertical = numbers.angles(vertical_count, "vertical angle")?;
-    if vertical[0] < 0.0 || vertical[vertical.len() - 1] > 180.0 {
-        return Err("vertical angles of type C must lie within 0 and 180".into());
-    }
-    let horizontal = numbers.angles(horizontal_count, "horizontal angle")?;
-    let range = (horizontal[0], horizontal[horizontal.len() - 1]);
-    if ![(0.0, 0.0), (0.0, 90.0), (0.0, 180.0), (0.0, 360.0), (90.0, 270.0)].contains(&range) {
-        let message = "horizontal angles must be 0 alone, or run from 0 to 90, 180 or 360, or from 90 to 270";
-        return Err(format!("{message}, not from {} to {}", range.0, range.1));
-    }
+    let (vertical, horizontal) = (numbers.vertical_angles(vertical_count)?, numbers.horizontal_angles(horizontal_count)?);
     let scale = multiplier * ballast * photometric;
     let mut candela = Vec::new();
     for _ in 0..vertical_count * horizontal_count {

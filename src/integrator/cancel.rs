@@ -1,7 +1,7 @@
 //! Giving up a batch under way, so that a render ends soon even where a pass would take hours.
 //!
-//! Passes are short, and a render that is to end finishes the one under way. Only where that takes long are batches given up: their samples are
-//! not added to the film.
+//! Passes are short, and a render that is to end finishes the one under way. Only where that takes long are batches
+//! given up: their samples are not added to the film.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};

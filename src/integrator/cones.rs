@@ -1,21 +1,21 @@
-//! Ray cones: what a path's samples stand for where they look up a texture (Akenine-Möller et al., "Improved Shader and Texture Level of Detail
-//! Using Ray Cones").
+//! Ray cones: what a path's samples stand for where they look up a texture (Akenine-Möller et al., "Improved Shader and
+//! Texture Level of Detail Using Ray Cones").
 //!
-//! A camera ray's cone is as wide as its pixel divided by the root of the samples per pixel: the samples share the pixel, so with more of them
-//! each looks up a smaller part, and the picture converges to that of point lookups. The cone keeps its spread at mirrors and glass, whose
-//! curvature does not count. At all other surfaces it spreads at least as the solid angle `1 / pdf` around the direction that was chosen, again
-//! shared by the samples.
+//! A camera ray's cone is as wide as its pixel divided by the root of the samples per pixel: the samples share the
+//! pixel, so with more of them each looks up a smaller part, and the picture converges to that of point lookups. The
+//! cone keeps its spread at mirrors and glass, whose curvature does not count. At all other surfaces it spreads at
+//! least as the solid angle `1 / pdf` around the direction that was chosen, again shared by the samples.
 
 use std::f32::consts::PI;
 
 use super::World;
 use crate::geometry::{Hit, SurfaceInteraction};
-use crate::math::{Ray, RayCone};
+use crate::math::{Ray, RayCone, Vec3};
 use crate::texture::Footprint;
 
 /// How a picture is divided into samples.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Division {
+pub(super) struct PixelFootprint {
     /// Width and height in pixels.
     size: [u32; 2],
     /// One over the root of the samples per pixel.
@@ -27,15 +27,15 @@ impl World<'_> {
     #[must_use]
     pub fn of_picture(mut self, size: [u32; 2], spp: u32) -> Self {
         self.picture = Some(size);
-        let division = Division { size, share: 1.0 / (spp.max(1) as f32).sqrt() };
-        self.division = self.scene.features.filtered_textures.then_some(division);
+        let pixel_footprint = PixelFootprint { size, share: 1.0 / (spp.max(1) as f32).sqrt() };
+        self.pixel_footprint = self.scene.features.filtered_textures.then_some(pixel_footprint);
         self
     }
 
     /// The cone of a camera ray; `None` if no texture would make use of it.
     #[inline]
     pub(super) fn camera_cone(&self, ray: &Ray) -> Option<RayCone> {
-        let Division { size, share } = self.division?;
+        let PixelFootprint { size, share } = self.pixel_footprint?;
         let RayCone { width, spread } = self.scene.camera.pixel_cone(ray, size);
         Some(RayCone { width: width * share, spread: spread * share })
     }
@@ -44,7 +44,7 @@ impl World<'_> {
     /// (infinite for mirrors and glass).
     #[inline]
     pub(super) fn scattered_cone(&self, cone: RayCone, t: f32, pdf: f32) -> RayCone {
-        scattered(cone, t, pdf, self.division.map_or(0.0, |division| division.share))
+        scattered(cone, t, pdf, self.pixel_footprint.map_or(0.0, |pixel_footprint| pixel_footprint.share))
     }
 
     /// What `ray`, whose hit led to `at`, stands for in uv.
@@ -53,9 +53,13 @@ impl World<'_> {
         // Behind a rounding artefact another surface is met than the hit says.
         let hit = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids());
         let (Some(cone), Some(hit)) = (cone, hit) else { return self.scene.texture_point(at) };
-        let derivatives = self.scene.geometry.uv_derivatives(ray, hit);
-        let footprint = Footprint::of_cone(at.uv, cone.width_at(at.t), ray.direction.dot(at.n_g), derivatives);
-        self.scene.with_attributes(at, footprint)
+        self.covered(cone, ray.direction, at, self.scene.geometry.uv_density(ray, hit))
+    }
+
+    /// What a ray in `direction` stands for in uv at a point of this [density of uv](crate::geometry::Geometry::uv_density).
+    #[inline]
+    pub(super) fn covered(&self, cone: &RayCone, direction: Vec3, at: &SurfaceInteraction, uv_density: f32) -> Footprint<'_> {
+        self.scene.with_attributes(at, Footprint::of_cone(at.uv, cone.width_at(at.t), direction.dot(at.n_g), uv_density))
     }
 }
 

@@ -1,11 +1,11 @@
 //! Views of a scene without light transport, and ambient occlusion.
 
-use super::parts::add_undivided;
-use super::surface::surface_sample;
-use super::{CameraBatch, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
+use super::light_events::add_emission;
+use super::surface::{FirstSurface, surface_sample};
+use super::{CameraBatch, CameraSample, Integrator, PassContext, SurfaceAovs, Workspace, World, dimensions};
 use crate::accel::Coherence;
 use crate::color::Rgb;
-use crate::film::{PartNeeds, PixelSample, SampleBatch};
+use crate::film::{LightAovRequest, PixelSample};
 use crate::geometry::SurfaceInteraction;
 use crate::math::{Frame, Ray, Vec3};
 use crate::sampling::{Sampler, warp};
@@ -56,14 +56,16 @@ pub struct DebugView {
     /// What to show.
     pub view: View,
     /// What the layers need.
-    pub needs: SurfaceNeeds,
+    pub needs: SurfaceAovs,
     /// Which parts of the radiance layers need.
-    pub parts: PartNeeds,
+    pub light_aovs: LightAovRequest,
 }
 
 impl Integrator for DebugView {
-    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts) {
-        for_each_first_surface(world, samples, (self.needs, self.parts), out, counts, |_, _, at| self.view.color(world, at));
+    fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
+        let request = AovRequest { surface: self.needs, light: self.light_aovs };
+        let shade = |_: &CameraSample, _: &Ray, at: &SurfaceInteraction| self.view.color(pass.world, at);
+        for_each_first_surface(pass.world, samples, request, workspace, shade);
     }
 }
 
@@ -74,16 +76,18 @@ pub struct AmbientOcclusion {
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
-    pub needs: SurfaceNeeds,
+    pub needs: SurfaceAovs,
     /// Which parts of the radiance layers need.
-    pub parts: PartNeeds,
+    pub light_aovs: LightAovRequest,
 }
 
 impl Integrator for AmbientOcclusion {
-    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts) {
+    fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
+        let world = pass.world;
         let mut shadow_rays = 0;
         let distance = (f64::from(self.distance) * world.scene.camera.render_space().scale()) as f32;
-        for_each_first_surface(world, samples, (self.needs, self.parts), out, counts, |sample, ray, at| {
+        let request = AovRequest { surface: self.needs, light: self.light_aovs };
+        for_each_first_surface(world, samples, request, workspace, |sample, ray, at| {
             let u = self.sampler.sample_4d(sample.seed, sample.sample, dimensions::bsdf(0));
             let side = if at.n_g.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
             let direction = Frame::from_normal(at.n_s * side).to_world(warp::cosine_hemisphere([u[1], u[2]]));
@@ -93,25 +97,31 @@ impl Integrator for AmbientOcclusion {
             let free = above && !world.accel.occluded(&Ray { t_max: distance, ..at.spawn(direction) });
             Rgb::splat(f32::from(u8::from(free)))
         });
-        counts.shadow += shadow_rays;
+        workspace.counts.shadow += shadow_rays;
     }
 }
 
-/// Traces all camera rays side by side and fills `out` from `shade`, with nothing where a ray leaves the scene.
+/// What layers need beside the radiance of pixels.
+#[derive(Clone, Copy)]
+struct AovRequest {
+    surface: SurfaceAovs,
+    light: LightAovRequest,
+}
+
+/// Traces all camera rays of a batch and sets its values from `shade`, with nothing where a ray leaves the scene.
 fn for_each_first_surface(
     world: &World,
     samples: &CameraBatch,
-    (needs, parts): (SurfaceNeeds, PartNeeds),
-    out: &mut SampleBatch,
-    counts: &mut RayCounts,
+    AovRequest { surface: needs, light: light_aovs }: AovRequest,
+    Workspace { out, counts, .. }: &mut Workspace,
     mut shade: impl FnMut(&CameraSample, &Ray, &SurfaceInteraction) -> Rgb,
 ) {
     let rays: Vec<Ray> = samples.iter().map(|sample| sample.ray).collect();
     let mut hits = vec![None; rays.len()];
     world.accel.intersect_batch(&rays, &mut hits, Coherence::Coherent);
     counts.camera += rays.len() as u64;
-    let wants_surface = needs != SurfaceNeeds::default();
-    out.reset(samples.len(), wants_surface, parts);
+    let wants_surface = needs != SurfaceAovs::default();
+    out.reset(samples.len(), wants_surface, light_aovs);
     for (i, ((sample, ray), hit)) in samples.iter().zip(&rays).zip(hits).enumerate() {
         let sample = &sample;
         let Some(at) = world.resolve(ray, hit) else {
@@ -122,9 +132,10 @@ fn for_each_first_surface(
         };
         let radiance = shade(sample, ray, &at);
         out.pixels[i] = PixelSample { radiance, alpha: 1.0 };
-        add_undivided(parts, out.parts_mut(i), radiance);
+        add_emission(light_aovs, out.light_aovs_mut(i), radiance);
         if wants_surface {
-            out.surfaces[i] = surface_sample(world, needs, &at, (ray, hit.as_ref()), || world.scene.texture_point(&at));
+            out.surfaces[i] =
+                surface_sample(world, needs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || world.scene.texture_point(&at));
         }
     }
 }

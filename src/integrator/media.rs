@@ -5,7 +5,7 @@ use crate::bsdf::Bsdf;
 use crate::color::Rgb;
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::math::{Aabb, Ray, Vec3, vec3};
-use crate::medium::{Interior, RelativeIor, Sides};
+use crate::medium::{BoundaryMedia, MediumStack, RelativeIor};
 use crate::scene::Scene;
 
 /// Surfaces on one straight way, at most; a way along a surface must not go on for ever.
@@ -18,7 +18,7 @@ const PROBE: Vec3 = vec3(0.169_031, 0.961_236, 0.217_947);
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MediaState {
     /// The media that contain its end.
-    pub here: Interior,
+    pub current: MediumStack,
     /// The colour channel that it follows, once dispersion has parted them.
     pub channel: Option<usize>,
     /// If it has arrived at a boundary between media: the index of refraction of the inside over that of the outside.
@@ -39,7 +39,7 @@ pub(super) struct Arrival {
 
 /// A surface between two media.
 struct MediumBoundary {
-    sides: Sides,
+    sides: BoundaryMedia,
     ior: RelativeIor,
 }
 
@@ -69,10 +69,10 @@ impl World<'_> {
     /// The medium's boundary that a ray meets at a surface; `None` where the surface or this point of it is none.
     fn boundary(&self, at: &SurfaceInteraction, direction: Vec3, state: &MediaState) -> Option<MediumBoundary> {
         let medium = self.scene.surface(at.shape).medium?;
-        if !self.scene.met_material(at, direction).transmits() {
+        if !self.scene.met_material(at, direction).flags().transmits() {
             return None;
         }
-        let sides = Sides::new(state.here, medium, direction.dot(at.n_g) < 0.0);
+        let sides = BoundaryMedia::new(state.current, medium, direction.dot(at.n_g) < 0.0);
         Some(MediumBoundary { sides, ior: self.scene.media.relative_ior(&sides, state.channel) })
     }
 
@@ -84,19 +84,19 @@ impl World<'_> {
     }
 
     /// The media beyond a surface, if a path that came along `from` crosses it by going on along `to`; else those it is in.
-    pub(super) fn media_toward(&self, at: &SurfaceInteraction, from: Vec3, to: Vec3, here: &Interior) -> Interior {
+    pub(super) fn media_toward(&self, at: &SurfaceInteraction, from: Vec3, to: Vec3, current: &MediumStack) -> MediumStack {
         match self.scene.surface(at.shape).medium {
             Some(medium) if crosses(at, from, to) => {
                 let is_front = from.dot(at.n_g) < 0.0;
-                Sides::new(*here, medium, is_front).beyond(is_front)
+                BoundaryMedia::new(*current, medium, is_front).beyond(is_front)
             }
-            _ => *here,
+            _ => *current,
         }
     }
 
     /// What is left of the light along a ray that meets nothing on its way, which lies within `here`.
-    pub(super) fn transmittance(&self, here: &Interior, ray: &Ray) -> Rgb {
-        self.scene.media.transmittance(here, (ray.t_max - ray.t_min) * ray.direction.length())
+    pub(super) fn transmittance(&self, current: &MediumStack, ray: &Ray) -> Rgb {
+        self.scene.media.transmittance(current, (ray.t_max - ray.t_min) * ray.direction.length())
     }
 
     /// Follows `ray`, which has found `hit`, through all surfaces where light passes as if there were none.
@@ -106,13 +106,13 @@ impl World<'_> {
         loop {
             let at = self.resolve(ray, hit);
             let distance = at.as_ref().map_or(f32::INFINITY, |at| (at.t - ray.t_min) * ray.direction.length());
-            transmittance *= self.scene.media.transmittance(&state.here, distance);
+            transmittance *= self.scene.media.transmittance(&state.current, distance);
             let boundary = at.as_ref().and_then(|at| self.boundary(at, ray.direction, state));
             let ior = boundary.as_ref().map(|boundary| boundary.ior);
             let (Some(at), Some(boundary), true) = (at, boundary, ior.is_some_and(|ior| ior.is_one()) && passed < MAX_SURFACES) else {
                 return Arrival { hit, transmittance, passed, ior };
             };
-            state.here = boundary.sides.beyond(ray.direction.dot(at.n_g) < 0.0);
+            state.current = boundary.sides.beyond(ray.direction.dot(at.n_g) < 0.0);
             *ray = at.spawn(ray.direction);
             hit = self.accel.intersect(ray);
             passed += 1;
@@ -120,10 +120,10 @@ impl World<'_> {
     }
 
     /// The media around the start of a camera ray, by counting surfaces from there to infinity.
-    pub(super) fn media_at_start(&self, ray: &Ray) -> Interior {
+    pub(super) fn media_at_start(&self, ray: &Ray) -> MediumStack {
         let start = ray.at(ray.t_min);
         if !self.media_bounds.contains(start) {
-            return Interior::default();
+            return MediumStack::default();
         }
         let mut probe = Ray { time: ray.time, ..Ray::new(start, PROBE) };
         let mut crossings = Vec::new();
@@ -137,9 +137,9 @@ impl World<'_> {
             probe = at.spawn(PROBE);
         }
         // On the way back from infinity, where nothing contains anything.
-        crossings
-            .iter()
-            .rev()
-            .fold(Interior::default(), |here, &(medium, entering)| if entering { here.left(medium) } else { here.entered(medium) })
+        crossings.iter().rev().fold(
+            MediumStack::default(),
+            |current, &(medium, entering)| if entering { current.popped(medium) } else { current.pushed(medium) },
+        )
     }
 }

@@ -7,8 +7,8 @@
 mod cancel;
 mod cones;
 mod debug;
+mod light_events;
 mod media;
-mod parts;
 mod path;
 mod regularization;
 mod shading;
@@ -20,22 +20,21 @@ mod world;
 
 pub use cancel::Cancel;
 pub use debug::{AmbientOcclusion, DebugView, View};
+use path::PathBuffers;
 pub use path::PathIntegrator;
 pub use regularization::Regularization;
 pub(crate) use shading::{facing_normal, terminator_factor};
 pub use strategy::Strategy;
-pub use surface::SurfaceNeeds;
+pub use surface::SurfaceAovs;
 pub use whitted::Whitted;
 pub use world::World;
 
-use std::sync::Arc;
-
 use crate::desc::IntegratorDesc;
-use crate::film::{PartNeeds, SampleBatch};
+use crate::film::{LightAovRequest, SampleBatch};
 use crate::guiding::Guide;
 use crate::math::rows::BATCH;
 use crate::math::{Ray, RayRows};
-use crate::sampling::{PixelSeed, Requests, Sampler};
+use crate::sampling::{PixelSeed, SampleIdRows, Sampler};
 
 /// Sets of four dimensions of the sampler, by purpose.
 pub mod dimensions {
@@ -48,7 +47,8 @@ pub mod dimensions {
     /// Choice of a colour (one), where dispersion parts them.
     pub const COLOR: u32 = u32::MAX - 1;
 
-    /// Of path tracing: choice of a light (one, and one for its last digits) and a direction towards it (two), at the vertex with this many bounces before it.
+    /// Of path tracing: choice of a light (one, and one for its last digits) and a direction towards it (two), at the
+    /// vertex with this many bounces before it.
     pub const fn light(bounce: u32) -> u32 {
         1 + 2 * bounce
     }
@@ -83,7 +83,7 @@ pub struct CameraBlock {
     /// The camera rays.
     pub rays: RayRows,
     /// Pixels and indices of the samples.
-    pub requests: Requests,
+    pub requests: SampleIdRows,
 }
 
 impl CameraBatch {
@@ -164,29 +164,46 @@ impl RayCounts {
     }
 }
 
-/// Computes what each camera sample brings.
+/// What all batches of a pass read.
+#[derive(Clone, Copy)]
+pub struct PassContext<'a> {
+    /// The scene with its accelerator.
+    pub world: &'a World<'a>,
+    /// The learned incident radiance, if paths are guided.
+    pub guide: Option<&'a Guide>,
+}
+
+/// The buffers of one thread, reused from batch to batch.
+#[derive(Default)]
+pub struct Workspace {
+    /// The values of the last batch's samples.
+    pub out: SampleBatch,
+    /// The rays of all batches.
+    pub counts: RayCounts,
+    paths: PathBuffers,
+}
+
+/// Estimates the radiance of camera samples.
 pub trait Integrator: Send + Sync {
-    /// Fills `out` with one entry for each of `samples`, and counts rays.
-    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts);
+    /// Sets the workspace's `out` to one entry for each of `samples`, and adds to its `counts`.
+    fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace);
 }
 
 /// What integrators need to know beside their parameters.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 pub struct Setup {
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
-    pub needs: SurfaceNeeds,
+    pub needs: SurfaceAovs,
     /// Which parts of the radiance layers need.
-    pub parts: PartNeeds,
-    /// What a path tracer follows beside the surfaces.
-    pub guide: Option<Arc<Guide>>,
+    pub light_aovs: LightAovRequest,
 }
 
 /// The integrator with these parameters.
 pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
-    let Setup { sampler, needs, parts, guide } = setup;
-    let view = |view| Box::new(DebugView { view, needs, parts }) as Box<dyn Integrator>;
+    let Setup { sampler, needs, light_aovs } = setup;
+    let view = |view| Box::new(DebugView { view, needs, light_aovs }) as Box<dyn Integrator>;
     match *desc {
         IntegratorDesc::Path { max_depth, rr_depth, strategy, clamp, regularize, hide_emitters, .. } => Box::new(PathIntegrator {
             max_depth,
@@ -197,11 +214,10 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
             hide_emitters,
             sampler,
             needs,
-            parts,
-            guide,
+            light_aovs,
         }),
         IntegratorDesc::Whitted { max_depth, ambient, hide_emitters } => {
-            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, sampler, needs, parts })
+            Box::new(Whitted { max_depth, ambient: ambient.into(), hide_emitters, sampler, needs, light_aovs })
         }
         IntegratorDesc::Normal => view(View::Normal),
         IntegratorDesc::ShadingNormal => view(View::ShadingNormal),
@@ -209,7 +225,7 @@ pub fn build(desc: &IntegratorDesc, setup: Setup) -> Box<dyn Integrator> {
         IntegratorDesc::Depth => view(View::Depth),
         IntegratorDesc::PrimitiveId => view(View::PrimitiveId),
         IntegratorDesc::AmbientOcclusion { distance } => {
-            Box::new(AmbientOcclusion { distance: distance.unwrap_or(f32::INFINITY), sampler, needs, parts })
+            Box::new(AmbientOcclusion { distance: distance.unwrap_or(f32::INFINITY), sampler, needs, light_aovs })
         }
     }
 }

@@ -9,9 +9,10 @@ use crate::math::{Ray, Vec3};
 /// The least cosine to the surface that a mirror reflection keeps, unless the incoming direction itself is shallower.
 const LEAST_REFLECTION: f32 = 0.01;
 
-/// The shading normal `n_s`, turned just as far that what is reflected like by a mirror leaves on the side of the geometric normal `n_g` where
-/// it came from (Keller et al., "The Iray Light Transport Simulation and Rendering System", section 4.3). All are unit, `back` points away from
-/// the surface, `n_s` lies in the hemisphere of `n_g`, and so does the result, which `back` sees from the same side as `n_g`.
+/// The shading normal `n_s`, turned just as far that what is reflected like by a mirror leaves on the side of the
+/// geometric normal `n_g` where it came from (Keller et al., "The Iray Light Transport Simulation and Rendering
+/// System", section 4.3). All are unit, `back` points away from the surface, `n_s` lies in the hemisphere of `n_g`, and
+/// so does the result, which `back` sees from the same side as `n_g`.
 #[inline]
 pub fn facing_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
     if is_consistent(back, n_s, n_g) { n_s } else { adapted_normal(back, n_s, n_g) }
@@ -40,9 +41,10 @@ pub fn adapted_normal(back: Vec3, n_s: Vec3, n_g: Vec3) -> Vec3 {
     if half.dot(normal) * side > 0.0 { (half.normalize() * side).as_vec3() } else { n_g }
 }
 
-/// How much of the light from a direction a surface gets whose shading normal sees it better than the surface does: 1 where the surface sees it
-/// at least as well, falling smoothly to 0 where the surface turns away (Chiang, Li and Burley, "Taming the Shadow Terminator"). The
-/// cosines are those of the direction with both normals, on the side that is lit, and of the normals with each other.
+/// How much of the light from a direction a surface gets whose shading normal sees it better than the surface does: 1
+/// where the surface sees it at least as well, falling smoothly to 0 where the surface turns away (Chiang, Li and
+/// Burley, "Taming the Shadow Terminator"). The cosines are those of the direction with both normals, on the side that
+/// is lit, and of the normals with each other.
 #[inline]
 pub fn terminator_factor(cos_geometric: f32, cos_shading: f32, cos_normals: f32) -> f32 {
     let g = cos_geometric / (cos_shading * cos_normals);
@@ -58,17 +60,18 @@ pub fn terminator_factor(cos_geometric: f32, cos_shading: f32, cos_normals: f32)
 /// How far above a facet a ray may start at least, in roundings of its place: a multiple of the distances that rays keep from surfaces.
 const MIN_TERMINATOR_OFFSET: f64 = 256.0;
 
-/// Where rays start that see more than the facet `at` does: above it on the side of the shading normal `n`, on the smooth surface that the facet
-/// stands for, so that the shadow of a coarse mesh has no edges but its own. The second is a ray from the facet to there: if anything occludes it, the
-/// start is not to be used, so that rays get nowhere that rays from the facet cannot get in one step or two. `None` if that surface is not above the
-/// facet, and in scenes with media, for the side of the facet determines the medium.
+/// Where rays start that see more than the facet `at` does: above it on the side of the shading normal `n`, on the
+/// smooth surface that the facet stands for, so that the shadow of a coarse mesh has no edges but its own. The second
+/// is a ray from the facet to there: if anything occludes it, the start is not to be used, so that rays get nowhere
+/// that rays from the facet cannot get in one step or two. `None` if that surface is not above the facet, and in scenes
+/// with media, for the side of the facet determines the medium.
 #[cold]
 #[inline(never)]
 pub fn terminator_start(world: &World, at: &SurfaceInteraction, n: Vec3) -> Option<(SurfaceInteraction, Ray)> {
     if world.scene.features.media {
         return None;
     }
-    let p = world.scene.geometry.raised(at, n)?;
+    let p = world.scene.geometry.terminator_point(at, n)?;
     let offset = p - at.p;
     let rounding = UNIT_ROUNDOFF * at.p.abs().max_element() + f64::from(at.error);
     let on_lit_side = offset.dot(at.n_g.as_dvec3()) * f64::from(n.dot(at.n_g)) > 0.0;

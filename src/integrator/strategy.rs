@@ -1,7 +1,7 @@
 //! How paths find lights.
 
 use crate::desc::StrategyDesc;
-use crate::light::FoundBy;
+use crate::light::MisCompensation;
 
 /// How directions towards lights are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,8 +18,8 @@ pub enum Strategy {
 impl Strategy {
     /// What finds the lights' directions.
     #[inline]
-    pub(super) fn found_by(self) -> FoundBy {
-        if self == Self::Mis { FoundBy::Both } else { FoundBy::Lights }
+    pub(super) fn compensation(self) -> MisCompensation {
+        if self == Self::Mis { MisCompensation::On } else { MisCompensation::Off }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::texture::Footprint;
 
 /// Which parts of [`SurfaceSample`] are wanted; the rest is not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SurfaceNeeds {
+pub struct SurfaceAovs {
     /// Any of depth, normals, position and the shape.
     pub geometry: bool,
     /// Surface parameters.
@@ -23,7 +23,7 @@ pub struct SurfaceNeeds {
 }
 
 /// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator found.
-pub(super) fn place_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInteraction, hit: Option<&Hit>) -> SurfaceSample {
+pub(super) fn place_sample(world: &World, needs: SurfaceAovs, at: &SurfaceInteraction, hit: Option<&Hit>) -> SurfaceSample {
     let mut sample = SurfaceSample::default();
     if needs.geometry {
         sample.depth = world.scene.camera.depth(at.p, at.time);
@@ -41,13 +41,19 @@ pub(super) fn place_sample(world: &World, needs: SurfaceNeeds, at: &SurfaceInter
     sample
 }
 
-/// What the layers need of the first surface, which `ray` meets at `at`, for integrators that follow no mirrors to tell denoisers of what is
-/// behind; `hit` is what the accelerator found.
+/// The first surface of a camera ray.
+pub(super) struct FirstSurface<'a> {
+    pub ray: &'a Ray,
+    /// As the accelerator found it.
+    pub hit: Option<&'a Hit>,
+    pub at: &'a SurfaceInteraction,
+}
+
+/// The AOVs of the first surface, for integrators that do not follow specular paths for denoising features.
 pub(super) fn surface_sample<'f>(
     world: &World,
-    needs: SurfaceNeeds,
-    at: &SurfaceInteraction,
-    (ray, hit): (&Ray, Option<&Hit>),
+    needs: SurfaceAovs,
+    FirstSurface { ray, hit, at }: FirstSurface,
     footprint: impl FnOnce() -> Footprint<'f>,
 ) -> SurfaceSample {
     let mut sample = place_sample(world, needs, at, hit);
@@ -64,7 +70,7 @@ pub(super) fn surface_sample<'f>(
 /// What a surface scatters of the light that goes back along a ray.
 pub(super) fn albedo_at<'f>(world: &World, at: &SurfaceInteraction, ray: &Ray, footprint: impl FnOnce() -> Footprint<'f>) -> Rgb {
     let frame = Frame::from_normal(at.n_s);
-    world.scene.bsdf(at, ray.direction, footprint, &mut None).albedo(frame.to_local(-ray.direction))
+    world.scene.bsdf(at, ray.direction, footprint).albedo(frame.to_local(-ray.direction))
 }
 
 /// Tells of the last surface so far that the sample shows, through mirrors and clear glass that leave `throughput`.

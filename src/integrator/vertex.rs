@@ -1,19 +1,14 @@
 //! A surface point with its scattering, as one path sees it.
 
+use std::borrow::Cow;
+
 use super::World;
 use super::shading::{facing_normal, terminator_factor, terminator_start};
 use crate::bsdf::{Bsdf, BsdfEval};
 use crate::geometry::SurfaceInteraction;
-use crate::light::Receiver;
+use crate::light::LightSampleContext;
 use crate::math::{Frame, Ray, Vec3};
 use crate::texture::Footprint;
-
-/// Reflection into a direction that the facet does not see.
-pub(super) struct RaisedEval {
-    eval: BsdfEval,
-    /// The point above the facet where a ray in that direction starts.
-    start: SurfaceInteraction,
-}
 
 /// Whether two directions are on the same side of a surface: of its shading normal, and of its geometric one.
 #[derive(Clone, Copy)]
@@ -45,7 +40,7 @@ impl HemisphereTest {
 /// A surface point with its scattering and the frame for it.
 pub(super) struct Vertex<'a> {
     pub at: &'a SurfaceInteraction,
-    pub bsdf: &'a Bsdf,
+    pub bsdf: Cow<'a, Bsdf>,
     pub frame: Frame,
     /// The direction back, in the frame.
     pub wo: Vec3,
@@ -56,21 +51,14 @@ pub(super) struct Vertex<'a> {
 }
 
 impl<'a> Vertex<'a> {
-    /// The vertex at `at`, where `ray` arrives, which stands for `footprint`; `bsdf` is the place for scattering that is not the same
-    /// everywhere.
+    /// The vertex at `at`, where `ray` arrives, which stands for `footprint`.
     #[inline(always)]
-    pub fn new(
-        world: &'a World,
-        at: &'a SurfaceInteraction,
-        ray: &Ray,
-        footprint: impl FnOnce() -> Footprint<'a>,
-        bsdf: &'a mut Option<Bsdf>,
-    ) -> Self {
+    pub fn new(world: &'a World, at: &'a SurfaceInteraction, ray: &Ray, footprint: impl FnOnce() -> Footprint<'a>) -> Self {
         let back = -ray.direction;
         let cos_geometric = back.dot(at.n_g);
         let n_s = if world.scene.features.shading_normals { facing_normal(back, at.n_s, at.n_g) } else { at.n_g };
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
-        let bsdf = world.scene.bsdf(at, ray.direction, footprint, bsdf);
+        let bsdf = world.scene.bsdf(at, ray.direction, footprint);
         // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
         let has_relief = world.scene.features.reliefs && world.scene.relief(at, ray.direction).is_some();
         let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
@@ -79,13 +67,14 @@ impl<'a> Vertex<'a> {
 
     /// The point and the side of it that light must reach.
     #[inline]
-    pub fn receiver(&self) -> Receiver {
-        let n = if self.bsdf.transmits() { Vec3::ZERO } else { self.frame.z * 1f32.copysign(self.wo.z) };
-        Receiver { p: self.at.p, n }
+    pub fn light_context(&self) -> LightSampleContext {
+        let n = if self.bsdf.flags().transmits() { Vec3::ZERO } else { self.frame.z * 1f32.copysign(self.wo.z) };
+        LightSampleContext { p: self.at.p, n }
     }
 
-    /// What the surface lets through of light from a direction, beyond its BSDF: nothing where the shading frame and the geometry disagree on
-    /// its side, for it would leak through, and less where only the shading normal sees it well. 1 for most.
+    /// What the surface lets through of light from a direction, beyond its BSDF: nothing where the shading frame and
+    /// the geometry disagree on its side, for it would leak through, and less where only the shading normal sees it
+    /// well. 1 for most.
     #[inline]
     pub fn shadowing(&self, local: Vec3, world: Vec3) -> f32 {
         let cos = world.dot(self.at.n_g);
@@ -110,38 +99,33 @@ impl<'a> Vertex<'a> {
         (!value.is_black()).then(|| BsdfEval { value: value * shadowing, pdf })
     }
 
-    /// What is scattered from a direction, and where a ray in that direction starts: here, or above the facet if that hides it (then in `place`).
+    /// What is scattered from a direction, and where a ray in that direction starts: here, or above the facet if that
+    /// hides it.
     #[inline(always)]
-    pub fn eval_toward<'b>(
-        &'b self,
-        world: &World,
-        direction: Vec3,
-        place: &'b mut Option<RaisedEval>,
-    ) -> Option<(BsdfEval, &'b SurfaceInteraction)> {
-        if let Some(eval) = self.eval(direction) {
-            return Some((eval, self.at));
+    pub fn eval_toward(&self, world: &World, direction: Vec3) -> Option<(BsdfEval, Cow<'a, SurfaceInteraction>)> {
+        match self.eval(direction) {
+            Some(eval) => Some((eval, Cow::Borrowed(self.at))),
+            None => self.eval_raised(world, direction).map(|(eval, start)| (eval, Cow::Owned(start))),
         }
-        *place = self.eval_raised(world, direction);
-        place.as_ref().map(|raised| (raised.eval, &raised.start))
     }
 
     /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other directions, and where
     /// [`terminator_start`] finds no start.
     #[inline]
-    fn eval_raised(&self, world: &World, direction: Vec3) -> Option<RaisedEval> {
-        let start = self.raised(world, direction)?;
-        Some(RaisedEval { eval: self.bsdf.eval(self.wo, self.frame.to_local(direction)), start })
+    fn eval_raised(&self, world: &World, direction: Vec3) -> Option<(BsdfEval, SurfaceInteraction)> {
+        let start = self.terminator_point(world, direction)?;
+        Some((self.bsdf.eval(self.wo, self.frame.to_local(direction)), start))
     }
 
     /// Where a ray starts in a direction that the shading normal sees and the facet does not.
     #[inline]
-    fn raised(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
+    fn terminator_point(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
         let sides = HemisphereTest::new([self.wo.z, direction.dot(self.frame.z)], [self.cos_geometric, direction.dot(self.at.n_g)]);
         // Under a relief, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
-        if !sides.is_below_facet() || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.transmits() {
+        if !sides.is_below_facet() || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.flags().transmits() {
             return None;
         }
-        let (start, way) = terminator_start(world, self.at, self.receiver().n)?;
+        let (start, way) = terminator_start(world, self.at, self.light_context().n)?;
         (!world.accel.occluded(&way)).then_some(start)
     }
 }

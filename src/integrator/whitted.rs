@@ -1,19 +1,21 @@
 //! Whitted's ray tracing: mirror reflection, refraction, direct light of every light and an ambient term ("An Improved Illumination Model
 //! for Shaded Display").
 
+use std::borrow::Cow;
+
+use super::light_events::{LightEvent, LobeWeights, add_by_group, add_by_scattering, group_of};
 use super::media::MediaState;
-use super::parts::{LightEvent, LobeWeights, add_by_group, add_by_scattering, group_of};
-use super::surface::surface_sample;
+use super::surface::{FirstSurface, surface_sample};
 use super::vertex::Vertex;
-use super::{CameraBatch, CameraSample, Integrator, RayCounts, SurfaceNeeds, World, dimensions};
+use super::{CameraBatch, CameraSample, Integrator, PassContext, RayCounts, SurfaceAovs, Workspace, World, dimensions};
 use crate::color::Rgb;
-use crate::film::{PartNeeds, PixelSample, SampleBatch, SurfaceSample};
+use crate::film::{LightAovRequest, PixelSample, SurfaceSample};
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::id::LightId;
-use crate::light::FoundBy;
+use crate::light::MisCompensation;
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::{Ray, RayCone};
-use crate::medium::Interior;
+use crate::math::{Ray, RayCone, Vec3};
+use crate::medium::MediumStack;
 use crate::sampling::Sampler;
 use crate::texture::Footprint;
 
@@ -30,31 +32,32 @@ pub struct Whitted {
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// What the layers need.
-    pub needs: SurfaceNeeds,
+    pub needs: SurfaceAovs,
     /// Which parts of the radiance layers need.
-    pub parts: PartNeeds,
+    pub light_aovs: LightAovRequest,
 }
 
 impl Integrator for Whitted {
-    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts) {
+    fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
+        let (world, Workspace { out, counts, .. }) = (pass.world, workspace);
         counts.camera += samples.len() as u64;
-        let wants_surface = self.needs != SurfaceNeeds::default();
-        out.reset(samples.len(), wants_surface, self.parts);
+        let wants_surface = self.needs != SurfaceAovs::default();
+        out.reset(samples.len(), wants_surface, self.light_aovs);
         for (i, sample) in samples.iter().enumerate() {
             let sample = &sample;
             let in_media = world.scene.features.media;
-            let here = if in_media { world.media_at_start(&sample.ray) } else { Interior::default() };
+            let current = if in_media { world.media_at_start(&sample.ray) } else { MediumStack::default() };
             let mut ray = sample.ray;
             if self.hide_emitters {
-                let mut hit = world.accel.intersect(&ray);
-                counts.camera += 1 + world.pass_emitters(&mut ray, &mut hit);
+                let hit = world.accel.intersect(&ray);
+                counts.camera += 1 + world.skip_emitters(&mut ray, hit).1;
             }
-            let segment = Segment::trace(world, ray, world.camera_cone(&ray), here, counts);
+            let segment = Segment::trace(world, ray, world.camera_cone(&ray), current, counts);
             if wants_surface {
                 out.surfaces[i] = match &segment.end {
                     Some(at) => {
-                        let met = (&segment.ray, segment.hit.as_ref());
-                        surface_sample(world, self.needs, at, met, || segment.footprint(world, at))
+                        let first = FirstSurface { ray: &segment.ray, hit: segment.hit.as_ref(), at };
+                        surface_sample(world, self.needs, first, || segment.footprint(world, at))
                     }
                     None if self.needs.motion => {
                         SurfaceSample { motion: world.motion_at_infinity(segment.ray.direction).to_array(), ..SurfaceSample::default() }
@@ -62,7 +65,7 @@ impl Integrator for Whitted {
                     None => SurfaceSample::default(),
                 };
             }
-            let mut tally = Tally { needs: self.parts, parts: out.parts_mut(i), rays: counts, sample, light_samples: 0 };
+            let mut tally = Tally { needs: self.light_aovs, light_aovs: out.light_aovs_mut(i), rays: counts, sample, light_samples: 0 };
             let view = View { depth: 1, throughput: segment.transmittance, way: None };
             out.pixels[i] = match &segment.end {
                 Some(at) => PixelSample { radiance: self.shade(world, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
@@ -100,8 +103,8 @@ impl View {
 
 /// A camera sample, and what is counted of it beside its radiance.
 struct Tally<'a> {
-    needs: PartNeeds,
-    parts: &'a mut [Rgb],
+    needs: LightAovRequest,
+    light_aovs: &'a mut [Rgb],
     rays: &'a mut RayCounts,
     sample: &'a CameraSample,
     /// How many times a light was sampled.
@@ -115,9 +118,9 @@ impl Tally<'_> {
 
     /// Adds light at the camera; that of no light is in the last group.
     fn add(&mut self, world: &World, light: Rgb, course: LightEvent, source: Option<LightId>) {
-        add_by_scattering(self.needs, self.parts, light, course);
+        add_by_scattering(self.needs, self.light_aovs, light, course);
         let group = source.map_or(self.needs.light_groups.saturating_sub(1) as usize, |id| group_of(world.scene, id));
-        add_by_group(self.needs, self.parts, light, group);
+        add_by_group(self.needs, self.light_aovs, light, group);
     }
 }
 
@@ -137,8 +140,8 @@ struct Segment {
 
 impl Segment {
     /// Traces a ray that starts within the media `here`.
-    fn trace(world: &World, mut ray: Ray, cone: Option<RayCone>, here: Interior, counts: &mut RayCounts) -> Self {
-        let mut media = MediaState { here, ..MediaState::default() };
+    fn trace(world: &World, mut ray: Ray, cone: Option<RayCone>, current: MediumStack, counts: &mut RayCounts) -> Self {
+        let mut media = MediaState { current, ..MediaState::default() };
         let hit = world.accel.intersect(&ray);
         if !world.scene.features.media {
             return Self { ray, cone, hit, end: world.resolve(&ray, hit), media, transmittance: Rgb::WHITE };
@@ -161,7 +164,7 @@ impl Segment {
     fn escaped(&self, world: &World, view: View, tally: &mut Tally) -> Rgb {
         if tally.sorts() {
             for &id in world.scene.lights.at_infinity() {
-                let light = world.scene.lights.get(id).eval_at_infinity(self.ray.direction, FoundBy::Lights).radiance;
+                let light = world.scene.lights.get(id).eval_infinite(self.ray.direction, MisCompensation::Off).radiance;
                 let course = view.course(0, LightEvent::Environment);
                 tally.add(world, view.throughput * light * self.transmittance, course, Some(id));
             }
@@ -182,20 +185,24 @@ impl Whitted {
         if view.depth >= self.max_depth || world.gives_up() {
             return radiance;
         }
-        let mut bsdf = None;
         let boundary = world.boundary_bsdf(at, ray.direction, media);
-        let mut vertex = Vertex::new(world, at, ray, || segment.footprint(world, at), &mut bsdf);
-        if let Some(boundary) = &boundary {
-            vertex.bsdf = boundary;
+        let mut vertex = Vertex::new(world, at, ray, || segment.footprint(world, at));
+        if let Some(boundary) = boundary {
+            vertex.bsdf = Cow::Owned(boundary);
         }
-        if !vertex.bsdf.is_delta() {
+        if !vertex.bsdf.flags().is_delta() {
             let ambient = self.ambient * vertex.bsdf.albedo(vertex.wo);
             radiance += ambient;
             if tally.sorts() {
                 tally.add(world, view.throughput * ambient, view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE)), None);
             }
             for id in (0..world.scene.lights.lights().len()).map(LightId::new) {
-                radiance += self.direct_light(world, segment, &vertex, id, view, tally);
+                let Some((light, wi)) = self.direct_light(world, segment, &vertex, id, tally) else { continue };
+                radiance += light;
+                if tally.sorts() {
+                    let way = LobeWeights::between(&vertex.bsdf, vertex.wo, vertex.frame.to_local(wi));
+                    tally.add(world, view.throughput * light, view.course(1, LightEvent::Direct(way)), Some(id));
+                }
             }
         }
 
@@ -209,9 +216,9 @@ impl Whitted {
                 continue;
             }
             tally.rays.indirect += 1;
-            let here = world.media_toward(at, ray.direction, direction, &media.here);
-            let next = Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), here, tally.rays);
-            let way = view.way.unwrap_or_else(|| LobeWeights::of_sample(vertex.bsdf, vertex.wo, &lobe));
+            let current = world.media_toward(at, ray.direction, direction, &media.current);
+            let next = Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), current, tally.rays);
+            let way = view.way.unwrap_or_else(|| LobeWeights::of_sample(&vertex.bsdf, vertex.wo, &lobe));
             let behind = View { depth: view.depth + 1, throughput: view.throughput * lobe.weight * lobe.pdf, way: Some(way) };
             let arriving = match &next.end {
                 Some(end) => {
@@ -225,34 +232,24 @@ impl Whitted {
         radiance
     }
 
-    /// Light that arrives from one light along a sampled direction and is scattered back.
-    fn direct_light(&self, world: &World, segment: &Segment, vertex: &Vertex, id: LightId, view: View, tally: &mut Tally) -> Rgb {
+    /// Light that arrives from one light along a sampled direction and is scattered back, with that direction.
+    fn direct_light(&self, world: &World, segment: &Segment, vertex: &Vertex, id: LightId, tally: &mut Tally) -> Option<(Rgb, Vec3)> {
         let set = dimensions::light(0).wrapping_add(tally.light_samples);
         tally.light_samples = tally.light_samples.wrapping_add(1);
         let [u, v, ..] = self.sampler.sample_4d(tally.sample.seed, tally.sample.sample, set);
         let (at, light) = (vertex.at, world.scene.lights.get(id));
-        let Some(sample) = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [u, v], FoundBy::Lights) else {
-            return Rgb::BLACK;
-        };
-        let mut raised = None;
-        let Some((eval, start)) = vertex.eval_toward(world, sample.wi, &mut raised) else {
-            return Rgb::BLACK;
-        };
+        let sample = light.sample(&world.scene.geometry, &world.scene.textures, at.p, [u, v], MisCompensation::Off)?;
+        let (eval, start) = vertex.eval_toward(world, sample.wi)?;
         let scattered = eval.value * sample.radiance / sample.pdf;
         if scattered.is_black() {
-            return scattered;
+            return None;
         }
         tally.rays.shadow += 1;
-        let shadow = sample.shadow_ray(start);
+        let shadow = sample.shadow_ray(&start);
         if world.accel.occluded(&shadow) {
-            return Rgb::BLACK;
+            return None;
         }
-        let here = world.media_toward(at, segment.ray.direction, shadow.direction, &segment.media.here);
-        let light = scattered * world.transmittance(&here, &shadow);
-        if tally.sorts() {
-            let way = LobeWeights::between(vertex.bsdf, vertex.wo, vertex.frame.to_local(sample.wi));
-            tally.add(world, view.throughput * light, view.course(1, LightEvent::Direct(way)), Some(id));
-        }
-        light
+        let current = world.media_toward(at, segment.ray.direction, shadow.direction, &segment.media.current);
+        Some((scattered * world.transmittance(&current, &shadow), sample.wi))
     }
 }

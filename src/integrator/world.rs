@@ -1,16 +1,16 @@
 //! A scene with its accelerator: rays in, surface interactions out.
 
 use super::cancel::Cancel;
-use super::cones::Division;
+use super::cones::PixelFootprint;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
-use crate::geometry::{Analytic, Detail, Hit, Shape, SurfaceInteraction};
+use crate::geometry::{Analytic, Detail, Hit, Mesh, Shape, SurfaceInteraction};
 use crate::id::{MaterialId, ShapeId};
-use crate::light::{FoundBy, Light};
+use crate::light::{Light, MisCompensation};
 use crate::material::Material;
 use crate::math::float::step_past;
 use crate::math::rows::BATCH;
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 use crate::math::{Aabb, Ray, RayRows, Vec3};
 use crate::scene::{Scene, Surface};
 
@@ -29,10 +29,10 @@ pub struct World<'a> {
     bounds: Aabb,
     /// Squared distance from the bounds up to which rays may start.
     reach_squared: f32,
-    /// By shape: whether nothing depends on its uv and tangents.
-    skips_parameters: Vec<bool>,
-    /// Of pictures of scenes with [filtered textures](crate::scene::Features::filtered_textures).
-    pub(super) division: Option<Division>,
+    /// By shape: what depends on its parametrisation.
+    parametrization: Vec<Parametrization>,
+    /// Of pictures of scenes with [filtered textures](crate::scene::SceneFeatures::filtered_textures).
+    pub(super) pixel_footprint: Option<PixelFootprint>,
     /// Around all surfaces of media.
     pub(super) media_bounds: Aabb,
     /// Width and height of the picture in pixels, if it is part of one.
@@ -51,8 +51,8 @@ impl<'a> World<'a> {
             accel,
             bounds,
             reach_squared: bounds.size().max_element().powi(2),
-            skips_parameters: shapes_without_parameters(scene),
-            division: None,
+            parametrization: parametrization(scene),
+            pixel_footprint: None,
             media_bounds: super::media::bounds(scene),
             picture: None,
             shows_background: true,
@@ -91,27 +91,37 @@ impl<'a> World<'a> {
     /// How much of interactions with a shape is computed.
     #[inline]
     pub(super) fn detail(&self, shape: ShapeId) -> Detail {
-        if self.skips_parameters[shape.index()] { Detail::Place } else { Detail::Full }
+        if self.parametrization[shape.index()] == Parametrization::Unused { Detail::Place } else { Detail::Full }
     }
 
-    /// Whether a shape is a mesh at rest of whose hits nothing but the point and the normals is needed.
-    #[inline]
-    pub(super) fn is_plain_mesh(&self, shape: ShapeId) -> bool {
-        self.skips_parameters[shape.index()] && matches!(self.scene.geometry.shape(shape), Shape::Mesh(mesh) if !mesh.is_deforming())
+    /// The shape if it is a mesh at rest of whose hits nothing but the point, the normals and perhaps uv is needed.
+    #[inline(always)]
+    pub(super) fn mesh_without_tangents(&self, shape: ShapeId) -> Option<&'a Mesh> {
+        match self.scene.geometry.shape(shape) {
+            Shape::Mesh(mesh) if !mesh.is_deforming() && self.parametrization[shape.index()] != Parametrization::Full => Some(mesh),
+            _ => None,
+        }
     }
 
-    /// Whether a shape is analytic and [`Placed::resolve_rows`](crate::geometry::Placed::resolve_rows) finds all that is needed of its hits.
+    /// Whether anything depends on the uv of a shape.
+    #[inline(always)]
+    pub(super) fn uses_uv(&self, shape: ShapeId) -> bool {
+        self.parametrization[shape.index()] != Parametrization::Unused
+    }
+
+    /// Whether a shape is analytic and [`Placed::resolve_rows`](crate::geometry::Placed::resolve_rows) finds all that
+    /// is needed of its hits.
     #[inline]
     pub(super) fn resolves_in_rows(&self, shape: ShapeId) -> bool {
         match self.scene.geometry.shape(shape) {
-            Shape::Analytic(placed) => self.skips_parameters[shape.index()] || matches!(placed.shape, Analytic::Quad(_)),
+            Shape::Analytic(placed) => !self.uses_uv(shape) || matches!(placed.shape, Analytic::Quad(_)),
             Shape::Mesh(_) => false,
         }
     }
 
     /// With the parametrisation of every surface, whether or not the scene needs it.
     pub fn in_full(self) -> Self {
-        Self { skips_parameters: vec![false; self.skips_parameters.len()], ..self }
+        Self { parametrization: vec![Parametrization::Full; self.parametrization.len()], ..self }
     }
 
     /// The surface that a ray meets first.
@@ -133,17 +143,18 @@ impl<'a> World<'a> {
         at
     }
 
-    /// Lets `ray`, which has found `hit`, start behind the emitters that it meets first; says how many rays that took.
-    pub(super) fn pass_emitters(&self, ray: &mut Ray, hit: &mut Option<Hit>) -> u64 {
+    /// Lets `ray`, which has found `hit`, start behind the emitters that it meets first. The result is its new hit and
+    /// the number of rays traced.
+    pub(super) fn skip_emitters(&self, ray: &mut Ray, mut hit: Option<Hit>) -> (Option<Hit>, u64) {
         let emits = |at: &SurfaceInteraction| self.scene.surface(at.shape).light(at.prim).is_some();
         for passed in 0..MAX_EMITTERS {
-            let Some(at) = self.resolve(ray, *hit).filter(emits) else {
-                return passed;
+            let Some(at) = self.resolve(ray, hit).filter(emits) else {
+                return (hit, passed);
             };
             ray.t_min = step_past(at.t.max(ray.t_min));
-            *hit = self.accel.intersect(ray);
+            hit = self.accel.intersect(ray);
         }
-        MAX_EMITTERS
+        (hit, MAX_EMITTERS)
     }
 
     /// With the shading normal that the surface's relief gives, if it has one.
@@ -183,63 +194,65 @@ impl<'a> World<'a> {
             .lights
             .at_infinity()
             .iter()
-            .fold(Rgb::BLACK, |sum, &id| sum + self.scene.lights.get(id).eval_at_infinity(direction, FoundBy::Lights).radiance)
+            .fold(Rgb::BLACK, |sum, &id| sum + self.scene.lights.get(id).eval_infinite(direction, MisCompensation::Off).radiance)
     }
 
-    /// Moves camera rays that start far outside the scene along themselves (in `f64`) to just before the scene's box: accelerators compute in `f32` and
-    /// lose as many digits as the origin is far away.
-    pub fn approach(&self, rays: &mut RayRows, count: usize) {
-        vectorize(Approach { bounds: self.bounds, reach_squared: self.reach_squared, rays, count });
-    }
-}
-
-struct Approach<'a> {
-    bounds: Aabb,
-    reach_squared: f32,
-    rays: &'a mut RayRows,
-    count: usize,
-}
-
-impl Kernel for Approach<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { bounds, reach_squared, rays, count } = self;
-        let extent = bounds.size().max_element();
-        for i in 0..count.min(BATCH) {
-            let origin = rays.origin.get(i);
-            let nearest = origin.max(bounds.min).min(bounds.max);
-            let gap_squared = (nearest - origin).length_squared();
-            let gap = gap_squared.sqrt();
-            // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
-            let is_far = (gap_squared > reach_squared) & (gap > extent) & (gap < f32::INFINITY);
-            let (o, d) = (origin.as_dvec3(), rays.direction.get(i).as_dvec3());
-            let moved = (o + d * (f64::from(gap - 0.5 * extent) / d.length())).as_vec3();
-            let choose = |a: f32, b: f32| if is_far { a } else { b };
-            rays.origin.set(i, Vec3::new(choose(moved.x, origin.x), choose(moved.y, origin.y), choose(moved.z, origin.z)));
-        }
+    /// Moves camera rays that start far outside the scene along themselves (in `f64`) to just before the scene's box:
+    /// accelerators compute in `f32` and lose as many digits as the origin is far away.
+    pub fn clip_to_scene(&self, rays: &mut RayRows, count: usize) {
+        vectorize!(clip_to_scene(self.bounds, self.reach_squared, rays, count));
     }
 }
 
-/// By shape, whether nothing depends on its uv and tangents.
-fn shapes_without_parameters(scene: &Scene) -> Vec<bool> {
-    let suffices = |surface: &Surface| {
+#[inline(always)]
+fn clip_to_scene(bounds: Aabb, reach_squared: f32, rays: &mut RayRows, count: usize) {
+    let extent = bounds.size().max_element();
+    for i in 0..count.min(BATCH) {
+        let origin = rays.origin.get(i);
+        let nearest = origin.max(bounds.min).min(bounds.max);
+        let gap_squared = (nearest - origin).length_squared();
+        let gap = gap_squared.sqrt();
+        // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
+        let is_far = (gap_squared > reach_squared) & (gap > extent) & (gap < f32::INFINITY);
+        let (o, d) = (origin.as_dvec3(), rays.direction.get(i).as_dvec3());
+        let moved = (o + d * (f64::from(gap - 0.5 * extent) / d.length())).as_vec3();
+        let choose = |a: f32, b: f32| if is_far { a } else { b };
+        rays.origin.set(i, Vec3::new(choose(moved.x, origin.x), choose(moved.y, origin.y), choose(moved.z, origin.z)));
+    }
+}
+
+/// What depends on a shape's parametrisation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Parametrization {
+    /// Nothing.
+    Unused,
+    /// What is looked up by uv.
+    Uv,
+    /// Directions in the tangent plane, too.
+    Full,
+}
+
+/// By shape, what depends on its parametrisation.
+fn parametrization(scene: &Scene) -> Vec<Parametrization> {
+    let of = |surface: &Surface| {
         let emits_evenly = surface.first_light.is_none_or(|id| match scene.lights.get(id) {
             Light::Area(light) => light.emission.texture.is_none() && light.emission.opacity.is_none(),
             _ => false,
         });
         let has_relief = surface.relief.is_some() || !scene.part_reliefs.is_empty();
-        !has_relief && emits_evenly && is_uniform(scene, surface.material)
+        if has_relief || has_part(scene, surface.material, |material| material.flags().is_anisotropic()) {
+            Parametrization::Full
+        } else if emits_evenly && !has_part(scene, surface.material, Material::is_textured) {
+            Parametrization::Unused
+        } else {
+            Parametrization::Uv
+        }
     };
-    scene.surfaces.iter().map(|surface| !scene.features.parameters || suffices(surface)).collect()
+    scene.surfaces.iter().map(|surface| if scene.features.parameters { of(surface) } else { Parametrization::Unused }).collect()
 }
 
-/// Whether a material scatters alike at all points and in all directions of the tangent plane.
-fn is_uniform(scene: &Scene, id: MaterialId) -> bool {
-    match &scene.materials[id.index()] {
-        Material::Constant(bsdf) => !bsdf.is_anisotropic(),
-        Material::TwoSided { front, back } => [*front, *back].into_iter().all(|id| is_uniform(scene, id)),
-        Material::Varying(_) | Material::Mix { .. } => false,
-    }
+/// Whether a material or one of those that it consists of has a property.
+fn has_part(scene: &Scene, id: MaterialId, has: fn(&Material) -> bool) -> bool {
+    let material = &scene.materials[id.index()];
+    has(material) || material.parts().is_some_and(|parts| parts.into_iter().any(|part| has_part(scene, part, has)))
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::{InfinityEval, LightSample, ShadowTarget};
+use super::{InfiniteLightEval, LightSample, ShadowTarget};
 use crate::color::Rgb;
 use crate::math::{DVec3, Frame, Vec3, unit_circle};
 
@@ -68,13 +68,13 @@ impl DirectionalLight {
 
     /// Radiance arriving along the unit direction `wi` at a ray that leaves the scene, with the density of `sample`; zero for a delta.
     #[inline]
-    pub fn eval(&self, wi: Vec3) -> InfinityEval {
+    pub fn eval(&self, wi: Vec3) -> InfiniteLightEval {
         match &self.disk {
             // A chord keeps its digits where the cosine of a small angle has none left.
             Some(disk) if (wi - self.frame.z).length_squared() <= disk.chord_squared => {
-                InfinityEval { radiance: disk.radiance, pdf: disk.pdf }
+                InfiniteLightEval { radiance: disk.radiance, pdf: disk.pdf }
             }
-            _ => InfinityEval::default(),
+            _ => InfiniteLightEval::default(),
         }
     }
 
@@ -93,7 +93,7 @@ mod tests {
         let light = DirectionalLight::new(DVec3::new(0.0, -3.0, 0.0), Rgb::WHITE, 0.0);
         let s = light.sample([0.3, 0.7]).unwrap();
         assert!(light.is_delta() && s.is_delta && s.pdf == 1.0 && s.wi == Vec3::Y && s.radiance == Rgb::WHITE);
-        assert_eq!(light.eval(Vec3::Y), InfinityEval::default());
+        assert_eq!(light.eval(Vec3::Y), InfiniteLightEval::default());
     }
 
     #[test]
@@ -107,7 +107,7 @@ mod tests {
                 let s = light.sample([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32]).unwrap();
                 let cos = s.wi.as_dvec3().dot(-direction.normalize());
                 irradiance += f64::from(s.radiance.g) * cos / f64::from(s.pdf);
-                inside += usize::from(light.eval(s.wi) == InfinityEval { radiance: s.radiance, pdf: s.pdf });
+                inside += usize::from(light.eval(s.wi) == InfiniteLightEval { radiance: s.radiance, pdf: s.pdf });
             }
             irradiance /= f64::from(n * n);
             assert!((irradiance / 2.0 - 1.0).abs() < 1e-4, "{degrees}: {irradiance}");
@@ -120,7 +120,7 @@ mod tests {
     fn nothing_arrives_from_outside_the_disk() {
         let light = DirectionalLight::new(-DVec3::Z, Rgb::WHITE, 0.02);
         for (angle, lit) in [(0.0f32, true), (0.0099, true), (0.0101, false), (1.0, false), (3.1, false)] {
-            let InfinityEval { radiance, pdf } = light.eval(Vec3::new(0.0, angle.sin(), angle.cos()));
+            let InfiniteLightEval { radiance, pdf } = light.eval(Vec3::new(0.0, angle.sin(), angle.cos()));
             assert!((pdf > 0.0) == lit && radiance.is_black() != lit, "{angle}");
         }
     }

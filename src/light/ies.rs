@@ -29,8 +29,9 @@ struct Bracket {
 }
 
 impl IesProfile {
-    /// A table as in photometric files of type C: horizontal angles are a single 0 (the same all around), from 0 to 90 or 180 (mirrored), from
-    /// 0 to 360, or from 90 to 270 (mirrored); `intensity` has a value for each vertical angle, one horizontal angle after another.
+    /// A table as in photometric files of type C: horizontal angles are a single 0 (the same all around), from 0 to 90
+    /// or 180 (mirrored), from 0 to 360, or from 90 to 270 (mirrored); `intensity` has a value for each vertical angle,
+    /// one horizontal angle after another.
     ///
     /// `None` if the numbers do not make a table.
     pub fn new(vertical: Vec<f32>, horizontal: Vec<f32>, intensity: Vec<f32>) -> Option<Self> {
@@ -141,8 +142,9 @@ pub struct IesLight {
 }
 
 impl IesLight {
-    /// A light whose nadir points along `nadir` (any length but zero), turned about it by `rotation` radians. Without a turn, the angle 0 is
-    /// the direction towards +X (+Y if the nadir lies along X), and the angle grows counter-clockwise for one who looks along the nadir.
+    /// A light whose nadir points along `nadir` (any length but zero), turned about it by `rotation` radians. Without a
+    /// turn, the angle 0 is the direction towards +X (+Y if the nadir lies along X), and the angle grows
+    /// counter-clockwise for one who looks along the nadir.
     ///
     /// The intensity is `intensity` times that of the profile.
     pub fn new(position: DVec3, nadir: DVec3, rotation: f64, intensity: Rgb, profile: Arc<IesProfile>) -> Self {
@@ -253,7 +255,8 @@ mod tests {
 
     #[test]
     fn a_hanging_light_turns_counter_clockwise_seen_from_above() {
-        // Only towards the angle 90 from 0: without a turn 0 is +X, and counter-clockwise from above (with +X to the right, +Z towards us) is -Z.
+        // Only towards the angle 90 from 0: without a turn 0 is +X, and counter-clockwise from above (with +X to the
+        // right, +Z towards us) is -Z.
         let table = Arc::new(profile(&[0.0, 180.0], &[0.0, 45.0, 90.0, 135.0, 360.0], &[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]));
         let lit = |rotation: f64, p: DVec3| {
             let light = IesLight::new(DVec3::ZERO, -DVec3::Y, rotation, Rgb::WHITE, table.clone());

@@ -21,11 +21,11 @@ pub use environment::{Environment, EnvironmentMap, EnvironmentMapError, Environm
 pub use groups::LightGroups;
 pub use ies::{IesLight, IesProfile};
 pub use point::PointLight;
-pub use projector::{Projection, Projector};
+pub use projector::{Projector, TextureProjection};
 pub use queue::{LightContext, LightQueries, LightQueue, LightSampleRows, light_target};
 pub use set::{LightChoice, LightSelection, LightSet};
 pub use spot::SpotLight;
-pub use tree::Receiver;
+pub use tree::LightSampleContext;
 
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint, SurfaceInteraction};
@@ -53,19 +53,19 @@ pub enum Light {
     Environment(Environment),
 }
 
-/// What finds the light of a scene. Where sampling the BSDF finds every direction, sampling lights need not: it had better look where there
-/// is more light than elsewhere.
+/// Whether the densities of environments are lowered for combination with BSDF sampling, which finds every direction:
+/// light sampling is then concentrated where there is more light than elsewhere (Karlík et al., "MIS Compensation").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FoundBy {
-    /// Sampling lights alone.
-    Lights,
-    /// Sampling lights and sampling the BSDF, combined.
-    Both,
+pub enum MisCompensation {
+    /// For light sampling alone.
+    Off,
+    /// For light sampling combined with BSDF sampling.
+    On,
 }
 
 /// Light from infinity along a direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct InfinityEval {
+pub struct InfiniteLightEval {
     /// Radiance arriving.
     pub radiance: Rgb,
     /// Density per solid angle with which the light's `sample` chooses the direction.
@@ -73,8 +73,8 @@ pub struct InfinityEval {
 }
 
 soa! {
-    /// As [`InfinityEval`].
-    pub struct InfinityEvalRows {
+    /// As [`InfiniteLightEval`].
+    pub struct InfiniteLightEvalRows {
         /// Radiance arriving.
         radiance: Rgb,
         /// Density per solid angle.
@@ -109,7 +109,7 @@ pub struct LightSample {
 impl LightSample {
     /// Light from infinity.
     #[inline(always)]
-    fn far_away(wi: Vec3, radiance: Rgb, pdf: f32) -> Self {
+    fn infinite_sample(wi: Vec3, radiance: Rgb, pdf: f32) -> Self {
         Self { wi, radiance, pdf, is_delta: false, target: ShadowTarget::Infinity }
     }
 }
@@ -138,11 +138,11 @@ impl Light {
     /// Light that arrives along the unit direction `wi` at a ray that leaves the scene, with the density of sampling it; nothing from
     /// lights that such rays cannot see.
     #[inline]
-    pub fn eval_at_infinity(&self, wi: Vec3, found_by: FoundBy) -> InfinityEval {
+    pub fn eval_infinite(&self, wi: Vec3, compensation: MisCompensation) -> InfiniteLightEval {
         match self {
-            Self::Environment(light) => light.eval(wi, found_by),
+            Self::Environment(light) => light.eval(wi, compensation),
             Self::Directional(light) => light.eval(wi),
-            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Projector(_) | Self::Ies(_) => InfinityEval::default(),
+            Self::Area(_) | Self::Point(_) | Self::Spot(_) | Self::Projector(_) | Self::Ies(_) => InfiniteLightEval::default(),
         }
     }
 
@@ -153,7 +153,14 @@ impl Light {
 
     /// Light that arrives at `p` from a chosen direction, `u` in the unit square; `None` where nothing can arrive.
     #[inline]
-    pub fn sample(&self, geometry: &Geometry, textures: &[Texture], p: DVec3, u: [f32; 2], found_by: FoundBy) -> Option<LightSample> {
+    pub fn sample(
+        &self,
+        geometry: &Geometry,
+        textures: &[Texture],
+        p: DVec3,
+        u: [f32; 2],
+        compensation: MisCompensation,
+    ) -> Option<LightSample> {
         match self {
             Self::Area(light) => light.sample(geometry, textures, p, u),
             Self::Point(light) => light.sample(p),
@@ -161,7 +168,7 @@ impl Light {
             Self::Projector(light) => light.sample(textures, p),
             Self::Ies(light) => light.sample(p),
             Self::Directional(light) => light.sample(u),
-            Self::Environment(light) => light.sample(u, found_by),
+            Self::Environment(light) => light.sample(u, compensation),
         }
     }
 
@@ -191,9 +198,9 @@ impl Light {
     }
 
     /// The part of [`power`](Self::power) that sampling this light is to find.
-    fn sampled_power(&self, scene_radius: f64, found_by: FoundBy) -> f64 {
+    fn sampled_power(&self, scene_radius: f64, compensation: MisCompensation) -> f64 {
         match self {
-            Self::Environment(light) => light.sampled_power(scene_radius, found_by),
+            Self::Environment(light) => light.sampled_power(scene_radius, compensation),
             _ => self.power(scene_radius),
         }
     }

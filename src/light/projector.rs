@@ -12,7 +12,7 @@ const LOOKUPS: u32 = 192;
 
 /// A texture in perspective: uv are those of a rectangle across an axis.
 #[derive(Clone, Copy, Debug)]
-pub struct Projection {
+pub struct TextureProjection {
     /// The texture; white without one.
     texture: Option<TextureId>,
     /// Unit vectors along u and along v, perpendicular to the axis.
@@ -22,17 +22,17 @@ pub struct Projection {
     half: Vec2,
 }
 
-impl Projection {
-    /// The texture over angles whose halves have the tangents `half` (above 0), about `axis` (any length but zero). u grows to the right and v
-    /// upward for one who looks along the axis; `up` is any direction but those of the axis.
+impl TextureProjection {
+    /// The texture over angles whose halves have the tangents `half` (above 0), about `axis` (any length but zero). u
+    /// grows to the right and v upward for one who looks along the axis; `up` is any direction but those of the axis.
     pub fn new(texture: Option<TextureId>, axis: DVec3, up: DVec3, half: Vec2) -> Self {
         let axis = axis.normalize_or_zero();
         let right = axis.cross(up).try_normalize().unwrap_or_else(|| axis.any_orthonormal_vector());
         Self { texture, along: [right.as_vec3(), right.cross(axis).as_vec3()], axis: axis.as_vec3(), half }
     }
 
-    /// Where in uv the unit direction `w` away from the light leads, which may be beyond the unit square, and its cosine with the axis; `None`
-    /// behind the light.
+    /// Where in uv the unit direction `w` away from the light leads, which may be beyond the unit square, and its
+    /// cosine with the axis; `None` behind the light.
     #[inline]
     fn place(&self, w: Vec3) -> Option<(Vec2, f32)> {
         let cos = w.dot(self.axis);
@@ -50,8 +50,8 @@ impl Projection {
         self.place(w).map_or(Rgb::BLACK, |(uv, _)| self.at(textures, uv))
     }
 
-    /// The integral over all directions within the unit square of the texture's luminance times `factor`, which is of the direction away from
-    /// the light and its cosine with the axis.
+    /// The integral over all directions within the unit square of the texture's luminance times `factor`, which is of
+    /// the direction away from the light and its cosine with the axis.
     pub(super) fn integral(&self, textures: &[Texture], factor: impl Fn(Vec3, f64) -> f64) -> f64 {
         let middle = |i: u32| (i as f32 + 0.5) / LOOKUPS as f32;
         let mut sum = 0.0;
@@ -71,14 +71,14 @@ impl Projection {
 #[derive(Clone, Debug)]
 pub struct Projector {
     source: PointLight,
-    projection: Projection,
+    projection: TextureProjection,
     /// Of the irradiance over the picture, by area on the plane at distance 1: the emitted power.
     flux: f64,
 }
 
 impl Projector {
     /// A light at `position`. `irradiance` multiplies the texture.
-    pub fn new(position: DVec3, irradiance: Rgb, projection: Projection, textures: &[Texture]) -> Self {
+    pub fn new(position: DVec3, irradiance: Rgb, projection: TextureProjection, textures: &[Texture]) -> Self {
         let flux = projection.integral(textures, |_, cos| cos.powi(-3)) * f64::from(irradiance.luminance());
         Self { source: PointLight { position, intensity: irradiance }, projection, flux }
     }
@@ -127,8 +127,8 @@ mod tests {
         [Texture::Checker(Checker { colors: [Rgb::new(0.0, 1.0, 0.0), Rgb::new(1.0, 0.0, 0.0)], scale: vec2(1.0, 1.0) })]
     }
 
-    fn projection(half: Vec2) -> Projection {
-        Projection::new(Some(TextureId(0)), DVec3::NEG_Z, DVec3::Y, half)
+    fn projection(half: Vec2) -> TextureProjection {
+        TextureProjection::new(Some(TextureId(0)), DVec3::NEG_Z, DVec3::Y, half)
     }
 
     #[test]
@@ -154,7 +154,7 @@ mod tests {
         let mean = 0.5 * f64::from(red.luminance() + green.luminance());
         assert!((light.power() - 2.0 * mean).abs() < 1e-6, "{}", light.power());
         // Upright with any other axis.
-        let down = Projection::new(Some(TextureId(0)), DVec3::NEG_Y, DVec3::NEG_Z, vec2(1.0, 1.0));
+        let down = TextureProjection::new(Some(TextureId(0)), DVec3::NEG_Y, DVec3::NEG_Z, vec2(1.0, 1.0));
         assert!(down.color(&textures, Vec3::new(0.3, -1.0, 0.3).normalize()).g == 0.0, "to the right and below");
         assert!(down.color(&textures, Vec3::new(0.3, -1.0, -0.3).normalize()).r == 0.0, "to the right and above");
         assert!(down.color(&textures, Vec3::Y).is_black());

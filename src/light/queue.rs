@@ -1,14 +1,14 @@
 //! Light samples for many vertices at once, the same as for each of them alone.
 
 use super::area::{AreaQueue, EmitterQueue};
-use super::environment::{EnvironmentScratch, InfinitySampleRows};
-use super::{EnvironmentMap, FoundBy, Light, LightSample, LightSet, Receiver, ShadowTarget};
+use super::environment::{EnvironmentScratch, InfiniteLightSampleRows};
+use super::{EnvironmentMap, Light, LightSample, LightSampleContext, LightSet, MisCompensation, ShadowTarget};
 use crate::color::Rgb;
 use crate::geometry::{Geometry, SpawnPoint};
 use crate::id::LightId;
 use crate::math::rows::{BATCH, Points, Row, soa};
 use crate::math::{DVec3, Vec3};
-use crate::sampling::Numbers;
+use crate::sampling::SampleRows;
 use crate::texture::Texture;
 
 /// Where light samples end.
@@ -96,7 +96,7 @@ pub struct LightContext<'a> {
     /// The scene's lights.
     pub lights: &'a LightSet,
     /// What else finds the lights.
-    pub found_by: FoundBy,
+    pub compensation: MisCompensation,
 }
 
 /// What light sampling reads of vertices.
@@ -107,7 +107,7 @@ pub struct LightQueries<'a> {
     /// Their points.
     pub points: &'a Points,
     /// Numbers in `[0, 1)`: the first and the last choose a light, the others a point of it.
-    pub u: &'a Numbers,
+    pub u: &'a SampleRows,
 }
 
 impl LightQueries<'_> {
@@ -139,15 +139,15 @@ impl LightQueue {
         &mut self,
         context: &LightContext,
         lane: usize,
-        receiver: &Receiver,
+        light_context: &LightSampleContext,
         [u, _, _, v]: [f32; 4],
         samples: &mut LightSampleRows,
     ) {
-        let Some(choice) = context.lights.choose(receiver, [u, v], context.found_by) else { return };
+        let Some(choice) = context.lights.choose(light_context, [u, v], context.compensation) else { return };
         (samples.light[lane], self.pmfs[lane]) = (choice.id.0, choice.pmf);
         match context.lights.get(choice.id) {
             Light::Area(light) if self.area.push(light, choice.id, lane) || self.emitters.push(light, choice.id, lane) => {}
-            _ if context.lights.image_at_infinity().is_some_and(|(id, _)| id == choice.id) => self.sky.lanes.push(lane),
+            _ if context.lights.single_environment_map().is_some_and(|(id, _)| id == choice.id) => self.sky.lanes.push(lane),
             _ => self.alone.push((lane, choice.id)),
         }
     }
@@ -158,12 +158,12 @@ impl LightQueue {
         area.sample(queries, pmfs, samples, target_p);
         let mut set = |lane: usize, sample: &LightSample| samples.set(lane, sample, pmfs[lane], target_p);
         emitters.sample(context, queries, &mut set);
-        if let Some((_, image)) = context.lights.image_at_infinity() {
-            sky.sample(image, context.found_by, queries, &mut set);
+        if let Some((_, image)) = context.lights.single_environment_map() {
+            sky.sample(image, context.compensation, queries, &mut set);
         }
         for &(lane, id) in &*alone {
             let (p, u) = queries.get(lane);
-            if let Some(sample) = context.lights.get(id).sample(context.geometry, context.textures, p, u, context.found_by) {
+            if let Some(sample) = context.lights.get(id).sample(context.geometry, context.textures, p, u, context.compensation) {
                 set(lane, &sample);
             }
         }
@@ -175,7 +175,7 @@ struct SkyQueue {
     lanes: Vec<usize>,
     u: [[f32; 2]; BATCH],
     scratch: EnvironmentScratch,
-    samples: InfinitySampleRows,
+    samples: InfiniteLightSampleRows,
 }
 
 impl Default for SkyQueue {
@@ -184,20 +184,26 @@ impl Default for SkyQueue {
             lanes: Vec::with_capacity(BATCH),
             u: [[0.0; 2]; BATCH],
             scratch: EnvironmentScratch::default(),
-            samples: InfinitySampleRows::default(),
+            samples: InfiniteLightSampleRows::default(),
         }
     }
 }
 
 impl SkyQueue {
-    fn sample(&mut self, image: &EnvironmentMap, found_by: FoundBy, queries: &LightQueries, mut set: impl FnMut(usize, &LightSample)) {
+    fn sample(
+        &mut self,
+        image: &EnvironmentMap,
+        compensation: MisCompensation,
+        queries: &LightQueries,
+        mut set: impl FnMut(usize, &LightSample),
+    ) {
         let Self { lanes, u, scratch, samples } = self;
         for (u, &lane) in u.iter_mut().zip(&*lanes) {
             *u = queries.get(lane).1;
         }
-        if !lanes.is_empty() && scratch.sample(image, u, lanes.len(), found_by, samples) {
+        if !lanes.is_empty() && scratch.sample(image, u, lanes.len(), compensation, samples) {
             for (i, &lane) in lanes.iter().enumerate() {
-                set(lane, &LightSample::far_away(samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
+                set(lane, &LightSample::infinite_sample(samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
             }
         }
     }

@@ -1,7 +1,7 @@
 //! All lights of a scene, and which one a path looks at.
 
-use super::tree::{LightTree, Receiver};
-use super::{Environment, EnvironmentMap, FoundBy, Light};
+use super::tree::{LightSampleContext, LightTree};
+use super::{Environment, EnvironmentMap, Light, MisCompensation};
 use crate::geometry::Geometry;
 use crate::id::LightId;
 use crate::math::float::ONE_MINUS_EPSILON;
@@ -19,9 +19,9 @@ pub struct LightChoice {
 /// How a light is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightSelection {
-    /// In proportion to its power, whoever asks.
+    /// In proportion to its power.
     Power,
-    /// In proportion to an estimate of what arrives where it is asked for, by a tree; lights at infinity by their power.
+    /// In proportion to an estimate of its irradiance at the shading point, by a light tree; lights at infinity by their power.
     Tree,
 }
 
@@ -32,30 +32,30 @@ pub enum LightSelection {
 /// others, either kind has at least a quarter of the choices. Where power decides, a twentieth of the choices of a kind is spread evenly,
 /// so that no light of positive power starves beside a strong one.
 ///
-/// An environment [found by sampling the BSDF too](FoundBy::Both) counts with the power that is left to find.
+/// With [compensation](MisCompensation::On) an environment counts with the power that its lowered density leaves.
 #[derive(Clone, Debug, Default)]
 pub struct LightSet {
     lights: Vec<Light>,
     /// Lights that are not at infinity, if a tree chooses among them.
     tree: Option<Box<LightTree>>,
-    /// Where only sampling lights finds them.
-    alone: Choosing,
-    /// Where sampling the BSDF does too, if that makes a difference.
-    beside_bsdf: Option<Choosing>,
+    /// Without MIS compensation.
+    plain: LightDistribution,
+    /// With it, if that makes a difference.
+    mis_compensated: Option<LightDistribution>,
     at_infinity: Vec<LightId>,
 }
 
 /// How lights are chosen.
 #[derive(Clone, Debug, Default)]
-struct Choosing {
+struct LightDistribution {
     /// All lights, or (beside a tree) those at infinity.
     table: Option<AliasTable>,
-    /// Probability of asking the tree.
+    /// Probability of choosing by the tree.
     tree_share: f32,
 }
 
-/// From so many lights on that are not at infinity, a tree chooses. Where time is equal, it halves the error of 16 lights, and gains nothing
-/// on 3 or 4.
+/// From so many lights on that are not at infinity, a tree chooses. Where time is equal, it halves the error of 16
+/// lights, and gains nothing on 3 or 4.
 const TREE_FROM: usize = 6;
 
 /// Least share of the choices for lights at infinity, and for all others, if both exist.
@@ -72,36 +72,37 @@ impl LightSet {
         Self::with_selection(lights, geometry, selection)
     }
 
-    /// [`Self::new`] with a given way of choosing: noise and time differ, the picture does not.
+    /// [`Self::new`] with a given selection: noise and time differ, the picture does not.
     pub fn with_selection(lights: Vec<Light>, geometry: &Geometry, selection: LightSelection) -> Self {
         let bounds = geometry.bounds();
         let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().as_dvec3().length() };
-        let powers = |found_by: FoundBy| -> Vec<f64> {
-            let power = |light: &Light| Some(light.sampled_power(radius, found_by)).filter(|p| *p > 0.0 && p.is_finite()).unwrap_or(0.0);
+        let powers = |compensation: MisCompensation| -> Vec<f64> {
+            let power =
+                |light: &Light| Some(light.sampled_power(radius, compensation)).filter(|p| *p > 0.0 && p.is_finite()).unwrap_or(0.0);
             lights.iter().map(power).collect()
         };
         let far: Vec<bool> = lights.iter().map(Light::is_at_infinity).collect();
-        let alone = probabilities(&powers(FoundBy::Lights), &far);
+        let plain = probabilities(&powers(MisCompensation::Off), &far);
         let has_environment = lights.iter().any(|light| matches!(light, Light::Environment(_)));
-        let beside_bsdf = has_environment.then(|| probabilities(&powers(FoundBy::Both), &far));
+        let mis_compensated = has_environment.then(|| probabilities(&powers(MisCompensation::On), &far));
         let at_infinity = (0..lights.len()).filter(|&i| lights[i].is_visible_at_infinity()).map(LightId::new).collect();
         let tree = match selection {
             LightSelection::Power => None,
             LightSelection::Tree => {
-                let of = |i: usize| if alone[i] > 0.0 { lights[i].bounds(geometry) } else { None };
+                let of = |i: usize| if plain[i] > 0.0 { lights[i].bounds(geometry) } else { None };
                 LightTree::new(&(0..lights.len()).map(of).collect::<Vec<_>>())
             }
         };
-        let choosing = |mut probabilities: Vec<f64>| {
+        let distribution = |mut probabilities: Vec<f64>| {
             let mut tree_share = 0.0;
             if tree.is_some() {
                 tree_share = probabilities.iter().zip(&far).filter(|(_, far)| !**far).map(|(p, _)| p).sum::<f64>().min(1.0) as f32;
                 probabilities.iter_mut().zip(&far).filter(|(_, far)| !**far).for_each(|(p, _)| *p = 0.0);
             }
-            Choosing { table: AliasTable::new(&probabilities), tree_share }
+            LightDistribution { table: AliasTable::new(&probabilities), tree_share }
         };
-        let (alone, beside_bsdf) = (choosing(alone), beside_bsdf.map(choosing));
-        Self { lights, tree: tree.map(Box::new), alone, beside_bsdf, at_infinity }
+        let (plain, mis_compensated) = (distribution(plain), mis_compensated.map(distribution));
+        Self { lights, tree: tree.map(Box::new), plain, mis_compensated, at_infinity }
     }
 
     /// All lights, by [`LightId`].
@@ -122,7 +123,7 @@ impl LightSet {
 
     /// Whether any light shines.
     pub fn shines(&self) -> bool {
-        self.alone.table.is_some() || self.tree.is_some()
+        self.plain.table.is_some() || self.tree.is_some()
     }
 
     /// How a light is chosen.
@@ -131,41 +132,41 @@ impl LightSet {
     }
 
     #[inline]
-    fn choosing(&self, found_by: FoundBy) -> &Choosing {
-        match &self.beside_bsdf {
-            Some(choosing) if found_by == FoundBy::Both => choosing,
-            _ => &self.alone,
+    fn distribution(&self, compensation: MisCompensation) -> &LightDistribution {
+        match &self.mis_compensated {
+            Some(distribution) if compensation == MisCompensation::On => distribution,
+            _ => &self.plain,
         }
     }
 
     /// A light for `from`, `u` in the unit square (the second number adds digits to the first, for many lights); `None` if none shines
     /// there, as far as the choice has looked.
     #[inline]
-    pub fn choose(&self, from: &Receiver, u: [f32; 2], found_by: FoundBy) -> Option<LightChoice> {
-        let choosing = self.choosing(found_by);
+    pub fn choose(&self, from: &LightSampleContext, u: [f32; 2], compensation: MisCompensation) -> Option<LightChoice> {
+        let distribution = self.distribution(compensation);
         if let Some(tree) = &self.tree {
-            return choosing.choose_by_tree(tree, from, u);
+            return distribution.choose_by_tree(tree, from, u);
         }
-        let table = choosing.table.as_ref()?;
+        let table = distribution.table.as_ref()?;
         let chosen = table.sample(u[0]);
         Some(LightChoice { id: LightId::new(chosen.index), pmf: table.pmf(chosen.index) })
     }
 
     /// Probability with which [`choose`](Self::choose) takes this light for `from`.
     #[inline]
-    pub fn pmf(&self, id: LightId, from: &Receiver, found_by: FoundBy) -> f32 {
-        let choosing = self.choosing(found_by);
-        let by_power = choosing.table.as_ref().map_or(0.0, |table| table.pmf(id.index()));
+    pub fn pmf(&self, id: LightId, from: &LightSampleContext, compensation: MisCompensation) -> f32 {
+        let distribution = self.distribution(compensation);
+        let by_power = distribution.table.as_ref().map_or(0.0, |table| table.pmf(id.index()));
         match &self.tree {
             None => by_power,
-            Some(_) if self.get(id).is_at_infinity() => by_power * (1.0 - choosing.tree_share),
-            Some(tree) => tree.pmf(from, id.0) * choosing.tree_share,
+            Some(_) if self.get(id).is_at_infinity() => by_power * (1.0 - distribution.tree_share),
+            Some(tree) => tree.pmf(from, id.0) * distribution.tree_share,
         }
     }
 
     /// The image around the scene, if it is all that rays leaving the scene can see.
     #[inline]
-    pub fn image_at_infinity(&self) -> Option<(LightId, &EnvironmentMap)> {
+    pub fn single_environment_map(&self) -> Option<(LightId, &EnvironmentMap)> {
         match self.at_infinity[..] {
             [id] => match self.get(id) {
                 Light::Environment(Environment::Map(map)) => Some((id, map)),
@@ -182,8 +183,8 @@ impl LightSet {
     }
 }
 
-impl Choosing {
-    fn choose_by_tree(&self, tree: &LightTree, from: &Receiver, u: [f32; 2]) -> Option<LightChoice> {
+impl LightDistribution {
+    fn choose_by_tree(&self, tree: &LightTree, from: &LightSampleContext, u: [f32; 2]) -> Option<LightChoice> {
         // Random numbers are multiples of 2^-24.
         let u = f64::from(u[0]) + f64::from(u[1]) * (1.0 / 16_777_216.0);
         let share = f64::from(self.tree_share);
@@ -232,7 +233,7 @@ mod tests {
     use crate::light::{DirectionalLight, Environment, PointLight};
     use crate::math::{DVec3, Vec3};
 
-    const ANYWHERE: Receiver = Receiver { p: DVec3::ZERO, n: Vec3::ZERO };
+    const ANYWHERE: LightSampleContext = LightSampleContext { p: DVec3::ZERO, n: Vec3::ZERO };
 
     fn point(intensity: f32) -> Light {
         Light::Point(PointLight { position: DVec3::ZERO, intensity: Rgb::splat(intensity) })
@@ -250,33 +251,33 @@ mod tests {
         let n = 1 << 20;
         let mut count = [0u32; 6];
         for i in 0..n {
-            let choice = lights.choose(&ANYWHERE, [i as f32 / n as f32, 0.0], FoundBy::Lights).unwrap();
-            assert_eq!(choice.pmf, lights.pmf(choice.id, &ANYWHERE, FoundBy::Lights));
+            let choice = lights.choose(&ANYWHERE, [i as f32 / n as f32, 0.0], MisCompensation::Off).unwrap();
+            assert_eq!(choice.pmf, lights.pmf(choice.id, &ANYWHERE, MisCompensation::Off));
             count[choice.id.index()] += 1;
         }
         let mut sum = 0.0;
         for (i, &c) in count.iter().enumerate() {
-            let pmf = lights.pmf(LightId::new(i), &ANYWHERE, FoundBy::Lights);
+            let pmf = lights.pmf(LightId::new(i), &ANYWHERE, MisCompensation::Off);
             assert!((c as f32 / n as f32 - pmf).abs() < 1e-5, "{i}");
             assert_eq!(pmf > 0.0, i != 2, "{i}");
             sum += pmf;
         }
         assert!((sum - 1.0).abs() < 1e-6);
-        assert!([1, 4].map(|i| lights.pmf(LightId(i), &ANYWHERE, FoundBy::Lights)).iter().sum::<f32>() >= 0.249);
+        assert!([1, 4].map(|i| lights.pmf(LightId(i), &ANYWHERE, MisCompensation::Off)).iter().sum::<f32>() >= 0.249);
         assert_eq!(lights.at_infinity(), [LightId(1), LightId(4)]);
     }
 
     #[test]
     fn equal_lights_are_chosen_equally() {
         let lights = set(vec![point(2.0); 5]);
-        assert!((0..5).all(|i| (lights.pmf(LightId(i), &ANYWHERE, FoundBy::Lights) - 0.2).abs() < 1e-7));
+        assert!((0..5).all(|i| (lights.pmf(LightId(i), &ANYWHERE, MisCompensation::Off) - 0.2).abs() < 1e-7));
     }
 
     #[test]
     fn a_sharp_sun_is_not_visible_and_no_light_is_no_choice() {
         let lights = set(vec![Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.0)))]);
-        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0), &ANYWHERE, FoundBy::Lights) == 1.0);
-        assert!(LightSet::default().choose(&ANYWHERE, [0.5, 0.0], FoundBy::Lights).is_none() && LightSet::default().is_empty());
-        assert!(set(vec![point(0.0)]).choose(&ANYWHERE, [0.5, 0.0], FoundBy::Lights).is_none());
+        assert!(lights.at_infinity().is_empty() && lights.pmf(LightId(0), &ANYWHERE, MisCompensation::Off) == 1.0);
+        assert!(LightSet::default().choose(&ANYWHERE, [0.5, 0.0], MisCompensation::Off).is_none() && LightSet::default().is_empty());
+        assert!(set(vec![point(0.0)]).choose(&ANYWHERE, [0.5, 0.0], MisCompensation::Off).is_none());
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::bounds::{EmissionCone, LightBounds};
-use super::{LightSample, PointLight, Projection};
+use super::{LightSample, PointLight, TextureProjection};
 use crate::color::Rgb;
 use crate::math::{DVec3, Vec3};
 use crate::texture::Texture;
@@ -23,7 +23,7 @@ pub struct SpotLight {
     /// `1 / (cutoff - beam)`.
     slope: f32,
     /// What multiplies the intensity, and the power with it.
-    texture: Option<(Projection, f64)>,
+    texture: Option<(TextureProjection, f64)>,
 }
 
 impl SpotLight {
@@ -46,7 +46,7 @@ impl SpotLight {
 
     /// This light with a texture that multiplies its intensity.
     #[must_use]
-    pub fn with_texture(mut self, projection: Projection, textures: &[Texture]) -> Self {
+    pub fn with_texture(mut self, projection: TextureProjection, textures: &[Texture]) -> Self {
         let share = projection.integral(textures, |w, _| f64::from(self.falloff(w)));
         self.texture = Some((projection, share * f64::from(self.source.intensity.luminance())));
         self

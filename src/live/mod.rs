@@ -1,8 +1,8 @@
 //! Live view: the picture as it grows, sent to the viewer tev and served to browsers as a small web page.
 //!
-//! The render hands over a copy of the picture when a viewer needs one ([`Progress::wants_picture`]) and goes on at once; sending, converting
-//! and waiting happen on threads of the viewers. No viewer can slow or end the render: what one has not taken when the next picture comes is
-//! replaced by that.
+//! The render hands over a copy of the picture when a viewer needs one ([`Progress::wants_picture`]) and goes on at
+//! once; sending, converting and waiting happen on threads of the viewers. No viewer can slow or end the render: what
+//! one has not taken when the next picture comes is replaced by that.
 
 mod fan;
 mod pace;
@@ -14,7 +14,7 @@ mod tev;
 pub use fan::Fan;
 pub use preview::{Patience, Preview, PreviewOptions};
 pub use snapshot::Snapshot;
-pub use statistics::{Numbers, Statistics};
+pub use statistics::{ProgressNumbers, Statistics};
 pub use tev::{DEFAULT_ADDRESS, Tev, TevCounters, TevOptions};
 
 use std::sync::Arc;

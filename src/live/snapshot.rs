@@ -47,7 +47,8 @@ impl Snapshot {
         self.image.crop == other.image.crop && self.names == other.names
     }
 
-    /// What to call a layer with these channels: what is before the dot, or the channel if there is only one; `color` for the picture itself.
+    /// What to call a layer with these channels: what is before the dot, or the channel if there is only one; `color`
+    /// for the picture itself.
     pub fn title(names: &[String]) -> &str {
         match names {
             [] => "",

@@ -26,7 +26,7 @@ struct Plan {
 
 /// The numbers at one time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Numbers {
+pub struct ProgressNumbers {
     /// Samples done, of all pixels together.
     pub samples: u64,
     /// Samples that are to be done as far as known.
@@ -82,12 +82,12 @@ impl Statistics {
     }
 
     /// The numbers at this moment.
-    pub fn numbers(&self) -> Numbers {
+    pub fn numbers(&self) -> ProgressNumbers {
         let plan = self.plan_mut();
         let elapsed = plan.end.unwrap_or_else(Instant::now).saturating_duration_since(plan.start).as_secs_f64();
         let samples = self.done.load(Ordering::Relaxed);
         let per_pixel = |samples: u64| if plan.pixels == 0 { 0.0 } else { samples as f64 / plan.pixels as f64 };
-        Numbers {
+        ProgressNumbers {
             samples,
             samples_planned: plan.total,
             spp: per_pixel(samples),

@@ -1,6 +1,6 @@
 //! Parameters of materials that are constant or come from textures.
 
-use crate::bsdf::{Beckmann, Bsdf, Coat, Plastic, SeparableGgx, SingleScatteringBsdf};
+use crate::bsdf::{Beckmann, Bsdf, BsdfFlags, Coat, Plastic, SeparableGgx, SingleScatteringBsdf};
 use crate::color::Rgb;
 use crate::id::TextureId;
 use crate::math::Vec2;
@@ -129,6 +129,12 @@ impl AlphaInput {
         self.axes.map(|input| input.at(textures, footprint)).map(|value| if self.squared { value * value } else { value })
     }
 
+    /// Glossy or specular lobes, and whether they may be anisotropic.
+    pub(super) fn flags(&self) -> BsdfFlags {
+        let lobes = BsdfFlags::GLOSSY | BsdfFlags::SPECULAR;
+        if self.axes[0] == self.axes[1] { lobes } else { lobes | BsdfFlags::ANISOTROPIC }
+    }
+
     /// Whether no texture changes it.
     pub fn is_constant(&self) -> bool {
         self.textures().is_empty()
@@ -180,10 +186,10 @@ impl CoatInput {
         }
     }
 
-    pub(super) fn is_anisotropic(&self) -> bool {
+    pub(super) fn flags(&self) -> BsdfFlags {
         match self {
-            Self::Constant(coat) => coat.is_anisotropic(),
-            Self::Varying { alpha, .. } => alpha.axes[0] != alpha.axes[1],
+            Self::Constant(coat) => coat.flags(),
+            Self::Varying { alpha, .. } => alpha.flags() | BsdfFlags::REFLECTION,
         }
     }
 }
@@ -220,11 +226,11 @@ impl PlasticCoat {
         }
     }
 
-    pub(super) fn is_anisotropic(&self) -> bool {
+    pub(super) fn flags(&self) -> BsdfFlags {
         match self {
-            Self::Ggx(coat) => coat.is_anisotropic(),
-            Self::SeparableGgx(coat) => coat.is_anisotropic(),
-            Self::Beckmann(coat) => coat.is_anisotropic(),
+            Self::Ggx(coat) => coat.flags(),
+            Self::SeparableGgx(coat) => coat.flags(),
+            Self::Beckmann(coat) => coat.flags(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Parameters of the principled model from textures.
 
 use super::{ColorInput, RangedInput, ScalarInput};
-use crate::bsdf::PrincipledParameters;
+use crate::bsdf::{BsdfFlags, PrincipledParameters};
 use crate::id::TextureId;
 use crate::texture::{Footprint, Texture};
 
@@ -62,6 +62,13 @@ impl PrincipledInputs {
             diffuse_transmission: at(&self.diffuse_transmission),
             ..self.rest
         }
+    }
+
+    pub(super) fn flags(&self) -> BsdfFlags {
+        let mut flags = BsdfFlags::DIFFUSE | BsdfFlags::GLOSSY | BsdfFlags::REFLECTION;
+        flags.set(BsdfFlags::TRANSMISSION, !self.transmission.is_zero() || !self.diffuse_transmission.is_zero());
+        flags.set(BsdfFlags::ANISOTROPIC, !self.anisotropic.is_zero());
+        flags
     }
 
     pub(super) fn textures(&self) -> Vec<TextureId> {

@@ -4,7 +4,6 @@ use pulp::cast;
 use pulp::x86::V4;
 
 use super::rows::{BATCH, Row};
-use super::vectorize::Kernel;
 
 /// Lanes of a vector of 32-bit numbers.
 const WIDTH: usize = 16;
@@ -103,8 +102,8 @@ impl Compaction {
         self.append_3(from, to, None, 0);
     }
 
-    /// Writes the chosen numbers of `from` to the lanes of a block from `at` on, and on to the next, which there is if they do not fit. Lanes after them
-    /// may change too.
+    /// Writes the chosen numbers of `from` to the lanes of a block from `at` on, and on to the next, which there is if
+    /// they do not fit. Lanes after them may change too.
     #[inline]
     pub fn append<T: Compact>(&self, from: &Row<T>, to: &mut Row<T>, next: Option<&mut Row<T>>, at: usize) {
         if self.count == BATCH && at == 0 {
@@ -112,7 +111,10 @@ impl Compaction {
             return;
         }
         if let Some(simd) = self.simd {
-            simd.vectorize(Compress { simd, lanes: self, from, to, next, at });
+            simd.vectorize(
+                #[inline(always)]
+                || self.compress(simd, from, to, next, at),
+            );
             return;
         }
         let mut next = next;
@@ -123,38 +125,10 @@ impl Compaction {
         }
     }
 
-    /// [`append`](Self::append) for three rows.
-    #[inline]
-    pub fn append_3<T: Compact>(&self, from: &[Row<T>; 3], to: &mut [Row<T>; 3], next: Option<&mut [Row<T>; 3]>, at: usize) {
-        match next {
-            None => (0..3).for_each(|k| self.append(&from[k], &mut to[k], None, at)),
-            Some(next) => (0..3).for_each(|k| self.append(&from[k], &mut to[k], Some(&mut next[k]), at)),
-        }
-    }
-}
-
-/// A lane of a block or of the next.
-#[inline(always)]
-fn place<'a, T>(to: &'a mut Row<T>, next: Option<&'a mut Row<T>>, at: usize) -> Option<&'a mut T> {
-    if at < BATCH { to.get_mut(at) } else { next?.get_mut(at - BATCH) }
-}
-
-struct Compress<'a, T> {
-    simd: V4,
-    lanes: &'a Compaction,
-    from: &'a Row<T>,
-    to: &'a mut Row<T>,
-    next: Option<&'a mut Row<T>>,
-    at: usize,
-}
-
-impl<T: Compact> Kernel for Compress<'_, T> {
-    type Output = ();
-
+    /// [`append`](Self::append) by one instruction for each vector.
     #[inline(always)]
-    fn call(self) {
-        let Self { simd, lanes, from, to, mut next, mut at } = self;
-        for (&bits, numbers) in lanes.masks.iter().zip(from.as_chunks::<WIDTH>().0) {
+    fn compress<T: Compact>(&self, simd: V4, from: &Row<T>, to: &mut Row<T>, mut next: Option<&mut Row<T>>, mut at: usize) {
+        for (&bits, numbers) in self.masks.iter().zip(from.as_chunks::<WIDTH>().0) {
             let count = bits.count_ones() as usize;
             // Of a length that the compiler knows: else each is a call.
             let whole = if at < BATCH {
@@ -177,6 +151,21 @@ impl<T: Compact> Kernel for Compress<'_, T> {
             at += count;
         }
     }
+
+    /// [`append`](Self::append) for three rows.
+    #[inline]
+    pub fn append_3<T: Compact>(&self, from: &[Row<T>; 3], to: &mut [Row<T>; 3], next: Option<&mut [Row<T>; 3]>, at: usize) {
+        match next {
+            None => (0..3).for_each(|k| self.append(&from[k], &mut to[k], None, at)),
+            Some(next) => (0..3).for_each(|k| self.append(&from[k], &mut to[k], Some(&mut next[k]), at)),
+        }
+    }
+}
+
+/// A lane of a block or of the next.
+#[inline(always)]
+fn place<'a, T>(to: &'a mut Row<T>, next: Option<&'a mut Row<T>>, at: usize) -> Option<&'a mut T> {
+    if at < BATCH { to.get_mut(at) } else { next?.get_mut(at - BATCH) }
 }
 
 #[cfg(test)]

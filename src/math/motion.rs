@@ -184,8 +184,8 @@ impl Part {
     }
 }
 
-/// Bounds of what is within `bounds` and turns about a unit axis through the origin, however often: it stays at its height along the axis and
-/// as far from it as it is.
+/// Bounds of what is within `bounds` and turns about a unit axis through the origin, however often: it stays at its
+/// height along the axis and as far from it as it is.
 fn swept(axis: DVec3, bounds: &Bounds) -> Bounds {
     let corner = |i: usize| {
         let pick = |k: usize| if i >> k & 1 == 0 { bounds.min[k] } else { bounds.max[k] };
@@ -208,7 +208,8 @@ fn reach(bounds: &Bounds) -> f64 {
     bounds.min.abs().max(bounds.max.abs()).length()
 }
 
-/// How far a path can stray from a straight line: an eighth of the largest acceleration times the square of the time; doubled, for rounding.
+/// How far a path can stray from a straight line: an eighth of the largest acceleration times the square of the time;
+/// doubled, for rounding.
 fn stray(acceleration_by_squared_time: f64) -> f64 {
     0.25 * acceleration_by_squared_time
 }

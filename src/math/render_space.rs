@@ -8,7 +8,8 @@ const UNSCALED: [i32; 2] = [-20, 30];
 /// The extent, as a power of two, that smaller and larger scenes are scaled to. Large ones stay large: what is small in them gains.
 const SCALED: [i32; 2] = [0, 20];
 
-/// Scenes that reach this many times as far from their middle as that lies from the origin are not moved: they would gain less than two bits.
+/// Scenes that reach this many times as far from their middle as that lies from the origin are not moved: they would
+/// gain less than two bits.
 const LEAST_GAIN: f64 = 4.0;
 
 /// Scenes are not moved if their middle is nearer than this many times the size of their smallest shape, whose edges `f32` places to a

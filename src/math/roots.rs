@@ -26,7 +26,8 @@ pub fn solve_quadratic(a: f64, half_b: f64, c: f64) -> Option<Quadratic> {
     (!(roots.near.is_nan() && roots.far.is_nan())).then_some(roots)
 }
 
-/// [`solve_quadratic`] where `half_b² - a c` is known better than from the coefficients; both roots are NaN if there are none. Without branches.
+/// [`solve_quadratic`] where `half_b² - a c` is known better than from the coefficients; both roots are NaN if there
+/// are none. Without branches.
 #[inline(always)]
 pub fn quadratic_roots(a: f64, half_b: f64, c: f64, discriminant: f64) -> Quadratic {
     // The root of a negative number is NaN.

@@ -1,6 +1,6 @@
 //! Structures of arrays: rows of numbers, one per lane, for loops that become [vector code](super::vectorize).
 
-use super::{DVec3, Vec3};
+use super::{DVec3, Vec2, Vec3};
 
 /// Lanes of a row: few enough that rows stay in the nearest caches.
 pub const BATCH: usize = 128;
@@ -48,6 +48,39 @@ number!(f32 0.0, f64 0.0, u32 0);
 #[inline(always)]
 pub fn pair(rows: &[Row; 2], i: usize) -> [f32; 2] {
     [rows[0][i], rows[1][i]]
+}
+
+/// A vector of the plane per lane, by component.
+#[derive(Clone, Debug)]
+pub struct PlaneVectors(pub [Row; 2]);
+
+impl PlaneVectors {
+    /// The vector of a lane.
+    #[inline(always)]
+    pub fn get(&self, i: usize) -> Vec2 {
+        Vec2::new(self.0[0][i], self.0[1][i])
+    }
+
+    /// Sets the vector of a lane.
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, v: Vec2) {
+        (self.0[0][i], self.0[1][i]) = (v.x, v.y);
+    }
+}
+
+impl Element for Vec2 {
+    type Rows = PlaneVectors;
+    const ZERO: PlaneVectors = PlaneVectors([[0.0; BATCH]; 2]);
+
+    #[inline(always)]
+    fn get(rows: &PlaneVectors, i: usize) -> Self {
+        rows.get(i)
+    }
+
+    #[inline(always)]
+    fn set(rows: &mut PlaneVectors, i: usize, value: Self) {
+        rows.set(i, value);
+    }
 }
 
 /// A vector per lane, by component.
@@ -128,9 +161,10 @@ impl Element for DVec3 {
     }
 }
 
-/// Declares a structure of rows, one for each field: `soa! { pub struct PathRows { pdf: f32, throughput: Rgb } }`. With `of Path` the structure
-/// `Path` of one of them is declared too, and `get` and `set`. Rows of 32 and of 64 bits that one loop writes belong into different structures:
-/// where all rows are alike, the compiler sees that they do not overlap.
+/// Declares a structure of rows, one for each field: `soa! { pub struct PathRows { pdf: f32, throughput: Rgb } }`. With
+/// `of Path` the structure `Path` of one of them is declared too, and `get` and `set`. Rows of 32 and of 64 bits that
+/// one loop writes belong into different structures: where all rows are alike, the compiler sees that they do not
+/// overlap.
 macro_rules! soa {
     ($(#[$meta:meta])* $vis:vis struct $rows:ident of $item:ident { $($(#[$field_meta:meta])* $field:ident: $type:ty,)* }) => {
         $(#[$meta])*

@@ -1,5 +1,6 @@
 //! OpenEXR: the colour as R, G, B, A and every other layer as `layer.channel`, in one part or several.
 
+mod blocks;
 mod coverage;
 mod header_order;
 mod metadata;
@@ -9,7 +10,7 @@ mod plane;
 mod read;
 mod write;
 
-pub use header_order::finish_headers;
+pub use blocks::write_image;
 pub use metadata::sidecar_path;
 pub use plan::{OutputFault, check_output, find_output_fault};
 pub use read::{read_exr, read_settings};

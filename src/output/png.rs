@@ -12,8 +12,9 @@ use crate::desc::ViewDesc;
 use crate::error::Result;
 use crate::film::{Crop, Image, LayerKind};
 
-/// Writes the picture's colour in 8 bits through a view, after `exposure` stops. Colour is premultiplied, so leaving out alpha shows the picture over
-/// black. Ordered dithering hides the steps of dark gradients; a value that 8 bits hold exactly is not dithered.
+/// Writes the picture's colour in 8 bits through a view, after `exposure` stops. Colour is premultiplied, so leaving
+/// out alpha shows the picture over black. Ordered dithering hides the steps of dark gradients; a value that 8 bits
+/// hold exactly is not dithered.
 ///
 /// # Errors
 /// [`Error::Output`](crate::Error::Output) if the file cannot be written.

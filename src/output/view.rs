@@ -24,8 +24,9 @@ const MIDDLE_GREY: f32 = 0.18;
 /// Stops below and above middle grey that the curve spans.
 const STOPS: [f32; 2] = [10.0, 6.5];
 
-/// AgX (Troy Sobotka, github.com/sobotka/AgX), by its definition in place of its lookup tables: bright colours tend to white as on film. After
-/// the curve the inset of the primaries is undone, as in "Minimal AgX Implementation" (Benjamin Wrensch).
+/// AgX (Troy Sobotka, github.com/sobotka/AgX), by its definition in place of its lookup tables: bright colours tend to
+/// white as on film. After the curve the inset of the primaries is undone, as in "Minimal AgX Implementation" (Benjamin
+/// Wrensch).
 fn agx(light: Rgb) -> Rgb {
     let grey = |c: Rgb| SHARES.r * c.r + SHARES.g * c.g + SHARES.b * c.b;
     // Primaries inset by a factor: each colour is mixed with the grey of the same X + Y + Z.
@@ -39,8 +40,9 @@ fn agx(light: Rgb) -> Rgb {
     code.map(|x| ((x - white) / (1.0 - INSET)).clamp(0.0, 1.0))
 }
 
-/// The curve of AgX from and to `[0, 1]`: through (0, 0), (1, 1), and a half at middle grey with a slope of 2; from there a toe of power 3 and a
-/// shoulder of power 3.25, each `t / (1 + t^p)^(1/p)` with `t` scaled so that the end is met (the tunable sigmoid of Jed Smith).
+/// The curve of AgX from and to `[0, 1]`: through (0, 0), (1, 1), and a half at middle grey with a slope of 2; from
+/// there a toe of power 3 and a shoulder of power 3.25, each `t / (1 + t^p)^(1/p)` with `t` scaled so that the end is
+/// met (the tunable sigmoid of Jed Smith).
 fn sigmoid(x: f32) -> f32 {
     const PIVOT: [f32; 2] = [STOPS[0] / (STOPS[0] + STOPS[1]), 0.5];
     const SLOPE: f32 = 2.0;
@@ -50,7 +52,8 @@ fn sigmoid(x: f32) -> f32 {
     PIVOT[1] + SLOPE * (x - PIVOT[0]) / bend.powf(1.0 / power)
 }
 
-/// The curve of Uncharted 2 ("Filmic Tonemapping Operators", John Hable 2010) with its exposure of 2 and 11.2 as white, from light to `[0, 1]`.
+/// The curve of Uncharted 2 ("Filmic Tonemapping Operators", John Hable 2010) with its exposure of 2 and 11.2 as white,
+/// from light to `[0, 1]`.
 fn filmic(light: f32) -> f32 {
     const WHITE: f32 = 11.2;
     // Shoulder strength, linear strength, linear angle, toe strength, toe numerator, toe denominator.

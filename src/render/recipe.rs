@@ -94,15 +94,16 @@ impl Recipe {
         self
     }
 
-    /// The same but for what makes frames of a sequence different from each other: the number of the frame, and the seed that grows with it.
+    /// The same but for what makes frames of a sequence different from each other: the number of the frame, and the
+    /// seed that grows with it.
     #[must_use]
     pub fn of_frame(&self, number: i64) -> Self {
         let seed = self.settings.seed.wrapping_add_signed(number.wrapping_neg());
         Self { frame: None, settings: Settings { seed, ..self.settings.clone() }, ..self.clone() }
     }
 
-    /// What of this is not as in `expected`, of which a file is to be written as `output` says: settings by name, each with both values. The
-    /// command line, the folder and the version of the program do not count.
+    /// What of this is not as in `expected`, of which a file is to be written as `output` says: settings by name, each
+    /// with both values. The command line, the folder and the version of the program do not count.
     pub fn differences(&self, expected: &Self, output: &OutputDesc) -> Vec<String> {
         let flat = |recipe: &Self, output: Option<&OutputDesc>| {
             let mut values = BTreeMap::new();

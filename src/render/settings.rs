@@ -27,8 +27,8 @@ const MAX_THREADS: usize = 4096;
 
 /// How a scene is rendered.
 ///
-/// Serialized, these are the settings that the picture depends on: EXR files keep them for [`Recipe`](super::Recipe), and a checkpoint or shard
-/// belongs to another picture if any differs. Only what can never change a pixel is skipped.
+/// Serialized, these are the settings that the picture depends on: EXR files keep them for [`Recipe`](super::Recipe),
+/// and a checkpoint or shard belongs to another picture if any differs. Only what can never change a pixel is skipped.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
@@ -54,8 +54,8 @@ pub struct Settings {
     pub integrator: IntegratorDesc,
     /// What finds hits.
     pub accel: AccelKind,
-    /// Whether the camera's lens blurs what is out of focus; if not, [`Camera::remove_lens`](crate::camera::Camera::remove_lens) belongs before the
-    /// render.
+    /// Whether the camera's lens blurs what is out of focus; if not,
+    /// [`Camera::remove_lens`](crate::camera::Camera::remove_lens) belongs before the render.
     pub depth_of_field: bool,
     /// Number of threads, at least 1.
     #[serde(skip)]
@@ -373,7 +373,7 @@ mod tests {
         assert_eq!((s.sampler, s.spp, s.seed), (SamplerKind::Independent, 16, 3));
         assert!(matches!(s.integrator, IntegratorDesc::Path { max_depth: 9, rr_depth: 3, strategy: StrategyDesc::Mis, clamp: None, .. }));
         assert_eq!(s.layers, [LayerKind::N].into_iter().collect());
-        assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::EMBREE, None, 2));
+        assert_eq!((s.accel, s.time_limit, s.outputs.len()), (AccelKind::Auto, None, 2));
         assert!(s.threads >= 1);
     }
 

@@ -11,4 +11,4 @@ pub mod warp;
 pub use discrete::{AliasTable, DiscreteSample};
 pub use mis::power_heuristic;
 pub use piecewise::{Piecewise2d, PiecewiseCell, PiecewiseSample};
-pub use sampler::{Numbers, PixelSeed, Requests, Sampler, SamplerKind};
+pub use sampler::{PixelSeed, SampleIdRows, SampleRows, Sampler, SamplerKind};

@@ -1,7 +1,8 @@
 //! Piecewise-constant densities on the unit square, sampled by inversion so that stratified numbers stay stratified.
 //!
-//! Cells are grouped in blocks of 4 x 4. A block is found by inverting cumulative tables, which are small enough to stay in the processor's caches, a
-//! cell by the weights of its block, which are one cache line: a sample waits for memory once, however large the grid is.
+//! Cells are grouped in blocks of 4 x 4. A block is found by inverting cumulative tables, which are small enough to
+//! stay in the processor's caches, a cell by the weights of its block, which are one cache line: a sample waits for
+//! memory once, however large the grid is.
 
 use crate::math::float::ONE_MINUS_EPSILON;
 
@@ -128,8 +129,8 @@ struct Inverse {
 
 impl Table {
     fn new(len: usize, count: usize) -> Self {
-        // As many guide entries as there are entries: a search then takes less than two steps on average, however uneven the weights are (Chen and
-        // Asau, "On Generating Random Variates from an Empirical Distribution").
+        // As many guide entries as there are entries: a search then takes less than two steps on average, however
+        // uneven the weights are (Chen and Asau, "On Generating Random Variates from an Empirical Distribution").
         let guide_bits = usize::BITS - len.leading_zeros();
         let guide_shift = u32::BITS - guide_bits.clamp(1, 16);
         Self { len, limits: Vec::with_capacity((len + 1) * count), guide_shift, guide: Vec::with_capacity(((1 << guide_bits) + 1) * count) }

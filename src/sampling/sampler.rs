@@ -2,8 +2,9 @@
 //!
 //! The Sobol sampler follows Burley, "Practical Hash-based Owen Scrambling": every set of four dimensions uses the first four dimensions of
 //! Sobol's sequence (direction numbers of Joe and Kuo), with an index shuffle and four Owen scrambles of its own, all by hashing. Within a
-//! set, `2^k` consecutive samples from a multiple of `2^k` on are as stratified as Sobol's; between sets and pixels nothing is shared. The table
-//! takes 2 KiB and any number of samples and sets is good. A call costs about 21 ns (baseline x86-64 code on an AMD EPYC), an independent one 4 ns.
+//! set, `2^k` consecutive samples from a multiple of `2^k` on are as stratified as Sobol's; between sets and pixels
+//! nothing is shared. The table takes 2 KiB and any number of samples and sets is good. A call costs about 21 ns
+//! (baseline x86-64 code on an AMD EPYC), an independent one 4 ns.
 
 mod batch;
 
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::desc::SamplerKindDesc;
 use crate::math::random::mix;
 
-pub use batch::{Numbers, Requests};
+pub use batch::{SampleIdRows, SampleRows};
 
 /// How samples are chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,20 +1,20 @@
 //! Textures from images.
 //!
-//! The image fills the unit square of uv with its bottom left corner at the origin: v grows upward, as in OBJ files. Texels are squares whose
-//! colours stand at their middles.
+//! The image fills the unit square of uv with its bottom left corner at the origin: v grows upward, as in OBJ files.
+//! Texels are squares whose colours stand at their middles.
 
 use std::ops::{Add, Mul};
 use std::sync::Arc;
 
 use super::footprint::Footprint;
-use super::image::{Channel, Decoding, Image};
+use super::image::{Channel, Decoding, TextureImage};
 use super::mapping::{UvTransform, Wrap};
 use crate::color::Rgb;
 use crate::math::{Vec2, vec2};
 
 /// What stands between the middles of texels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Filter {
+pub enum TextureFilter {
     /// The colour of the texel.
     Nearest,
     /// The colours of the four nearest texels, blended.
@@ -28,11 +28,11 @@ pub enum Filter {
 #[derive(Clone, Debug)]
 pub struct Bitmap {
     /// The image; textures of one file share it.
-    pub image: Arc<Image>,
+    pub image: Arc<TextureImage>,
     /// How whole numbers become colours.
     pub decoding: Decoding,
     /// What stands between the middles of texels.
-    pub filter: Filter,
+    pub filter: TextureFilter,
     /// What lies beyond the edges, along u and along v.
     pub wrap: [Wrap; 2],
     /// From the uv of the surface to that of the image.
@@ -51,8 +51,8 @@ struct Texels {
 
 impl Bitmap {
     /// An image as it is: blended, repeated.
-    pub fn new(image: Arc<Image>, decoding: Decoding) -> Self {
-        let (filter, wrap) = (Filter::default(), [Wrap::default(); 2]);
+    pub fn new(image: Arc<TextureImage>, decoding: Decoding) -> Self {
+        let (filter, wrap) = (TextureFilter::default(), [Wrap::default(); 2]);
         Self { image, decoding, filter, wrap, transform: UvTransform::IDENTITY, channel: None, invert: false }
     }
 
@@ -107,7 +107,7 @@ impl Bitmap {
         let size = vec2(self.image.width() as f32, self.image.height() as f32);
         let texels = footprint.area * (along_u * size).perp_dot(along_v * size).abs();
         // Written so that a NaN means the image too.
-        if self.filter == Filter::Trilinear && texels > 1.0 { Some(self.levels_of_area(texels)) } else { None }
+        if self.filter == TextureFilter::Trilinear && texels > 1.0 { Some(self.levels_of_area(texels)) } else { None }
     }
 
     /// The levels where a texel covers about so many of the image's.
@@ -125,15 +125,15 @@ impl Bitmap {
 
     /// The colour at `uv` of the image or a level of it.
     #[inline]
-    fn color_in(&self, image: &Image, decoding: Decoding, uv: Vec2) -> Rgb {
+    fn color_in(&self, image: &TextureImage, decoding: Decoding, uv: Vec2) -> Rgb {
         let color = match self.channel {
             Some(channel) => Rgb::splat(self.channel_value(image, decoding, uv, channel)),
             None => match self.filter {
-                Filter::Nearest => {
+                TextureFilter::Nearest => {
                     let [x, y] = self.nearest(image, uv);
                     image.color(x, y, decoding)
                 }
-                Filter::Bilinear | Filter::Trilinear => {
+                TextureFilter::Bilinear | TextureFilter::Trilinear => {
                     let around = self.around(image, uv);
                     image.weigh(around.texels, around.weights, decoding)
                 }
@@ -144,7 +144,7 @@ impl Bitmap {
 
     /// One number at `uv` of the image or a level of it.
     #[inline]
-    fn scalar_in(&self, image: &Image, decoding: Decoding, uv: Vec2) -> f32 {
+    fn scalar_in(&self, image: &TextureImage, decoding: Decoding, uv: Vec2) -> f32 {
         let value = match self.channel {
             Some(channel) => self.channel_value(image, decoding, uv, channel),
             None if image.has_color() => return self.color_in(image, decoding, uv).luminance(),
@@ -153,33 +153,67 @@ impl Bitmap {
         if self.invert { 1.0 - value } else { value }
     }
 
-    fn channel_value(&self, image: &Image, decoding: Decoding, uv: Vec2, channel: Channel) -> f32 {
+    fn channel_value(&self, image: &TextureImage, decoding: Decoding, uv: Vec2, channel: Channel) -> f32 {
         let value = |[x, y]: [usize; 2]| image.value(x, y, channel, decoding);
         match self.filter {
-            Filter::Nearest => value(self.nearest(image, uv)),
-            Filter::Bilinear | Filter::Trilinear => {
+            TextureFilter::Nearest => value(self.nearest(image, uv)),
+            TextureFilter::Bilinear | TextureFilter::Trilinear => {
                 let Texels { texels, weights } = self.around(image, uv);
                 texels.into_iter().zip(weights).map(|(texel, weight)| value(texel) * weight).sum()
             }
         }
     }
 
+    /// How many cells there are along each axis: parts in which the same texels decide. Without blending a cell is a texel; else it is the
+    /// square between the middles of four, the first of which lie beyond the edge.
+    pub(super) fn cells(&self) -> [usize; 2] {
+        let between = usize::from(self.filter != TextureFilter::Nearest);
+        [self.image.width() + between, self.image.height() + between]
+    }
+
+    /// The smallest and the largest number of a cell.
+    pub(super) fn range_in(&self, [x, y]: [usize; 2]) -> [f32; 2] {
+        let (width, height) = (self.image.width() as i32, self.image.height() as i32);
+        let texel = |dx: i32, dy: i32| {
+            let (x, y) = (x as i32 - dx, y as i32 - dy);
+            [self.wrap[0].texel(x, width), self.wrap[1].texel(y, height)]
+        };
+        let before: &[[i32; 2]] = if self.filter == TextureFilter::Nearest { &[[0, 0]] } else { &[[0, 0], [1, 0], [0, 1], [1, 1]] };
+        let values = before.iter().map(|&[dx, dy]| self.scalar_of(&self.image, self.decoding, texel(dx, dy)));
+        values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+    }
+
+    /// The number of a texel.
+    fn scalar_of(&self, image: &TextureImage, decoding: Decoding, [x, y]: [usize; 2]) -> f32 {
+        let value = match self.channel {
+            Some(channel) => image.value(x, y, channel, decoding),
+            None if image.has_color() => image.color(x, y, decoding).luminance(),
+            None => image.value(x, y, Channel::R, decoding),
+        };
+        if self.invert { 1.0 - value } else { value }
+    }
+
+    /// The place in the unit square, from the top left, that `uv` means.
+    #[inline]
+    fn place(&self, uv: Vec2) -> Vec2 {
+        let at = self.transform.apply(uv);
+        vec2(self.wrap[0].fold(at.x), 1.0 - self.wrap[1].fold(at.y))
+    }
+
     /// The texel around a place.
     #[inline]
-    fn nearest(&self, image: &Image, uv: Vec2) -> [usize; 2] {
-        let at = self.transform.apply(uv);
+    fn nearest(&self, image: &TextureImage, uv: Vec2) -> [usize; 2] {
+        let place = self.place(uv);
         let (width, height) = (image.width(), image.height());
-        let (x, y) = (self.wrap[0].fold(at.x) * width as f32, (1.0 - self.wrap[1].fold(at.y)) * height as f32);
-        [(x as usize).min(width - 1), (y as usize).min(height - 1)]
+        [((place.x * width as f32) as usize).min(width - 1), ((place.y * height as f32) as usize).min(height - 1)]
     }
 
     /// The texels around a place.
     #[inline]
-    fn around(&self, image: &Image, uv: Vec2) -> Texels {
-        let at = self.transform.apply(uv);
-        let (width, height) = (image.width(), image.height());
-        let x = Between::new(self.wrap[0].fold(at.x), width, self.wrap[0]);
-        let y = Between::new(1.0 - self.wrap[1].fold(at.y), height, self.wrap[1]);
+    fn around(&self, image: &TextureImage, uv: Vec2) -> Texels {
+        let place = self.place(uv);
+        let x = Between::new(place.x, image.width(), self.wrap[0]);
+        let y = Between::new(place.y, image.height(), self.wrap[1]);
         let ([x0, x1], [y0, y1]) = (x.texels, y.texels);
         let (s, t) = (x.fraction, y.fraction);
         Texels { texels: [[x0, y0], [x1, y0], [x0, y1], [x1, y1]], weights: [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t] }
@@ -189,7 +223,7 @@ impl Bitmap {
 /// Two neighbouring levels of an image's pyramid.
 struct Levels<'a> {
     /// The finer one first, with how whole numbers become colours.
-    images: [(&'a Image, Decoding); 2],
+    images: [(&'a TextureImage, Decoding); 2],
     /// How far the footprint is from the first to the second, from 0 to 1.
     fraction: f32,
 }
@@ -197,7 +231,7 @@ struct Levels<'a> {
 impl Levels<'_> {
     /// A value between those of both levels.
     #[inline]
-    fn blend<T: Mul<f32, Output = T> + Add<Output = T>>(&self, value: impl Fn(&Image, Decoding) -> T) -> T {
+    fn blend<T: Mul<f32, Output = T> + Add<Output = T>>(&self, value: impl Fn(&TextureImage, Decoding) -> T) -> T {
         let [fine, coarse] = self.images.map(|(image, decoding)| value(image, decoding));
         fine * (1.0 - self.fraction) + coarse * self.fraction
     }

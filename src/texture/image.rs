@@ -57,7 +57,7 @@ pub enum Channel {
 
 /// An image; rows run from the top, as in the file.
 #[derive(Clone, Debug)]
-pub struct Image {
+pub struct TextureImage {
     data: ImageData,
     /// Smallest and largest number, of the colours and of alpha.
     ranges: [[f32; 2]; 2],
@@ -76,7 +76,7 @@ static TABLES_U8: LazyLock<[[f32; 256]; 2]> = LazyLock::new(|| {
 /// Linear values of the 65,536 codes by the sRGB curve.
 static SRGB_U16: LazyLock<Vec<f32>> = LazyLock::new(|| (0..65_536).map(|i| linear_from_srgb(i as f32 / 65_535.0)).collect());
 
-impl Image {
+impl TextureImage {
     /// An image from a file's numbers.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! Textures: colours and numbers as functions of uv, or attributes of meshes.
 //!
-//! A lookup is a point, or stands for what a sample of a pixel covers: then it takes a smaller version of the image where the samples of the
-//! pixel together would miss texels.
+//! A lookup is a point, or stands for what a sample of a pixel covers: then it takes a smaller version of the image
+//! where the samples of the pixel together would miss texels.
 
 mod bitmap;
 mod checker;
@@ -9,13 +9,15 @@ mod footprint;
 mod image;
 mod mapping;
 mod pyramid;
+mod solid;
 
-pub use bitmap::{Bitmap, Filter};
+pub use bitmap::{Bitmap, TextureFilter};
 pub use checker::Checker;
 pub use footprint::Footprint;
-pub use image::{Channel, Decoding, Image, ImageError};
+pub use image::{Channel, Decoding, ImageError, TextureImage};
 pub use mapping::{UvTransform, Wrap};
 pub use pyramid::Pyramid;
+pub use solid::{SolidTable, Solidity};
 
 use crate::color::Rgb;
 use crate::id::AttributeId;
@@ -96,7 +98,7 @@ impl Texture {
     pub fn is_filtered(&self) -> bool {
         match self {
             Self::Constant(_) | Self::Checker(_) | Self::Attribute(..) | Self::Step(..) => false,
-            Self::Bitmap(bitmap) => bitmap.filter == Filter::Trilinear,
+            Self::Bitmap(bitmap) => bitmap.filter == TextureFilter::Trilinear,
             Self::Product(factors) => factors.iter().any(Self::is_filtered),
         }
     }

@@ -5,26 +5,26 @@
 
 use half::f16;
 
-use super::image::{Channel, Decoding, Image};
+use super::image::{Channel, Decoding, TextureImage};
 use crate::import::{ImageData, Samples};
 
 /// The smaller levels of an image, down to a single texel. Whole numbers are kept in 16 bits, floats as the image has them; all are linear.
 #[derive(Clone, Debug)]
 pub struct Pyramid {
     /// From half the image's size on.
-    levels: Vec<Image>,
+    levels: Vec<TextureImage>,
 }
 
 impl Pyramid {
     /// Over an image whose whole numbers mean colours by `decoding`.
-    pub fn new(image: &Image, decoding: Decoding) -> Self {
-        let mut levels: Vec<Image> = Vec::new();
+    pub fn new(image: &TextureImage, decoding: Decoding) -> Self {
+        let mut levels: Vec<TextureImage> = Vec::new();
         loop {
             let (last, decoding) = levels.last().map_or((image, decoding), |level| (level, Decoding::Linear));
             if last.width() == 1 && last.height() == 1 {
                 return Self { levels };
             }
-            let Ok(half) = Image::new(halved(last, decoding)) else {
+            let Ok(half) = TextureImage::new(halved(last, decoding)) else {
                 // The mean of finite numbers is finite.
                 return Self { levels };
             };
@@ -34,7 +34,7 @@ impl Pyramid {
 
     /// Level 1 is half the image; `None` for 0, the image itself, and beyond the last.
     #[inline]
-    pub fn level(&self, level: usize) -> Option<&Image> {
+    pub fn level(&self, level: usize) -> Option<&TextureImage> {
         self.levels.get(level.wrapping_sub(1))
     }
 
@@ -68,7 +68,7 @@ impl Shares {
     }
 }
 
-fn halved(image: &Image, decoding: Decoding) -> ImageData {
+fn halved(image: &TextureImage, decoding: Decoding) -> ImageData {
     let half = |count: usize| (count / 2).max(1);
     let (width, height) = (half(image.width()), half(image.height()));
     let channels: &[Channel] = match (image.has_color(), image.has_alpha()) {
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
     use crate::math::Rng;
 
-    fn mean(image: &Image, channel: Channel, decoding: Decoding) -> f64 {
+    fn mean(image: &TextureImage, channel: Channel, decoding: Decoding) -> f64 {
         let (width, height) = (image.width(), image.height());
         let sum: f64 = (0..width * height).map(|i| f64::from(image.value(i % width, i / width, channel, decoding))).sum();
         sum / (width * height) as f64
@@ -125,7 +125,7 @@ mod tests {
                 (Samples::F16(floats.iter().map(|&v| f16::from_f32(v)).collect()), 0.1),
                 (Samples::F32(floats), 1e-4),
             ] {
-                let image = Image::new(ImageData { width, height, channels, samples }).unwrap();
+                let image = TextureImage::new(ImageData { width, height, channels, samples }).unwrap();
                 for decoding in [Decoding::Linear, Decoding::Srgb] {
                     let pyramid = Pyramid::new(&image, decoding);
                     let last = pyramid.level(pyramid.last()).unwrap_or(&image);
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_pyramid_has_a_third_of_the_image_in_texels() {
-        let image = Image::new(ImageData { width: 64, height: 64, channels: 1, samples: Samples::U16(vec![9; 4096]) }).unwrap();
+        let image = TextureImage::new(ImageData { width: 64, height: 64, channels: 1, samples: Samples::U16(vec![9; 4096]) }).unwrap();
         let pyramid = Pyramid::new(&image, Decoding::Linear);
         let bytes: usize = (1..=pyramid.last()).map(|level| pyramid.level(level).unwrap().memory_bytes()).sum();
         assert_eq!(bytes, 2 * (4096 - 1) / 3);

@@ -19,7 +19,7 @@ use std::time::Instant;
 use steradian::import::{ImageData, Samples};
 use steradian::math::{Vec2, vec2};
 use steradian::sampling::{Sampler, SamplerKind};
-use steradian::texture::{Bitmap, Decoding, Footprint, Image};
+use steradian::texture::{Bitmap, Decoding, Footprint, TextureImage};
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 64;
@@ -33,7 +33,7 @@ const TILES: f32 = 0.5;
 fn bitmap(texel: impl Fn(usize, usize) -> f32) -> Bitmap {
     let values = (0..TEXELS * TEXELS).map(|i| texel(i % TEXELS, i / TEXELS)).collect();
     let data = ImageData { width: TEXELS, height: TEXELS, channels: 1, samples: Samples::F32(values) };
-    Bitmap::new(Arc::new(Image::new(data).expect("a finite image")), Decoding::Linear)
+    Bitmap::new(Arc::new(TextureImage::new(data).expect("a finite image")), Decoding::Linear)
 }
 
 /// Where the ray through a point of the picture (in pixels) meets the plane, in uv.

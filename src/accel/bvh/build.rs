@@ -23,14 +23,14 @@ pub(super) const MAX_LEAF: usize = 8;
 
 /// An item to be sorted into the hierarchy.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reference {
+pub(in crate::accel) struct Reference {
     pub bounds: Aabb,
     pub item: u32,
 }
 
 /// A node of the binary hierarchy.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct BinaryNode {
+pub(in crate::accel) struct BinaryNode {
     pub bounds: Aabb,
     /// Of a leaf, its first reference; of an inner node, its second child. The first child follows its parent.
     pub link: u32,
@@ -41,7 +41,7 @@ pub(super) struct BinaryNode {
 const UNUSED: BinaryNode = BinaryNode { bounds: Aabb::EMPTY, link: 0, count: 0 };
 
 /// A binary hierarchy; the root is the first node.
-pub(super) struct Binary {
+pub(in crate::accel) struct Binary {
     /// A node for `n` references is followed by the room that its children may need, so parts of it are unused.
     pub nodes: Vec<BinaryNode>,
     pub references: Vec<Reference>,

@@ -33,7 +33,7 @@ pub(super) struct BlockHits {
 }
 
 /// One instruction set.
-pub(super) trait Lanes: Copy {
+pub(super) trait SimdIsa: Copy {
     /// The children that the ray may meet within `[t_min, t_max]` as bits, and where it enters each.
     fn enter(self, node: &WideNode, ray: &WideRay, t_min: f32, t_max: f32) -> (u32, [f32; WIDTH]);
 
@@ -45,7 +45,7 @@ pub(super) trait Lanes: Copy {
 #[derive(Clone, Copy)]
 pub(super) struct Portable;
 
-impl Lanes for Portable {
+impl SimdIsa for Portable {
     #[inline(always)]
     fn enter(self, node: &WideNode, ray: &WideRay, t_min: f32, t_max: f32) -> (u32, [f32; WIDTH]) {
         let (mut enter, mut leave) = ([t_min; WIDTH], [t_max; WIDTH]);
@@ -88,7 +88,7 @@ impl Lanes for Portable {
 }
 
 /// AVX2, without fused multiply-add: that would round otherwise.
-impl Lanes for V3 {
+impl SimdIsa for V3 {
     #[inline(always)]
     fn enter(self, node: &WideNode, ray: &WideRay, t_min: f32, t_max: f32) -> (u32, [f32; WIDTH]) {
         let x = self.avx;

@@ -14,7 +14,7 @@ use super::inspect::NodeInfo;
 use super::tree::{Counter, Items, Query, Tree};
 use crate::math::Aabb;
 use binary::BinaryTree;
-use build::{Binary, Reference};
+pub(super) use build::{Binary, Reference};
 use lanes::Portable;
 use wide::{ChildKind, STACK, WIDTH, Wide};
 
@@ -26,9 +26,9 @@ pub struct BvhOptions {
 }
 
 /// The hierarchy.
-pub(super) struct Bvh(Form);
+pub(super) struct Bvh(Layout);
 
-enum Form {
+enum Layout {
     Empty,
     Binary(BinaryTree),
     Wide(Wide, Option<V3>),
@@ -57,7 +57,7 @@ impl Bvh {
             // Halving gives the fewest levels.
             tree = Wide::new(&Binary::halved(references(items), |item| is_alone(items, item)), items);
         }
-        Self(Form::Wide(tree, simd))
+        Self(Layout::Wide(tree, simd))
     }
 }
 
@@ -79,51 +79,51 @@ impl Tree for Bvh {
 
     fn build(items: &Items<'_>, options: &BvhOptions) -> Self {
         if items.len() == 0 {
-            return Self(Form::Empty);
+            return Self(Layout::Empty);
         }
-        if options.binary { Self(Form::Binary(BinaryTree::new(binary(items), items))) } else { Self::wide(items, V3::try_new()) }
+        if options.binary { Self(Layout::Binary(BinaryTree::new(binary(items), items))) } else { Self::wide(items, V3::try_new()) }
     }
 
     #[inline]
     fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Self, C, ANY>) {
         match &self.0 {
-            Form::Empty => {}
-            Form::Binary(tree) => tree.traverse(query),
-            Form::Wide(wide, Some(simd)) => simd.vectorize(Run { simd: *simd, wide, query }),
-            Form::Wide(wide, None) => traverse::traverse(Portable, wide, query),
+            Layout::Empty => {}
+            Layout::Binary(tree) => tree.traverse(query),
+            Layout::Wide(wide, Some(simd)) => simd.vectorize(Run { simd: *simd, wide, query }),
+            Layout::Wide(wide, None) => traverse::traverse(Portable, wide, query),
         }
     }
 
     fn bounds(&self) -> Aabb {
         match &self.0 {
-            Form::Empty => Aabb::EMPTY,
-            Form::Binary(tree) => tree.bounds(),
-            Form::Wide(wide, _) => wide.bounds,
+            Layout::Empty => Aabb::EMPTY,
+            Layout::Binary(tree) => tree.bounds(),
+            Layout::Wide(wide, _) => wide.bounds,
         }
     }
 
     fn memory_bytes(&self) -> usize {
         match &self.0 {
-            Form::Empty => 0,
-            Form::Binary(tree) => tree.memory_bytes(),
-            Form::Wide(wide, _) => wide.memory_bytes(),
+            Layout::Empty => 0,
+            Layout::Binary(tree) => tree.memory_bytes(),
+            Layout::Wide(wide, _) => wide.memory_bytes(),
         }
     }
 
     fn visit_nodes(&self, visit: &mut dyn FnMut(&NodeInfo)) {
         match &self.0 {
-            Form::Empty => {}
-            Form::Binary(tree) => tree.visit_nodes(visit),
-            Form::Wide(wide, _) => visit_wide(wide, visit),
+            Layout::Empty => {}
+            Layout::Binary(tree) => tree.visit_nodes(visit),
+            Layout::Wide(wide, _) => visit_wide(wide, visit),
         }
     }
 
     fn description(&self) -> String {
         match &self.0 {
-            Form::Empty => "BVH, empty".into(),
-            Form::Binary(_) => "BVH, 2 wide, scalar".into(),
-            Form::Wide(_, Some(_)) => "BVH, 8 wide, AVX2".into(),
-            Form::Wide(_, None) => "BVH, 8 wide, scalar".into(),
+            Layout::Empty => "BVH, empty".into(),
+            Layout::Binary(_) => "BVH, 2 wide, scalar".into(),
+            Layout::Wide(_, Some(_)) => "BVH, 8 wide, AVX2".into(),
+            Layout::Wide(_, None) => "BVH, 8 wide, scalar".into(),
         }
     }
 }

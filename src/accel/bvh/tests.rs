@@ -1,5 +1,5 @@
 use super::build::{BLOCK, MAX_LEAF};
-use super::lanes::{Lanes, Portable, WideRay};
+use super::lanes::{Portable, SimdIsa, WideRay};
 use super::wide::{Block, Wide, WideNode};
 use super::*;
 use crate::accel::Accelerator;
@@ -73,7 +73,7 @@ fn avx2_answers_as_the_shared_triangle_test_bit_for_bit() {
     assert_same_triangle_hits(V3::try_new().unwrap());
 }
 
-fn assert_same_triangle_hits(lanes: impl Lanes) {
+fn assert_same_triangle_hits(lanes: impl SimdIsa) {
     let mut random = Sequence(5);
     let mut hits = 0;
     for _ in 0..many(60_000) {
@@ -112,7 +112,7 @@ fn avx2_opens_the_boxes_that_the_scalar_test_opens() {
     assert_same_boxes(V3::try_new().unwrap());
 }
 
-fn assert_same_boxes(lanes: impl Lanes) {
+fn assert_same_boxes(lanes: impl SimdIsa) {
     let mut random = Sequence(6);
     for _ in 0..many(60_000) {
         let boxes: Vec<_> = (0..WIDTH)
@@ -228,6 +228,6 @@ fn the_stack_holds_the_deepest_tree() {
     // The builder halves below its depth cap; this bounds the levels of the wide form for four billion references.
     let geometry = soup(&mut Sequence(10), many(5_000));
     let items = Items::of_shapes(&geometry, &geometry.world);
-    let Form::Wide(Wide { depth, .. }, _) = Bvh::wide(&items, None).0 else { panic!("a wide tree") };
+    let Layout::Wide(Wide { depth, .. }, _) = Bvh::wide(&items, None).0 else { panic!("a wide tree") };
     assert!(depth * (WIDTH - 1) < STACK, "{depth}");
 }

@@ -4,7 +4,7 @@ use std::ffi::{CStr, c_char, c_void};
 use std::sync::atomic::Ordering;
 
 use super::device::Monitor;
-use super::gate::{Gate, RayWords};
+use super::gate::{RayLimits, RayWords};
 use super::packet::INVALID;
 use super::sys;
 use crate::geometry::{Geometry, Hit, Instance, PACKET_SIZE, Placed, RayPacket, Shape};
@@ -54,8 +54,8 @@ pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *con
 /// [`intersect_placed`] for the rays of a packet.
 pub(super) unsafe extern "C" fn intersect_placed_packet(shape: *const c_void, rays: *const f32, n: u32, valid: *const i32, t: *mut f32) {
     let n = n as usize;
-    // SAFETY: the shape as in `intersect_placed`; the shim passes `n` lanes, at most a packet's, of rays in nine rows and more, and of `valid`, and
-    // room for the distances of a packet. Every bit pattern is a number.
+    // SAFETY: the shape as in `intersect_placed`; the shim passes `n` lanes, at most a packet's, of rays in nine rows
+    // and more, and of `valid`, and room for the distances of a packet. Every bit pattern is a number.
     let (placed, words, valid, t) = unsafe {
         let words = std::slice::from_raw_parts(rays, ROWS * n);
         (&*shape.cast::<Placed>(), words, std::slice::from_raw_parts(valid, n), &mut *t.cast::<[f32; PACKET_SIZE]>())
@@ -84,7 +84,7 @@ pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *co
     let local = instance.object_ray(ray);
     // SAFETY: as above; every bit pattern is a `Ray`.
     unsafe { inside.cast::<Ray>().write(local) };
-    Gate::OPEN.admits(&RayWords::new(&local))
+    RayLimits::OPEN.accepts(&RayWords::new(&local))
 }
 
 /// A shape with holes or slivers, as the user data of its geometry.

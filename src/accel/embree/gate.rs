@@ -8,7 +8,7 @@ use crate::math::{Ray, Vec3, Vec4};
 
 /// The limits on rays of one accelerator.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gate {
+pub(super) struct RayLimits {
     /// Largest magnitude of a coordinate of the origin; without instances, that of [`Ray::is_valid`].
     origin: f32,
     /// Largest magnitude of a component of the direction.
@@ -19,7 +19,7 @@ pub(super) struct Gate {
     high_d: Vec4,
 }
 
-impl Gate {
+impl RayLimits {
     /// The gate of a scene without instances.
     pub(super) const OPEN: Self = Self::new(EMBREE_LARGE.next_down(), EMBREE_LARGE.next_down());
 
@@ -55,7 +55,7 @@ impl Gate {
     /// Whether `ray` may be handed to Embree: it is [valid](Ray::is_valid) and within the limits. Every other ray hits nothing; so does one
     /// with `t_max = 0`, which Embree's closest-hit query passes over and its any-hit query does not.
     #[inline(always)]
-    pub(super) fn admits(&self, ray: &RayWords) -> bool {
+    pub(super) fn accepts(&self, ray: &RayWords) -> bool {
         let RayWords { origin_t_min: o, direction_time: d, t_max } = *ray;
         // Every comparison with a NaN is false.
         let within = o.cmpge(self.low_o) & o.cmple(self.high_o) & d.cmpge(self.low_d) & d.cmple(self.high_d);
@@ -65,7 +65,8 @@ impl Gate {
 
     /// Whether `ray` may be traced side by side with others. Embree sorts the rays of a packet by the signs of their directions but takes
     /// the reciprocal of any component below [`SMALLEST_RECIPROCAL`] as positive; a small negative one spoils the common frustum: nodes
-    /// are missed, and empty ones entered, which ends in an assertion. An interval of one point goes alone too: any-hit packets pass over it.
+    /// are missed, and empty ones entered, which ends in an assertion. An interval of one point goes alone too: any-hit
+    /// packets pass over it.
     #[inline(always)]
     pub(super) fn admits_to_packet(&self, ray: &Ray) -> bool {
         let tame = |x: f32| (x == 0.0) | (x.abs() >= SMALLEST_RECIPROCAL);

@@ -24,13 +24,14 @@ use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 use device::Device;
-use gate::Gate;
+use gate::RayLimits;
 use packet::{HitPacket, INVALID, ShadowPacket, Tracer, WIDTH};
-use scene::{EnteredInstances, GeometryHandle, Scene, SceneBuilder, UserShapes};
+use scene::{GeometryHandle, Scene, SceneBuilder, UserInstances, UserShapes};
 use sys::StHit;
 
-/// Has `report` called, in place of abort(), for an exception of C++ that nobody catches, such as one of memory in a thread of Embree's. It gets
-/// whether memory or threads ran out, and a description that lives during the call, and must not return.
+/// Has `report` called, in place of abort(), for an exception of C++ that nobody catches, such as one of memory in a
+/// thread of Embree's. It gets whether memory or threads ran out, and a description that lives during the call, and
+/// must not return.
 pub fn on_uncaught_exception(report: extern "C" fn(bool, *const c_char)) {
     // SAFETY: the function pointer is valid for ever, and takes what the header says.
     unsafe { sys::st_on_uncaught(Some(report)) }
@@ -85,7 +86,7 @@ pub struct EmbreeAccel<'g> {
     // Dropped in this order: the scene inside refers to the user data, to the objects' scenes and to the device.
     tracer: Tracer,
     user_shapes: UserShapes,
-    entered: EnteredInstances,
+    entered: UserInstances,
     _objects: Vec<Scene>,
     device: Device,
     geometry: &'g Geometry,
@@ -106,13 +107,17 @@ impl<'g> EmbreeAccel<'g> {
     /// # Errors
     /// As there.
     pub fn with_options(geometry: &'g Geometry, threads: usize, options: EmbreeOptions) -> Result<Self> {
-        let gate = Gate::for_instances(&geometry.instances)?;
+        let gate = RayLimits::for_instances(&geometry.instances)?;
         let device = Device::new(threads)?;
         let user_shapes = UserShapes::new(geometry);
         let shapes = shape_handles(geometry, &device, &user_shapes)?;
         let objects = object_scenes(geometry, &device, &shapes, options)?;
-        let entered = EnteredInstances::new(geometry, &objects);
-        let scene = build_world(geometry, &device, &shapes, &objects, &entered, options)?;
+        let entered = UserInstances::new(geometry, &objects);
+        let mut world = SceneBuilder::new(&device, options)?;
+        scene::attach_shapes(&mut world, &shapes, &geometry.world, |_, id| id.index())?;
+        attach_instances(&mut world, geometry, &device, &objects, &entered)?;
+        // It must be dropped before the user data and the objects' scenes.
+        let scene = world.commit()?;
         let tracer = Tracer { scene, gate, frusta: geometry.instances.is_empty(), cutouts: geometry.cutouts.clone() };
         Ok(Self { tracer, user_shapes, entered, _objects: objects, device, geometry, bounds: geometry.bounds() })
     }
@@ -184,17 +189,14 @@ fn object_scenes(geometry: &Geometry, device: &Device, shapes: &[Option<Geometry
     geometry.objects.iter().map(|object| object_scene(&object.shapes)).collect()
 }
 
-/// The committed scene of everything. It must be dropped before the user data and the objects' scenes.
-fn build_world(
+/// Attaches the instances, numbered after the shapes.
+fn attach_instances(
+    world: &mut SceneBuilder,
     geometry: &Geometry,
     device: &Device,
-    shapes: &[Option<GeometryHandle>],
     objects: &[Scene],
-    entered: &EnteredInstances,
-    options: EmbreeOptions,
-) -> Result<Scene> {
-    let mut world = SceneBuilder::new(device, options)?;
-    scene::attach_shapes(&mut world, shapes, &geometry.world, |_, id| id.index())?;
+    entered: &UserInstances,
+) -> Result<()> {
     for (i, instance) in geometry.instances.iter().enumerate() {
         let handle = match entered.get(i) {
             None => GeometryHandle::of_instance(device, &objects[instance.object.index()], instance)?,
@@ -203,7 +205,7 @@ fn build_world(
         };
         world.attach(&handle, geometry.shapes.len() + i)?;
     }
-    world.commit()
+    Ok(())
 }
 
 impl Accelerator for EmbreeAccel<'_> {

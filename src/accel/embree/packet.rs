@@ -5,11 +5,11 @@
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
-use super::gate::{Gate, RayWords};
+use super::gate::{RayLimits, RayWords};
 use super::scene::Scene;
 use super::sys::{self, RTCHit16, RTCRay, RTCRay16, RTCRayHit, RTCRayHit16, StHit};
 use crate::accel::{Coherence, HitRows};
-use crate::geometry::Cutouts;
+use crate::geometry::AlphaMasks;
 use crate::math::rows::Row;
 use crate::math::{Ray, RayRows, Vec3, Vec4};
 
@@ -25,11 +25,11 @@ pub(super) const ALL_GEOMETRIES: u32 = u32::MAX;
 /// What traces, and what it may be given.
 pub(super) struct Tracer {
     pub(super) scene: Scene,
-    pub(super) gate: Gate,
+    pub(super) gate: RayLimits,
     /// Whether packets may be traced as frusta: not through instances, since a transform can make a component of the direction tiny.
     pub(super) frusta: bool,
     /// For the keys of rays, where shapes have holes.
-    pub(super) cutouts: Cutouts,
+    pub(super) cutouts: AlphaMasks,
 }
 
 impl Tracer {
@@ -42,13 +42,13 @@ impl Tracer {
     #[inline(always)]
     pub(super) fn intersect(&self, ray: &Ray) -> Option<StHit> {
         let words = RayWords::new(ray);
-        if !self.gate.admits(&words) {
+        if !self.gate.accepts(&words) {
             return None;
         }
         let mut rayhit = MaybeUninit::<RTCRayHit>::uninit();
         let rayhit = rayhit.as_mut_ptr();
-        // SAFETY: the pointer is to memory of that type; all that Embree reads is written before it is called, with a ray that has passed the
-        // gate and a scene that is committed; all that is read after a hit Embree has written.
+        // SAFETY: the pointer is to memory of that type; all that Embree reads is written before it is called, with a
+        // ray that has passed the gate and a scene that is committed; all that is read after a hit Embree has written.
         unsafe {
             set_ray(&raw mut (*rayhit).ray, &words, self.cutouts.key(ray));
             (&raw mut (*rayhit).hit.geomID).write(INVALID);
@@ -73,7 +73,7 @@ impl Tracer {
     #[inline(always)]
     pub(super) fn occluded(&self, ray: &Ray) -> bool {
         let words = RayWords::new(ray);
-        if !self.gate.admits(&words) {
+        if !self.gate.accepts(&words) {
             return false;
         }
         let mut out = MaybeUninit::<RTCRay>::uninit();
@@ -152,7 +152,8 @@ impl HitPacket {
         }
     }
 
-    /// Writes the hits to sixteen lanes from `first` on, with Embree's numbers: a miss is [`INVALID`] as a shape, which is [`HitRows::MISS`].
+    /// Writes the hits to sixteen lanes from `first` on, with Embree's numbers: a miss is [`INVALID`] as a shape, which
+    /// is [`HitRows::MISS`].
     #[inline(always)]
     pub(super) fn read(&self, hits: &mut HitRows, first: usize) {
         const { assert!(INVALID == HitRows::MISS) };

@@ -81,14 +81,14 @@ impl UserShapes {
 
 /// The user data of the instances that move or stretch unevenly, into whose space we move the rays ourselves; the others have none. Embree
 /// keeps addresses into it.
-pub(super) struct EnteredInstances(Vec<Option<sys::StEnteredInstance>>);
+pub(super) struct UserInstances(Vec<Option<sys::StEnteredInstance>>);
 
 // SAFETY: the pointers inside lead to the geometry and to Embree's scenes, and are only read through, which both allow from any thread.
-unsafe impl Send for EnteredInstances {}
+unsafe impl Send for UserInstances {}
 // SAFETY: as above.
-unsafe impl Sync for EnteredInstances {}
+unsafe impl Sync for UserInstances {}
 
-impl EnteredInstances {
+impl UserInstances {
     /// The table for `geometry`, over the committed scenes of its objects, which must live as long.
     pub(super) fn new(geometry: &Geometry, objects: &[Scene]) -> Self {
         let of = |instance: &Instance| {

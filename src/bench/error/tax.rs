@@ -59,6 +59,7 @@ pub(super) fn subject(options: &ErrorOptions) -> Result<(&str, &Settings, Embree
     let found = options.variants.iter().find_map(|variant| match &variant.subject {
         Subject::Ours(settings) => match settings.accel {
             AccelKind::Embree(embree) => Some((variant.name.as_str(), &**settings, embree)),
+            AccelKind::Auto => Some((variant.name.as_str(), &**settings, EmbreeOptions::default())),
             _ => None,
         },
         Subject::External(_) => None,

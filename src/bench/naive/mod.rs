@@ -1,7 +1,8 @@
 //! Accelerators as course reports wrote them, to tell what the tree itself brings and what the care taken with it.
 //!
-//! They are built over the triangles of the meshes in the world, one tree for each mesh, with boxed children, visited recursively or through
-//! a queue. They test triangles with the function that all other accelerators use, so their answers are the oracle's bit for bit.
+//! They are built over the triangles of the meshes in the world, one tree for each mesh, with boxed children, visited
+//! recursively or through a queue. They test triangles with the function that all other accelerators use, so their
+//! answers are the oracle's bit for bit.
 
 /// Makes a tuple around a forest an accelerator.
 macro_rules! delegate {

@@ -115,7 +115,7 @@ fn break_even(scene: &SceneReport, kind: RayKind) -> Result<Option<(String, Stri
         let rate =
             report.and_then(|k| k.rates.iter().find(|r| r.mode == Mode::Single && r.threads == 1)).map(|r| r.mrays_per_second[0] * 1e6);
         if let (Some(build), Some(rate)) = (build, rate.filter(|r| *r > 0.0)) {
-            lines.push((accel.name.clone(), build, 1.0 / rate));
+            lines.push((accel.name.clone(), Cost { build, per_ray: 1.0 / rate }));
         }
     }
     if lines.is_empty() {
@@ -126,18 +126,18 @@ fn break_even(scene: &SceneReport, kind: RayKind) -> Result<Option<(String, Stri
     let mut crossings = Vec::new();
     for (i, a) in lines.iter().enumerate() {
         for b in &lines[i + 1..] {
-            if let Some(n) = crossing((a.1, a.2), (b.1, b.2)).filter(|n| (first..last).contains(n)) {
-                marks.push((n, a.1 + n * a.2));
-                let (slow, fast) = if a.2 < b.2 { (b, a) } else { (a, b) };
+            if let Some(n) = crossing(a.1, b.1).filter(|n| (first..last).contains(n)) {
+                marks.push((n, a.1.of_rays(n)));
+                let (slow, fast) = if a.1.per_ray < b.1.per_ray { (b, a) } else { (a, b) };
                 crossings.push(format!("{} overtakes {} at {n:.2e} rays", fast.0, slow.0));
             }
         }
     }
     let curves: Vec<_> = lines
         .iter()
-        .map(|(name, build, per_ray)| Curve {
+        .map(|(name, cost)| Curve {
             name: name.clone(),
-            points: (0..=70).map(|i| first * 10f64.powf(f64::from(i) / 10.0)).map(|n| (n, build + n * per_ray)).collect(),
+            points: (0..=70).map(|i| first * 10f64.powf(f64::from(i) / 10.0)).map(|n| (n, cost.of_rays(n))).collect(),
         })
         .collect();
     let svg = plot::curves(&curves, "rays", "seconds to build and trace", &marks)?;
@@ -145,9 +145,22 @@ fn break_even(scene: &SceneReport, kind: RayKind) -> Result<Option<(String, Stri
     Ok(Some((svg, format!("Build and trace {} rays on one thread: {ends}.", kind.name()))))
 }
 
+/// Seconds of an accelerator.
+#[derive(Clone, Copy)]
+struct Cost {
+    build: f64,
+    per_ray: f64,
+}
+
+impl Cost {
+    fn of_rays(self, n: f64) -> f64 {
+        self.build + n * self.per_ray
+    }
+}
+
 /// The number of rays after which `build + rays * per_ray` is the same for both; `None` if it never is.
-fn crossing(a: (f64, f64), b: (f64, f64)) -> Option<f64> {
-    let n = (b.0 - a.0) / (a.1 - b.1);
+fn crossing(a: Cost, b: Cost) -> Option<f64> {
+    let n = (b.build - a.build) / (a.per_ray - b.per_ray);
     (n.is_finite() && n > 0.0).then_some(n)
 }
 
@@ -192,8 +205,12 @@ mod tests {
 
     #[test]
     fn lines_cross_where_both_have_cost_the_same() {
-        assert_eq!(crossing((0.0, 2.0), (10.0, 1.0)), Some(10.0));
-        assert_eq!(crossing((0.0, 1.0), (10.0, 2.0)), None);
-        assert_eq!(crossing((5.0, 1.0), (10.0, 1.0)), None);
+        let crossing = |a: [f64; 2], b: [f64; 2]| {
+            let [a, b] = [a, b].map(|[build, per_ray]| Cost { build, per_ray });
+            crossing(a, b)
+        };
+        assert_eq!(crossing([0.0, 2.0], [10.0, 1.0]), Some(10.0));
+        assert_eq!(crossing([0.0, 1.0], [10.0, 2.0]), None);
+        assert_eq!(crossing([5.0, 1.0], [10.0, 1.0]), None);
     }
 }

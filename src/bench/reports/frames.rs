@@ -12,12 +12,14 @@ use crate::accel::{self, AccelKind, Accelerator};
 use crate::bench::observed::{Call, Observed, Observer};
 use crate::bench::{Watch, median_and_range};
 use crate::compile;
+use crate::desc::SceneDesc;
 use crate::error::Result;
 use crate::film::{Image, LayerKind};
 use crate::geometry::Mesh;
 use crate::import::parse_scene;
 use crate::math::Ray;
 use crate::render::{self, Overrides, Settings, Silent};
+use crate::scene::Scene;
 
 /// Rays whose primitive tests are counted, about.
 const COUNTED: usize = 20_000;
@@ -74,8 +76,26 @@ pub struct Found {
     pub different_pixels: usize,
 }
 
+/// Renders a frame on one thread; the seconds of the render, and its picture.
+fn frame(desc: &SceneDesc, scene: &Scene, size: [u32; 2], accel: &dyn Accelerator) -> Result<(f64, Image)> {
+    let overrides = Overrides { size: Some(size), threads: Some(1), default_outputs: vec!["unused.png".into()], ..Overrides::default() };
+    let result = render::render(scene, accel, &Settings::new(desc, &overrides)?, &Silent, &AtomicBool::new(false))?;
+    Ok((result.stats.render_seconds, result.image))
+}
+
+/// A comparison of accelerators on a mesh.
+#[derive(Clone, Copy)]
+pub struct FrameBenchmark<'a> {
+    pub title: &'a str,
+    pub mesh: &'a Mesh,
+    pub entries: &'a [Entry],
+    pub options: &'a ReportsOptions,
+    pub watch: &'a dyn Watch,
+}
+
 /// Times every accelerator on frames of a kind; fewer if it is stopped.
-pub fn measure(title: &str, kind: Kind, mesh: &Mesh, entries: &[Entry], options: &ReportsOptions, watch: &dyn Watch) -> Result<Vec<Found>> {
+pub fn measure(comparison: FrameBenchmark, kind: Kind) -> Result<Vec<Found>> {
+    let FrameBenchmark { title, mesh, entries, options, watch } = comparison;
     let full = u64::from(options.size[0]) * u64::from(options.size[1]);
     // The smallest divisor of the sides that keeps a linear frame within its budget.
     let tests = mesh.triangles().len() as u64 * kind.rays();
@@ -84,15 +104,7 @@ pub fn measure(title: &str, kind: Kind, mesh: &Mesh, entries: &[Entry], options:
     let file = Path::new("bench reports");
     let desc = parse_scene(&kind.scene(mesh).to_string(), file)?;
     let scene = compile::compile(&desc, file)?;
-    let settings = |size: [u32; 2]| {
-        let overrides =
-            Overrides { size: Some(size), threads: Some(1), default_outputs: vec!["unused.png".into()], ..Overrides::default() };
-        Settings::new(&desc, &overrides)
-    };
-    let frame = |size: [u32; 2], accel: &dyn Accelerator| -> Result<(f64, Image)> {
-        let result = render::render(&scene, accel, &settings(size)?, &Silent, &AtomicBool::new(false))?;
-        Ok((result.stats.render_seconds, result.image))
-    };
+    let frame = |size: [u32; 2], accel: &dyn Accelerator| frame(&desc, &scene, size, accel);
 
     let name = kind.name();
     let mut subjects = Vec::new();

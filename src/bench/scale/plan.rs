@@ -130,8 +130,6 @@ pub(super) fn sweeps(options: &ScaleOptions) -> Result<Vec<Sweep>> {
 }
 
 fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Sweep {
-    use Quantity as Q;
-    let [width, height] = options.size;
     let base = Case {
         subject: Subject::Room,
         size: options.size,
@@ -141,93 +139,160 @@ fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Swee
         threads: options.threads,
         accel: options.accel.to_string(),
     };
-    let make = |what: String, columns, fitted, cases| Sweep { name, axis, what, columns, fitted, cases };
-    let plain = |n: usize, case: Case| (n as f64, None, case);
-    let with = |subject: Subject| Case { subject, ..base.clone() };
-    let picture = format!("{width}x{height}, {} spp", options.spp);
-    match name {
-        "resolution" => {
-            let sizes = [1, 2, 4, 8, 16].map(|factor| options.size.map(|side| (side * factor).div_ceil(4).min(LARGEST_SIDE)));
-            make(
-                "The room, 1 spp".to_owned(),
-                &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
-                &[Q::Render, Q::Sample, Q::Peak],
-                sizes.into_iter().map(|size| plain(size[0] as usize * size[1] as usize, Case { size, spp: 1, ..base.clone() })).collect(),
-            )
-        }
-        "spp" => {
-            let counts = [1, 4, 16, 64, 256].map(|spp| if options.quick { spp.min(64) } else { spp });
-            let mut counts = counts.to_vec();
-            counts.dedup();
-            let size = options.size.map(|side| side.div_ceil(4));
-            make(
-                format!("The room, {}x{}", size[0], size[1]),
-                &[Q::Render, Q::Sample, Q::Rate, Q::Peak],
-                &[Q::Render, Q::Sample],
-                counts.into_iter().map(|spp| plain(spp as usize, Case { size, spp, ..base.clone() })).collect(),
-            )
-        }
-        "triangles" => make(
-            format!("A bumpy sphere on a floor under a sky, {picture}"),
-            &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Rate, Q::MeshPerTriangle, Q::AccelPerTriangle, Q::PeakPerTriangle, Q::Peak],
-            &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Accel, Q::Peak],
-            counts(1_000, options.triangles).into_iter().map(|n| plain(n, with(Subject::Sphere { triangles: n }))).collect(),
+    let planner = Planner { name, axis, options, base };
+    planner.sweep_of_scenes().unwrap_or_else(|| planner.sweep_of_settings())
+}
+
+/// Sets of layers with their names and numbers of channels.
+fn layer_sets() -> [(&'static str, u8, Vec<LayerDesc>); 6] {
+    [
+        ("color", 4, vec![]),
+        ("color, Z", 5, vec![LayerDesc::Z]),
+        ("color, Z, N", 8, vec![LayerDesc::Z, LayerDesc::N]),
+        ("color, Z, N, P", 11, vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P]),
+        ("color, Z, N, P, albedo", 14, vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo]),
+        (
+            "all (variance and samples too)",
+            18,
+            vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo, LayerDesc::Variance, LayerDesc::Samples],
         ),
-        "instances" => {
-            let triangles = INSTANCED[usize::from(!options.quick)];
-            make(
-                format!("A heap of instances of a sphere of {triangles} triangles, {picture}"),
-                &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Rate, Q::AccelPerInstance, Q::Peak],
-                &[Q::Build, Q::FirstPixel, Q::Sample, Q::Peak],
-                counts(1, options.instances).into_iter().map(|n| plain(n, with(Subject::Instances { count: n, triangles }))).collect(),
-            )
-        }
-        "lights" => make(
-            format!("Emissive triangles above a floor, {picture}"),
-            &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Rate, Q::Peak],
-            &[Q::Load, Q::FirstPixel, Q::Sample, Q::Peak],
-            counts(1, options.lights).into_iter().map(|n| plain(n, with(Subject::Lamps { count: n }))).collect(),
-        ),
-        "depth" => make(
-            format!("The room, {picture}; no path ends by chance"),
-            &[Q::Render, Q::Sample, Q::Rate, Q::RaysPerSample],
-            &[Q::Sample, Q::RaysPerSample],
-            [1, 2, 4, 8, 16, 32].into_iter().map(|depth| plain(depth as usize, Case { depth, ..base.clone() })).collect(),
-        ),
-        "layers" => {
-            let sets = [
-                ("color", 4, vec![]),
-                ("color, Z", 5, vec![LayerDesc::Z]),
-                ("color, Z, N", 8, vec![LayerDesc::Z, LayerDesc::N]),
-                ("color, Z, N, P", 11, vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P]),
-                ("color, Z, N, P, albedo", 14, vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo]),
-                (
-                    "all (variance and samples too)",
-                    18,
-                    vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo, LayerDesc::Variance, LayerDesc::Samples],
-                ),
-            ];
-            make(
-                format!("The room, {picture}; by channels"),
-                &[Q::Sample, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
-                &[Q::Sample, Q::FilmPerPixel],
-                sets.into_iter()
-                    .map(|(name, channels, layers)| (f64::from(channels), Some(name.to_owned()), Case { layers, ..base.clone() }))
-                    .collect(),
-            )
-        }
-        _ => {
-            let triangles = if options.quick { 10_000 } else { 1_000_000 }.min(options.triangles);
-            let spp = 4 * options.spp;
-            make(
-                format!("A bumpy sphere of {triangles} triangles, {width}x{height}, {spp} spp"),
-                &[Q::Build, Q::Render, Q::Sample, Q::Rate],
-                &[Q::Build, Q::Render, Q::Sample],
-                doubled(options.threads)
-                    .into_iter()
-                    .map(|threads| plain(threads, Case { threads, spp, ..with(Subject::Sphere { triangles }) }))
-                    .collect(),
-            )
+    ]
+}
+
+fn plain(n: usize, case: Case) -> (f64, Option<String>, Case) {
+    (n as f64, None, case)
+}
+
+/// Plans a sweep; `base` is the case of which one quantity grows.
+struct Planner<'a> {
+    name: &'static str,
+    axis: &'static str,
+    options: &'a ScaleOptions,
+    base: Case,
+}
+
+impl Planner<'_> {
+    fn sweep(
+        &self,
+        what: String,
+        columns: &'static [Quantity],
+        fitted: &'static [Quantity],
+        cases: Vec<(f64, Option<String>, Case)>,
+    ) -> Sweep {
+        Sweep { name: self.name, axis: self.axis, what, columns, fitted, cases }
+    }
+
+    fn with(&self, subject: Subject) -> Case {
+        Case { subject, ..self.base.clone() }
+    }
+
+    fn picture(&self) -> String {
+        let [width, height] = self.options.size;
+        format!("{width}x{height}, {} spp", self.options.spp)
+    }
+
+    /// A sweep over the size of the scene; `None` for another.
+    fn sweep_of_scenes(&self) -> Option<Sweep> {
+        use Quantity as Q;
+        let (options, picture) = (self.options, self.picture());
+        Some(match self.name {
+            "triangles" => self.sweep(
+                format!("A bumpy sphere on a floor under a sky, {picture}"),
+                &[
+                    Q::Load,
+                    Q::Build,
+                    Q::FirstPixel,
+                    Q::Sample,
+                    Q::Rate,
+                    Q::MeshPerTriangle,
+                    Q::AccelPerTriangle,
+                    Q::PeakPerTriangle,
+                    Q::Peak,
+                ],
+                &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Accel, Q::Peak],
+                counts(1_000, options.triangles).into_iter().map(|n| plain(n, self.with(Subject::Sphere { triangles: n }))).collect(),
+            ),
+            "instances" => {
+                let triangles = INSTANCED[usize::from(!options.quick)];
+                self.sweep(
+                    format!("A heap of instances of a sphere of {triangles} triangles, {picture}"),
+                    &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Rate, Q::AccelPerInstance, Q::Peak],
+                    &[Q::Build, Q::FirstPixel, Q::Sample, Q::Peak],
+                    counts(1, options.instances)
+                        .into_iter()
+                        .map(|n| plain(n, self.with(Subject::Instances { count: n, triangles })))
+                        .collect(),
+                )
+            }
+            "lights" => self.sweep(
+                format!("Emissive triangles above a floor, {picture}"),
+                &[Q::Load, Q::Build, Q::FirstPixel, Q::Sample, Q::Rate, Q::Peak],
+                &[Q::Load, Q::FirstPixel, Q::Sample, Q::Peak],
+                counts(1, options.lights).into_iter().map(|n| plain(n, self.with(Subject::Lamps { count: n }))).collect(),
+            ),
+            _ => return None,
+        })
+    }
+
+    /// A sweep over settings of the render.
+    fn sweep_of_settings(&self) -> Sweep {
+        use Quantity as Q;
+        let (options, picture) = (self.options, self.picture());
+        match self.name {
+            "resolution" => {
+                let sizes = [1, 2, 4, 8, 16].map(|factor| options.size.map(|side| (side * factor).div_ceil(4).min(LARGEST_SIDE)));
+                self.sweep(
+                    "The room, 1 spp".to_owned(),
+                    &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
+                    &[Q::Render, Q::Sample, Q::Peak],
+                    sizes
+                        .into_iter()
+                        .map(|size| plain(size[0] as usize * size[1] as usize, Case { size, spp: 1, ..self.base.clone() }))
+                        .collect(),
+                )
+            }
+            "spp" => {
+                let counts = [1, 4, 16, 64, 256].map(|spp| if options.quick { spp.min(64) } else { spp });
+                let mut counts = counts.to_vec();
+                counts.dedup();
+                let size = options.size.map(|side| side.div_ceil(4));
+                self.sweep(
+                    format!("The room, {}x{}", size[0], size[1]),
+                    &[Q::Render, Q::Sample, Q::Rate, Q::Peak],
+                    &[Q::Render, Q::Sample],
+                    counts.into_iter().map(|spp| plain(spp as usize, Case { size, spp, ..self.base.clone() })).collect(),
+                )
+            }
+            "depth" => self.sweep(
+                format!("The room, {picture}; no path ends by chance"),
+                &[Q::Render, Q::Sample, Q::Rate, Q::RaysPerSample],
+                &[Q::Sample, Q::RaysPerSample],
+                [1, 2, 4, 8, 16, 32].into_iter().map(|depth| plain(depth as usize, Case { depth, ..self.base.clone() })).collect(),
+            ),
+            "layers" => {
+                let sets = layer_sets();
+                self.sweep(
+                    format!("The room, {picture}; by channels"),
+                    &[Q::Sample, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
+                    &[Q::Sample, Q::FilmPerPixel],
+                    sets.into_iter()
+                        .map(|(name, channels, layers)| (f64::from(channels), Some(name.to_owned()), Case { layers, ..self.base.clone() }))
+                        .collect(),
+                )
+            }
+            _ => {
+                let triangles = if options.quick { 10_000 } else { 1_000_000 }.min(options.triangles);
+                let spp = 4 * options.spp;
+                self.sweep(
+                    format!("A bumpy sphere of {triangles} triangles, {}x{}, {spp} spp", options.size[0], options.size[1]),
+                    &[Q::Build, Q::Render, Q::Sample, Q::Rate],
+                    &[Q::Build, Q::Render, Q::Sample],
+                    doubled(options.threads)
+                        .into_iter()
+                        .map(|threads| plain(threads, Case { threads, spp, ..self.with(Subject::Sphere { triangles }) }))
+                        .collect(),
+                )
+            }
         }
     }
 }

@@ -141,8 +141,8 @@ fn k2_blur(effort: Effort) -> Outcome {
         let expected = vec![f64::from(samples) / (RINGS * SECTORS) as f64; RINGS * SECTORS];
         least = least.min(chi_squared_p_value(&counts, &expected));
     }
-    // In the plane in focus the blur has radius A |f - d| / d; a disk's mean square distance from its centre is half of its radius squared, and those of
-    // light and pixel add to it.
+    // In the plane in focus the blur has radius A |f - d| / d; a disk's mean square distance from its centre is half of
+    // its radius squared, and those of light and pixel add to it.
     let mut error = 0f64;
     for (distance, focus) in [(1.0, 2.0), (1.0, 0.6), (2.0, 8.0)] {
         let pixel = 2.0 * 20f64.to_radians().tan() * focus / 65.0;

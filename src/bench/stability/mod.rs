@@ -1,7 +1,7 @@
 //! Numerical stability: a catalogue of checks with criteria, which `steradian bench stability` and the tests run alike.
 //!
-//! Each group has its file: a `checks!` list of ids, names and set-ups, and below it one function for each check, which measures and says what
-//! the numbers must be.
+//! Each group has its file: a `checks!` list of ids, names and set-ups, and below it one function for each check, which
+//! measures and says what the numbers must be.
 
 pub mod geometry;
 pub mod oracle;
@@ -188,8 +188,9 @@ pub fn run(
     Ok(reports)
 }
 
-/// The probability that a correct program fails a check: what each of `tests` independent p-values must reach for the whole to stay below one
-/// in a million (Šidák, "Rectangular confidence regions for the means of multivariate normal distributions").
+/// The probability that a correct program fails a check: what each of `tests` independent p-values must reach for the
+/// whole to stay below one in a million (Šidák, "Rectangular confidence regions for the means of multivariate normal
+/// distributions").
 pub fn sidak_level(tests: usize) -> f64 {
     // 1 - (1 - a)^(1/n) without cancellation.
     -((-1e-6f64).ln_1p() / tests.max(1) as f64).exp_m1()

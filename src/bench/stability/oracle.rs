@@ -8,8 +8,8 @@ use super::geometry::Rng;
 use crate::geometry::{Analytic, Disk, Frustum, Profile, Quad, Revolution, ShapeSample, Sphere};
 use crate::math::{DMat3, DVec3, Ray, Transform, dvec3};
 
-/// The quotient. That of the crate is good to 53 bits only: it computes a residual without a fused multiply-add. One step of Newton's method
-/// gives the rest.
+/// The quotient. That of the crate is good to 53 bits only: it computes a residual without a fused multiply-add. One
+/// step of Newton's method gives the rest.
 pub fn quotient(a: TwoFloat, b: TwoFloat) -> TwoFloat {
     let first = a / b;
     first + (a - first * b) / b.hi()
@@ -293,7 +293,8 @@ impl Case {
         (ends / size).min(side * (rho / size).min(1.0))
     }
 
-    /// What a ray meets first after `t = 0`. Undecidable are rays that pass an edge or a silhouette closer than `margin`, relative to the size.
+    /// What a ray meets first after `t = 0`. Undecidable are rays that pass an edge or a silhouette closer than
+    /// `margin`, relative to the size.
     pub fn answer(&self, transform: &ExactTransform, ray: &Ray, margin: f64) -> Answer {
         let [o, d] = transform.inverse_ray(ray);
         let Some(roots) = self.roots(o, d, margin) else { return Answer::Undecidable };

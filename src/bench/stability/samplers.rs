@@ -21,7 +21,7 @@ checks! {
         "Sobol: 1024 samples in 16 bins and 16 x 16, counts exact; independent: chi-square over 16 x 16 cells of all pairs of dimensions; the first \
          samples of 65536 pixels and of as many sets (Mitsuba, samplers/tests/utils.py)";
     "S5" s5_scrambles "scrambles of pixels and sets are independent":
-        "in place of pbrt's ZSobolSampler.ValidIndices, for pixels share no sequence here: each pixel and set scrambles its own by a hash; seeds of \
+        "in place of pbrt's ZSobolSampler.ValidIndices, for pixels share no sequence current: each pixel and set scrambles its own by a hash; seeds of \
          a picture's pixels are equal no more often than random ones, and first samples of neighbours fill 16 x 16 cells evenly (chi-square)";
     "S6" s6_decorrelation "neighbours are not correlated":
         "correlation of dimensions 0 to 63 with those of the pixels (1, 0), (0, 1), (16, 16), and with the next set's (Ahmed and Wonka)";
@@ -185,11 +185,18 @@ fn s5_scrambles(effort: Effort) -> Outcome {
         )
 }
 
+/// Four dimensions of a pixel's samples.
+#[derive(Clone, Copy)]
+struct SampleSet {
+    pixel: PixelSeed,
+    set: u32,
+}
+
 /// Correlations of the four dimensions of one set of a pixel with those of another, shifted by some dimensions.
-fn correlations(sampler: Sampler, count: u32, a: (PixelSeed, u32), b: (PixelSeed, u32), shift: usize) -> [f64; 4] {
+fn correlations(sampler: Sampler, count: u32, a: SampleSet, b: SampleSet, shift: usize) -> [f64; 4] {
     let mut sums = [0f64; 4];
     for i in 0..count {
-        let (x, y) = (sampler.sample_4d(a.0, i, a.1), sampler.sample_4d(b.0, i, b.1));
+        let (x, y) = (sampler.sample_4d(a.pixel, i, a.set), sampler.sample_4d(b.pixel, i, b.set));
         for lane in 0..4 {
             sums[lane] += (f64::from(x[lane]) - 0.5) * (f64::from(y[(lane + shift) % 4]) - 0.5);
         }
@@ -207,9 +214,10 @@ fn s6_decorrelation(effort: Effort) -> Outcome {
         let found: Vec<f64> = (0..16u32)
             .into_par_iter()
             .flat_map_iter(|set| {
-                let others =
-                    [(1, 0), (0, 1), (16, 16)].map(|(x, y)| correlations(sampler, count, (origin, set), (sampler.pixel(x, y), set), 0));
-                let next = [0, 1, 2, 3].map(|shift| correlations(sampler, count, (origin, set), (origin, set + 1), shift));
+                let of = |pixel: PixelSeed, set: u32| SampleSet { pixel, set };
+                let own = of(origin, set);
+                let others = [(1, 0), (0, 1), (16, 16)].map(|(x, y)| correlations(sampler, count, own, of(sampler.pixel(x, y), set), 0));
+                let next = [0, 1, 2, 3].map(|shift| correlations(sampler, count, own, of(origin, set + 1), shift));
                 others.into_iter().chain(next).flatten()
             })
             .collect();

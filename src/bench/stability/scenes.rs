@@ -3,12 +3,13 @@
 use super::geometry::{
     Rng, cube, grid, instances, meshes, placed_analytic_shapes, ray, ray_through, reach, soup, sphere_mesh, transform, world,
 };
+use crate::accel::inspect::Inspect;
 use crate::accel::{self, AccelKind, Accelerator, Coherence};
 use crate::bench::bumpy_sphere;
 use crate::geometry::{Geometry, Hit, Instance, Mesh, MeshStep, Object, Shape};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{DAffine3, DMat3, DVec3, Motion, Ray};
+use crate::math::{Aabb, DAffine3, DMat3, DVec3, Motion, Ray};
 
 /// Checks build over their own geometry, which every accelerator takes.
 const BUILDS: &str = "accelerators build over the geometry of checks";
@@ -23,11 +24,50 @@ pub fn own(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)
     ["bvh", "bvh:binary", "kdtree", "kdtree:median", "octree"].map(|name| (name, build(name.parse().expect(BUILDS), geometry))).into()
 }
 
-/// [`own`] and Embree.
+/// [`own`], Embree, and packets.
 pub fn all(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)> {
     let mut accels = own(geometry);
     accels.push(("embree", build(AccelKind::EMBREE, geometry)));
+    accels.push(("packets", packets(geometry)));
     accels
+}
+
+/// An accelerator whose answers to single rays are those to batches of one.
+pub struct OfBatches<'g>(pub Box<dyn Accelerator + 'g>);
+
+impl Accelerator for OfBatches<'_> {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let mut hits = [None];
+        self.0.intersect_batch(&[*ray], &mut hits, Coherence::Incoherent);
+        hits[0]
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        let mut occluded = [false];
+        self.0.occluded_batch(&[*ray], &mut occluded, Coherence::Incoherent);
+        occluded[0]
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.0.bounds()
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.0.memory_bytes()
+    }
+
+    fn description(&self) -> String {
+        self.0.description()
+    }
+
+    fn inspect(&self) -> Option<&dyn Inspect> {
+        self.0.inspect()
+    }
+}
+
+/// Packets of rays, also for single ones.
+pub fn packets(geometry: &Geometry) -> Box<dyn Accelerator + '_> {
+    Box::new(OfBatches(build(AccelKind::Packets, geometry)))
 }
 
 /// What every entry point answers to these rays: single, in coherent batches and in incoherent ones.
@@ -201,8 +241,9 @@ pub fn camera_rays(geometry: &Geometry, resolution: usize) -> Vec<Ray> {
     (0..blocks * 16).map(pixel).collect()
 }
 
-/// Whether two hits of `ray` are the same within rounding: 8 ulp of t, and over the cosine with the surface 4 roundoffs of the reach and the
-/// error with which an accelerator may see the surface (in the space of an instance rays are rounded anew).
+/// Whether two hits of `ray` are the same within rounding: 8 ulp of t, and over the cosine with the surface 4 roundoffs
+/// of the reach and the error with which an accelerator may see the surface (in the space of an instance rays are
+/// rounded anew).
 pub fn same(geometry: &Geometry, ray: &Ray, a: &Hit, b: &Hit) -> bool {
     let length = f64::from(ray.direction.length());
     let slack = |hit: &Hit| {

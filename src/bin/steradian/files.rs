@@ -11,86 +11,102 @@ use steradian::output::{FileUses, files_of_output};
 
 #[cfg(feature = "bench")]
 use crate::args::BenchCommand;
-use crate::args::{Cli, Command, FarmCommand, ImportArgs, RenderArgs};
+use crate::args::{Cli, Command, ConfigCommand, FarmCommand, ImportArgs, RenderArgs};
 use crate::frames::Shot;
+
+/// The files that a command line names, with what they are for.
+#[derive(Default)]
+struct NamedFiles<'a> {
+    read: Vec<(&'a Path, &'a str)>,
+    written: Vec<(PathBuf, &'a str)>,
+    import: Option<&'a ImportArgs>,
+}
+
+const SCENE: &str = "the scene";
+
+impl<'a> NamedFiles<'a> {
+    fn add_outputs(&mut self, names: &[String]) {
+        self.written.extend(names.iter().map(|name| (PathBuf::from(name), "--output")));
+    }
+
+    fn add(&mut self, command: &'a Command) {
+        match command {
+            Command::Render(arguments) => {
+                self.read.push((&arguments.scene, SCENE));
+                self.add_outputs(&arguments.output);
+                let named = [(&arguments.json, "--json"), (&arguments.state.checkpoint, "--checkpoint")];
+                self.written.extend(named.into_iter().filter_map(|(path, option)| Some((path.clone()?, option))));
+                self.import = Some(&arguments.import);
+            }
+            Command::Rerender(arguments) => {
+                self.read.push((&arguments.file, "the picture to render again"));
+                self.read.extend(arguments.scene.iter().map(|path| (path.as_path(), SCENE)));
+                self.add_outputs(std::slice::from_ref(&arguments.output));
+            }
+            Command::Info(arguments) => {
+                self.read.push((&arguments.scene, SCENE));
+                self.import = Some(&arguments.import);
+            }
+            Command::Convert(arguments) => {
+                self.read.push((&arguments.input, SCENE));
+                self.written.push((arguments.output.clone(), "the converted scene"));
+                self.import = Some(&arguments.import);
+            }
+            Command::Merge(arguments) => {
+                self.read.extend(arguments.shards.iter().map(|path| (path.as_path(), "a shard")));
+                self.add_outputs(&arguments.output);
+            }
+            Command::Denoise(arguments) => {
+                self.read.push((&arguments.input, "the noisy picture"));
+                self.written.push((arguments.output.clone(), "the denoised picture"));
+                self.written.extend(arguments.also.iter().map(|path| (path.clone(), "--png")));
+            }
+            Command::CheckExr(arguments) => self.read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check"))),
+            Command::Compare(arguments) => {
+                self.read.extend([(arguments.reference.as_path(), "the reference"), (arguments.test.as_path(), "the test")]);
+            }
+            Command::Farm(FarmCommand::Slurm(arguments)) => self.read.push((&arguments.job.scene, SCENE)),
+            Command::Farm(FarmCommand::Openjd(arguments)) => self.read.push((&arguments.job.scene, SCENE)),
+            Command::Config(ConfigCommand::Show(arguments)) => {
+                self.read.extend(arguments.scene.iter().map(|path| (path.as_path(), SCENE)));
+            }
+            #[cfg(feature = "bench")]
+            Command::Bench(command) => self.add_bench(command),
+            #[cfg(not(feature = "bench"))]
+            Command::Bench { .. } => {}
+            Command::Schema | Command::Man { .. } | Command::Completions { .. } => {}
+        }
+    }
+
+    #[cfg(feature = "bench")]
+    fn add_bench(&mut self, command: &'a BenchCommand) {
+        let (folder, stem) = match command {
+            BenchCommand::Accel(arguments) => {
+                self.read.extend(arguments.scenes.iter().map(|path| (path.as_path(), SCENE)));
+                self.import = Some(&arguments.import);
+                (&arguments.out, "accel")
+            }
+            BenchCommand::Error(arguments) => {
+                self.read.push((&arguments.scene, SCENE));
+                self.read.extend(arguments.reference.iter().map(|path| (path.as_path(), "--reference")));
+                self.import = Some(&arguments.import);
+                (&arguments.out, "error")
+            }
+            BenchCommand::Scale(arguments) => (&arguments.out, "scale"),
+            BenchCommand::Stability(arguments) => (&arguments.out, "stability"),
+            BenchCommand::Reports(arguments) => (&arguments.out, "reports"),
+            BenchCommand::ScaleCase => return,
+        };
+        let files = folder.iter().flat_map(|folder| ["html", "md", "csv", "json"].map(|kind| folder.join(format!("{stem}.{kind}"))));
+        self.written.extend(files.map(|path| (path, "--out")));
+    }
+}
 
 /// Compares the files that the command line itself names; `uses` are those of every command.
 pub fn of_command(cli: &Cli, mut uses: FileUses) -> Result<()> {
-    let mut read: Vec<(&Path, &str)> = Vec::new();
-    let mut written: Vec<(PathBuf, &str)> = Vec::new();
-    let (scene, output) = ("the scene", "--output");
-    let mut outputs = |names: &[String]| written.extend(names.iter().map(|name| (PathBuf::from(name), output)));
-    #[cfg(feature = "bench")]
-    let reports = |folder: &Option<PathBuf>, stem: &str| -> Vec<(PathBuf, &'static str)> {
-        let kinds = folder.iter().flat_map(|folder| ["html", "md", "csv", "json"].map(|kind| folder.join(format!("{stem}.{kind}"))));
-        kinds.map(|path| (path, "--out")).collect()
-    };
-    let mut import: Option<&ImportArgs> = None;
-    match &cli.command {
-        Command::Render(arguments) => {
-            read.push((&arguments.scene, scene));
-            outputs(&arguments.output);
-            let named = [(&arguments.json, "--json"), (&arguments.state.checkpoint, "--checkpoint")];
-            written.extend(named.into_iter().filter_map(|(path, option)| Some((path.clone()?, option))));
-            import = Some(&arguments.import);
-        }
-        Command::Rerender(arguments) => {
-            read.push((&arguments.file, "the picture to render again"));
-            read.extend(arguments.scene.iter().map(|path| (path.as_path(), scene)));
-            outputs(std::slice::from_ref(&arguments.output));
-        }
-        Command::Info(arguments) => {
-            read.push((&arguments.scene, scene));
-            import = Some(&arguments.import);
-        }
-        Command::Convert(arguments) => {
-            read.push((&arguments.input, scene));
-            written.push((arguments.output.clone(), "the converted scene"));
-            import = Some(&arguments.import);
-        }
-        Command::Merge(arguments) => {
-            read.extend(arguments.shards.iter().map(|path| (path.as_path(), "a shard")));
-            outputs(&arguments.output);
-        }
-        Command::Denoise(arguments) => {
-            read.push((&arguments.input, "the noisy picture"));
-            written.push((arguments.output.clone(), "the denoised picture"));
-            written.extend(arguments.also.iter().map(|path| (path.clone(), "--png")));
-        }
-        Command::CheckExr(arguments) => read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check"))),
-        Command::Compare(arguments) => {
-            read.extend([(arguments.reference.as_path(), "the reference"), (arguments.test.as_path(), "the test")]);
-        }
-        Command::Farm(FarmCommand::Slurm(arguments)) => read.push((&arguments.job.scene, scene)),
-        Command::Farm(FarmCommand::Openjd(arguments)) => read.push((&arguments.job.scene, scene)),
-        Command::Config(crate::args::ConfigCommand::Show(arguments)) => {
-            read.extend(arguments.scene.iter().map(|path| (path.as_path(), scene)));
-        }
-        #[cfg(feature = "bench")]
-        Command::Bench(BenchCommand::Accel(arguments)) => {
-            read.extend(arguments.scenes.iter().map(|path| (path.as_path(), scene)));
-            written.extend(reports(&arguments.out, "accel"));
-            import = Some(&arguments.import);
-        }
-        #[cfg(feature = "bench")]
-        Command::Bench(BenchCommand::Error(arguments)) => {
-            read.push((&arguments.scene, scene));
-            read.extend(arguments.reference.iter().map(|path| (path.as_path(), "--reference")));
-            written.extend(reports(&arguments.out, "error"));
-            import = Some(&arguments.import);
-        }
-        #[cfg(feature = "bench")]
-        Command::Bench(BenchCommand::Scale(arguments)) => written.extend(reports(&arguments.out, "scale")),
-        #[cfg(feature = "bench")]
-        Command::Bench(BenchCommand::Stability(arguments)) => written.extend(reports(&arguments.out, "stability")),
-        #[cfg(feature = "bench")]
-        Command::Bench(BenchCommand::Reports(arguments)) => written.extend(reports(&arguments.out, "reports")),
-        #[cfg(feature = "bench")]
-        Command::Bench(BenchCommand::ScaleCase) => {}
-        #[cfg(not(feature = "bench"))]
-        Command::Bench { .. } => {}
-        Command::Schema | Command::Man { .. } | Command::Completions { .. } => {}
-    }
+    let mut named = NamedFiles::default();
+    named.add(&cli.command);
+    let NamedFiles { read, mut written, import } = named;
     written.extend(import.and_then(|import| import.report.clone()).map(|path| (path, "--report")));
     read.into_iter().try_for_each(|(path, purpose)| uses.read(path, purpose))?;
     written.iter().filter(|(path, _)| !is_stdout(path)).try_for_each(|(path, purpose)| uses.write(path, *purpose))

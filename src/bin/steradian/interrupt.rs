@@ -1,5 +1,5 @@
-//! Signals. The first Ctrl-C or SIGTERM asks the render to stop, so that its state and the picture so far are written; the second ends the program
-//! at once. SIGUSR1 asks for a checkpoint, and the render goes on.
+//! Signals. The first Ctrl-C or SIGTERM asks the render to stop, so that its state and the picture so far are written;
+//! the second ends the program at once. SIGUSR1 asks for a checkpoint, and the render goes on.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

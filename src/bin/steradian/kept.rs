@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use steradian::accel::Accelerator;
 use steradian::film::Image;
 use steradian::import::{Imported, scene_fingerprint};
 use steradian::output::RenderInfo;
-use steradian::render::{self, Checkpoints, Header, Overrides, Progress, RenderResult, RenderState, Settings, Shard, StateFile};
+use steradian::render::{
+    self, Checkpoints, Header, Overrides, Progress, RenderResult, RenderSession, RenderState, Settings, Shard, StateFile,
+};
 use steradian::scene::Scene;
 use steradian::{Error, Result};
 
@@ -66,22 +67,15 @@ impl<'a> Kept<'a> {
         Ok(Some(Self { arguments, shard, shard_file: take(shard_file)?, checkpoint: take(checkpoint)? }))
     }
 
-    /// What checkpoints and shards of this render say of themselves.
+    /// The header of checkpoints and shards of this render.
     pub fn header(&self, imported: &Imported, file: &Path, scene: &Scene, settings: &Settings, info: RenderInfo) -> Result<Header> {
         let fingerprint = scene_fingerprint(imported, file)?;
         Ok(Header { info, ..Header::new(&file.to_string_lossy(), fingerprint, scene, settings, self.shard) })
     }
 
     /// Renders from where the checkpoint is, and writes the shard.
-    pub fn render(
-        mut self,
-        scene: &Scene,
-        accel: &dyn Accelerator,
-        settings: &Settings,
-        header: &Header,
-        (reporter, progress): (&Reporter, &dyn Progress),
-        interrupt: &Interrupt,
-    ) -> Result<RenderResult> {
+    pub fn render(mut self, session: &RenderSession, header: &Header, reporter: &Reporter, interrupt: &Interrupt) -> Result<RenderResult> {
+        let RenderSession { scene, settings, .. } = *session;
         let state = match self.checkpoint.as_ref().filter(|_| self.arguments.resume) {
             Some(file) if file.path().exists() => {
                 let state = RenderState::read(file.path(), header, scene, settings)?;
@@ -94,9 +88,11 @@ impl<'a> Kept<'a> {
             }
             None => RenderState::new(scene, settings, self.shard)?,
         };
-        let asked = || Arc::clone(&interrupt.checkpoint);
-        let mut checkpoints = self.checkpoint.take().map(|file| Checkpoints::new(file, header.clone(), self.arguments.every, asked()));
-        let (state, stats) = render::render_from(scene, accel, settings, state, checkpoints.as_mut(), progress, &interrupt.stop)?;
+        let mut checkpoints = self
+            .checkpoint
+            .take()
+            .map(|file| Checkpoints::new(file, header.clone(), self.arguments.every, Arc::clone(&interrupt.checkpoint)));
+        let (state, stats) = session.render(state, checkpoints.as_mut())?;
         // What an interrupted shard has is in its checkpoint; a shard that is there is complete.
         let unfinished = stats.interrupted && checkpoints.is_some();
         if state.torn && self.shard_file.is_some() && !unfinished {
@@ -108,15 +104,15 @@ impl<'a> Kept<'a> {
         } else if let Some(file) = self.shard_file.as_ref().filter(|_| !unfinished) {
             file.replace(|out| state.write(header, out))?;
         }
-        // Of a shard nobody looks at the picture.
+        // A shard has no picture.
         let image = if self.shard_file.is_some() { Image::default() } else { state.picture(settings) };
         Ok(RenderResult { image, stats })
     }
 }
 
-/// What SIGUSR1 asks for without a checkpoint.
+/// Warns where SIGUSR1 was sent without a checkpoint file.
 pub fn warn_of_request(interrupt: &Interrupt, reporter: &Reporter) {
     if interrupt.checkpoint.load(std::sync::atomic::Ordering::Relaxed) {
-        reporter.warn("SIGUSR1 asked for a checkpoint, but there is no --checkpoint");
+        reporter.warn("SIGUSR1 requests a checkpoint, which needs --checkpoint FILE");
     }
 }

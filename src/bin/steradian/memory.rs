@@ -1,7 +1,7 @@
 //! The end of the program when memory runs out, in its own code or a library's: one line on stderr and exit code 33.
 //!
-//! Rust ends with SIGABRT and a backtrace, C++ by an exception that nobody catches. What is done here takes no memory, and runs no destructors,
-//! which other threads may be in the way of.
+//! Rust ends with SIGABRT and a backtrace, C++ by an exception that nobody catches. What is done here takes no memory,
+//! and runs no destructors, which other threads may be in the way of.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::ffi::{CStr, c_char, c_int};

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use steradian::farm::{Event, Format, Status};
+use steradian::farm::{Event, ProgressFormat, Status};
 use steradian::render::Progress;
 
 use crate::log::{self, Level};
@@ -31,7 +31,7 @@ enum Sink {
 /// Shows the progress of a render, or of a sequence of them.
 pub struct Reporter {
     sink: Sink,
-    format: &'static Format,
+    format: &'static ProgressFormat,
     stop: OnceLock<Arc<AtomicBool>>,
     done: AtomicU64,
     state: Mutex<State>,
@@ -60,7 +60,7 @@ struct State {
 
 impl Reporter {
     /// Tells progress in `format`, if that is given, in any case; else as fits where stderr goes, or not at all if `quiet`.
-    pub fn new(format: Option<&'static Format>, quiet: bool) -> Self {
+    pub fn new(format: Option<&'static ProgressFormat>, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb");
         let human = format.is_none_or(|format| format.name == "human");
         let sink = match (quiet, human && terminal) {
@@ -84,7 +84,7 @@ impl Reporter {
             stop_told: false,
             bar: None,
         };
-        let format = format.or_else(|| Format::by_name("plain")).unwrap_or(&steradian::farm::FORMATS[0]);
+        let format = format.or_else(|| ProgressFormat::by_name("plain")).unwrap_or(&steradian::farm::FORMATS[0]);
         Self { sink, format, stop: OnceLock::new(), done: AtomicU64::new(0), state: Mutex::new(state) }
     }
 
@@ -277,7 +277,7 @@ mod tests {
     use super::*;
 
     fn at(frames_done: usize, frames: usize, done: u64, seconds: u64, limit: Option<u64>) -> Status {
-        let reporter = Reporter::new(Format::by_name("plain"), false);
+        let reporter = Reporter::new(ProgressFormat::by_name("plain"), false);
         let mut state = reporter.state.into_inner().unwrap();
         let now = state.begin + Duration::from_secs(1000);
         state.start = now - Duration::from_secs(seconds);
@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn what_was_there_at_the_start_took_no_time() {
-        let reporter = Reporter::new(Format::by_name("plain"), false);
+        let reporter = Reporter::new(ProgressFormat::by_name("plain"), false);
         let mut state = reporter.state.into_inner().unwrap();
         let now = state.begin + Duration::from_secs(1000);
         (state.start, state.total, state.resumed) = (now - Duration::from_secs(10), 1000, 800);

@@ -9,14 +9,13 @@ use steradian::farm::check_single_name;
 use steradian::film::LayerSet;
 use steradian::live::{Fan, Live};
 use steradian::output::{self, RenderInfo, RenderStatistics};
-use steradian::render::{self, DEFAULT_EXTENSIONS, Header, Progress, Recipe, RenderResult, Replayed, Settings, Stats};
+use steradian::render::{self, DEFAULT_EXTENSIONS, Header, Progress, Recipe, RenderResult, RenderSession, Replayed, Settings, Stats};
 use steradian::scene::Scene;
 use steradian::{Result, compile};
 
 use crate::args::RenderArgs;
 use crate::denoise;
 use crate::frames::{Session, Shot};
-use crate::interrupt::Interrupt;
 use crate::kept::{self, Kept};
 use crate::progress::Reporter;
 use crate::rerender;
@@ -41,7 +40,8 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
 
     let start = Instant::now();
     let accel = accel::build(plan.settings.accel, &scene.geometry, plan.settings.threads)?;
-    let run = Run { scene: &plan.scene_file.clone(), load_seconds, build_seconds: start.elapsed().as_secs_f64() };
+    let build_seconds = start.elapsed().as_secs_f64();
+    let run = Run { scene: &plan.scene_file.clone(), accel: &*accel, load_seconds, build_seconds };
     tracing::info!("{}; {load_seconds:.3} s to load, {:.3} s to build", accel.description(), run.build_seconds);
 
     if let (Some(pixel), Some(sample)) = (arguments.pixel, arguments.sample) {
@@ -52,7 +52,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
 
     let interrupt = session.interrupt()?;
     let live = plan.watch(session)?;
-    let result = plan.render(&scene, &*accel, header.as_ref(), (session, &live), interrupt)?;
+    let result = plan.render(&scene, &*accel, header.as_ref(), session, &live)?;
     let first = load_seconds + run.build_seconds + result.stats.first_pass_seconds;
     tracing::info!("{first:.3} s until every pixel had its first sample");
     warn_of_dropped(&result.stats, &session.reporter);
@@ -66,7 +66,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         session.reporter.say("interrupted before every pixel had a sample: nothing is written");
         return Ok(exit_code);
     }
-    plan.write(&scene, &*accel, result, &run, (session, &live))?;
+    plan.write(&scene, result, &run, session, &live)?;
     if arguments.live.preview_hold {
         interrupt.wait();
     }
@@ -169,13 +169,14 @@ impl<'a> Plan<'a> {
         scene: &Scene,
         accel: &dyn Accelerator,
         header: Option<&Header>,
-        (session, live): (&Session, &Live),
-        interrupt: &Interrupt,
+        session: &Session,
+        live: &Live,
     ) -> Result<RenderResult> {
-        let reporter = &session.reporter;
+        let (reporter, interrupt) = (&session.reporter, session.interrupt()?);
         let fan = Fan::new([reporter as &dyn Progress, live]);
         if let (Some(kept), Some(header)) = (self.kept.take(), header) {
-            return kept.render(scene, accel, &self.settings, header, (reporter, &fan), interrupt);
+            let session = RenderSession { scene, accel, settings: &self.settings, progress: &fan, stop: &interrupt.stop };
+            return kept.render(&session, header, reporter, interrupt);
         }
         let result = render::render(scene, accel, &self.settings, &fan, &interrupt.stop)?;
         kept::warn_of_request(interrupt, reporter);
@@ -186,11 +187,12 @@ impl<'a> Plan<'a> {
     fn write(
         &self,
         scene: &Scene,
-        accel: &dyn Accelerator,
         RenderResult { mut image, stats }: RenderResult,
         run: &Run,
-        (session, live): (&Session, &Live),
+        session: &Session,
+        live: &Live,
     ) -> Result<()> {
+        let accel = run.accel;
         let denoised = denoise::finish(self.denoiser.as_ref().filter(|_| self.shard_file.is_none()), &mut image, &session.reporter);
         let info = RenderInfo {
             samples_per_pixel: stats.spp_done,
@@ -217,11 +219,14 @@ impl<'a> Plan<'a> {
             live.show_final(&image, stats.spp_done);
         }
         if let Some(path) = &self.json {
-            let mut value = stats::value(run, &self.settings, accel, &stats);
+            let mut value = stats::value(run, &self.settings, &stats);
             value["denoise"] = denoised.statistics;
             stats::write(path, &value)?;
         }
-        report(&session.reporter, &self.settings, accel, &stats, (&written, failure.is_none()));
+        report(&session.reporter, &self.settings, accel, &stats, &written);
+        if failure.is_none() && !stats.interrupted {
+            session.reporter.complete_frame();
+        }
         failure.map_or(Ok(()), Err)
     }
 }
@@ -262,7 +267,7 @@ fn warn_of_dropped(stats: &Stats, reporter: &Reporter) {
     ));
 }
 
-fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, stats: &Stats, (written, all): (&[String], bool)) {
+fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, stats: &Stats, written: &[String]) {
     let seconds = stats.render_seconds.max(1e-9);
     let ended = match (stats.interrupted, stats.time_limited) {
         (true, _) => " (interrupted)",
@@ -284,9 +289,6 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
         reporter.say(&format!("relative squared error about {error:.3e}, asked for {target:.3e}"));
     }
     written.iter().for_each(|file| reporter.say(&format!("wrote {file}")));
-    if all && !stats.interrupted {
-        reporter.complete_frame();
-    }
 }
 
 fn describe_sample(sample: &Replayed) -> String {

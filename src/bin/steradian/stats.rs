@@ -14,6 +14,8 @@ use crate::text;
 pub struct Run<'a> {
     /// The scene file.
     pub scene: &'a Path,
+    /// The accelerator.
+    pub accel: &'a dyn Accelerator,
     /// Seconds to read and compile the scene.
     pub load_seconds: f64,
     /// Seconds to build the accelerator.
@@ -21,7 +23,8 @@ pub struct Run<'a> {
 }
 
 /// The statistics as one JSON object.
-pub fn value(run: &Run, settings: &Settings, accel: &dyn Accelerator, stats: &Stats) -> Value {
+pub fn value(run: &Run, settings: &Settings, stats: &Stats) -> Value {
+    let accel = run.accel;
     let rays = stats.rays;
     let millions_per_second = |count: u64| if stats.render_seconds > 0.0 { count as f64 / stats.render_seconds * 1e-6 } else { 0.0 };
     let description = accel.description();

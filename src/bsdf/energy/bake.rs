@@ -7,7 +7,7 @@ use super::super::principled::shapes::{self, ClearCoat};
 use super::super::{Ggx, SMOOTH_ALPHA};
 use super::table::{
     ALPHAS, ASPECTS, Block, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MAX_IOR, MIRRORS,
-    MIRRORS_AVERAGE, Place, SCHLICK, SHAPES, SHEEN, across, cosine_axis, schlick_weight, smoothed,
+    MIRRORS_AVERAGE, SCHLICK, SHAPES, SHEEN, TableCoordinate, across, cosine_axis, schlick_weight, smoothed,
 };
 use crate::math::{Vec3, sin_cos_turns, vec3};
 use crate::sampling::warp;
@@ -99,9 +99,9 @@ fn glass_average(entry: usize, glass: &[f32]) -> f32 {
 
 /// The principled model's diffuse lobe, then its flat one.
 fn diffuse(entry: usize) -> f32 {
-    let [flat, shape, cos] = places(entry, [2, SHAPES, COSINES]);
+    let [subsurface, shape, cos] = places(entry, [2, SHAPES, COSINES]);
     let (roughness, cos) = (node_shape(shape), node_cosine(1.0, cos));
-    let lobe = if flat == 1 { shapes::flat } else { shapes::diffuse };
+    let lobe = if subsurface == 1 { shapes::subsurface } else { shapes::diffuse };
     mean_of_cosines(cos, |o, i| lobe(o, i, roughness))
 }
 
@@ -124,7 +124,7 @@ fn coat(entry: usize) -> f32 {
 fn coat_average(entry: usize, coat: &[f32]) -> f32 {
     let row = &coat[entry * COAT_NODES..][..COAT_NODES];
     let mean = cosines().map(|(cos, weight)| {
-        let at = Place::new(cos.sqrt(), COAT_NODES);
+        let at = TableCoordinate::new(cos.sqrt(), COAT_NODES);
         weight * f64::from(row[at.node] + (row[at.node + 1] - row[at.node]) * at.part)
     });
     mean.sum::<f64>() as f32
@@ -193,7 +193,7 @@ fn mean_of_facets(alpha: [f32; 2], o: Vec3, f: impl Fn(&Facet) -> f32) -> f32 {
         let m = ggx.sample_visible_normal(o, u);
         let cos = o.dot(m).clamp(0.0, 1.0);
         let i = reflect(o, m, cos);
-        Facet { m, cos, shadowing: if i.z > 0.0 { ggx.sampled_shadowing(o, i) } else { 0.0 } }
+        Facet { m, cos, shadowing: if i.z > 0.0 { ggx.g2_over_g1(o, i) } else { 0.0 } }
     });
     mean(facets.map(|facet| f(&facet)))
 }
@@ -208,7 +208,7 @@ fn glass_albedo(alpha: f32, eta: f32, cos: f32) -> f32 {
     mean_of_facets([alpha; 2], o, |facet| {
         let refraction = fresnel::dielectric(facet.cos, eta);
         let i = facet.m * (facet.cos / eta - refraction.cos_t) - o / eta;
-        let crossing = if i.z < 0.0 { ggx.sampled_shadowing(o, vec3(i.x, i.y, -i.z)) } else { 0.0 };
+        let crossing = if i.z < 0.0 { ggx.g2_over_g1(o, vec3(i.x, i.y, -i.z)) } else { 0.0 };
         refraction.reflectance * facet.shadowing + (1.0 - refraction.reflectance) * crossing
     })
 }
@@ -246,7 +246,7 @@ fn cosines() -> impl Iterator<Item = (f32, f64)> {
 
 /// The row of a table at a cosine.
 fn between(row: &[f32], alpha: f32, cos: f32) -> f32 {
-    let at = Place::of_cosine(cos, alpha);
+    let at = TableCoordinate::of_cosine(cos, alpha);
     row[at.node] + (row[at.node + 1] - row[at.node]) * at.part
 }
 

@@ -1,4 +1,4 @@
-//! How much of the light microfacets scatter at once, and what is lost to their second and later encounters.
+//! Directional albedo of single-scattering microfacets, and the energy that multiple scattering carries.
 //!
 //! A microfacet model follows light to one microfacet; what is masked on its way out is missing, up to two thirds at alpha 1. With `E(w)`
 //! the fraction that is scattered at once for the direction `w` and `E_avg` its mean under diffuse light, the lobe
@@ -22,13 +22,13 @@ use crate::math::Vec3;
 pub(super) use table::schlick_weight;
 use table::{
     ALPHAS, ASPECTS, CLEAR_COAT, COAT, COAT_AVERAGE, COAT_NODES, COSINES, DIFFUSE, GLASS, GLASS_AVERAGE, IORS, MIRRORS, MIRRORS_AVERAGE,
-    Place, SCHLICK, SHAPES, SHEEN, across, smoothed,
+    SCHLICK, SHAPES, SHEEN, TableCoordinate, across, smoothed,
 };
 
 /// The least loss under diffuse light that is told from none.
 const MIN_LOST: f32 = 1e-7;
 
-/// Fraction of the light that rough microfacets scatter at once.
+/// Directional albedo of rough microfacets with single scattering.
 #[derive(Clone, Copy, Debug)]
 pub struct Energy {
     ggx: Ggx,
@@ -36,14 +36,14 @@ pub struct Energy {
     alpha: f32,
     /// The smaller alpha over the larger.
     aspect: f32,
-    at_alpha: Place,
+    at_alpha: TableCoordinate,
 }
 
-/// A direction as the tables see it.
+/// Where the tables are read for a direction.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct DirectionCoordinates {
     /// By the cosine with which isotropic microfacets of the larger alpha mask as much.
-    at: Place,
+    cosine: TableCoordinate,
     /// See [`across`].
     across: f32,
 }
@@ -53,15 +53,15 @@ impl Energy {
     pub fn new(ggx: &Ggx) -> Self {
         let [ax, ay] = ggx.alpha();
         let alpha = ax.max(ay);
-        Self { ggx: *ggx, alpha, aspect: ax.min(ay) / alpha, at_alpha: Place::of_alpha(alpha) }
+        Self { ggx: *ggx, alpha, aspect: ax.min(ay) / alpha, at_alpha: TableCoordinate::of_alpha(alpha) }
     }
 
     #[inline]
-    fn see(&self, w: Vec3) -> Seen {
+    fn coordinates(&self, w: Vec3) -> DirectionCoordinates {
         let [ax, ay] = self.ggx.alpha();
         let cos = w.z.clamp(0.0, 1.0);
         if ax == ay {
-            return Seen { at: Place::of_cosine(cos, self.alpha), across: 0.0 };
+            return DirectionCoordinates { cosine: TableCoordinate::of_cosine(cos, self.alpha), across: 0.0 };
         }
         // What counts is the tangent times the alpha along the direction.
         let (x, y) = (ax * w.x, ay * w.y);
@@ -69,48 +69,54 @@ impl Energy {
         let run = (x2 + y2).sqrt() / self.alpha;
         let cos = cos / (cos * cos + run * run).sqrt();
         let (major, minor) = if ax > ay { (w.x, w.y) } else { (w.y, w.x) };
-        Seen { at: Place::of_cosine(cos, self.alpha), across: across(major * major, minor * minor, self.aspect) }
+        DirectionCoordinates {
+            cosine: TableCoordinate::of_cosine(cos, self.alpha),
+            across: across(major * major, minor * minor, self.aspect),
+        }
     }
 
-    /// What perfect mirrors would scatter.
+    /// The albedo of perfectly reflecting microfacets.
     #[inline]
-    pub fn mirrors(&self, w: Vec3) -> f32 {
-        let seen = self.see(w);
+    pub fn directional_albedo(&self, w: Vec3) -> f32 {
+        let coordinates = self.coordinates(w);
         const AXIS: usize = ALPHAS * COSINES;
-        let lookup = |aspect: usize, axis: usize| MIRRORS.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, seen.at);
+        let lookup =
+            |aspect: usize, axis: usize| MIRRORS.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, coordinates.cosine);
         if self.aspect == 1.0 {
             return lookup(ASPECTS - 1, 0);
         }
-        let at = Place::new(self.aspect.sqrt(), ASPECTS);
+        let at = TableCoordinate::new(self.aspect.sqrt(), ASPECTS);
         let of = |axis: usize| {
             let (before, after) = (lookup(at.node, axis), lookup(at.node + 1, axis));
             before + (after - before) * at.part
         };
         let (along, across) = (of(0), of(1));
-        along + (across - along) * seen.across
+        along + (across - along) * coordinates.across
     }
 
-    /// What [`Energy::mirrors`] lacks of 1 under diffuse light.
-    pub fn mirrors_lost(&self) -> f32 {
-        let lost = MIRRORS_AVERAGE.bilinear_square(0, ALPHAS, Place::new(self.aspect.sqrt(), ASPECTS), self.at_alpha).max(MIN_LOST);
+    /// 1 minus the mean of [`Energy::directional_albedo`] under diffuse light.
+    pub fn average_missing_energy(&self) -> f32 {
+        let missing =
+            MIRRORS_AVERAGE.bilinear_square(0, ALPHAS, TableCoordinate::new(self.aspect.sqrt(), ASPECTS), self.at_alpha).max(MIN_LOST);
         // Between the axes of anisotropic microfacets the table is interpolated: rather a hundredth of the lobe too dark than too bright.
-        if self.aspect == 1.0 { lost } else { 1.01 * lost }
+        if self.aspect == 1.0 { missing } else { 1.01 * missing }
     }
 
-    /// What mirrors of reflectance `(1 - cos)^5` would scatter: Schlick's approximation is linear in this and [`Energy::mirrors`]. Of anisotropic
-    /// microfacets at least that, to a hundredth, and 0.02 more on average.
+    /// What mirrors of reflectance `(1 - cos)^5` would scatter: Schlick's approximation is linear in this and
+    /// [`Energy::directional_albedo`]. Of anisotropic microfacets at least that, to a hundredth, and 0.02 more on
+    /// average.
     #[inline]
     pub fn schlick(&self, w: Vec3) -> f32 {
         let cos = w.z.clamp(0.0, 1.0);
-        let of = |alpha: f32, at_alpha: Place| {
-            SCHLICK.bilinear_from(0, COSINES, at_alpha, Place::of_cosine(cos, alpha)) + schlick_weight(smoothed(cos, alpha))
+        let of = |alpha: f32, at_alpha: TableCoordinate| {
+            SCHLICK.bilinear_from(0, COSINES, at_alpha, TableCoordinate::of_cosine(cos, alpha)) + schlick_weight(smoothed(cos, alpha))
         };
         let weight = of(self.alpha, self.at_alpha);
         if self.aspect == 1.0 {
             return weight;
         }
         let alpha = self.grazed_alpha(w);
-        weight.max(of(alpha, Place::of_alpha(alpha)))
+        weight.max(of(alpha, TableCoordinate::of_alpha(alpha)))
     }
 
     /// Alpha of round microfacets that grazing light from `w` meets at the angles at which it meets these, or at greater ones.
@@ -122,8 +128,9 @@ impl Energy {
         if run2 <= 0.0 {
             return self.alpha;
         }
-        // Where alpha is divided out, visible normals are distributed by their cosine with the direction. Its square has the mean 1/2, those
-        // with the two axes across have 1/4 each. Round microfacets show as much of their normals for alpha² = q / (1 - 3 q).
+        // Where alpha is divided out, visible normals are distributed by their cosine with the direction. Its square
+        // has the mean 1/2, those with the two axes across have 1/4 each. Round microfacets show as much of their
+        // normals for alpha² = q / (1 - 3 q).
         let (ax2, ay2) = (ax * ax, ay * ay);
         let along = (ax2 * x2 + ay2 * y2) / run2;
         let across = (ax2 * y2 + ay2 * x2) / run2;
@@ -137,23 +144,23 @@ impl Energy {
     /// What dielectric microfacets reflect and refract together, for the index of refraction beyond them over that on this side, within
     /// `[1/10, 10]`. Of isotropic microfacets.
     #[inline]
-    pub fn glass(&self, eta: f32, w: Vec3) -> f32 {
+    pub fn dielectric_albedo(&self, eta: f32, w: Vec3) -> f32 {
         const SIDE: usize = ALPHAS * IORS * COSINES;
         let (start, ior) = if eta >= 1.0 { (0, eta) } else { (SIDE, 1.0 / eta) };
-        let seen = self.see(w);
-        GLASS.trilinear(start, [IORS, COSINES], [self.at_alpha, Place::of_ior(ior), seen.at])
+        let coordinates = self.coordinates(w);
+        GLASS.trilinear(start, [IORS, COSINES], [self.at_alpha, TableCoordinate::of_ior(ior), coordinates.cosine])
     }
 
-    /// What [`Energy::glass`] lacks of 1 under diffuse light.
-    pub fn glass_lost(&self, eta: f32) -> f32 {
+    /// 1 minus the mean of [`Energy::dielectric_albedo`] under diffuse light.
+    pub fn dielectric_average_missing_energy(&self, eta: f32) -> f32 {
         let (start, ior) = if eta >= 1.0 { (0, eta) } else { (ALPHAS * IORS, 1.0 / eta) };
-        GLASS_AVERAGE.bilinear_square(start, IORS, self.at_alpha, Place::of_ior(ior)).max(MIN_LOST)
+        GLASS_AVERAGE.bilinear_square(start, IORS, self.at_alpha, TableCoordinate::of_ior(ior)).max(MIN_LOST)
     }
 }
 
-/// Colour of light that leaves after more than one reflection, over what perfect mirrors would leave for it, where `reflectance` is the mean
-/// reflectance and `average` what perfect mirrors scatter at once under diffuse light: `sum_k reflectance^k (1 - average)^(k - 2) average`
-/// from `k = 2` on.
+/// Colour of light that leaves after more than one reflection, over what perfect mirrors would leave for it, where
+/// `reflectance` is the mean reflectance and `average` what perfect mirrors scatter at once under diffuse light: `sum_k
+/// reflectance^k (1 - average)^(k - 2) average` from `k = 2` on.
 #[inline]
 pub fn multiple_color(reflectance: f32, average: f32) -> f32 {
     reflectance * reflectance * average / (1.0 - reflectance * (1.0 - average)).max(f32::MIN_POSITIVE)
@@ -161,34 +168,34 @@ pub fn multiple_color(reflectance: f32, average: f32) -> f32 {
 
 /// Albedo of the principled model's white diffuse lobe, with `flat` of it the flat lobe.
 #[inline]
-pub fn principled_diffuse(roughness: f32, flat: f32, cos: f32) -> f32 {
-    let (shape, at) = (Place::new(roughness, SHAPES), Place::of_cosine(cos, 1.0));
+pub fn principled_diffuse(roughness: f32, subsurface: f32, cos: f32) -> f32 {
+    let (shape, at) = (TableCoordinate::new(roughness, SHAPES), TableCoordinate::of_cosine(cos, 1.0));
     let of = |kind: usize| DIFFUSE.bilinear_from(kind * SHAPES * COSINES, COSINES, shape, at);
     let diffuse = of(0);
-    if flat == 0.0 { diffuse } else { diffuse + (of(1) - diffuse) * flat }
+    if subsurface == 0.0 { diffuse } else { diffuse + (of(1) - diffuse) * subsurface }
 }
 
 /// Albedo of the principled model's sheen.
 #[inline]
 pub fn principled_sheen(cos: f32) -> f32 {
-    let at = Place::of_cosine(cos, 1.0);
+    let at = TableCoordinate::of_cosine(cos, 1.0);
     SHEEN.linear(at.node, at.part)
 }
 
 /// Albedo of the principled model's clear coat.
 #[inline]
 pub fn principled_clear_coat(gloss: f32, cos: f32) -> f32 {
-    CLEAR_COAT.bilinear_from(0, COSINES, Place::new(gloss, SHAPES), Place::of_cosine(cos, 1.0))
+    CLEAR_COAT.bilinear_from(0, COSINES, TableCoordinate::new(gloss, SHAPES), TableCoordinate::of_cosine(cos, 1.0))
 }
 
 /// Albedo of a clear coat of isotropic microfacets, for an index of refraction over that of the outside within `[1, 10]`.
 #[inline]
 pub fn coat_albedo(ior: f32, alpha: f32, cos: f32) -> f32 {
-    let at = [Place::of_alpha(alpha), Place::of_ior(ior), Place::new(cos.sqrt(), COAT_NODES)];
+    let at = [TableCoordinate::of_alpha(alpha), TableCoordinate::of_ior(ior), TableCoordinate::new(cos.sqrt(), COAT_NODES)];
     COAT.trilinear(0, [IORS, COAT_NODES], at)
 }
 
 /// Its mean under diffuse light.
 pub fn coat_average(ior: f32, alpha: f32) -> f32 {
-    COAT_AVERAGE.bilinear_from(0, IORS, Place::of_alpha(alpha), Place::of_ior(ior))
+    COAT_AVERAGE.bilinear_from(0, IORS, TableCoordinate::of_alpha(alpha), TableCoordinate::of_ior(ior))
 }

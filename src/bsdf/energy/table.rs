@@ -74,7 +74,7 @@ impl Block {
 
     /// Between nodes of two axes, the second with `columns` nodes, in the part of the block that begins at `start`.
     #[inline]
-    pub fn bilinear_from(&self, start: usize, columns: usize, first: Place, second: Place) -> f32 {
+    pub fn bilinear_from(&self, start: usize, columns: usize, first: TableCoordinate, second: TableCoordinate) -> f32 {
         let row = |node: usize| self.linear(start + node * columns + second.node, second.part);
         let (before, after) = (row(first.node), row(first.node + 1));
         before + (after - before) * first.part
@@ -82,7 +82,7 @@ impl Block {
 
     /// Square of the value between nodes of two axes, linear in the squares.
     #[inline]
-    pub fn bilinear_square(&self, start: usize, columns: usize, first: Place, second: Place) -> f32 {
+    pub fn bilinear_square(&self, start: usize, columns: usize, first: TableCoordinate, second: TableCoordinate) -> f32 {
         let square = |node: usize| self.at(node) * self.at(node);
         let row = |node: usize| {
             let at = start + node * columns + second.node;
@@ -94,7 +94,7 @@ impl Block {
 
     /// Between nodes of three axes.
     #[inline]
-    pub fn trilinear(&self, start: usize, counts: [usize; 2], places: [Place; 3]) -> f32 {
+    pub fn trilinear(&self, start: usize, counts: [usize; 2], places: [TableCoordinate; 3]) -> f32 {
         let plane = |node: usize| self.bilinear_from(start + node * counts[0] * counts[1], counts[1], places[1], places[2]);
         let (before, after) = (plane(places[0].node), plane(places[0].node + 1));
         before + (after - before) * places[0].part
@@ -125,14 +125,14 @@ const TOTAL: usize = COAT_AVERAGE.end();
 
 /// A place between two nodes of an axis.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct TableCoordinate {
     /// The node before.
     pub node: usize,
     /// How far it is to the next node, within `[0, 1]`.
     pub part: f32,
 }
 
-impl Place {
+impl TableCoordinate {
     /// On an axis of `count` nodes, where `x` runs from 0 to 1.
     #[inline]
     pub fn new(x: f32, count: usize) -> Self {
@@ -168,9 +168,10 @@ pub fn cosine_axis(cos: f32, alpha: f32) -> f32 {
     0.5 * (cos * (1.0 + alpha) / (cos + alpha).max(f32::MIN_POSITIVE) + cos.sqrt())
 }
 
-/// How far a direction is from the plane of the larger alpha to that of the smaller, within `[0, 1]`: for the squared cosine and sine of its
-/// azimuth from that plane, and the smaller alpha over the larger. At equal masking the albedo changes close to the second plane, the closer
-/// the smaller the aspect; the power is fitted so that it is linear in this to a hundredth, and hardly ever less.
+/// How far a direction is from the plane of the larger alpha to that of the smaller, within `[0, 1]`: for the squared
+/// cosine and sine of its azimuth from that plane, and the smaller alpha over the larger. At equal masking the albedo
+/// changes close to the second plane, the closer the smaller the aspect; the power is fitted so that it is linear in
+/// this to a hundredth, and hardly ever less.
 #[inline]
 pub fn across(cos_squared: f32, sin_squared: f32, aspect: f32) -> f32 {
     let shrunk = sin_squared * aspect.powf(1.95 - 1.6 * aspect);

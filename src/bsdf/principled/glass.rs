@@ -29,13 +29,14 @@ impl Principled {
         if self.specular_tint == 0.0 {
             return Rgb::splat(exact);
         }
-        let (weight, ahead) = (schlick_weight(cos), (self.ior - 1.0) / (self.ior + 1.0));
-        let tinted = tint(self.base, self.model) * (ahead * ahead * (1.0 - weight)) + Rgb::splat(weight);
+        let (weight, f0) = (schlick_weight(cos), (self.ior - 1.0) / (self.ior + 1.0));
+        let tinted = tint(self.base, self.model) * (f0 * f0 * (1.0 - weight)) + Rgb::splat(weight);
         mix(Rgb::splat(exact), tinted, self.specular_tint)
     }
 
-    /// A thin sheet, for the direction to the viewer and that of the light mirrored to its side. All reflections within the sheet count together,
-    /// and light that passes does not turn. In Mitsuba the first reflection alone counts, and what passes has a lobe of its own.
+    /// A thin sheet, for the direction to the viewer and that of the light mirrored to its side. All reflections within
+    /// the sheet count together, and light that passes does not turn. In Mitsuba the first reflection alone counts, and
+    /// what passes has a lobe of its own.
     #[inline]
     pub(super) fn eval_thin(&self, o: Vec3, i: Vec3, reflects: bool) -> BsdfEval {
         if self.is_mitsuba() {

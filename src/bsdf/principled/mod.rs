@@ -18,9 +18,9 @@
 //! - subsurface scattering is the flat lobe of 2012 for solids as well; glass has exact Fresnel terms, all else Schlick's;
 //! - the specular lobe that passes a thin sheet has the width of the one that it reflects.
 //!
-//! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled` and, for thin sheets of glass, `principledthin`: added without limit,
-//! with exact Fresnel terms for the untinted layer, G as a product, no compensation, tints over the luminance, and a clear coat that is larger by
-//! 4 cos cos.
+//! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled` and, for thin sheets of glass,
+//! `principledthin`: added without limit, with exact Fresnel terms for the untinted layer, G as a product, no
+//! compensation, tints over the luminance, and a clear coat that is larger by 4 cos cos.
 
 mod glass;
 mod parameters;
@@ -31,7 +31,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::energy::{Energy, principled_clear_coat, principled_diffuse, principled_sheen, schlick_weight};
 use super::microfacet::{FacetReflection, MIN_COSINE, Microfacets, SeparableGgx, reflect};
-use super::{BsdfEval, BsdfSample, Ggx};
+use super::{BsdfEval, BsdfFlags, BsdfSample, Ggx};
 use crate::color::Rgb;
 use crate::math::{Vec3, vec3};
 use crate::sampling::warp;
@@ -62,7 +62,7 @@ pub struct Principled {
     clearcoat: f32,
     gloss: f32,
     roughness: f32,
-    flat: f32,
+    subsurface: f32,
     diffuse_transmission: f32,
     specular_tint: f32,
     thin: bool,
@@ -71,9 +71,9 @@ pub struct Principled {
 }
 
 /// What the layers reflect of the light from one direction, each if it alone were there.
-struct Albedos {
+struct LobeAlbedos {
     /// Microfacets that reflect all, and those that reflect Schlick's weight.
-    mirrors: f32,
+    facets: f32,
     schlick: f32,
     clearcoat: f32,
     sheen: f32,
@@ -82,7 +82,7 @@ struct Albedos {
 }
 
 /// Probabilities of the lobes.
-struct Choice {
+struct LobePmf {
     clearcoat: f32,
     specular: f32,
     /// What is sampled by the cosine: diffuse base, sheen, and light scattered several times.
@@ -102,16 +102,16 @@ impl Principled {
         let least = if refracts { MIN_ALPHA.max(2e-4 / (ior - 1.0)) } else { MIN_ALPHA };
         let ggx = Ggx::new([squared / aspect, squared * aspect].map(|a| a.clamp(least, 1.0)));
 
-        let ahead = (p.ior - 1.0) / (p.ior + 1.0);
-        let specular = mix(Rgb::WHITE, tint(p.base_color, p.model), p.specular_tint) * (ahead * ahead);
+        let f0 = (p.ior - 1.0) / (p.ior + 1.0);
+        let specular = mix(Rgb::WHITE, tint(p.base_color, p.model), p.specular_tint) * (f0 * f0);
         let dielectric = 1.0 - p.metallic - glass;
         let mut multiple = Rgb::BLACK;
         let multiscatter = p.multiscatter && p.model == PrincipledModel::Burley;
         if multiscatter && p.metallic + dielectric > 0.0 {
-            let lost = Energy::new(&ggx).mirrors_lost();
-            let color = p.base_color.map(|f| schlick_multiple(f, 1.0 - lost)) * p.metallic
-                + specular.map(|f| schlick_multiple(f, 1.0 - lost)) * dielectric.max(0.0);
-            multiple = color / (PI * lost);
+            let missing = Energy::new(&ggx).average_missing_energy();
+            let color = p.base_color.map(|f| schlick_multiple(f, 1.0 - missing)) * p.metallic
+                + specular.map(|f| schlick_multiple(f, 1.0 - missing)) * dielectric.max(0.0);
+            multiple = color / (PI * missing);
         }
         Self {
             base: p.base_color,
@@ -126,7 +126,7 @@ impl Principled {
             clearcoat: p.clearcoat,
             gloss: p.clearcoat_gloss,
             roughness: p.roughness,
-            flat: p.subsurface,
+            subsurface: p.subsurface,
             diffuse_transmission: p.diffuse_transmission,
             specular_tint: p.specular_tint,
             thin: p.thin,
@@ -149,7 +149,7 @@ impl Principled {
 
     /// Reflectance of metal and layer together, at Schlick's weight 0.
     #[inline]
-    fn reflectance_ahead(&self) -> Rgb {
+    fn f0(&self) -> Rgb {
         self.base * self.metallic + self.specular * self.dielectric()
     }
 
@@ -168,37 +168,37 @@ impl Principled {
     #[inline]
     fn reflectance(&self, cos: f32) -> Rgb {
         let weight = schlick_weight(cos);
-        let schlick = |ahead: Rgb, grazing: f32| ahead * (1.0 - weight) + Rgb::splat(grazing * weight);
+        let schlick = |f0: Rgb, f90: f32| f0 * (1.0 - weight) + Rgb::splat(f90 * weight);
         if !self.is_mitsuba() {
-            return schlick(self.reflectance_ahead(), self.metallic + self.dielectric());
+            return schlick(self.f0(), self.metallic + self.dielectric());
         }
         schlick(self.base, 1.0) * self.metallic + self.mitsuba_specular(cos) * self.dielectric()
     }
 
     #[inline]
-    fn albedos(&self, w: Vec3) -> Albedos {
+    fn albedos(&self, w: Vec3) -> LobeAlbedos {
         let cos = w.z.clamp(0.0, 1.0);
         let energy = Energy::new(&self.ggx);
-        let mirrors = energy.mirrors(w);
+        let facets = energy.directional_albedo(w);
         let dielectric = self.dielectric() > 0.0;
-        Albedos {
-            mirrors,
-            schlick: energy.schlick(w).clamp(0.0, mirrors),
+        LobeAlbedos {
+            facets,
+            schlick: energy.schlick(w).clamp(0.0, facets),
             clearcoat: if self.clearcoat > 0.0 { self.clearcoat * principled_clear_coat(self.gloss, cos) } else { 0.0 },
             sheen: if dielectric && self.sheen > 0.0 { principled_sheen(cos) } else { 0.0 },
-            diffuse: if dielectric { principled_diffuse(self.roughness, self.flat, cos) } else { 0.0 },
+            diffuse: if dielectric { principled_diffuse(self.roughness, self.subsurface, cos) } else { 0.0 },
         }
     }
 
     /// What the dielectric layer reflects, several times scattered light included.
     #[inline]
-    fn layer_albedo(&self, at: &Albedos) -> Rgb {
+    fn layer_albedo(&self, at: &LobeAlbedos) -> Rgb {
         self.specular.map(|f| facets_albedo(f, at))
     }
 
     /// What diffuse base and sheen would scatter without a layer.
     #[inline]
-    fn base_albedo(&self, at: &Albedos) -> Rgb {
+    fn base_albedo(&self, at: &LobeAlbedos) -> Rgb {
         let diffuse = at.diffuse + (1.0 - at.diffuse) * self.diffuse_transmission;
         let base = self.base * diffuse;
         if self.sheen > 0.0 { base + self.sheen_color() * at.sheen } else { base }
@@ -206,7 +206,7 @@ impl Principled {
 
     /// What would be scattered without a clear coat, at most.
     #[inline]
-    fn uncoated_albedo(&self, at: &Albedos) -> Rgb {
+    fn uncoated_albedo(&self, at: &LobeAlbedos) -> Rgb {
         let layer = self.layer_albedo(at);
         let base = rgb_min(self.base_albedo(at), Rgb::WHITE - layer);
         self.base.map(|f| facets_albedo(f, at)) * self.metallic + (layer + base) * self.dielectric() + Rgb::splat(self.glass)
@@ -220,19 +220,19 @@ impl Principled {
 
     /// Probabilities for a direction: by what the lobes scatter, about.
     #[inline]
-    fn choose(&self, at: &Albedos) -> Choice {
+    fn lobe_pmf(&self, at: &LobeAlbedos) -> LobePmf {
         let below = 1.0 - at.clearcoat;
-        let ahead = self.reflectance_ahead().mean();
-        let specular = below * (ahead * (at.mirrors - at.schlick) + (self.metallic + self.dielectric()) * at.schlick);
+        let f0 = self.f0().mean();
+        let specular = below * (f0 * (at.facets - at.schlick) + (self.metallic + self.dielectric()) * at.schlick);
         let left = (1.0 - self.layer_albedo(at).mean()).min(1.0);
         let base = self.dielectric() * left.min(self.base.mean());
-        let around = self.dielectric() * left * self.sheen * at.sheen + (1.0 - at.mirrors) * self.multiple.mean().min(1.0);
+        let around = self.dielectric() * left * self.sheen * at.sheen + (1.0 - at.facets) * self.multiple.mean().min(1.0);
         let diffuse = below * (base * (1.0 - self.diffuse_transmission) + around);
         let diffuse_transmission = below * base * self.diffuse_transmission;
         let glass = below * self.glass;
         let sum = at.clearcoat + specular + diffuse + diffuse_transmission + glass;
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-        Choice {
+        LobePmf {
             clearcoat: at.clearcoat * scale,
             specular: specular * scale,
             diffuse: diffuse * scale,
@@ -248,10 +248,10 @@ impl Principled {
             return BsdfEval::default();
         }
         let at_o = self.albedos(vec3(wo.x, wo.y, wo.z.abs()));
-        self.eval_from(wo, wi, &at_o, &self.choose(&at_o))
+        self.eval_from(wo, wi, &at_o, &self.lobe_pmf(&at_o))
     }
 
-    fn eval_from(&self, wo: Vec3, wi: Vec3, at_o: &Albedos, choice: &Choice) -> BsdfEval {
+    fn eval_from(&self, wo: Vec3, wi: Vec3, at_o: &LobeAlbedos, pmf: &LobePmf) -> BsdfEval {
         let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
         let at_i = self.albedos(i);
         let reflects = wo.z * wi.z > 0.0;
@@ -266,13 +266,13 @@ impl Principled {
             if self.clearcoat > 0.0 {
                 let (unscaled, density) = ClearCoat::new(self.gloss).eval(o, i);
                 coat = self.clearcoat * unscaled * if self.is_mitsuba() { 4.0 * o.z * i.z } else { 1.0 };
-                pdf += choice.clearcoat * density;
+                pdf += pmf.clearcoat * density;
             }
             if self.metallic + self.dielectric() > 0.0 {
                 let facet = self.facet(o, i);
                 value += self.reflectance(facet.cos) * facet.value;
-                value += self.multiple * ((1.0 - at_o.mirrors) * (1.0 - at_i.mirrors) * i.z);
-                pdf += choice.specular * facet.pdf;
+                value += self.multiple * ((1.0 - at_o.facets) * (1.0 - at_i.facets) * i.z);
+                pdf += pmf.specular * facet.pdf;
             }
         }
 
@@ -281,7 +281,7 @@ impl Principled {
         if self.dielectric() > 0.0 {
             value += self.base_value(o, i, reflects, at_o, &at_i) * self.dielectric();
         }
-        pdf += if reflects { choice.diffuse } else { choice.diffuse_transmission } * cosine_pdf;
+        pdf += if reflects { pmf.diffuse } else { pmf.diffuse_transmission } * cosine_pdf;
 
         if is_within {
             (value, coat) = (Rgb::BLACK, 0.0);
@@ -291,11 +291,11 @@ impl Principled {
         if self.glass > 0.0 {
             let glass = if self.thin { self.eval_thin(o, i, reflects) } else { self.eval_glass(wo, wi) };
             value += glass.value * self.glass;
-            pdf += choice.glass * glass.pdf;
+            pdf += pmf.glass * glass.pdf;
         }
         if self.clearcoat > 0.0 {
-            let clear = |at: &Albedos| Rgb::splat(at.clearcoat);
-            let below = self.left_below([clear(at_o), clear(&at_i)], [self.uncoated_albedo(at_o), self.uncoated_albedo(&at_i)]);
+            let clear = |at: &LobeAlbedos| Rgb::splat(at.clearcoat);
+            let below = self.base_attenuation([clear(at_o), clear(&at_i)], [self.uncoated_albedo(at_o), self.uncoated_albedo(&at_i)]);
             value = value * below + Rgb::splat(coat);
         }
         BsdfEval { value, pdf }
@@ -303,15 +303,15 @@ impl Principled {
 
     /// The diffuse base below its layer.
     #[inline]
-    fn base_value(&self, o: Vec3, i: Vec3, reflects: bool, at_o: &Albedos, at_i: &Albedos) -> Rgb {
+    fn base_value(&self, o: Vec3, i: Vec3, reflects: bool, at_o: &LobeAlbedos, at_i: &LobeAlbedos) -> Rgb {
         let layer = [self.layer_albedo(at_o), self.layer_albedo(at_i)];
-        let below_layer = self.left_below(layer, [self.base_albedo(at_o), self.base_albedo(at_i)]);
+        let below_layer = self.base_attenuation(layer, [self.base_albedo(at_o), self.base_albedo(at_i)]);
         if !reflects {
             return self.base * below_layer * (self.diffuse_transmission * FRAC_1_PI * i.z);
         }
         let mut shape = shapes::diffuse(o, i, self.roughness);
-        if self.flat > 0.0 {
-            shape += (shapes::flat(o, i, self.roughness) - shape) * self.flat;
+        if self.subsurface > 0.0 {
+            shape += (shapes::subsurface(o, i, self.roughness) - shape) * self.subsurface;
         }
         let mut value = self.base * ((1.0 - self.diffuse_transmission) * shape);
         if self.sheen > 0.0 {
@@ -328,12 +328,12 @@ impl Principled {
         }
         let o = vec3(wo.x, wo.y, wo.z.abs());
         let at_o = self.albedos(o);
-        let choice = self.choose(&at_o);
-        let wi = self.sample_direction(wo, o, &choice, u_lobe, u)?;
+        let pmf = self.lobe_pmf(&at_o);
+        let wi = self.sample_direction(wo, o, &pmf, u_lobe, u)?;
         if wi.z.abs() <= MIN_COSINE {
             return None;
         }
-        let BsdfEval { value, pdf } = self.eval_from(wo, wi, &at_o, &choice);
+        let BsdfEval { value, pdf } = self.eval_from(wo, wi, &at_o, &pmf);
         if pdf <= 0.0 {
             return None;
         }
@@ -347,7 +347,7 @@ impl Principled {
     }
 
     /// A direction with the density of the chosen lobe.
-    fn sample_direction(&self, wo: Vec3, o: Vec3, choice: &Choice, u_lobe: f32, u: [f32; 2]) -> Option<Vec3> {
+    fn sample_direction(&self, wo: Vec3, o: Vec3, pmf: &LobePmf, u_lobe: f32, u: [f32; 2]) -> Option<Vec3> {
         let side = 1f32.copysign(wo.z);
         // A reflection keeps its side, or is lost.
         let above = |i: Vec3| (i.z > 0.0).then(|| vec3(i.x, i.y, i.z * side));
@@ -356,23 +356,23 @@ impl Principled {
             u_lobe -= probability;
             u_lobe < 0.0
         };
-        if is_chosen(choice.clearcoat) {
+        if is_chosen(pmf.clearcoat) {
             return above(ClearCoat::new(self.gloss).sample(o, u));
         }
-        if is_chosen(choice.specular) {
+        if is_chosen(pmf.specular) {
             let m = self.ggx.sample_visible_normal(o, u);
             return above(reflect(o, m, o.dot(m)));
         }
-        if is_chosen(choice.diffuse) {
+        if is_chosen(pmf.diffuse) {
             return above(warp::cosine_hemisphere(u));
         }
-        if is_chosen(choice.diffuse_transmission) {
+        if is_chosen(pmf.diffuse_transmission) {
             return above(warp::cosine_hemisphere(u)).map(|i| vec3(i.x, i.y, -i.z));
         }
-        if choice.glass <= 0.0 {
+        if pmf.glass <= 0.0 {
             return None;
         }
-        let u_glass = (u_lobe / choice.glass).min(crate::math::float::ONE_MINUS_EPSILON);
+        let u_glass = (u_lobe / pmf.glass).min(crate::math::float::ONE_MINUS_EPSILON);
         if !self.thin {
             return self.glass().sample(wo, u_glass, u).map(|sample| sample.wi);
         }
@@ -382,7 +382,7 @@ impl Principled {
 
     /// The share of what is below a layer that is left for a pair of directions: the layer's albedos for both, and those of what is below.
     #[inline]
-    fn left_below(&self, layer: [Rgb; 2], below: [Rgb; 2]) -> Rgb {
+    fn base_attenuation(&self, layer: [Rgb; 2], below: [Rgb; 2]) -> Rgb {
         if self.is_mitsuba() {
             return Rgb::WHITE;
         }
@@ -404,20 +404,12 @@ impl Principled {
         Self { ggx: Ggx::new(alpha), ..*self }
     }
 
-    /// Whether the highlight is stretched.
-    pub fn is_anisotropic(&self) -> bool {
-        self.ggx.alpha()[0] != self.ggx.alpha()[1]
-    }
-
-    /// Whether light can cross the surface.
-    pub fn transmits(&self) -> bool {
-        self.glass > 0.0 || self.diffuse_transmission > 0.0
-    }
-
-    /// Never.
+    /// The lobes.
     #[inline]
-    pub fn is_delta(&self) -> bool {
-        false
+    pub fn flags(&self) -> BsdfFlags {
+        let crosses = self.glass > 0.0 || self.diffuse_transmission > 0.0;
+        let transmission = if crosses { BsdfFlags::TRANSMISSION } else { BsdfFlags::empty() };
+        BsdfFlags::DIFFUSE | BsdfFlags::REFLECTION | self.ggx.flags() | BsdfFlags::GLOSSY | transmission
     }
 
     /// What all lobes scatter together, about.
@@ -431,9 +423,9 @@ impl Principled {
 
 /// What microfacets with Schlick's reflectance `f` ahead scatter, at most.
 #[inline]
-fn facets_albedo(f: f32, at: &Albedos) -> f32 {
+fn facets_albedo(f: f32, at: &LobeAlbedos) -> f32 {
     let average = f + (1.0 - f) / 21.0;
-    f * (at.mirrors - at.schlick) + at.schlick + (1.0 - at.mirrors) * average * average
+    f * (at.facets - at.schlick) + at.schlick + (1.0 - at.facets) * average * average
 }
 
 #[inline]

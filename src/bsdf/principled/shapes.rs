@@ -15,15 +15,15 @@ fn half_cos_squared(o: Vec3, i: Vec3) -> f32 {
 /// The diffuse lobe with its retro-reflection at grazing angles (Burley, "Physically Based Shading at Disney").
 #[inline]
 pub fn diffuse(o: Vec3, i: Vec3, roughness: f32) -> f32 {
-    let grazing = 2.0 * roughness * half_cos_squared(o, i) - 0.5;
-    FRAC_1_PI * i.z * (1.0 + grazing * schlick_weight(o.z)) * (1.0 + grazing * schlick_weight(i.z))
+    let fd90 = 2.0 * roughness * half_cos_squared(o, i) - 0.5;
+    FRAC_1_PI * i.z * (1.0 + fd90 * schlick_weight(o.z)) * (1.0 + fd90 * schlick_weight(i.z))
 }
 
 /// The flat lobe that stands for subsurface scattering (ibid., after Hanrahan and Krueger).
 #[inline]
-pub fn flat(o: Vec3, i: Vec3, roughness: f32) -> f32 {
-    let grazing = roughness * half_cos_squared(o, i) - 1.0;
-    let facing = (1.0 + grazing * schlick_weight(o.z)) * (1.0 + grazing * schlick_weight(i.z));
+pub fn subsurface(o: Vec3, i: Vec3, roughness: f32) -> f32 {
+    let fd90 = roughness * half_cos_squared(o, i) - 1.0;
+    let facing = (1.0 + fd90 * schlick_weight(o.z)) * (1.0 + fd90 * schlick_weight(i.z));
     FRAC_1_PI * i.z * 1.25 * (facing * (1.0 / (o.z + i.z) - 0.5) + 0.5)
 }
 

@@ -16,7 +16,7 @@ impl Principled {
         let mut base = self.base_value(o, i, true, &at_o, &at_i) * self.dielectric();
         if self.clearcoat > 0.0 {
             let coats = [at_o.clearcoat, at_i.clearcoat].map(Rgb::splat);
-            base *= self.left_below(coats, [self.uncoated_albedo(&at_o), self.uncoated_albedo(&at_i)]);
+            base *= self.base_attenuation(coats, [self.uncoated_albedo(&at_o), self.uncoated_albedo(&at_i)]);
         }
         share(base, self.eval(wo, wi).value)
     }

@@ -48,7 +48,7 @@ fn masking_is_the_closed_form() {
 #[test]
 fn directions_follow_the_density() {
     for (name, bsdf) in rough_bsdfs().into_iter().filter(|(_, bsdf)| matches!(bsdf, Bsdf::Beckmann(_))) {
-        let inside: &[f32] = if bsdf.transmits() { &[-0.3, -0.9] } else { &[] };
+        let inside: &[f32] = if bsdf.flags().transmits() { &[-0.3, -0.9] } else { &[] };
         for &cos in [1.0, 0.6, 0.1].iter().chain(inside) {
             let wo = direction(cos, 0.15);
             let sample = |u: [f32; 4]| bsdf.sample(wo, u[2], [u[0], u[1]]).map(|s| s.wi);
@@ -88,7 +88,7 @@ fn no_white_furnace_gains_light_and_a_smooth_one_loses_none() {
 #[test]
 fn a_hardly_rough_surface_scatters_as_a_smooth_one_does() {
     for (rough, smooth) in [(metal([SMOOTH_ALPHA; 2]), metal([0.0; 2])), (clear([3.0 * SMOOTH_ALPHA; 2]), clear([0.0; 2]))] {
-        assert!(smooth.is_delta() && !rough.is_delta());
+        assert!(smooth.flags().is_delta() && !rough.flags().is_delta());
         for u in random_points(2, 2_000) {
             let wo = direction(0.2 + 0.8 * u[0], u[1]);
             let (a, b) = (rough.sample(wo, u[2], [u[3], u[0]]).unwrap(), smooth.sample(wo, u[2], [0.5; 2]).unwrap());

@@ -119,7 +119,10 @@ fn a_tint_colours_what_crosses_the_coat_and_more_so_at_an_angle() {
 #[test]
 fn two_smooth_layers_are_deltas_and_ends_of_ranges_are_finite() {
     let mirror = Bsdf::Mirror(Mirror { reflectance: Rgb::WHITE });
-    assert!(coated(1.5, [0.0; 2], Rgb::WHITE, mirror.clone()).is_delta() && !coated(1.5, [0.1; 2], Rgb::WHITE, mirror).is_delta());
+    assert!(
+        coated(1.5, [0.0; 2], Rgb::WHITE, mirror.clone()).flags().is_delta()
+            && !coated(1.5, [0.1; 2], Rgb::WHITE, mirror).flags().is_delta()
+    );
     for (name, base) in bases(COLOR) {
         for ior in [1.0, 1.5, 10.0] {
             for alpha in [[0.0; 2], [1e-4; 2], [1.0; 2], [1.0, 1e-4]] {

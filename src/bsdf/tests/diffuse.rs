@@ -159,7 +159,7 @@ fn a_glossy_value_has_pi_and_the_cosine_and_no_bias_at_grazing() {
 #[test]
 fn a_pane_reflects_the_sum_of_all_inner_reflections_and_bends_nothing() {
     let pane = Bsdf::ThinDielectric(ThinDielectric::new(1.5));
-    assert!(pane.is_delta() && pane.transmits());
+    assert!(pane.flags().is_delta() && pane.flags().transmits());
     let wo = direction(1.0, 0.0);
     // R = 0.04: 2 R / (1 + R).
     let (reflected, passed) = (pane.sample(wo, 0.0, [0.5; 2]).unwrap(), pane.sample(wo, 0.99, [0.5; 2]).unwrap());

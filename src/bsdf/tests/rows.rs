@@ -14,7 +14,15 @@ fn bsdfs() -> Vec<Bsdf> {
         let made = [gold(alpha), glass(alpha), separable_gold(alpha), separable_glass(alpha), beckmann_gold(alpha), beckmann_glass(alpha)];
         made.into_iter().chain([single(gold(alpha)), single(glass(alpha))])
     });
-    rough.chain([gold([0.0; 2]), glass([0.0; 2])]).collect()
+    rough.chain([gold([0.0; 2]), glass([0.0; 2])]).chain(plastics()).collect()
+}
+
+fn plastics() -> impl Iterator<Item = Bsdf> {
+    let coated =
+        |alpha, nonlinear| Plastic { nonlinear, tint: Rgb::new(0.9, 0.5, 1.0), ..Plastic::new(Rgb::new(0.2, 0.5, 0.9), 1.5, alpha) };
+    let ggx = [[0.0; 2], [0.1; 2], [0.7; 2], [0.1, 0.5]].into_iter().flat_map(move |alpha| [coated(alpha, false), coated(alpha, true)]);
+    let separable = [0.0, 0.2].map(|alpha| lossy_plastic(SeparableGgx::new([alpha; 2]), true)).map(Bsdf::SeparableGgx);
+    ggx.map(Bsdf::Plastic).chain(separable)
 }
 
 #[test]

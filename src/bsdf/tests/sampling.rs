@@ -42,7 +42,7 @@ fn weights_are_value_over_density() {
 #[test]
 fn nothing_crosses_an_opaque_surface_and_all_that_crosses_says_so() {
     for (name, bsdf) in rough_bsdfs() {
-        let opaque = !bsdf.transmits();
+        let opaque = !bsdf.flags().transmits();
         for u in random_points(8, 2_000) {
             for wo in [direction(u[0].max(0.01), u[1]), direction(-u[0].max(0.01), u[1])] {
                 assert!(!opaque || bsdf.eval(wo, direction(-u[2] * wo.z.signum(), u[3])) == BsdfEval::default(), "{name}");

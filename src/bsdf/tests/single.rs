@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// `pi f / r` of Mitsuba 3.9.1's `roughplastic` with index 1.49 and no reflection by the coat, for `wi` ahead and `wo` at cosines 0.1, 0.55 and 1, and
-/// its internal reflectance, from its values of a nonlinear base.
+/// `pi f / r` of Mitsuba 3.9.1's `roughplastic` with index 1.49 and no reflection by the coat, for `wi` ahead and `wo`
+/// at cosines 0.1, 0.55 and 1, and its internal reflectance, from its values of a nonlinear base.
 const MITSUBA: [(bool, f32, [f32; 3], f32); 6] = [
     (false, 0.1, [0.58267, 0.87832, 0.91551], 0.54553),
     (false, 0.3, [0.52012, 0.65491, 0.69436], 0.40877),

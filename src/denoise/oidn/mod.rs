@@ -54,7 +54,8 @@ impl Device {
         // SAFETY: opening runs the library's initialisers. The file is named by the user, or has the name of a library known to be fit.
         let library = unsafe { Library::new(file) }.map_err(|e| Unusable(loader_message(&e)))?;
         let library = ManuallyDrop::new(library);
-        // SAFETY: the types are those of version 2, which is checked below before anything but the version is asked for; the library is never closed.
+        // SAFETY: the types are those of version 2, which is checked below before anything but the version is asked
+        // for; the library is never closed.
         let functions = unsafe { Functions::find(&library) }.map_err(|missing| {
             // SAFETY: the symbol is only looked for, not called.
             let old = unsafe { library.get::<unsafe extern "C" fn()>(sys::OF_VERSION_1) }.is_ok();

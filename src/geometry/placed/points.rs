@@ -4,8 +4,8 @@ use super::{Analytic, CenteredRay, LocalHit, Placed};
 use crate::geometry::{Detail, Disk, Frustum, LocalSurface, Quad, ShapeSample, Sphere};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::rows::{BATCH, Element, Row, pair, soa};
-use crate::math::vectorize::{Kernel, vectorize};
-use crate::math::{DVec3, Ray, RayF64, RayRows, Vec3};
+use crate::math::vectorize::vectorize;
+use crate::math::{DVec3, Ray, RayF64, RayRows, Vec2, Vec3};
 
 soa! {
     /// Points of a surface.
@@ -22,12 +22,10 @@ soa! {
     pub struct PlacedNormalRows {
         /// Unit normal.
         n: Vec3,
-        /// Change of the point with u; as the next two, zero for other shapes than quads.
+        /// Change of the point with u; as the next one, zero for other shapes than quads.
         dp_du: Vec3,
-        /// The first of uv.
-        uv_x: f32,
-        /// The second of uv.
-        uv_y: f32,
+        /// Surface parameters.
+        uv: Vec2,
         /// 0 where [`Placed::interaction`] has to be called, else 1.
         is_resolved: u32,
     }
@@ -47,29 +45,17 @@ soa! {
 
 /// Samples the first `count` points, at most [`BATCH`]. Surfaces of revolution are sampled alone.
 pub(super) fn sample(placed: &Placed, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
-    vectorize(Sample { placed, u, count, out });
+    vectorize!(sample_rows(placed, u, count, out));
 }
 
-struct Sample<'a> {
-    placed: &'a Placed,
-    u: &'a [Row; 2],
-    count: usize,
-    out: &'a mut PlacedSampleRows,
-}
-
-impl Kernel for Sample<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { placed, u, count, out } = self;
-        match &placed.shape {
-            Analytic::Sphere(sphere) => sample_on(placed, sphere, u, count, out),
-            Analytic::Quad(quad) => sample_on(placed, quad, u, count, out),
-            Analytic::Disk(disk) => sample_on(placed, disk, u, count, out),
-            Analytic::Frustum(frustum) => sample_on(placed, frustum, u, count, out),
-            Analytic::Revolution(_) => out.pdf_area = [0.0; BATCH],
-        }
+#[inline(always)]
+fn sample_rows(placed: &Placed, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+    match &placed.shape {
+        Analytic::Sphere(sphere) => sample_on(placed, sphere, u, count, out),
+        Analytic::Quad(quad) => sample_on(placed, quad, u, count, out),
+        Analytic::Disk(disk) => sample_on(placed, disk, u, count, out),
+        Analytic::Frustum(frustum) => sample_on(placed, frustum, u, count, out),
+        Analytic::Revolution(_) => out.pdf_area = [0.0; BATCH],
     }
 }
 
@@ -84,8 +70,8 @@ fn sample_on<S: LaneShape>(placed: &Placed, shape: &S, u: &[Row; 2], count: usiz
     }
 }
 
-/// Finds the points of the hits of the first `count` rays at the distances `t`, at most [`BATCH`], with parameters on quads alone. Nothing is resolved on
-/// surfaces of revolution.
+/// Finds the points of the hits of the first `count` rays at the distances `t`, at most [`BATCH`], with parameters on
+/// quads alone. Nothing is resolved on surfaces of revolution.
 pub(super) fn resolve(
     placed: &Placed,
     rays: &RayRows,
@@ -94,16 +80,7 @@ pub(super) fn resolve(
     points: &mut PlacedPointRows,
     normals: &mut PlacedNormalRows,
 ) {
-    vectorize(Resolve { placed, rays, t, count, points, normals });
-}
-
-struct Resolve<'a> {
-    placed: &'a Placed,
-    rays: &'a RayRows,
-    t: &'a [f32; BATCH],
-    count: usize,
-    points: &'a mut PlacedPointRows,
-    normals: &'a mut PlacedNormalRows,
+    vectorize!(resolve_rows(placed, rays, t, count, points, normals));
 }
 
 /// A shape whose functions are inlined into loops that become vector code.
@@ -136,19 +113,21 @@ macro_rules! lane_shapes {
 
 lane_shapes!(Sphere: Detail::Place, Quad: Detail::Full, Disk: Detail::Place, Frustum: Detail::Place);
 
-impl Kernel for Resolve<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { placed, rays, t, count, points, normals } = self;
-        match &placed.shape {
-            Analytic::Sphere(sphere) => resolve_on(placed, sphere, rays, t, count, points, normals),
-            Analytic::Quad(quad) => resolve_on(placed, quad, rays, t, count, points, normals),
-            Analytic::Disk(disk) => resolve_on(placed, disk, rays, t, count, points, normals),
-            Analytic::Frustum(frustum) => resolve_on(placed, frustum, rays, t, count, points, normals),
-            Analytic::Revolution(_) => normals.is_resolved = [0; BATCH],
-        }
+#[inline(always)]
+fn resolve_rows(
+    placed: &Placed,
+    rays: &RayRows,
+    t: &[f32; BATCH],
+    count: usize,
+    points: &mut PlacedPointRows,
+    normals: &mut PlacedNormalRows,
+) {
+    match &placed.shape {
+        Analytic::Sphere(sphere) => resolve_on(placed, sphere, rays, t, count, points, normals),
+        Analytic::Quad(quad) => resolve_on(placed, quad, rays, t, count, points, normals),
+        Analytic::Disk(disk) => resolve_on(placed, disk, rays, t, count, points, normals),
+        Analytic::Frustum(frustum) => resolve_on(placed, frustum, rays, t, count, points, normals),
+        Analytic::Revolution(_) => normals.is_resolved = [0; BATCH],
     }
 }
 
@@ -172,7 +151,7 @@ fn resolve_on<S: LaneShape>(
         points.t[i] = distance + shift;
         normals.n.set(i, found.n);
         normals.dp_du.set(i, placed.transform.vector(surface.dp_du).as_vec3());
-        (normals.uv_x[i], normals.uv_y[i]) = (surface.uv[0] as f32, surface.uv[1] as f32);
+        normals.uv.set(i, Vec2::new(surface.uv[0] as f32, surface.uv[1] as f32));
         // The first hit is the one that was found, and ahead; false for a NaN.
         let expected = f64::from(<f32 as Element>::get(t, i));
         let is_resolved = ((expected - shift) - distance <= 8.0 * UNIT_ROUNDOFF * expected) & (distance + shift > 0.0);

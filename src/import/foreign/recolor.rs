@@ -8,8 +8,8 @@ use super::Draft;
 use crate::desc::{ChannelDesc, ColorSpaceDesc, TextureDesc};
 use crate::import::{ImageData, Samples, read_image};
 
-/// A texture like the one of this name, whose colours times `factor` are changed; its name. `None` if it is of a kind that cannot be changed,
-/// or has no readable image, which is found out when the scene is compiled.
+/// A texture like the one of this name, whose colours times `factor` are changed; its name. `None` if it is of a kind
+/// that cannot be changed, or has no readable image, which is found out when the scene is compiled.
 pub fn recolored(draft: &mut Draft, folder: &Path, name: &str, factor: [f32; 3], change: &dyn Fn(f32) -> f32) -> Option<String> {
     let each = |color: [f32; 3]| std::array::from_fn(|i| change(color[i] * factor[i]));
     let texture = match draft.desc.textures.get(name).cloned()? {

@@ -55,8 +55,8 @@ impl ImportReport {
         self.entries.iter().all(|entry| entry.outcome == Outcome::Mapped)
     }
 
-    /// What was not mapped, a line for each kind of it: the same note about the same parameter of many elements is one line. Elements that are
-    /// ignored as a whole come first, then parameters that are, then approximations.
+    /// What was not mapped, a line for each kind of it: the same note about the same parameter of many elements is one
+    /// line. Elements that are ignored as a whole come first, then parameters that are, then approximations.
     pub fn summary(&self) -> Vec<String> {
         let (whole, rest) = self.kinds();
         whole.into_iter().chain(rest).collect()

@@ -18,8 +18,8 @@ pub enum Named {
     Illuminant([f32; 3]),
 }
 
-/// Metals: eta and k under D65, with eta such that the reflectance ahead is that of the spectrum (optical constants of luxpop.com, of which k
-/// is 0 within the accuracy for both oxides; brass as in refractiveindex.info: Querry).
+/// Metals: eta and k under D65, with eta such that the reflectance ahead is that of the spectrum (optical constants of
+/// luxpop.com, of which k is 0 within the accuracy for both oxides; brass as in refractiveindex.info: Querry).
 const METALS: &[(&str, [f32; 3], [f32; 3])] = &[
     ("Ag", [0.1267, 0.1207, 0.1491], [4.0649, 3.2863, 2.3918]),
     ("Al", [1.4286, 0.9285, 0.5905], [7.7405, 6.6026, 5.3604]),

@@ -6,11 +6,11 @@ use crate::bsdf::{BsdfEval, Lambert};
 use crate::color::Rgb;
 use crate::geometry::{PlacedNormalRows, PlacedPointRows, SpawnPoint, SurfaceInteraction};
 use crate::id::{InstanceId, PrimId, ShapeId};
-use crate::integrator::parts::LobeWeights;
-use crate::light::{LightSampleRows, Receiver};
+use crate::integrator::light_events::LobeWeights;
+use crate::light::{LightSampleContext, LightSampleRows};
 use crate::math::rows::{BATCH, Row, soa};
 use crate::math::{DVec3, Frame, RayRows, Vec2, Vec3};
-use crate::sampling::{Numbers, Requests};
+use crate::sampling::{SampleIdRows, SampleRows};
 use crate::scene::Scene;
 
 /// Bits of a vertex's `flags`.
@@ -59,6 +59,10 @@ soa! {
         n_a: Vec3,
         n_b: Vec3,
         n_c: Vec3,
+        /// Their uv.
+        uv_a: Vec2,
+        uv_b: Vec2,
+        uv_c: Vec2,
         u: f32,
         v: f32,
     }
@@ -86,8 +90,9 @@ soa! {
         n_g: Vec3,
         n_s: Vec3,
         dp_du: Vec3,
-        uv_x: f32,
-        uv_y: f32,
+        uv: Vec2,
+        /// Of a triangle found in rows, as [`Geometry::uv_density`](crate::geometry::Geometry::uv_density); else zero.
+        uv_density: f32,
         /// Whether the point is still to be found by [`World::resolve`](crate::integrator::World::resolve).
         is_unresolved: u32,
         flags: u32,
@@ -102,7 +107,7 @@ soa! {
         n: Vec3,
         is_consistent: u32,
         /// The normal on the side of the path, or zero where light may cross.
-        receiver_n: Vec3,
+        light_context_n: Vec3,
         /// The direction back, in the frame.
         wo: Vec3,
         /// Cosine of the direction back with the geometric normal.
@@ -202,11 +207,11 @@ pub(super) struct Vertices {
     /// Vertices on surfaces that are not diffuse.
     pub non_diffuse: Vec<u8>,
     pub bsdfs: BsdfTable,
-    pub requests: Requests,
+    pub requests: SampleIdRows,
     /// Choice of a light (two) and a point of it (two).
-    pub u_light: Numbers,
+    pub u_light: SampleRows,
     /// Choice of a lobe (one), a direction (two), roulette (one).
-    pub u_bsdf: Numbers,
+    pub u_bsdf: SampleRows,
 }
 
 impl Vertices {
@@ -231,7 +236,7 @@ impl Vertices {
             n_g: rows.n_g.get(lane),
             n_s: rows.n_s.get(lane),
             dp_du: rows.dp_du.get(lane),
-            uv: Vec2::new(rows.uv_x[lane], rows.uv_y[lane]),
+            uv: rows.uv.get(lane),
             shape: ShapeId(rows.shape[lane]),
             prim: PrimId(rows.prim[lane]),
             instance: InstanceId(rows.instance[lane]),
@@ -247,7 +252,8 @@ impl Vertices {
         rows.n_g.set(lane, at.n_g);
         rows.n_s.set(lane, at.n_s);
         rows.dp_du.set(lane, at.dp_du);
-        (rows.uv_x[lane], rows.uv_y[lane]) = (at.uv.x, at.uv.y);
+        rows.uv.set(lane, at.uv);
+        rows.uv_density[lane] = 0.0;
         (rows.shape[lane], rows.prim[lane], rows.instance[lane]) = (at.shape.0, at.prim.0, at.instance.0);
     }
 
@@ -259,8 +265,8 @@ impl Vertices {
 
     /// The point and the side of it that light must reach.
     #[inline(always)]
-    pub fn receiver(&self, lane: usize) -> Receiver {
-        Receiver { p: self.points.p.get(lane), n: self.rows.receiver_n.get(lane) }
+    pub fn light_context(&self, lane: usize) -> LightSampleContext {
+        LightSampleContext { p: self.points.p.get(lane), n: self.rows.light_context_n.get(lane) }
     }
 
     #[inline(always)]

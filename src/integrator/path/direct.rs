@@ -12,7 +12,7 @@ use crate::integrator::shading::terminator_factor;
 use crate::integrator::vertex::HemisphereTest;
 use crate::light::{LightContext, LightQueries, LightQueue, LightSampleRows, light_target};
 use crate::math::rows::BATCH;
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 use crate::math::{Frame, Vec3};
 use crate::sampling::power_heuristic;
 
@@ -25,7 +25,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
         return;
     }
     choose_lights(context, vertices, light_queue);
-    vectorize(EvalDiffuse { rows: &vertices.rows, lights: &vertices.light_samples, direct: &mut vertices.direct, count });
+    vectorize!(eval_diffuse(&vertices.rows, &vertices.light_samples, &mut vertices.direct, count));
     eval_non_diffuse(context, vertices, bsdf_rows);
     if let Some(regions) = regions {
         guided::mix_scatter_pdfs(regions, vertices);
@@ -33,9 +33,9 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     let Vertices { rows, points, light_samples: lights, direct, .. } = &mut *vertices;
     let is_mis = context.config.strategy == Strategy::Mis;
     if context.scene.features.reliefs {
-        vectorize(Illuminate::<true> { rows, points, lights, direct, is_mis, count });
+        vectorize!(illuminate::<true>(rows, points, lights, direct, is_mis, count));
     } else {
-        vectorize(Illuminate::<false> { rows, points, lights, direct, is_mis, count });
+        vectorize!(illuminate::<false>(rows, points, lights, direct, is_mis, count));
     }
     if context.scene.features.shading_normals {
         wave.counts.shadow += offset_below_facets(context, vertices, terminator_rays);
@@ -68,11 +68,11 @@ fn eval_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfS
 /// Samples a light for each vertex that is not all mirror.
 fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQueue) {
     let (scene, lights) = (context.scene, &context.scene.lights);
-    let light_context = LightContext { geometry: &scene.geometry, textures: &scene.textures, lights, found_by: context.found_by };
+    let light_context = LightContext { geometry: &scene.geometry, textures: &scene.textures, lights, compensation: context.compensation };
     queue.clear();
     for lane in (0..vertices.count.min(BATCH)).filter(|&lane| vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::MISS) == 0) {
-        let receiver = vertices.receiver(lane);
-        queue.push(&light_context, lane, &receiver, vertices.u_light.of(lane), &mut vertices.light_samples);
+        let from = vertices.light_context(lane);
+        queue.push(&light_context, lane, &from, vertices.u_light.of(lane), &mut vertices.light_samples);
     }
     let Vertices { count, points, u_light, light_samples, .. } = vertices;
     let queries = LightQueries { count: *count, points: &points.p, u: u_light };
@@ -81,23 +81,6 @@ fn choose_lights(context: &Context, vertices: &mut Vertices, queue: &mut LightQu
         for lane in (0..BATCH).filter(|&lane| light_samples.is_delta[lane] == 0) {
             light_samples.target[lane] = light_target::NONE;
         }
-    }
-}
-
-/// Evaluates diffuse reflection towards the lights.
-struct EvalDiffuse<'a> {
-    rows: &'a VertexRows,
-    lights: &'a LightSampleRows,
-    direct: &'a mut DirectRows,
-    count: usize,
-}
-
-impl Kernel for EvalDiffuse<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        eval_diffuse(self.rows, self.lights, self.direct, self.count);
     }
 }
 
@@ -110,25 +93,6 @@ fn eval_diffuse(rows: &VertexRows, lights: &LightSampleRows, direct: &mut Direct
         direct.wi.set(i, wi);
         direct.value.set(i, eval.value);
         direct.scatter_pdf[i] = eval.pdf;
-    }
-}
-
-/// Finds what shadow rays contribute, and the rays.
-struct Illuminate<'a, const RELIEF: bool> {
-    rows: &'a VertexRows,
-    points: &'a PointRows,
-    lights: &'a LightSampleRows,
-    direct: &'a mut DirectRows,
-    is_mis: bool,
-    count: usize,
-}
-
-impl<const RELIEF: bool> Kernel for Illuminate<'_, RELIEF> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        illuminate::<RELIEF>(self.rows, self.points, self.lights, self.direct, self.is_mis, self.count);
     }
 }
 
@@ -167,14 +131,15 @@ fn illuminate<const RELIEF: bool>(
     }
 }
 
-/// The factor on light from a direction under a normal or bump map, for the cosines of the direction with the geometric and the shading normal and of these.
+/// The factor on light from a direction under a normal or bump map, for the cosines of the direction with the geometric
+/// and the shading normal and of these.
 #[inline(always)]
 pub(super) fn shadowing<const RELIEF: bool>(test: HemisphereTest, [cos, cos_local, cos_normals]: [f32; 3]) -> f32 {
     if RELIEF & test.in_frame & test.in_geometry & (cos_normals != 0.0) { terminator_factor(cos, cos_local, cos_normals) } else { 1.0 }
 }
 
-/// Whether a ray may start above the facet that hides its direction. Under a normal or bump map the factor has darkened what comes near; where light
-/// passes, the side of the facet determines the medium.
+/// Whether a ray may start above the facet that hides its direction. Under a normal or bump map the factor has darkened
+/// what comes near; where light passes, the side of the facet determines the medium.
 #[inline(always)]
 pub(super) fn can_be_below(rows: &VertexRows, test: HemisphereTest, i: usize) -> bool {
     test.is_below_facet() & (rows.flags[i] & vertex_flags::TRANSMITS == 0) & (rows.cos_normals[i] == 0.0)

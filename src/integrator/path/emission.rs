@@ -7,7 +7,7 @@ use crate::color::Rgb;
 use crate::geometry::SurfaceInteraction;
 use crate::id::LightId;
 use crate::integrator::Strategy;
-use crate::integrator::parts::LightEvent;
+use crate::integrator::light_events::LightEvent;
 use crate::light::Light;
 use crate::math::Ray;
 use crate::math::rows::BATCH;
@@ -34,8 +34,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         let lane = usize::from(lane);
         let i = vertices.path(lane);
         let at = vertices.interaction(lane);
-        let Some(id) = context.scene.surface(at.shape).light(at.prim) else { continue };
-        let radiance = emitted(context, (paths, i), &rays.get(i), &at, id);
+        let Some((id, radiance)) = emitted(context, paths, i, &rays.get(i), &at) else { continue };
         let light = context.config.clamped(paths.throughput.get(i) * radiance, context.bounce);
         if light.is_black() {
             continue;
@@ -43,20 +42,21 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         out.add(paths.slot[i], light);
         if context.config.wants_light_aovs() {
             let event = light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Emission);
-            out.add_to_light_aovs(context, paths.slot[i], light, (event, id));
+            out.add_to_light_aovs(context, paths.slot[i], light, event, id);
         }
     }
 }
 
-/// Light that a surface emits against `ray`, weighted by MIS.
-fn emitted(context: &Context, (paths, i): (&PathRows, usize), ray: &Ray, at: &SurfaceInteraction, id: LightId) -> Rgb {
+/// The light of a surface with what it emits against `ray`, weighted by MIS; `None` if it is no emitter.
+fn emitted(context: &Context, paths: &PathRows, i: usize, ray: &Ray, at: &SurfaceInteraction) -> Option<(LightId, Rgb)> {
     let scene = context.scene;
-    let Light::Area(light) = scene.lights.get(id) else { return Rgb::BLACK };
+    let id = scene.surface(at.shape).light(at.prim)?;
+    let Light::Area(light) = scene.lights.get(id) else { return None };
     let radiance = light.radiance(&scene.geometry, &scene.textures, at, -ray.direction);
     if radiance.is_black() {
-        return radiance;
+        return Some((id, radiance));
     }
     let from = paths.from(i);
-    let light_pdf = || light.pdf(&scene.geometry, from.p, ray, at) * scene.lights.pmf(id, &from, context.found_by);
-    radiance * bsdf_mis_weight(context, paths, i, light_pdf)
+    let light_pdf = || light.pdf(&scene.geometry, from.p, ray, at) * scene.lights.pmf(id, &from, context.compensation);
+    Some((id, radiance * bsdf_mis_weight(context, paths, i, light_pdf)))
 }

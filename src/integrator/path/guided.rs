@@ -1,4 +1,5 @@
-//! Path guiding: directions sampled from what was learned of the incident radiance beside those of the BSDF, and the records that it is learned from.
+//! Path guiding: directions sampled from what was learned of the incident radiance beside those of the BSDF, and the
+//! records that it is learned from.
 
 use super::Context;
 use super::block::{Vertices, spawn, vertex_flags};

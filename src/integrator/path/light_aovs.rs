@@ -3,7 +3,7 @@
 use super::{Context, PathIntegrator};
 use crate::color::Rgb;
 use crate::id::LightId;
-use crate::integrator::parts::{LightEvent, LobeWeights};
+use crate::integrator::light_events::{LightEvent, LobeWeights};
 
 /// State beside paths and shadow rays.
 #[derive(Default)]
@@ -39,7 +39,7 @@ impl LightAovs {
     /// The class of light that a shadow ray from a path's vertex finds, which scatters it with these weights of lobes.
     pub fn shadow_event(&self, context: &Context, path: usize, lobes: impl FnOnce() -> LobeWeights) -> LightEvent {
         // Without AOVs by scattering, any class will do.
-        let is_first = context.bounce == 0 && context.config.parts.by_scattering;
+        let is_first = context.bounce == 0 && context.config.light_aovs.by_scattering;
         if is_first { LightEvent::Direct(lobes()) } else { self.event(context.bounce + 1, path, LightEvent::Emission) }
     }
 
@@ -51,7 +51,7 @@ impl LightAovs {
         lobes: impl FnOnce() -> LobeWeights,
         feature_factor: impl FnOnce() -> Option<Rgb>,
     ) {
-        if context.config.parts.by_scattering {
+        if context.config.light_aovs.by_scattering {
             if context.bounce == 0 {
                 self.lobes.push(lobes());
             } else {

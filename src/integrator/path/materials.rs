@@ -79,12 +79,14 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
                 vertices.bsdfs.ids[lane] = id.0;
                 set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, bsdf);
             }
-            Material::Varying(varying) => {
+            Material::Textured(textured) => {
                 let path = vertices.path(lane);
                 let (at, ray) = (vertices.interaction(lane), rays[block].get(path));
-                let cone = cones.get(block * BATCH + path);
-                let footprint = context.world.footprint(cone, &ray, hits[block].get(path).as_ref(), &at);
-                match varying.bsdf(&scene.textures, &footprint) {
+                let footprint = match (cones.get(block * BATCH + path), vertices.rows.uv_density[lane]) {
+                    (Some(cone), density) if density > 0.0 => context.world.covered(cone, ray.direction, &at, density),
+                    (cone, _) => context.world.footprint(cone, &ray, hits[block].get(path).as_ref(), &at),
+                };
+                match textured.bsdf(&scene.textures, &footprint) {
                     Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
                     bsdf => {
                         set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
@@ -113,8 +115,8 @@ fn set_non_diffuse(rows: &mut VertexRows, non_diffuse: &mut Vec<u8>, lane: usize
 
 #[inline]
 fn flags(bsdf: &Bsdf) -> u32 {
-    let delta = if bsdf.is_delta() { vertex_flags::DELTA } else { 0 };
-    let transmits = if bsdf.transmits() { vertex_flags::TRANSMITS } else { 0 };
+    let delta = if bsdf.flags().is_delta() { vertex_flags::DELTA } else { 0 };
+    let transmits = if bsdf.flags().transmits() { vertex_flags::TRANSMITS } else { 0 };
     delta | transmits
 }
 

@@ -58,7 +58,8 @@ pub(super) fn absorb_direct(context: &Context, vertices: &mut Vertices, media: &
         let from = vertices.rows.direction.get(lane);
         let direct = &mut vertices.direct;
         let ray = Ray { t_max: direct.shadow_end[lane], ..Ray::new(direct.shadow_origin.get(lane), direct.shadow_direction.get(lane)) };
-        let inside = context.world.media_toward(&at, from, ray.direction, &media[block * BATCH + vertices.rows.path[lane] as usize].here);
+        let inside =
+            context.world.media_toward(&at, from, ray.direction, &media[block * BATCH + vertices.rows.path[lane] as usize].current);
         direct.contribution.set(lane, direct.contribution.get(lane) * context.world.transmittance(&inside, &ray));
     }
 }
@@ -67,5 +68,5 @@ pub(super) fn absorb_direct(context: &Context, vertices: &mut Vertices, media: &
 pub(super) fn after(context: &Context, vertices: &Vertices, lane: usize, state: &MediaState) -> MediaState {
     let at = vertices.interaction(lane);
     let to = vertices.scatter.direction.get(lane);
-    MediaState { here: context.world.media_toward(&at, vertices.rows.direction.get(lane), to, &state.here), ..*state }
+    MediaState { current: context.world.media_toward(&at, vertices.rows.direction.get(lane), to, &state.current), ..*state }
 }

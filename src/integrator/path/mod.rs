@@ -1,9 +1,10 @@
 //! Path tracing with next-event estimation and multiple importance sampling, a wave of paths at a time.
 //!
 //! A wave is one sample of every pixel of a tile. Each round of the main loop lengthens all its paths by a segment, stage by stage: trace,
-//! media, vertices, misses, materials, emission, direct light, scatter, shadow rays. Stages work on blocks of `BATCH` paths, whose state is in
-//! structures of arrays. Each path draws its random numbers from its own (pixel, sample, bounce), so a path is the same in any wave.
-//! "Vectorized Production Path Tracing" (Lee et al. 2017) has the idea, `docs/wavefront.md` the figures.
+//! media, vertices, misses, materials, emission, direct light, scatter, shadow rays. Stages work on blocks of `BATCH`
+//! paths, whose state is in structures of arrays. Each path draws its random numbers from its own (pixel, sample,
+//! bounce), so a path is the same in any wave. "Vectorized Production Path Tracing" (Lee et al. 2017) has the idea,
+//! `docs/wavefront.md` the figures.
 
 mod block;
 mod direct;
@@ -21,16 +22,12 @@ mod trace;
 mod vertices;
 mod wave;
 
-use std::cell::RefCell;
-use std::sync::Arc;
-
 use super::cancel;
 use super::regularization::Regularization;
-use super::{CameraBatch, Integrator, RayCounts, Strategy, SurfaceNeeds, World, dimensions};
+use super::{CameraBatch, Integrator, PassContext, Strategy, SurfaceAovs, Workspace, World, dimensions};
 use crate::color::Rgb;
-use crate::film::{PartNeeds, SampleBatch};
-use crate::guiding::Guide;
-use crate::light::FoundBy;
+use crate::film::LightAovRequest;
+use crate::light::MisCompensation;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
 use radiance::Output;
@@ -54,11 +51,9 @@ pub struct PathIntegrator {
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// Which AOVs of surfaces are wanted.
-    pub needs: SurfaceNeeds,
+    pub needs: SurfaceAovs,
     /// Which light AOVs are wanted.
-    pub parts: PartNeeds,
-    /// What was learned of the incident radiance, if paths are guided.
-    pub guide: Option<Arc<Guide>>,
+    pub light_aovs: LightAovRequest,
 }
 
 /// What all stages of one bounce read.
@@ -71,29 +66,29 @@ struct Context<'a> {
     bounce: u32,
     /// Whether paths end at this vertex.
     is_last: bool,
-    found_by: FoundBy,
+    compensation: MisCompensation,
 }
 
 impl Context<'_> {
     /// Whether any AOV of surfaces is wanted.
     fn wants_surfaces(&self) -> bool {
-        self.config.needs != SurfaceNeeds::default()
+        self.config.needs != SurfaceAovs::default()
     }
 
     /// Whether any AOV is wanted that needs state beside paths.
     fn wants_aovs(&self) -> bool {
-        self.config.parts.by_scattering || self.config.needs.features
+        self.config.light_aovs.by_scattering || self.config.needs.features
     }
 }
 
-thread_local! {
-    static WAVE: RefCell<Wave> = RefCell::default();
-}
+/// The buffers of the waves of one thread.
+#[derive(Default)]
+pub(super) struct PathBuffers(Wave);
 
 impl Integrator for PathIntegrator {
-    fn render_batch(&self, world: &World, samples: &CameraBatch, out: &mut SampleBatch, counts: &mut RayCounts) {
-        out.reset(samples.len(), self.needs != SurfaceNeeds::default(), self.parts);
-        WAVE.with_borrow_mut(|wave| self.render_wave(world, samples, &mut Output { batch: out, config: self }, counts, wave));
+    fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
+        workspace.out.reset(samples.len(), self.needs != SurfaceAovs::default(), self.light_aovs);
+        self.render_wave(pass, samples, workspace);
     }
 }
 
@@ -111,13 +106,15 @@ impl PathIntegrator {
     /// Whether any light AOV is wanted.
     #[inline]
     fn wants_light_aovs(&self) -> bool {
-        self.parts.count() > 0
+        self.light_aovs.count() > 0
     }
 
     /// The main loop.
-    fn render_wave(&self, world: &World, samples: &CameraBatch, out: &mut Output, counts: &mut RayCounts, wave: &mut Wave) {
-        let (found_by, guide) = (self.strategy.found_by(), self.guide.as_deref());
-        let mut context = Context { config: self, world, scene: world.scene, bounce: 0, is_last: false, found_by };
+    fn render_wave(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
+        let PassContext { world, guide } = *pass;
+        let Workspace { out, counts, paths: PathBuffers(wave) } = workspace;
+        let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out, config: self });
+        let mut context = Context { config: self, world, scene: world.scene, bounce: 0, is_last: false, compensation };
         wave.start(&context, samples);
         for bounce in 0..self.max_depth {
             if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && world.gives_up()) {

@@ -4,7 +4,7 @@ use super::{Context, PathIntegrator};
 use crate::color::Rgb;
 use crate::film::SampleBatch;
 use crate::id::LightId;
-use crate::integrator::parts::{LightEvent, add_by_group, add_by_scattering, group_of};
+use crate::integrator::light_events::{LightEvent, add_by_group, add_by_scattering, group_of};
 
 /// The samples of a wave.
 pub(super) struct Output<'a> {
@@ -20,18 +20,18 @@ impl Output<'_> {
     }
 
     /// Adds light of one light to the light AOVs of a sample.
-    pub fn add_to_light_aovs(&mut self, context: &Context, slot: u32, light: Rgb, (event, id): (LightEvent, LightId)) {
+    pub fn add_to_light_aovs(&mut self, context: &Context, slot: u32, light: Rgb, event: LightEvent, id: LightId) {
         self.add_by_scattering(slot, light, event);
         self.add_to_group_of(context, slot, light, id);
     }
 
     /// Adds light to the light AOVs by scattering of a sample.
     pub fn add_by_scattering(&mut self, slot: u32, light: Rgb, event: LightEvent) {
-        add_by_scattering(self.config.parts, self.batch.parts_mut(slot as usize), light, event);
+        add_by_scattering(self.config.light_aovs, self.batch.light_aovs_mut(slot as usize), light, event);
     }
 
     /// Adds light to the AOV of the group that has the light `id`.
     pub fn add_to_group_of(&mut self, context: &Context, slot: u32, light: Rgb, id: LightId) {
-        add_by_group(self.config.parts, self.batch.parts_mut(slot as usize), light, group_of(context.scene, id));
+        add_by_group(self.config.light_aovs, self.batch.light_aovs_mut(slot as usize), light, group_of(context.scene, id));
     }
 }

@@ -11,8 +11,8 @@ use crate::geometry::SpawnPoint;
 use crate::integrator::vertex::HemisphereTest;
 use crate::math::Frame;
 use crate::math::rows::BATCH;
-use crate::math::vectorize::{Kernel, vectorize};
-use crate::sampling::Numbers;
+use crate::math::vectorize::vectorize;
+use crate::sampling::SampleRows;
 
 /// Samples a direction for each vertex of a block, and finds the rays along them.
 pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wave, block: usize) {
@@ -22,7 +22,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
         guided.choose(regions, vertices);
     }
     let Vertices { rows, scatter, u_bsdf, .. } = &mut *vertices;
-    vectorize(SampleDiffuse { rows, scatter, u: u_bsdf, count });
+    vectorize!(sample_diffuse(rows, scatter, u_bsdf, count));
     sample_non_diffuse(context, vertices, bsdf_rows);
     if let Some(regions) = regions {
         guided.mix(context, regions, vertices);
@@ -31,9 +31,9 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     let roulette = context.bounce + 1 >= context.config.rr_depth;
     let no_lights = context.scene.lights.is_empty();
     if context.scene.features.reliefs {
-        vectorize(Scatter::<true> { rows, points, scatter, u: u_bsdf, roulette, no_lights, count });
+        vectorize!(spawn_rays::<true>(rows, points, scatter, u_bsdf, [roulette, no_lights], count));
     } else {
-        vectorize(Scatter::<false> { rows, points, scatter, u: u_bsdf, roulette, no_lights, count });
+        vectorize!(spawn_rays::<false>(rows, points, scatter, u_bsdf, [roulette, no_lights], count));
     }
     if context.scene.features.shading_normals {
         wave.counts.indirect += terminator::offset(
@@ -78,25 +78,8 @@ fn sample_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut Bsd
     }
 }
 
-/// Samples diffuse reflection.
-struct SampleDiffuse<'a> {
-    rows: &'a VertexRows,
-    scatter: &'a mut ScatterRows,
-    u: &'a Numbers,
-    count: usize,
-}
-
-impl Kernel for SampleDiffuse<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        sample_diffuse(self.rows, self.scatter, self.u, self.count);
-    }
-}
-
 #[inline(always)]
-fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &Numbers, count: usize) {
+fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &SampleRows, count: usize) {
     for i in 0..count.min(BATCH) {
         let lambert = Lambert { albedo: rows.albedo.get(i) };
         let [_, u, v, _] = u.of(i);
@@ -111,28 +94,8 @@ fn sample_diffuse(rows: &VertexRows, scatter: &mut ScatterRows, u: &Numbers, cou
     }
 }
 
-/// Finds the rays that go on.
-struct Scatter<'a, const RELIEF: bool> {
-    rows: &'a VertexRows,
-    points: &'a PointRows,
-    scatter: &'a mut ScatterRows,
-    u: &'a Numbers,
-    roulette: bool,
-    no_lights: bool,
-    count: usize,
-}
-
-impl<const RELIEF: bool> Kernel for Scatter<'_, RELIEF> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { rows, points, scatter, u, roulette, no_lights, count } = self;
-        spawn_rays::<RELIEF>(rows, points, scatter, u, [roulette, no_lights], count);
-    }
-}
-
-/// Probability with which Russian roulette lets a path go on: what it has left of its throughput, so that one that lost nothing always goes on.
+/// Probability with which Russian roulette lets a path go on: what it has left of its throughput, so that one that lost
+/// nothing always goes on.
 #[inline(always)]
 fn survival_probability(max_throughput: f32, rr_scale: f32) -> f32 {
     (max_throughput * rr_scale).min(1.0)
@@ -143,7 +106,7 @@ fn spawn_rays<const RELIEF: bool>(
     rows: &VertexRows,
     points: &PointRows,
     scatter: &mut ScatterRows,
-    u: &Numbers,
+    u: &SampleRows,
     [roulette, no_lights]: [bool; 2],
     count: usize,
 ) {

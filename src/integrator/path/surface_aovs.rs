@@ -5,6 +5,7 @@ use super::block::Vertices;
 use super::radiance::Output;
 use super::wave::Wave;
 use crate::color::Rgb;
+use crate::film::SurfaceSample;
 use crate::geometry::SurfaceInteraction;
 use crate::integrator::surface::{place_sample, set_features};
 use crate::math::rows::BATCH;
@@ -57,17 +58,16 @@ fn albedo(context: &Context, vertices: &Vertices, lane: usize, at: &SurfaceInter
     }
 }
 
-/// Writes the AOVs of a sample whose path leaves the scene: to denoisers, the radiance of what is there, as far as it is not brighter than white.
+/// Writes the AOVs of a sample whose path leaves the scene: to denoisers, the radiance of what is there, as far as it
+/// is not brighter than white.
 #[inline(never)]
 pub(super) fn write_miss(
     context: &Context,
-    slot: u32,
     features: Option<Rgb>,
     direction: Vec3,
     radiance: impl FnOnce() -> Rgb,
-    out: &mut Output,
+    surface: &mut SurfaceSample,
 ) {
-    let surface = &mut out.batch.surfaces[slot as usize];
     if context.bounce == 0 && context.config.needs.motion {
         surface.motion = context.world.motion_at_infinity(direction).to_array();
     }

@@ -1,5 +1,5 @@
-//! Rays that the shading normal sees and the facet hides: they start above the facet, on the smooth surface that it approximates (Hanika, "Hacking the
-//! Shadow Terminator"), if nothing lies between.
+//! Rays that the shading normal sees and the facet hides: they start above the facet, on the smooth surface that it
+//! approximates (Hanika, "Hacking the Shadow Terminator"), if nothing lies between.
 
 use super::Context;
 use super::block::{Vertices, spawn};
@@ -17,8 +17,8 @@ pub(super) struct TerminatorRays {
     rays: RayRows,
 }
 
-/// Starts the rays of vertices above their facets whose `status` is [`spawn::BELOW_FACET`]: `respawn` sets such a ray. The result is how many rays
-/// this took.
+/// Starts the rays of vertices above their facets whose `status` is [`spawn::BELOW_FACET`]: `respawn` sets such a ray.
+/// The result is how many rays this took.
 pub(super) fn offset(
     context: &Context,
     vertices: &mut Vertices,

@@ -18,8 +18,9 @@ pub(super) fn closest(context: &Context, wave: &mut Wave, counts: &mut RayCounts
         context.world.accel.intersect_rows(rays, count, hits, coherence);
         if is_camera && context.config.hide_emitters {
             for lane in 0..count {
-                let (mut ray, mut hit) = (rays.get(lane), hits.get(lane));
-                counts.camera += context.world.pass_emitters(&mut ray, &mut hit);
+                let mut ray = rays.get(lane);
+                let (hit, traced) = context.world.skip_emitters(&mut ray, hits.get(lane));
+                counts.camera += traced;
                 rays.set(lane, &ray);
                 hits.set(lane, hit);
             }
@@ -42,8 +43,8 @@ pub(super) fn shadow(context: &Context, wave: &mut Wave, out: &mut Output, count
             let rows = &shadows.rows[block];
             let (slot, light) = (rows.slot[i % BATCH], rows.contribution.get(i % BATCH));
             out.add(slot, light);
-            if let Some(&source) = wave.light_aovs.shadow_sources.get(i) {
-                out.add_to_light_aovs(context, slot, light, source);
+            if let Some(&(event, id)) = wave.light_aovs.shadow_sources.get(i) {
+                out.add_to_light_aovs(context, slot, light, event, id);
             }
         }
     }

@@ -5,20 +5,20 @@ use super::block::{AnalyticScratch, PointRows, TriangleRows, VertexRows, Vertice
 use super::wave::{PathRows, Wave};
 use crate::accel::HitRows;
 use crate::color::Rgb;
-use crate::geometry::{Hit, Mesh, Shape, TrianglePoints, interpolated_normal};
+use crate::geometry::{Hit, Shape, TrianglePoints, interpolated_normal, interpolated_uv, uv_area, uv_density};
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
 use crate::math::compact::Compaction;
-use crate::math::rows::{BATCH, Row, Vectors};
-use crate::math::vectorize::{Kernel, vectorize};
-use crate::math::{Frame, RayRows};
+use crate::math::rows::{BATCH, Element, Row, Vectors};
+use crate::math::vectorize::vectorize;
+use crate::math::{Frame, RayRows, Vec2};
 
 /// Finds the vertices of a block's paths, and which paths miss.
 pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     let count = wave.block_len(block);
     let Wave { vertices, paths, rays, hits, .. } = wave;
     let (paths, rays, hits) = (&paths[block], &rays[block], &hits[block]);
-    let smooth = context.scene.features.shading_normals;
+    let features = &context.scene.features;
     let lanes = Compaction::different(&hits.shape, HitRows::MISS, count);
     vertices.misses.clear();
     vertices.misses.extend((0..count.min(BATCH)).filter(|&path| !lanes.contains(path)).map(|path| path as u8));
@@ -26,7 +26,8 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     let mut triangles = 0;
     for lane in 0..vertices.count.min(BATCH) {
         let Vertices { rows, triangles: corners, .. } = vertices;
-        let mesh = if rows.instance[lane] == Hit::NO_INSTANCE.0 { plain_mesh(context, ShapeId(rows.shape[lane])) } else { None };
+        let mesh =
+            if rows.instance[lane] == Hit::NO_INSTANCE.0 { context.world.mesh_without_tangents(ShapeId(rows.shape[lane])) } else { None };
         rows.is_unresolved[lane] = u32::from(mesh.is_none());
         if let Some(mesh) = mesh {
             triangles += 1;
@@ -35,15 +36,16 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
         }
     }
     if triangles > 0 {
-        gather_triangles(context, vertices, smooth);
+        gather_triangles(context, vertices);
         let Vertices { count, rows, triangles, points, .. } = vertices;
-        if smooth {
-            vectorize(IntersectTriangles::<true> { triangles, rows, points, count: *count });
-        } else {
-            vectorize(IntersectTriangles::<false> { triangles, rows, points, count: *count });
+        match (features.shading_normals, features.parameters) {
+            (false, false) => vectorize!(intersect_triangles::<false, false>(triangles, rows, points, *count)),
+            (true, false) => vectorize!(intersect_triangles::<true, false>(triangles, rows, points, *count)),
+            (false, true) => vectorize!(intersect_triangles::<false, true>(triangles, rows, points, *count)),
+            (true, true) => vectorize!(intersect_triangles::<true, true>(triangles, rows, points, *count)),
         }
     }
-    if context.scene.features.analytic_shapes {
+    if features.analytic_shapes {
         resolve_analytic(context, vertices, rays, hits);
     }
     for lane in 0..vertices.count.min(BATCH) {
@@ -92,7 +94,8 @@ fn start_vertices(vertices: &mut Vertices, lanes: &Compaction, paths: &PathRows,
     rows.flags = [0; BATCH];
     // Not every hit sets them.
     rows.dp_du = Vectors::ZERO;
-    (rows.uv_x, rows.uv_y) = ([0.0; BATCH], [0.0; BATCH]);
+    rows.uv = <Vec2 as Element>::ZERO;
+    rows.uv_density = [0.0; BATCH];
 }
 
 /// Resolves hits on analytic shapes in the world that need no more than rows have, many on one shape at a time.
@@ -124,7 +127,8 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
             rows.n_g.set(lane, normals.n.get(i));
             rows.n_s.set(lane, normals.n.get(i));
             rows.dp_du.set(lane, normals.dp_du.get(i));
-            (rows.uv_x[lane], rows.uv_y[lane]) = (normals.uv_x[i], normals.uv_y[i]);
+            rows.uv.set(lane, normals.uv.get(i));
+            rows.uv_density[lane] = 0.0;
             rows.is_unresolved[lane] = 0;
         }
     }
@@ -133,62 +137,49 @@ fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, 
 /// Hits on one shape that are worth a vector.
 const MIN_ANALYTIC_LANES: usize = 3;
 
-/// The mesh of a shape in the world that is at rest, if nothing depends on its parametrisation.
-#[inline(always)]
-fn plain_mesh<'a>(context: &Context<'a>, shape: ShapeId) -> Option<&'a Mesh> {
-    match context.scene.geometry.shape(shape) {
-        Shape::Mesh(mesh) if context.world.is_plain_mesh(shape) => Some(mesh),
-        _ => None,
-    }
-}
-
 /// Gathers the corners of the triangles.
-fn gather_triangles(context: &Context, vertices: &mut Vertices, smooth: bool) {
+fn gather_triangles(context: &Context, vertices: &mut Vertices) {
+    let features = &context.scene.features;
     let Vertices { count, rows, triangles, .. } = vertices;
     for lane in (0..BATCH.min(*count)).filter(|&lane| rows.is_unresolved[lane] == 0) {
-        let Shape::Mesh(mesh) = context.scene.geometry.shape(ShapeId(rows.shape[lane])) else { continue };
+        let shape = ShapeId(rows.shape[lane]);
+        let Shape::Mesh(mesh) = context.scene.geometry.shape(shape) else { continue };
         let indices = [triangles.a_index[lane], triangles.b_index[lane], triangles.c_index[lane]];
         let TrianglePoints { a, b, c } = mesh.points(indices);
         triangles.a.set(lane, a);
         triangles.b.set(lane, b);
         triangles.c.set(lane, c);
-        if smooth {
+        if features.shading_normals {
             // Without normals of its own, a triangle is flat.
             let [a, b, c] = mesh.vertex_normals(indices).unwrap_or_default();
             triangles.n_a.set(lane, a);
             triangles.n_b.set(lane, b);
             triangles.n_c.set(lane, c);
         }
-    }
-}
-
-/// Intersects rays and the planes of their triangles in `f64`.
-struct IntersectTriangles<'a, const SMOOTH: bool> {
-    triangles: &'a TriangleRows,
-    rows: &'a mut VertexRows,
-    points: &'a mut PointRows,
-    count: usize,
-}
-
-impl<const SMOOTH: bool> Kernel for IntersectTriangles<'_, SMOOTH> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        intersect_triangles::<SMOOTH>(self.triangles, self.rows, self.points, self.count);
+        if features.parameters {
+            let [a, b, c] = if context.world.uses_uv(shape) { mesh.vertex_uvs(indices) } else { [Vec2::ZERO; 3] };
+            triangles.uv_a.set(lane, a);
+            triangles.uv_b.set(lane, b);
+            triangles.uv_c.set(lane, c);
+        }
     }
 }
 
 // Rows are parameters of their own here and below: the compiler then knows that they do not overlap.
 #[inline(always)]
-fn intersect_triangles<const SMOOTH: bool>(triangles: &TriangleRows, rows: &mut VertexRows, points: &mut PointRows, count: usize) {
+fn intersect_triangles<const SMOOTH: bool, const UV: bool>(
+    triangles: &TriangleRows,
+    rows: &mut VertexRows,
+    points: &mut PointRows,
+    count: usize,
+) {
     for i in 0..count.min(BATCH) {
         let corners = TrianglePoints { a: triangles.a.get(i), b: triangles.b.get(i), c: triangles.c.get(i) };
         let place = corners.place(triangles.origin.get(i), rows.direction.get(i));
         points.p.set(i, place.p);
         rows.t[i] = place.t as f32;
         rows.error[i] = place.error;
-        rows.is_unresolved[i] |= u32::from(!place.is_ahead());
+        rows.is_unresolved[i] |= u32::from(!place.is_valid());
         rows.n_g.set(i, place.n_g);
         let n_s = if SMOOTH {
             let normals = [triangles.n_a.get(i), triangles.n_b.get(i), triangles.n_c.get(i)];
@@ -197,6 +188,11 @@ fn intersect_triangles<const SMOOTH: bool>(triangles: &TriangleRows, rows: &mut 
             place.n_g
         };
         rows.n_s.set(i, n_s);
+        if UV {
+            let corners = [triangles.uv_a.get(i), triangles.uv_b.get(i), triangles.uv_c.get(i)];
+            rows.uv.set(i, interpolated_uv(corners, [triangles.u[i], triangles.v[i]]));
+            rows.uv_density[i] = uv_density(uv_area(corners), place.double_area);
+        }
     }
 }
 
@@ -206,7 +202,7 @@ pub(super) fn build_frames(context: &Context, wave: &mut Wave) {
     let vertices = &mut wave.vertices;
     let count = vertices.count;
     if features.shading_normals {
-        vectorize(AdaptNormals { rows: &mut vertices.rows, count });
+        vectorize!(adapt_normals(&mut vertices.rows, count));
         let rows = &mut vertices.rows;
         for lane in (0..count).filter(|&lane| rows.is_consistent[lane] == 0) {
             let n = adapted_normal(-rows.direction.get(lane), rows.n_s.get(lane), rows.n_g.get(lane));
@@ -214,10 +210,10 @@ pub(super) fn build_frames(context: &Context, wave: &mut Wave) {
         }
     }
     match (features.shading_normals, features.anisotropic) {
-        (false, false) => vectorize(BuildFrames::<false, false> { rows: &mut vertices.rows, count }),
-        (true, false) => vectorize(BuildFrames::<true, false> { rows: &mut vertices.rows, count }),
-        (false, true) => vectorize(BuildFrames::<false, true> { rows: &mut vertices.rows, count }),
-        (true, true) => vectorize(BuildFrames::<true, true> { rows: &mut vertices.rows, count }),
+        (false, false) => vectorize!(set_frames::<false, false>(&mut vertices.rows, count)),
+        (true, false) => vectorize!(set_frames::<true, false>(&mut vertices.rows, count)),
+        (false, true) => vectorize!(set_frames::<false, true>(&mut vertices.rows, count)),
+        (true, true) => vectorize!(set_frames::<true, true>(&mut vertices.rows, count)),
     }
     if features.reliefs {
         for lane in 0..count {
@@ -234,49 +230,29 @@ pub(super) fn build_frames(context: &Context, wave: &mut Wave) {
 }
 
 /// Takes the shading normals that reflect nothing below the surface.
-struct AdaptNormals<'a> {
-    rows: &'a mut VertexRows,
-    count: usize,
-}
-
-impl Kernel for AdaptNormals<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { rows, count } = self;
-        for i in 0..count.min(BATCH) {
-            let n_s = rows.n_s.get(i);
-            rows.is_consistent[i] = u32::from(is_consistent(-rows.direction.get(i), n_s, rows.n_g.get(i)));
-            rows.n.set(i, n_s);
-        }
+#[inline(always)]
+fn adapt_normals(rows: &mut VertexRows, count: usize) {
+    for i in 0..count.min(BATCH) {
+        let n_s = rows.n_s.get(i);
+        rows.is_consistent[i] = u32::from(is_consistent(-rows.direction.get(i), n_s, rows.n_g.get(i)));
+        rows.n.set(i, n_s);
     }
 }
 
-struct BuildFrames<'a, const SMOOTH: bool, const TANGENTS: bool> {
-    rows: &'a mut VertexRows,
-    count: usize,
-}
-
-impl<const SMOOTH: bool, const TANGENTS: bool> Kernel for BuildFrames<'_, SMOOTH, TANGENTS> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { rows, count } = self;
-        for i in 0..count.min(BATCH) {
-            let (back, n_g) = (-rows.direction.get(i), rows.n_g.get(i));
-            let n = if SMOOTH { rows.n.get(i) } else { n_g };
-            let frame = if TANGENTS { Frame::from_normal_and_tangent(n, rows.dp_du.get(i)) } else { Frame::from_normal(n) };
-            rows.frame_x.set(i, frame.x);
-            rows.frame_y.set(i, frame.y);
-            rows.n.set(i, n);
-            let wo = frame.to_local(back);
-            rows.wo.set(i, wo);
-            let side = if rows.flags[i] & vertex_flags::TRANSMITS != 0 { 0.0 } else { 1f32.copysign(wo.z) };
-            rows.receiver_n.set(i, n * side);
-            rows.cos_geometric[i] = back.dot(n_g);
-            rows.cos_normals[i] = 0.0;
-        }
+#[inline(always)]
+fn set_frames<const SMOOTH: bool, const TANGENTS: bool>(rows: &mut VertexRows, count: usize) {
+    for i in 0..count.min(BATCH) {
+        let (back, n_g) = (-rows.direction.get(i), rows.n_g.get(i));
+        let n = if SMOOTH { rows.n.get(i) } else { n_g };
+        let frame = if TANGENTS { Frame::from_normal_and_tangent(n, rows.dp_du.get(i)) } else { Frame::from_normal(n) };
+        rows.frame_x.set(i, frame.x);
+        rows.frame_y.set(i, frame.y);
+        rows.n.set(i, n);
+        let wo = frame.to_local(back);
+        rows.wo.set(i, wo);
+        let side = if rows.flags[i] & vertex_flags::TRANSMITS != 0 { 0.0 } else { 1f32.copysign(wo.z) };
+        rows.light_context_n.set(i, n * side);
+        rows.cos_geometric[i] = back.dot(n_g);
+        rows.cos_normals[i] = 0.0;
     }
 }

@@ -12,11 +12,11 @@ use crate::color::{Rgb, RgbRows};
 use crate::id::LightId;
 use crate::integrator::media::MediaState;
 use crate::integrator::{CameraBatch, CameraBlock, RayCounts};
-use crate::light::{LightQueue, Receiver};
+use crate::light::{LightQueue, LightSampleContext};
 use crate::math::compact::Compaction;
 use crate::math::rows::{BATCH, soa};
 use crate::math::{DVec3, Ray, RayCone, RayRows, Vec3};
-use crate::sampling::{PixelSeed, Requests};
+use crate::sampling::{PixelSeed, SampleIdRows};
 
 /// Bits of [`Path::flags`].
 pub(super) mod path_flags {
@@ -52,7 +52,7 @@ soa! {
 
 impl PathRows {
     /// Starts the paths of a block of camera samples, the first of which has this index in the wave.
-    fn start(&mut self, requests: &Requests, first: usize) {
+    fn start(&mut self, requests: &SampleIdRows, first: usize) {
         self.throughput = RgbRows([[1.0; BATCH]; 3]);
         self.rr_scale = [1.0; BATCH];
         self.flags = [path_flags::SPECULAR; BATCH];
@@ -63,8 +63,8 @@ impl PathRows {
     }
 
     #[inline(always)]
-    pub fn from(&self, i: usize) -> Receiver {
-        Receiver { p: self.from_p.get(i), n: self.from_n.get(i) }
+    pub fn from(&self, i: usize) -> LightSampleContext {
+        LightSampleContext { p: self.from_p.get(i), n: self.from_n.get(i) }
     }
 
     #[inline(always)]
@@ -107,7 +107,7 @@ macro_rules! append {
     }};
 }
 
-/// A wave, kept by its thread.
+/// A wave.
 #[derive(Default)]
 pub(super) struct Wave {
     /// Paths under way.
@@ -148,7 +148,7 @@ impl Wave {
         }
         self.media.clear();
         if context.scene.features.media {
-            let state = |ray: &Ray| MediaState { here: context.world.media_at_start(ray), ..MediaState::default() };
+            let state = |ray: &Ray| MediaState { current: context.world.media_at_start(ray), ..MediaState::default() };
             self.media.extend(samples.iter().map(|sample| state(&sample.ray)));
         }
         self.cones.clear();
@@ -211,7 +211,7 @@ impl Wave {
         }, {
             scatter.throughput => throughput,
             points.p => from_p,
-            rows.receiver_n => from_n,
+            rows.light_context_n => from_n,
         });
         append!(lanes, at, rays, next_rays, { rows.time => time, }, { scatter.origin => origin, scatter.direction => direction, });
         *survivors += lanes.len();

@@ -4,10 +4,10 @@ use super::tests::{assert_power_flows_out, assert_samples_are_hits, irradiance, 
 use super::*;
 use crate::geometry::{Disk, Frustum, Quad, Sphere};
 use crate::id::LightId;
-use crate::light::{FoundBy, Light, LightContext, LightQueries, LightSet};
+use crate::light::{Light, LightContext, LightQueries, LightSet, MisCompensation};
 use crate::math::rows::{BATCH, Points};
 use crate::math::{DAffine3, DMat3, Rng, Transform};
-use crate::sampling::Numbers;
+use crate::sampling::SampleRows;
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
 const TWO_SIDED: Emission = Emission { two_sided: true, ..WHITE };
@@ -131,7 +131,7 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
     let mut random = Rng::new(31);
     let mut queue = EmitterQueue::default();
     let set = LightSet::new(lights.iter().cloned().map(Light::Area).collect(), &geometry);
-    let context = LightContext { geometry: &geometry, textures: &[], lights: &set, found_by: FoundBy::Lights };
+    let context = LightContext { geometry: &geometry, textures: &[], lights: &set, compensation: MisCompensation::Off };
     let mut points = Points::ZERO;
     let mut sampled = 0;
     for kinds in [1, 2, 4, 4, 4, 4, lights.len()] {
@@ -139,7 +139,7 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
         let first = random.below(lights.len());
         let vertices: Vec<_> =
             (0..BATCH).map(|_| ((first + random.below(kinds)) % lights.len(), random.cube() * 5.0 - 2.0, random.pair())).collect();
-        let numbers = Numbers::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
+        let numbers = SampleRows::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
         for (lane, (i, p, _)) in vertices.iter().enumerate() {
             points.set(lane, *p);
             assert!(queue.push(&lights[*i], LightId::new(*i), lane));

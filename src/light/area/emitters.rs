@@ -6,7 +6,7 @@ use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSample};
 use crate::math::DVec3;
 use crate::math::rows::{BATCH, Row, pair, soa};
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 
 soa! {
     /// Points that sample a light, and the points sampled as seen from there.
@@ -24,6 +24,11 @@ soa! {
 pub(in crate::light) struct EmitterQueue {
     /// The light and the vertex of each.
     entries: Vec<(LightId, usize)>,
+    rows: EmitterRows,
+}
+
+/// Vertices with one light, with its samples.
+struct EmitterRows {
     u: [Row; 2],
     views: ViewRows,
     samples: PlacedSampleRows,
@@ -31,7 +36,8 @@ pub(in crate::light) struct EmitterQueue {
 
 impl Default for EmitterQueue {
     fn default() -> Self {
-        Self { entries: Vec::with_capacity(BATCH), u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: PlacedSampleRows::default() }
+        let rows = EmitterRows { u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: PlacedSampleRows::default() };
+        Self { entries: Vec::with_capacity(BATCH), rows }
     }
 }
 
@@ -56,22 +62,22 @@ impl EmitterQueue {
 
     /// Samples all lights; `set` takes each sample with its vertex.
     pub fn sample(&mut self, context: &LightContext, queries: &LightQueries, mut set: impl FnMut(usize, &LightSample)) {
-        let Self { entries, u, views, samples } = self;
+        let Self { entries, rows } = self;
         entries.sort_unstable_by_key(|&(id, lane)| u64::from(id.0) << 8 | lane as u64);
         for group in entries.chunk_by(|a, b| a.0 == b.0) {
             let Light::Area(light) = context.lights.get(group[0].0) else { continue };
             let is_in_rows = group.len() >= MIN_LANES && {
                 for (i, &(_, lane)) in group.iter().enumerate() {
                     let (p, [s, t]) = queries.get(lane);
-                    views.p.set(i, p);
-                    (u[0][i], u[1][i]) = (s, t);
+                    rows.views.p.set(i, p);
+                    (rows.u[0][i], rows.u[1][i]) = (s, t);
                 }
-                sample_rows(light, context.geometry, u, group.len(), samples, views)
+                rows.sample(light, context.geometry, group.len())
             };
             for (i, &(_, lane)) in group.iter().enumerate() {
                 let (p, u) = queries.get(lane);
                 let sample =
-                    if is_in_rows { sample_of_row(light, views, i) } else { light.sample(context.geometry, context.textures, p, u) };
+                    if is_in_rows { sample_of_row(light, &rows.views, i) } else { light.sample(context.geometry, context.textures, p, u) };
                 if let Some(sample) = sample {
                     set(lane, &sample);
                 }
@@ -80,26 +86,22 @@ impl EmitterQueue {
     }
 }
 
-/// Samples a light for the first `count` points of `views`; `false` if it has to be sampled alone.
-fn sample_rows(
-    light: &AreaLight,
-    geometry: &Geometry,
-    u: &[Row; 2],
-    count: usize,
-    samples: &mut PlacedSampleRows,
-    views: &mut ViewRows,
-) -> bool {
-    match (&light.form, geometry.shape(light.shape)) {
-        (Form::Sphere(sphere), _) if !sphere.inward && (0..count.min(BATCH)).all(|i| sphere.sees_front(views.p.get(i))) => {
-            vectorize(SampleSphere { sphere, u, views, count });
-            true
+impl EmitterRows {
+    /// Samples a light for the first `count` vertices; `false` if it has to be sampled alone.
+    fn sample(&mut self, light: &AreaLight, geometry: &Geometry, count: usize) -> bool {
+        let Self { u, views, samples } = self;
+        match (&light.form, geometry.shape(light.shape)) {
+            (Form::Sphere(sphere), _) if !sphere.inward && (0..count.min(BATCH)).all(|i| sphere.sees_front(views.p.get(i))) => {
+                vectorize!(sample_sphere(sphere, u, views, count));
+                true
+            }
+            (Form::Placed { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
+                placed.sample_area_rows(u, count, samples);
+                vectorize!(see_samples(samples, views, count));
+                true
+            }
+            _ => false,
         }
-        (Form::Placed { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
-            placed.sample_area_rows(u, count, samples);
-            vectorize(SeeSamples { samples, views, count });
-            true
-        }
-        _ => false,
     }
 }
 
@@ -111,22 +113,6 @@ fn sample_of_row(light: &AreaLight, views: &ViewRows, i: usize) -> Option<LightS
     is_seen.then(|| sample.with_radiance(light.emission.radiance, 0.0))
 }
 
-struct SampleSphere<'a> {
-    sphere: &'a SphereEmitter,
-    u: &'a [Row; 2],
-    views: &'a mut ViewRows,
-    count: usize,
-}
-
-impl Kernel for SampleSphere<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        sample_sphere(self.sphere, self.u, self.views, self.count);
-    }
-}
-
 // Whole vectors, here and below: what is computed for vertices beyond the count is not used.
 #[inline(always)]
 fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, count: usize) {
@@ -136,21 +122,6 @@ fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, cou
         views.n.set(i, point.n);
         views.wi.set(i, point.wi);
         views.pdf[i] = point.pdf;
-    }
-}
-
-struct SeeSamples<'a> {
-    samples: &'a PlacedSampleRows,
-    views: &'a mut ViewRows,
-    count: usize,
-}
-
-impl Kernel for SeeSamples<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        see_samples(self.samples, self.views, self.count);
     }
 }
 

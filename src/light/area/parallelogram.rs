@@ -93,8 +93,8 @@ impl Parallelogram {
         self.corner + self.axis_u * along_u + self.axis_v * along_v
     }
 
-    /// A point as seen from `p` by area, on emitters that are `two_sided` or not, and whether it is to be sampled by solid angle instead. Without branches,
-    /// as the next, for loops over many vertices.
+    /// A point as seen from `p` by area, on emitters that are `two_sided` or not, and whether it is to be sampled by
+    /// solid angle instead. Without branches, as the next, for loops over many vertices.
     #[inline(always)]
     pub fn sample_by_area(&self, p: DVec3, u: [f32; 2], two_sided: bool) -> (ParallelogramSample, bool) {
         let view = self.view(p);
@@ -110,7 +110,8 @@ impl Parallelogram {
         (sample, is_seen & (self.is_rectangle != 0.0) & view.is_near())
     }
 
-    /// A point by solid angle as seen from `p`, of a rectangle of which something is seen from there, or `otherwise` if the solid angle is too small.
+    /// A point by solid angle as seen from `p`, of a rectangle of which something is seen from there, or `otherwise` if
+    /// the solid angle is too small.
     #[inline(always)]
     pub fn sample_by_solid_angle(&self, p: DVec3, u: [f32; 2], otherwise: &ParallelogramSample) -> ParallelogramSample {
         let view = self.view(p);
@@ -230,7 +231,8 @@ fn product(xa: f64, xb: f64, ya: f64, yb: f64, h2: f64) -> f64 {
 }
 
 impl View {
-    /// Whether the point is in the plane, within the rounding of itself and of the rectangle, whose corner is `corner`: the surface does not shine on itself, and nothing is seen of it from there.
+    /// Whether the point is in the plane, within the rounding of itself and of the rectangle, whose corner is `corner`:
+    /// the surface does not shine on itself, and nothing is seen of it from there.
     #[inline(always)]
     fn is_edge_on(&self, corner: DVec3) -> bool {
         let reach = self.x1.max(-self.x0) + self.y1.max(-self.y0);

@@ -7,8 +7,8 @@ use crate::id::LightId;
 use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::DVec3;
 use crate::math::rows::{BATCH, Element, Points, Row, pair, soa};
-use crate::math::vectorize::{Kernel, vectorize};
-use crate::sampling::Numbers;
+use crate::math::vectorize::vectorize;
+use crate::sampling::SampleRows;
 
 soa! {
     /// Points of lights as seen from vertices.
@@ -99,7 +99,7 @@ impl NearQueue {
             near += 1;
         }
         if near > 0 {
-            vectorize(SampleBySolidAngle { shapes: near_shapes, u, points, views: near_views, count: near });
+            vectorize!(sample_by_solid_angle(near_shapes, u, points, near_views, near));
             for (i, &lane) in lanes[..near].iter().enumerate() {
                 let lane = lane as usize % BATCH;
                 target_p.set(lane, points.q.get(i));
@@ -143,27 +143,9 @@ impl AreaQueue {
             samples.target = [light_target::NONE; BATCH];
             return;
         }
-        vectorize(SampleByArea { shapes, emissions, queries, views, target_p });
+        vectorize!(sample_by_area(shapes, emissions, queries.points, queries.u, views, target_p, queries.count));
         near.sample(shapes, queries, views, target_p);
-        vectorize(SetSamples { shapes, emissions, views, pmfs, samples, count: queries.count });
-    }
-}
-
-struct SampleByArea<'a> {
-    shapes: &'a ParallelogramRows,
-    emissions: &'a EmissionRows,
-    queries: &'a LightQueries<'a>,
-    views: &'a mut ViewRows,
-    target_p: &'a mut Points,
-}
-
-impl Kernel for SampleByArea<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { shapes, emissions, queries, views, target_p } = self;
-        sample_by_area(shapes, emissions, queries.points, queries.u, views, target_p, queries.count);
+        vectorize!(set_samples(shapes, emissions, views, pmfs, samples, queries.count));
     }
 }
 
@@ -173,7 +155,7 @@ fn sample_by_area(
     shapes: &ParallelogramRows,
     emissions: &EmissionRows,
     points: &Points,
-    u: &Numbers,
+    u: &SampleRows,
     views: &mut ViewRows,
     target_p: &mut Points,
     count: usize,
@@ -188,23 +170,6 @@ fn sample_by_area(
     }
 }
 
-struct SampleBySolidAngle<'a> {
-    shapes: &'a ParallelogramRows,
-    u: &'a [Row; 2],
-    points: &'a mut NearRows,
-    views: &'a mut ViewRows,
-    count: usize,
-}
-
-impl Kernel for SampleBySolidAngle<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        sample_by_solid_angle(self.shapes, self.u, self.points, self.views, self.count);
-    }
-}
-
 #[inline(always)]
 fn sample_by_solid_angle(shapes: &ParallelogramRows, u: &[Row; 2], points: &mut NearRows, views: &mut ViewRows, count: usize) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
@@ -214,24 +179,6 @@ fn sample_by_solid_angle(shapes: &ParallelogramRows, u: &[Row; 2], points: &mut 
         points.q.set(i, sample.q);
         views.wi.set(i, sample.wi);
         views.pdf[i] = sample.pdf;
-    }
-}
-
-struct SetSamples<'a> {
-    shapes: &'a ParallelogramRows,
-    emissions: &'a EmissionRows,
-    views: &'a ViewRows,
-    pmfs: &'a Row,
-    samples: &'a mut LightSampleRows,
-    count: usize,
-}
-
-impl Kernel for SetSamples<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        set_samples(self.shapes, self.emissions, self.views, self.pmfs, self.samples, self.count);
     }
 }
 

@@ -6,7 +6,7 @@ use crate::light::test_support::assert_chi_squared;
 use crate::light::{LightQueries, LightSampleRows, light_target};
 use crate::math::Rng;
 use crate::math::rows::{BATCH, Points};
-use crate::sampling::Numbers;
+use crate::sampling::SampleRows;
 
 const WHITE: Emission = Emission::constant(Rgb::WHITE);
 
@@ -52,7 +52,8 @@ pub(super) fn assert_samples_are_hits(geometry: &Geometry, light: &AreaLight, p:
         if (at.p - target.p).length() > 1e-5 * (target.p - p).length() {
             continue;
         }
-        // Seen edge-on, the rounding of the direction decides: it moves the point by d / cos, and the cosine by as much on a curved surface.
+        // Seen edge-on, the rounding of the direction decides: it moves the point by d / cos, and the cosine by as much
+        // on a curved surface.
         let cos = f64::from(at.n_g.dot(s.wi));
         if cos * cos < 4e-3 * (target.p - p).length() {
             continue;
@@ -171,7 +172,7 @@ fn queued_samples_have_the_bits_of_single_ones() {
     for count in [1, 16, 100, BATCH] {
         queue.clear();
         let vertices: Vec<_> = (0..count).map(|_| (random.below(lights.len()), random.cube() * 3.0, random.pair())).collect();
-        let numbers = Numbers::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
+        let numbers = SampleRows::new(&vertices.iter().map(|(_, _, [u, v])| [0.0, *u, *v, 0.0]).collect::<Vec<_>>());
         // One in eight is not queued.
         let is_queued = |lane: usize| lane % 8 != 3;
         for (lane, (i, p, _)) in vertices.iter().enumerate() {

@@ -1,12 +1,12 @@
-//! Many directions of an image at once: what is computed is computed in rows, and what waits for memory is nothing but copies, which do not wait for one
-//! another.
+//! Many directions of an image at once: what is computed is computed in rows, and what waits for memory is nothing but
+//! copies, which do not wait for one another.
 
 use super::{EnvironmentMap, Location};
 use crate::color::{Rgb, RgbRows};
-use crate::light::{FoundBy, InfinityEvalRows};
+use crate::light::{InfiniteLightEvalRows, MisCompensation};
 use crate::math::Vec3;
 use crate::math::rows::{BATCH, Element, Vectors, soa};
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 use crate::sampling::PiecewiseCell;
 
 soa! {
@@ -38,20 +38,15 @@ soa! {
         v: f32,
         pmf: f32,
         inverse_solid_angle: f32,
-    }
-}
-
-soa! {
-    /// Cosines of the polar angle at a cell's upper and lower limit.
-    struct LimitRows {
-        upper: f64,
-        lower: f64,
+        /// Cosines of the polar angle at the cell's upper and lower limit.
+        upper_cosine: f64,
+        lower_cosine: f64,
     }
 }
 
 soa! {
     /// Light samples from infinity.
-    pub struct InfinitySampleRows {
+    pub struct InfiniteLightSampleRows {
         /// Unit direction to the light.
         wi: Vec3,
         /// Radiance that arrives.
@@ -66,7 +61,6 @@ pub struct EnvironmentScratch {
     locations: LocationRows,
     corners: CornerRows,
     cells: CellRows,
-    limits: LimitRows,
     chosen: [PiecewiseCell; BATCH],
 }
 
@@ -76,7 +70,6 @@ impl Default for EnvironmentScratch {
             locations: LocationRows::default(),
             corners: CornerRows::default(),
             cells: CellRows::default(),
-            limits: LimitRows::default(),
             chosen: [PiecewiseCell::default(); BATCH],
         }
     }
@@ -96,20 +89,21 @@ impl LocationRows {
 }
 
 impl EnvironmentScratch {
-    /// [`Environment::eval`](super::Environment::eval) for the first `count` unit directions, at most [`BATCH`]; the densities only if `found_by` is given.
+    /// [`Environment::eval`](super::Environment::eval) for the first `count` unit directions, at most [`BATCH`]; the
+    /// densities only if `compensation` is given.
     pub fn eval(
         &mut self,
         map: &EnvironmentMap,
         directions: &Vectors,
         count: usize,
-        found_by: Option<FoundBy>,
-        evals: &mut InfinityEvalRows,
+        compensation: Option<MisCompensation>,
+        evals: &mut InfiniteLightEvalRows,
     ) {
         let Self { locations, corners, .. } = self;
-        vectorize(Locate { map, directions, locations, count });
+        vectorize!(locate(map, directions, locations, count));
         look_up(map, locations, count, corners, &mut evals.radiance);
-        let Some(found_by) = found_by else { return };
-        match map.density(found_by) {
+        let Some(compensation) = compensation else { return };
+        match map.density(compensation) {
             None => evals.pdf = [0.0; BATCH],
             Some(density) => {
                 density.pmfs(&locations.x, &locations.y, count, &mut evals.pdf);
@@ -120,25 +114,26 @@ impl EnvironmentScratch {
         }
     }
 
-    /// [`Environment::sample`](super::Environment::sample) with the first `count` pairs of numbers, at most [`BATCH`]; `false` if there is nothing to find.
+    /// [`Environment::sample`](super::Environment::sample) with the first `count` pairs of numbers, at most [`BATCH`];
+    /// `false` if there is nothing to find.
     pub fn sample(
         &mut self,
         map: &EnvironmentMap,
         u: &[[f32; 2]; BATCH],
         count: usize,
-        found_by: FoundBy,
-        samples: &mut InfinitySampleRows,
+        compensation: MisCompensation,
+        samples: &mut InfiniteLightSampleRows,
     ) -> bool {
-        let Some(density) = map.density(found_by) else { return false };
-        let Self { locations, corners, cells, limits, chosen } = self;
+        let Some(density) = map.density(compensation) else { return false };
+        let Self { locations, corners, cells, chosen } = self;
         density.sample_cells(&u[..count], chosen);
         for (i, cell) in chosen.iter().enumerate().take(count) {
             (cells.x[i], cells.y[i], cells.pmf[i]) = (cell.x as u32, cell.y as u32, cell.pmf);
             [cells.u[i], cells.v[i]] = cell.within;
             cells.inverse_solid_angle[i] = map.inverse_solid_angles[cell.y];
-            (limits.upper[i], limits.lower[i]) = (map.cosines[cell.y], map.cosines[cell.y + 1]);
+            (cells.upper_cosine[i], cells.lower_cosine[i]) = (map.cosines[cell.y], map.cosines[cell.y + 1]);
         }
-        vectorize(FindDirections { map, cells, limits, locations, samples, count });
+        vectorize!(find_directions(map, cells, locations, samples, count));
         look_up(map, locations, count, corners, &mut samples.radiance);
         true
     }
@@ -153,24 +148,7 @@ fn look_up(map: &EnvironmentMap, locations: &LocationRows, count: usize, corners
         corners.lower_left.set(i, c);
         corners.lower_right.set(i, d);
     }
-    vectorize(Interpolate { locations, corners, radiance, count });
-}
-
-struct Locate<'a> {
-    map: &'a EnvironmentMap,
-    directions: &'a Vectors,
-    locations: &'a mut LocationRows,
-    count: usize,
-}
-
-impl Kernel for Locate<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { map, directions, locations, count } = self;
-        locate(map, directions, locations, count);
-    }
+    vectorize!(interpolate_rows(locations, corners, radiance, count));
 }
 
 // Whole vectors, here and below: what is computed beyond the count is not used.
@@ -181,56 +159,19 @@ fn locate(map: &EnvironmentMap, directions: &Vectors, locations: &mut LocationRo
     }
 }
 
-struct FindDirections<'a> {
-    map: &'a EnvironmentMap,
-    cells: &'a CellRows,
-    limits: &'a LimitRows,
-    locations: &'a mut LocationRows,
-    samples: &'a mut InfinitySampleRows,
-    count: usize,
-}
-
-impl Kernel for FindDirections<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { map, cells, limits, locations, samples, count } = self;
-        find_directions(map, cells, limits, locations, samples, count);
-    }
-}
-
 #[inline(always)]
 fn find_directions(
     map: &EnvironmentMap,
     cells: &CellRows,
-    limits: &LimitRows,
     locations: &mut LocationRows,
-    samples: &mut InfinitySampleRows,
+    samples: &mut InfiniteLightSampleRows,
     count: usize,
 ) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
-        let (wi, at) = map.direction_in([cells.x[i], cells.y[i]], [cells.u[i], cells.v[i]], [limits.upper[i], limits.lower[i]]);
+        let (wi, at) = map.direction_in([cells.x[i], cells.y[i]], [cells.u[i], cells.v[i]], [cells.upper_cosine[i], cells.lower_cosine[i]]);
         locations.set(i, at);
         samples.wi.set(i, wi);
         samples.pdf[i] = cells.pmf[i] * <f32 as Element>::get(&cells.inverse_solid_angle, i);
-    }
-}
-
-struct Interpolate<'a> {
-    locations: &'a LocationRows,
-    corners: &'a CornerRows,
-    radiance: &'a mut RgbRows,
-    count: usize,
-}
-
-impl Kernel for Interpolate<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { locations, corners, radiance, count } = self;
-        interpolate_rows(locations, corners, radiance, count);
     }
 }
 

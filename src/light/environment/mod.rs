@@ -1,22 +1,22 @@
 //! Light from every direction.
 //!
 //! A lat-long image is laid around the scene with its top at +Y: the unit direction `d`, in the light's own space, looks up
-//! `u = 1/2 + atan2(d.x, -d.z) / (2 pi)` and `v = acos(d.y) / pi`, where (0, 0) is the image's upper left corner. The middle column is -Z and
-//! +X lies at three quarters of the width (Mitsuba's `envmap` after half a turn about +Y). The lookup is bilinear between texel centres,
-//! wraps in u and clamps in v.
+//! `u = 1/2 + atan2(d.x, -d.z) / (2 pi)` and `v = acos(d.y) / pi`, where (0, 0) is the image's upper left corner. The
+//! middle column is -Z and +X lies at three quarters of the width (Mitsuba's `envmap` after half a turn about +Y). The
+//! lookup is bilinear between texel centres, wraps in u and clamps in v.
 //!
 //! Beside sampling the BSDF, which finds all directions about evenly, an image is sampled by how much brighter it is than its mean (Karlik
 //! et al., "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling"): nothing of an even sky.
 
 mod batch;
 
-pub use batch::{EnvironmentScratch, InfinitySampleRows};
+pub use batch::{EnvironmentScratch, InfiniteLightSampleRows};
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-use super::{FoundBy, InfinityEval, LightSample};
+use super::{InfiniteLightEval, LightSample, MisCompensation};
 use crate::color::Rgb;
 use crate::math::{DMat3, Vec3, angle_of, unit_circle};
 use crate::sampling::{Piecewise2d, PiecewiseCell};
@@ -38,9 +38,9 @@ pub enum Environment {
 impl Environment {
     /// Light from a direction chosen by brightness; `u` in the unit square. `None` if there is nothing to find.
     #[inline]
-    pub fn sample(&self, u: [f32; 2], found_by: FoundBy) -> Option<LightSample> {
+    pub fn sample(&self, u: [f32; 2], compensation: MisCompensation) -> Option<LightSample> {
         let (wi, radiance, pdf) = match self {
-            Self::Constant(_) if found_by == FoundBy::Both => return None,
+            Self::Constant(_) if compensation == MisCompensation::On => return None,
             Self::Constant(radiance) => {
                 let z = 1.0 - 2.0 * u[0];
                 let sin = (4.0 * u[0] * (1.0 - u[0])).max(0.0).sqrt();
@@ -48,23 +48,23 @@ impl Environment {
                 (Vec3::new(around.x, around.y, z).normalize(), *radiance, UNIFORM_SPHERE_PDF)
             }
             Self::Map(map) => {
-                let chosen = map.choose(map.density(found_by)?, u);
+                let chosen = map.choose(map.density(compensation)?, u);
                 (chosen.wi, map.lookup(chosen.at), chosen.pdf)
             }
         };
-        Some(LightSample::far_away(wi, radiance, pdf))
+        Some(LightSample::infinite_sample(wi, radiance, pdf))
     }
 
     /// Radiance arriving along the unit direction `wi`, and the density of sampling it.
     #[inline]
-    pub fn eval(&self, wi: Vec3, found_by: FoundBy) -> InfinityEval {
+    pub fn eval(&self, wi: Vec3, compensation: MisCompensation) -> InfiniteLightEval {
         match self {
             Self::Constant(radiance) => {
-                InfinityEval { radiance: *radiance, pdf: if found_by == FoundBy::Both { 0.0 } else { UNIFORM_SPHERE_PDF } }
+                InfiniteLightEval { radiance: *radiance, pdf: if compensation == MisCompensation::On { 0.0 } else { UNIFORM_SPHERE_PDF } }
             }
             Self::Map(map) => {
                 let at = map.locate(wi);
-                InfinityEval { radiance: map.lookup(at), pdf: map.pdf(at, found_by) }
+                InfiniteLightEval { radiance: map.lookup(at), pdf: map.pdf(at, compensation) }
             }
         }
     }
@@ -80,15 +80,15 @@ impl Environment {
 
     /// Power that falls on a scene of the given radius, as luminance.
     pub fn power(&self, scene_radius: f64) -> f64 {
-        self.sampled_power(scene_radius, FoundBy::Lights)
+        self.sampled_power(scene_radius, MisCompensation::Off)
     }
 
     /// The part of [`power`](Self::power) that [`sample`](Self::sample) is to find.
-    pub(super) fn sampled_power(&self, scene_radius: f64, found_by: FoundBy) -> f64 {
+    pub(super) fn sampled_power(&self, scene_radius: f64, compensation: MisCompensation) -> f64 {
         let fluence = match self {
-            Self::Constant(_) if found_by == FoundBy::Both => 0.0,
+            Self::Constant(_) if compensation == MisCompensation::On => 0.0,
             Self::Constant(radiance) => 4.0 * PI * f64::from(radiance.luminance()),
-            Self::Map(map) => map.fluence(found_by),
+            Self::Map(map) => map.fluence(compensation),
         };
         PI * scene_radius * scene_radius * fluence
     }
@@ -131,8 +131,9 @@ pub struct EnvironmentMap {
     texels: Vec<Rgb>,
     /// Columns in world space: the light's axes.
     axes: [Vec3; 3],
-    /// How directions are chosen, by [`FoundBy`]; made when asked for. None if there is nothing to find. Column i lies between the centres of texels i and i + 1; row j between those of rows j - 1 and j, the first
-    /// and the last between the outermost centres and the poles.
+    /// How directions are chosen, by [`MisCompensation`]; built on first use. `None` if the image is black. Column i
+    /// lies between the centres of texels i and i + 1; row j between those of rows j - 1 and j, the first and the last
+    /// between the outermost centres and the poles.
     densities: [OnceLock<Option<Piecewise2d>>; 2],
     /// Cosine of the polar angle at the upper limit of each row of the density, and at the lower pole.
     cosines: Vec<f64>,
@@ -188,7 +189,7 @@ impl EnvironmentMap {
     }
 
     /// What is to be found in each cell: the mean of the bilinear luminance (its corners' mean) times the cell's solid angle; row by row.
-    fn weights(&self, found_by: FoundBy) -> Vec<f64> {
+    fn weights(&self, compensation: MisCompensation) -> Vec<f64> {
         // Negative channels (of colours out of gamut) must not cancel others: such a texel is not black.
         let brightness = |t: Rgb| f64::from(t.map(f32::abs).luminance());
         let row = |y: usize| -> Vec<f64> { self.texels[y * self.width..(y + 1) * self.width].iter().map(|&t| brightness(t)).collect() };
@@ -203,9 +204,9 @@ impl EnvironmentMap {
         }
         let rows =
             |weights: &[f64]| -> f64 { weights.chunks(self.width).zip(0..).map(|(row, y)| row.iter().sum::<f64>() * solid_angle(y)).sum() };
-        let found_without = match found_by {
-            FoundBy::Lights => 0.0,
-            FoundBy::Both => rows(&weights) / (4.0 * PI),
+        let found_without = match compensation {
+            MisCompensation::Off => 0.0,
+            MisCompensation::On => rows(&weights) / (4.0 * PI),
         };
         for (row, y) in weights.chunks_mut(self.width).zip(0..) {
             for weight in row {
@@ -217,20 +218,20 @@ impl EnvironmentMap {
         weights
     }
 
-    fn density(&self, found_by: FoundBy) -> Option<&Piecewise2d> {
+    fn density(&self, compensation: MisCompensation) -> Option<&Piecewise2d> {
         let make = || {
-            let weights = self.weights(found_by);
+            let weights = self.weights(compensation);
             // Scaled so that neither the brightest nor faint ones leave the range of f32.
             let largest = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
             let scaled = |&w: &f64| if w > 0.0 { ((w / largest) as f32).max(f32::MIN_POSITIVE) } else { 0.0 };
             Piecewise2d::new(self.width, self.height + 1, &weights.iter().map(scaled).collect::<Vec<_>>())
         };
-        self.densities[found_by as usize].get_or_init(make).as_ref()
+        self.densities[compensation as usize].get_or_init(make).as_ref()
     }
 
     /// Integral of the luminance that is to be found over all directions.
-    fn fluence(&self, found_by: FoundBy) -> f64 {
-        self.weights(found_by).iter().sum()
+    fn fluence(&self, compensation: MisCompensation) -> f64 {
+        self.weights(compensation).iter().sum()
     }
 
     /// The texels at the corners of a cell: upper left, upper right, lower left, lower right.
@@ -266,9 +267,9 @@ impl EnvironmentMap {
 
     /// Density per solid angle, constant in each cell.
     #[inline]
-    fn pdf(&self, at: Location, found_by: FoundBy) -> f32 {
+    fn pdf(&self, at: Location, compensation: MisCompensation) -> f32 {
         let (x, y) = (at.x as usize, at.y as usize);
-        self.density(found_by).map_or(0.0, |density| density.pmf(x, y) * self.inverse_solid_angles[y])
+        self.density(compensation).map_or(0.0, |density| density.pmf(x, y) * self.inverse_solid_angles[y])
     }
 
     /// A direction chosen by a density.

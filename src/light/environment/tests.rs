@@ -1,7 +1,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::*;
-use crate::light::InfinityEvalRows;
+use crate::light::InfiniteLightEvalRows;
 use crate::light::test_support::assert_chi_squared;
 use crate::math::rows::{BATCH, Vectors};
 use crate::math::{DVec3, Rng};
@@ -47,16 +47,19 @@ fn the_density_is_finite_at_the_poles_and_at_texel_corners() {
     let map = map(16, 8, |x, y| (x + y) as f32);
     for d in [Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(1e-20, 1.0, 0.0), Vec3::new(0.0, -1.0, -1e-30)] {
         let at = map.locate(d);
-        assert!(map.pdf(at, FoundBy::Lights).is_finite() && map.pdf(at, FoundBy::Lights) > 0.0 && map.lookup(at).is_finite(), "{d}");
+        assert!(
+            map.pdf(at, MisCompensation::Off).is_finite() && map.pdf(at, MisCompensation::Off) > 0.0 && map.lookup(at).is_finite(),
+            "{d}"
+        );
     }
     for y in 0..=8 {
         for x in 0..=16 {
             let d = direction(f64::from(x) / 16.0, PI * f64::from(y) / 8.0);
-            assert!(map.pdf(map.locate(d), FoundBy::Lights).is_finite());
+            assert!(map.pdf(map.locate(d), MisCompensation::Off).is_finite());
         }
     }
     for u in [[0.0, 0.0], [0.0, 0.999_999_94], [0.999_999_94, 0.0], [0.999_999_94; 2]] {
-        let s = map.choose(map.density(FoundBy::Lights).unwrap(), u);
+        let s = map.choose(map.density(MisCompensation::Off).unwrap(), u);
         assert!(s.wi.is_finite() && s.pdf.is_finite() && s.pdf > 0.0);
     }
 }
@@ -78,7 +81,7 @@ fn wherever_there_is_light_the_density_is_positive() {
         for _ in 0..20_000 {
             let d = random.direction().as_vec3();
             let at = map.locate(d);
-            assert!(map.lookup(at).is_black() || map.pdf(at, FoundBy::Lights) > 0.0, "{d}");
+            assert!(map.lookup(at).is_black() || map.pdf(at, MisCompensation::Off) > 0.0, "{d}");
         }
     }
 }
@@ -90,7 +93,7 @@ fn power_is_the_light_from_all_sides() {
     let n = 400;
     let mut sum = 0.0;
     for i in 0..n * n {
-        let s = environment.sample([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32], FoundBy::Lights).unwrap();
+        let s = environment.sample([((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32], MisCompensation::Off).unwrap();
         sum += f64::from(s.radiance.luminance() / s.pdf);
     }
     let power = PI * 9.0 * sum / f64::from(n * n);
@@ -105,8 +108,8 @@ fn a_constant_environment_is_sampled_uniformly() {
     let environment = Environment::Constant(Rgb::WHITE);
     let (mut counts, mut random) = (vec![0u32; 100], Rng::new(2));
     for _ in 0..100_000 {
-        let s = environment.sample(random.pair(), FoundBy::Lights).unwrap();
-        assert!((s.pdf - environment.eval(s.wi, FoundBy::Lights).pdf).abs() < 1e-9 && (s.wi.length() - 1.0).abs() < 1e-6);
+        let s = environment.sample(random.pair(), MisCompensation::Off).unwrap();
+        assert!((s.pdf - environment.eval(s.wi, MisCompensation::Off).pdf).abs() < 1e-9 && (s.wi.length() - 1.0).abs() < 1e-6);
         let i = ((0.5 + 0.5 * s.wi.x) * 10.0) as usize;
         let j = ((s.wi.y.atan2(s.wi.z) / TAU as f32 + 0.5) * 10.0) as usize;
         counts[i.min(9) * 10 + j.min(9)] += 1;
@@ -127,8 +130,8 @@ fn what_is_no_environment_is_refused_and_black_gives_nothing() {
     assert_eq!(new(1, 1, vec![Rgb::WHITE], scaled, 1.0), Err(EnvironmentMapError::Rotation));
     let black = environment(map(4, 2, |_, _| 0.0));
     assert!(
-        black.sample([0.5; 2], FoundBy::Lights).is_none()
-            && black.eval(Vec3::X, FoundBy::Lights).pdf == 0.0
+        black.sample([0.5; 2], MisCompensation::Off).is_none()
+            && black.eval(Vec3::X, MisCompensation::Off).pdf == 0.0
             && black.radiance(Vec3::X).is_black()
     );
 }
@@ -152,16 +155,16 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
     };
     for _ in 0..n {
         let even = random.direction().as_vec3();
-        for (found_by, sums) in [(FoundBy::Lights, &mut by_lights), (FoundBy::Both, &mut by_both)] {
-            let pdf = |wi: Vec3| f64::from(environment.eval(wi, found_by).pdf);
-            let s = environment.sample(random.pair(), found_by).unwrap();
-            let at = environment.eval(s.wi, found_by);
+        for (compensation, sums) in [(MisCompensation::Off, &mut by_lights), (MisCompensation::On, &mut by_both)] {
+            let pdf = |wi: Vec3| f64::from(environment.eval(wi, compensation).pdf);
+            let s = environment.sample(random.pair(), compensation).unwrap();
+            let at = environment.eval(s.wi, compensation);
             // Rounding takes directions at a limit to the next cell.
             strays += u32::from((at.pdf - s.pdf).abs() > 1e-5 * s.pdf);
             add(sums, light(s.wi) * response(s.wi) / (f64::from(s.pdf) + EVEN) + light(even) * response(even) / (pdf(even) + EVEN));
         }
         // Cells are as bright as their corners in the middle, so that dark directions share a cell with bright ones at most.
-        let at = environment.eval(even, FoundBy::Both);
+        let at = environment.eval(even, MisCompensation::On);
         assert!(at.pdf > 0.0 || f64::from(at.radiance.luminance()) < 2.0 * mean, "{at:?}");
     }
     assert!(strays < n / 1000, "{strays} of {n}");
@@ -173,8 +176,8 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
     // Of an even sky nothing is left.
     let even = [Environment::Constant(Rgb::WHITE), self::environment(map(8, 4, |_, _| 2.0))];
     for sky in even {
-        assert!(sky.sample([0.3, 0.6], FoundBy::Both).is_none() && sky.eval(Vec3::X, FoundBy::Both).pdf == 0.0);
-        assert!(sky.sampled_power(1.0, FoundBy::Both) == 0.0 && sky.power(1.0) > 0.0);
+        assert!(sky.sample([0.3, 0.6], MisCompensation::On).is_none() && sky.eval(Vec3::X, MisCompensation::On).pdf == 0.0);
+        assert!(sky.sampled_power(1.0, MisCompensation::On) == 0.0 && sky.power(1.0) > 0.0);
     }
 }
 
@@ -188,14 +191,14 @@ fn many_directions_at_once_are_each_of_them() {
     for count in [1, 17, BATCH, BATCH, BATCH, BATCH] {
         (0..count).for_each(|i| directions.set(i, (rng.cube() - 0.5).as_vec3().normalize()));
         let u = std::array::from_fn(|_| rng.pair());
-        for found_by in [FoundBy::Lights, FoundBy::Both] {
-            let (mut evals, mut samples) = (InfinityEvalRows::default(), InfinitySampleRows::default());
-            scratch.eval(&map, &directions, count, Some(found_by), &mut evals);
-            assert!(scratch.sample(&map, &u, count, found_by, &mut samples));
+        for compensation in [MisCompensation::Off, MisCompensation::On] {
+            let (mut evals, mut samples) = (InfiniteLightEvalRows::default(), InfiniteLightSampleRows::default());
+            scratch.eval(&map, &directions, count, Some(compensation), &mut evals);
+            assert!(scratch.sample(&map, &u, count, compensation, &mut samples));
             for (i, u) in u.iter().enumerate().take(count) {
-                let InfinityEval { radiance, pdf } = sky.eval(directions.get(i), found_by);
+                let InfiniteLightEval { radiance, pdf } = sky.eval(directions.get(i), compensation);
                 assert_eq!((evals.radiance.get(i), evals.pdf[i]), (radiance, pdf));
-                let one = sky.sample(*u, found_by).unwrap();
+                let one = sky.sample(*u, compensation).unwrap();
                 assert_eq!((one.wi, one.radiance, one.pdf), (samples.wi.get(i), samples.radiance.get(i), samples.pdf[i]));
             }
         }

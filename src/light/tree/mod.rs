@@ -11,7 +11,7 @@ mod node;
 mod tests;
 
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 use crate::math::{DVec3, Vec3};
 use arrayvec::ArrayVec;
 use node::{Node, WIDTH};
@@ -27,7 +27,7 @@ const MAX_OPEN: usize = 16;
 
 /// Where light is to arrive.
 #[derive(Clone, Copy, Debug)]
-pub struct Receiver {
+pub struct LightSampleContext {
     /// The point.
     pub p: DVec3,
     /// Unit normal of the side that light must reach; zero where it may come from either side.
@@ -98,13 +98,13 @@ impl LightTree {
 
     /// A light, `u` in `[0, 1)`; `None` where nothing arrives.
     #[inline]
-    pub fn choose(&self, from: &Receiver, u: f64) -> Option<TreeChoice> {
-        vectorize(Choose { tree: self, p: from.p.as_vec3(), n: from.n, u })
+    pub fn choose(&self, from: &LightSampleContext, u: f64) -> Option<TreeChoice> {
+        vectorize!(choose(self, from.p.as_vec3(), from.n, u))
     }
 
     /// The probability with which [`choose`](Self::choose) finds a light.
-    pub fn pmf(&self, from: &Receiver, light: u32) -> f32 {
-        vectorize(Pmf { tree: self, p: from.p.as_vec3(), n: from.n, light })
+    pub fn pmf(&self, from: &LightSampleContext, light: u32) -> f32 {
+        vectorize!(pmf(self, from.p.as_vec3(), from.n, light))
     }
 
     /// Bytes of the tables.
@@ -114,72 +114,48 @@ impl LightTree {
     }
 }
 
-struct Choose<'a> {
-    tree: &'a LightTree,
-    p: Vec3,
-    n: Vec3,
-    u: f64,
-}
-
-impl Kernel for Choose<'_> {
-    type Output = Option<TreeChoice>;
-
-    #[inline(always)]
-    fn call(self) -> Option<TreeChoice> {
-        let Self { tree, p, n, u } = self;
-        let mut cut = Cut::default();
-        if !tree.find_cut(p, n, &mut cut) {
-            return None;
-        }
-        let open = pick(&cut.sums, u * f64::from(cut.total))?;
-        let importances = &cut.importances[open.index];
-        let mut picked = pick(importances, open.within)?;
-        let mut pmf = importances[picked.index] / cut.total;
-        let mut child = tree.nodes[cut.nodes[open.index] as usize].child(picked.index);
-        while child & LEAF == 0 {
-            let node = &tree.nodes[child as usize];
-            let importances = node.importances(p, n).of;
-            let total = total(&importances)?;
-            picked = pick(&importances, picked.share() * f64::from(total))?;
-            pmf *= importances[picked.index] / total;
-            child = node.child(picked.index);
-        }
-        Some(TreeChoice { light: child & !LEAF, pmf })
+#[inline(always)]
+fn choose(tree: &LightTree, p: Vec3, n: Vec3, u: f64) -> Option<TreeChoice> {
+    let mut cut = Cut::default();
+    if !tree.find_cut(p, n, &mut cut) {
+        return None;
     }
+    let open = pick(&cut.sums, u * f64::from(cut.total))?;
+    let importances = &cut.importances[open.index];
+    let mut picked = pick(importances, open.within)?;
+    let mut pmf = importances[picked.index] / cut.total;
+    let mut child = tree.nodes[cut.nodes[open.index] as usize].child(picked.index);
+    while child & LEAF == 0 {
+        let node = &tree.nodes[child as usize];
+        let importances = node.importances(p, n).of;
+        let total = total(&importances)?;
+        picked = pick(&importances, picked.share() * f64::from(total))?;
+        pmf *= importances[picked.index] / total;
+        child = node.child(picked.index);
+    }
+    Some(TreeChoice { light: child & !LEAF, pmf })
 }
 
-struct Pmf<'a> {
-    tree: &'a LightTree,
-    p: Vec3,
-    n: Vec3,
-    light: u32,
-}
-
-impl Kernel for Pmf<'_> {
-    type Output = f32;
-
-    #[inline(always)]
-    fn call(self) -> f32 {
-        let Self { tree, p, n, light } = self;
-        let mut place = tree.light_places[light as usize];
-        if place.node == NONE {
-            return 0.0;
+#[inline(always)]
+fn pmf(tree: &LightTree, p: Vec3, n: Vec3, light: u32) -> f32 {
+    let mut place = tree.light_places[light as usize];
+    if place.node == NONE {
+        return 0.0;
+    }
+    let mut cut = Cut::default();
+    if !tree.find_cut(p, n, &mut cut) {
+        return 0.0;
+    }
+    let mut pmf = 1.0;
+    // Up to the cut, which holds the root.
+    loop {
+        if let Some(open) = cut.nodes.iter().position(|&node| node == place.node) {
+            return pmf * cut.importances[open][place.slot as usize] / cut.total;
         }
-        let mut cut = Cut::default();
-        if !tree.find_cut(p, n, &mut cut) {
-            return 0.0;
-        }
-        let mut pmf = 1.0;
-        // Up to the cut, which holds the root.
-        loop {
-            if let Some(open) = cut.nodes.iter().position(|&node| node == place.node) {
-                return pmf * cut.importances[open][place.slot as usize] / cut.total;
-            }
-            let importances = tree.nodes[place.node as usize].importances(p, n).of;
-            let Some(total) = total(&importances) else { return 0.0 };
-            pmf *= importances[place.slot as usize] / total;
-            place = tree.node_places[place.node as usize];
-        }
+        let importances = tree.nodes[place.node as usize].importances(p, n).of;
+        let Some(total) = total(&importances) else { return 0.0 };
+        pmf *= importances[place.slot as usize] / total;
+        place = tree.node_places[place.node as usize];
     }
 }
 

@@ -3,7 +3,7 @@ use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Mesh, Placed, Quad, Shape, Sphere};
 use crate::id::{LightId, ShapeId};
 use crate::light::{
-    AreaLight, Emission, Environment, FoundBy, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, SpotLight,
+    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, MisCompensation, PointLight, SpotLight,
 };
 use crate::math::{DAffine3, Rng, Transform};
 
@@ -61,18 +61,18 @@ fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
 }
 
 /// Receivers near and far, with a side and without.
-fn receivers(seed: u64, count: usize) -> Vec<Receiver> {
+fn receivers(seed: u64, count: usize) -> Vec<LightSampleContext> {
     let mut random = Rng::new(seed);
     let receiver = |i: usize| {
         let p = random.direction() * f64::from(random.unit_f32()) * if i.is_multiple_of(5) { 50.0 } else { 3.0 };
         let n = if i.is_multiple_of(4) { Vec3::ZERO } else { random.direction().as_vec3().normalize() };
-        Receiver { p, n }
+        LightSampleContext { p, n }
     };
     (0..count).map(receiver).collect()
 }
 
-fn pmfs(set: &LightSet, from: &Receiver) -> Vec<f64> {
-    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from, FoundBy::Lights))).collect()
+fn pmfs(set: &LightSet, from: &LightSampleContext) -> Vec<f64> {
+    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from, MisCompensation::Off))).collect()
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn whatever_can_shine_somewhere_can_be_chosen_there() {
         for (light, pmf) in set.lights().iter().zip(pmfs(&set, &from)) {
             let mut arrives = false;
             for _ in 0..16 {
-                let Some(s) = light.sample(&geometry, &[], from.p, random.pair(), FoundBy::Lights) else { continue };
+                let Some(s) = light.sample(&geometry, &[], from.p, random.pair(), MisCompensation::Off) else { continue };
                 arrives |= s.radiance.luminance() > 0.0 && (from.n == Vec3::ZERO || s.wi.dot(from.n) > 0.0);
             }
             assert!(pmf > 0.0 || !arrives, "{from:?} {light:?}");
@@ -104,9 +104,9 @@ fn near_lights_are_preferred_to_strong_ones_far_away() {
     let set = LightSet::new(lights, &Geometry::default());
     assert_eq!(set.selection(), LightSelection::Tree);
     for i in 0..20 {
-        let from = Receiver { p: DVec3::new(f64::from(i), 0.1, 0.0), n: Vec3::ZERO };
+        let from = LightSampleContext { p: DVec3::new(f64::from(i), 0.1, 0.0), n: Vec3::ZERO };
         // 100 from the light at hand, less than 3.3 from all others together.
-        assert!(set.pmf(LightId::new(i as usize), &from, FoundBy::Lights) > 0.9, "{i}");
+        assert!(set.pmf(LightId::new(i as usize), &from, MisCompensation::Off) > 0.9, "{i}");
     }
 }
 
@@ -125,7 +125,7 @@ fn any_arrangement_of_lights_makes_a_tree_of_bounded_size() {
             (0..n).map(|i| PointLight { position: place(f64::from(i)), intensity: Rgb::splat(1.0 + (i % 7) as f32) }.bounds()).collect();
         let tree = LightTree::new(&lights).unwrap();
         assert!(tree.memory_bytes() < 150 * n as usize, "{name}: {} bytes", tree.memory_bytes());
-        let from = Receiver { p: DVec3::new(0.3, 0.2, 0.1), n: Vec3::ZERO };
+        let from = LightSampleContext { p: DVec3::new(0.3, 0.2, 0.1), n: Vec3::ZERO };
         let sum: f64 = (0..n as u32).map(|i| f64::from(tree.pmf(&from, i))).sum();
         assert!((sum - 1.0).abs() < 1e-4, "{name}: {sum}");
         for i in 0..1000 {

@@ -35,7 +35,7 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 
 
 /// Why a request is not answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
+pub(crate) enum Refusal {
     /// Not HTTP, or without a host.
     Malformed,
     /// The head is too long.
@@ -211,8 +211,9 @@ fn check(request: &httparse::Request, host: &str) -> Result<Request, Refusal> {
     Ok(Request { path: path.to_owned(), query: query.to_owned() })
 }
 
-/// Whether a Host header names this machine: by address, as localhost, or by the name asked for on the command line. A foreign name that has been
-/// made to point here (DNS rebinding) is none of these. The port may be another, that of a tunnel.
+/// Whether a Host header names this machine: by address, as localhost, or by the name asked for on the command line. A
+/// foreign name that has been made to point here (DNS rebinding) is none of these. The port may be another, that of a
+/// tunnel.
 fn is_own_host(asked: &str, host: &str) -> bool {
     let asked = asked.to_ascii_lowercase();
     let (name, port) = match asked.strip_prefix('[').and_then(|rest| rest.split_once(']')) {

@@ -1,7 +1,8 @@
 //! A small web page that shows the picture as it grows.
 //!
-//! The page and everything it needs are in the program. It asks for the numbers a few times a second, fetches the layer it shows when there is a
-//! newer picture, and so tells that it wants the next one; nobody looking means no pictures and no cost.
+//! The page and everything it needs are in the program. It asks for the numbers a few times a second, fetches the layer
+//! it shows when there is a newer picture, and so tells that it wants the next one; nobody looking means no pictures
+//! and no cost.
 
 mod board;
 mod http;

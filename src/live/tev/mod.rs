@@ -1,7 +1,8 @@
 //! The viewer tev: a picture and its layers, sent over TCP as they grow.
 //!
-//! A thread of its own connects, quietly tries again while nobody is there, and sends what has changed. Between the render and that thread is
-//! a place for one picture: a new one replaces one that still waits there, so the render never waits for the viewer.
+//! A thread of its own connects, quietly tries again while nobody is there, and sends what has changed. Between the
+//! render and that thread is a place for one picture: a new one replaces one that still waits there, so the render
+//! never waits for the viewer.
 
 mod queue;
 mod sender;

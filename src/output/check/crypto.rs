@@ -8,7 +8,7 @@ use crate::output::cryptomatte::{self, layer_of};
 use crate::output::role::Role;
 
 /// A matte that metadata describes.
-pub struct Matte {
+pub(crate) struct Matte {
     pub part: usize,
     pub key: String,
     /// By the attribute's last word.

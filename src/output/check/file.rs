@@ -22,7 +22,7 @@ pub struct ExrFile {
 }
 
 /// A channel of a file.
-pub struct Channel<'a> {
+pub(crate) struct Channel<'a> {
     pub part: usize,
     pub name: String,
     pub sample_type: SampleType,

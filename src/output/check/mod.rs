@@ -1,4 +1,5 @@
-//! Checks of anyone's EXR files against the conventions of the programs that read them: one table of rules, each with its reason and its remedy.
+//! Checks of anyone's EXR files against the conventions of the programs that read them: one table of rules, each with
+//! its reason and its remedy.
 
 mod attributes;
 mod crypto;
@@ -107,7 +108,8 @@ pub struct Finding {
 /// Names the rules that a file breaks, those that matter most first.
 ///
 /// # Errors
-/// [`Error::Missing`](crate::Error::Missing) if the file cannot be read, [`Error::Malformed`](crate::Error::Malformed) if it is no EXR file.
+/// [`Error::Missing`](crate::Error::Missing) if the file cannot be read, [`Error::Malformed`](crate::Error::Malformed)
+/// if it is no EXR file.
 pub fn check_exr(path: &Path, profile: ExrProfileDesc) -> Result<Vec<Finding>> {
     let file = ExrFile::read(path)?;
     let mut findings = Vec::new();

@@ -232,7 +232,8 @@ fn described_as(word: &str, value: Option<&str>) -> Draft {
     one(described(word, value))
 }
 
-/// Every rule finds the file made to break it, in every profile that it holds for, and nothing else does in the profile for which it is worst.
+/// Every rule finds the file made to break it, in every profile that it holds for, and nothing else does in the profile
+/// for which it is worst.
 #[test]
 fn every_rule_has_a_file_that_breaks_it() {
     for rule in RULES {

@@ -1,5 +1,6 @@
-//! What the library that writes files leaves out of their headers: attributes in the order of their names, as other programs write them, since
-//! equal pictures would come in different files; and the mark of files with long names, without which OpenEXR refuses to read them.
+//! What the library that writes files leaves out of their headers: attributes in the order of their names, as other
+//! programs write them, since equal pictures would come in different files; and the mark of files with long names,
+//! without which OpenEXR refuses to read them.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
@@ -13,7 +14,8 @@ const LONG_NAMES: u32 = 1 << 10;
 /// The most bytes of a name in files without that bit.
 const SHORT: usize = 31;
 
-/// Sorts the attributes of all headers of a file, and marks long names. The headers' length stays the same, and so does everything behind them.
+/// Sorts the attributes of all headers of a file, and marks long names. The headers' length stays the same, and so does
+/// everything behind them.
 ///
 /// # Errors
 /// The system's, or if the file is no EXR file.

@@ -74,8 +74,8 @@ fn windows(display: &IntegerBounds, position: Vec2<i32>, size: Vec2<usize>) -> (
     if crop.fits([full_width, full_height]) { ([full_width, full_height], crop) } else { whole }
 }
 
-/// The settings that a file was rendered with: what [`RenderInfo::settings`](crate::output::RenderInfo::settings) had, and under `output` how it
-/// was written.
+/// The settings that a file was rendered with: what [`RenderInfo::settings`](crate::output::RenderInfo::settings) had,
+/// and under `output` how it was written.
 ///
 /// # Errors
 /// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no EXR file or has no settings.

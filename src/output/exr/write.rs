@@ -5,10 +5,10 @@ use std::io::Write;
 use std::path::Path;
 
 use exr::meta::attribute::IntegerBounds;
-use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, ImageAttributes, LineOrder, Vec2, WritableImage};
+use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, ImageAttributes, LineOrder, Vec2};
 
+use super::blocks::write_image;
 use super::coverage::{self, Matte};
-use super::header_order::finish_headers;
 use super::metadata::{Common, Mattes, part_attributes, text};
 use super::names::{channel_name, motion_channels, plain_word};
 use super::plan::{self, PartKind};
@@ -21,11 +21,13 @@ use crate::output::{RenderInfo, write_atomically};
 
 type FileLayer = exr::prelude::Layer<AnyChannels<FlatSamples>>;
 
-/// Writes the picture's colour, those of `output`'s layers that it has, and the [noisy](LayerKind::Noisy) picture if there is one. The display
-/// window is the picture without its overscan, the data window what was rendered. Numbers beyond what 16 bits hold become their largest, 65504.
+/// Writes the picture's colour, those of `output`'s layers that it has, and the [noisy](LayerKind::Noisy) picture if
+/// there is one. The display window is the picture without its overscan, the data window what was rendered. Numbers
+/// beyond what 16 bits hold become their largest, 65504.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if `output` makes no sense ([`check_output`](super::check_output)), [`Error::Output`](crate::Error::Output) if the file cannot be written.
+/// [`Error::Usage`](crate::Error::Usage) if `output` makes no sense ([`check_output`](super::check_output)),
+/// [`Error::Output`](crate::Error::Output) if the file cannot be written.
 pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderInfo) -> Result<()> {
     plan::check_output(output)?;
     let contents = Contents::new(image, output, info);
@@ -45,10 +47,7 @@ pub fn write_exr(path: &Path, image: &Image, output: &OutputDesc, info: &RenderI
     attributes.chromaticities = Some(REC709);
     attributes.pixel_aspect = info.pixel_aspect.unwrap_or(1.0);
     let file = exr::prelude::Image { attributes, layer_data: parts };
-    write_atomically(path, |out| {
-        file.write().to_buffered(&mut *out).map_err(|e| e.to_string())?;
-        out.flush().and_then(|()| finish_headers(out.get_mut())).map_err(|e| e.to_string())
-    })
+    write_atomically(path, |out| write_image(&file, out))
 }
 
 /// Windows of a file.

@@ -33,8 +33,8 @@ impl Checkpoints {
         self.every
     }
 
-    /// A pass is done, `elapsed` after this run began, and the next one is expected to take `next`: writes the state if the interval would be
-    /// over when that is in the file.
+    /// A pass is done, `elapsed` after this run began, and the next one is expected to take `next`: writes the state if
+    /// the interval would be over when that is in the file.
     pub(in crate::render) fn pass_done(&mut self, state: &RenderState, elapsed: Duration, next: Duration, progress: &dyn Progress) {
         let asked = self.asked.swap(false, Ordering::Relaxed);
         if asked || self.last.elapsed() + next + self.cost >= self.every {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! 8 bytes   "STERFILM"
-//! u32       version of the format, 1
+//! u32       version of the format, 3
 //! u32       bytes of the header
 //!           the header, JSON
 //!           blocks, each a u64 with its bytes and then so many bytes
@@ -10,7 +10,7 @@
 //! 32 bytes  BLAKE3 of everything before
 //! ```
 //!
-//! Numbers are little endian. The checksum is looked at before anything else is believed.
+//! SampleRows are little endian. The checksum is looked at before anything else is believed.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Take, Write};
@@ -22,7 +22,7 @@ use crate::file;
 
 const MAGIC: [u8; 8] = *b"STERFILM";
 const END: [u8; 8] = *b"STEREND\n";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const BUFFER: usize = 1 << 20;
 /// The marks at the beginning.
 const START: u64 = 12;

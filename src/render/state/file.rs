@@ -18,8 +18,8 @@ pub struct StateFile {
 }
 
 impl StateFile {
-    /// Takes the file for this process and cleans up after killed ones. The file itself is not touched. The lock is beside the file that symbolic
-    /// links lead to, so that it is one lock by whatever name.
+    /// Takes the file for this process and cleans up after killed ones. The file itself is not touched. The lock is
+    /// beside the file that symbolic links lead to, so that it is one lock by whatever name.
     ///
     /// # Errors
     /// [`Error::Output`] if another process has it, it cannot be written, or is no regular file.

@@ -31,8 +31,8 @@ impl Shard {
     /// All samples.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// The indices of its samples, of `spp` in all: contiguous, and none missing or double among all parts. Empty if there are more parts than
-    /// samples.
+    /// The indices of its samples, of `spp` in all: contiguous, and none missing or double among all parts. Empty if
+    /// there are more parts than samples.
     pub fn samples(&self, spp: u32) -> Range<u32> {
         let start = |index: u32| (u64::from(index) * u64::from(spp) / u64::from(self.count)) as u32;
         start(self.index - 1)..start(self.index)
@@ -118,10 +118,15 @@ impl Header {
     /// That of a file, without a look at the rest of it.
     ///
     /// # Errors
-    /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Checkpoint`](crate::Error::Checkpoint) if it is of another kind or
-    /// damaged.
+    /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Checkpoint`](crate::Error::Checkpoint)
+    /// if it is of another kind or damaged.
     pub fn read(file: &Path) -> Result<Self> {
         Reader::peek(file)
+    }
+
+    /// Whether it is of a guided render.
+    pub(super) fn is_guided(&self) -> bool {
+        self.settings.get("integrator.guiding").is_some_and(|value| value == "true")
     }
 
     /// What of it makes no sense in itself, so that no render can have written it; `None` if all does. `bytes` are those behind the header.
@@ -133,6 +138,8 @@ impl Header {
         let around = 2 * u64::from(self.film.overscan);
         if !(1..=count).contains(&index) {
             Some(format!("there is no shard {index} of {count}"))
+        } else if self.shard != Shard::WHOLE && self.is_guided() {
+            Some("a guided render has no shards".to_owned())
         } else if self.done > self.spp {
             Some(format!("{} of {} samples per pixel are done", self.done, self.spp))
         } else if x + width > full_width || y + height > full_height || (around > 0 && around >= full_width.min(full_height)) {
@@ -179,7 +186,7 @@ impl Header {
 fn compared(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     put(&mut found, "", &serde_json::to_value(settings).unwrap_or_default());
-    if settings.target_error.is_none() {
+    if settings.target_error.is_none() && !settings.is_guided() {
         found.remove("spp");
     }
     if scene.features.filtered_textures {

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::integrator::RayCounts;
 use crate::render::TILE_SIZE;
+use crate::render::planner::{GuidedPlanner, Planner};
 
 /// The picture of several shards.
 #[derive(Clone, Debug)]
@@ -20,11 +21,12 @@ pub struct Merged {
     pub partial: Option<String>,
 }
 
-/// Merges shards: the same bits as of one run with all samples. Without `partial` every shard and every sample must be there. Holds one film.
+/// Merges shards: the same bits as of one run with all samples. Without `partial` every shard and every sample must be
+/// there. Holds one film.
 ///
 /// # Errors
-/// [`Error::Missing`] if a file cannot be read; [`Error::Checkpoint`] naming the file if one is damaged, belongs to another picture, or is there
-/// twice, and naming what is missing.
+/// [`Error::Missing`] if a file cannot be read; [`Error::Checkpoint`] naming the file if one is damaged, belongs to
+/// another picture, or is there twice, and naming what is missing.
 pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
     let first = files.first().ok_or_else(|| Error::Usage("no shards to merge".into()))?;
     let mut headers: Vec<Header> = Vec::new();
@@ -48,21 +50,13 @@ pub fn merge(files: &[PathBuf], partial: bool) -> Result<Merged> {
         error @ Error::OutOfMemory(_) => error,
         error => Error::Checkpoint { file: first.clone(), message: error.to_string() },
     })?;
-    let rays = RayCounts::default();
-    let mut state = RenderState {
-        film,
-        shard: Shard::WHOLE,
-        done: 0,
-        tiles_ahead: 0,
-        torn: false,
-        complete: lack.is_none(),
-        blocks: None,
-        rays,
-        seconds: 0.0,
-    };
-    for file in files {
-        add(&mut state, file)?;
+    let mut state = RenderState::of_film(film, Planner::Uniform, Shard::WHOLE);
+    if headers[0].is_guided() {
+        add_guided(&mut state, first)?;
+    } else {
+        files.iter().try_for_each(|file| add(&mut state, file))?;
     }
+    state.complete = lack.is_none();
     Ok(Merged { state, header: headers.swap_remove(0), partial: lack.map(|(_, message)| message) })
 }
 
@@ -103,6 +97,15 @@ fn lack(files: &[PathBuf], headers: &[Header]) -> Option<(PathBuf, String)> {
         unfinished.map(|(_, file)| file).next()?
     };
     Some((file.clone(), parts.join(", ")))
+}
+
+/// Takes over the state of a guided render, which is never split.
+fn add_guided(state: &mut RenderState, file: &Path) -> Result<()> {
+    state.planner = Planner::Guided(Box::new(GuidedPlanner::new(&state.film)?));
+    state.load(&mut Reader::open(file)?)?;
+    state.film = state.whole_film().into_owned();
+    state.planner = Planner::Uniform;
+    Ok(())
 }
 
 /// Adds the samples of a file.

@@ -1,7 +1,8 @@
 //! The state of a render: what a checkpoint keeps, a shard brings, and a merge puts together.
 //!
-//! Films hold sums that do not depend on the order of their terms, and a sample depends on nothing but its pixel and its index. So a render that
-//! goes on from a state, and films of any parts of the samples put together, give the picture of one run bit for bit.
+//! Films hold sums that do not depend on the order of their terms, and a sample depends on nothing but its pixel and
+//! its index. So a render that goes on from a state, and films of any parts of the samples put together, give the
+//! picture of one run bit for bit.
 
 mod checkpoints;
 mod container;
@@ -21,7 +22,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::adaptive::Blocks;
+use super::planner::Planner;
 use super::{Settings, TILE_SIZE};
 use crate::error::{Error, Result};
 use crate::film::{Film, FilmTile, Image};
@@ -35,7 +36,8 @@ const TILES_AT_ONCE: usize = 64;
 /// How far a render is.
 #[derive(Clone, Debug)]
 pub struct RenderState {
-    /// All samples so far.
+    /// All samples so far; of guided renders those that have a weight, and [`whole_film`](Self::whole_film) has the
+    /// others, too.
     pub film: Film,
     /// Which samples belong to it.
     pub shard: Shard,
@@ -43,12 +45,13 @@ pub struct RenderState {
     pub done: u32,
     /// How many tiles, the first of the film, have one sample more.
     pub tiles_ahead: usize,
-    /// Whether a pass was given up: some tiles have samples that others lack, which no file can say. The picture is whole.
+    /// Whether a pass was given up: some tiles have samples that others lack, which no file can say. The picture is
+    /// whole.
     pub torn: bool,
     /// Whether no sample is missing.
     pub complete: bool,
-    /// With a target error, what every block of pixels has and is to get.
-    pub(super) blocks: Option<Blocks>,
+    /// What decides on the samples that are missing.
+    pub(super) planner: Planner,
     /// Rays so far.
     pub rays: RayCounts,
     /// Wall-clock seconds of rendering so far.
@@ -62,8 +65,14 @@ impl RenderState {
     /// As [`Film::new`].
     pub fn new(scene: &Scene, settings: &Settings, shard: Shard) -> Result<Self> {
         let film = Film::new(super::film_shape(scene, settings), TILE_SIZE)?;
-        let blocks = settings.target_error.map(|_| Blocks::new(film.sampled()));
-        Ok(Self { film, shard, done: 0, tiles_ahead: 0, torn: false, complete: false, blocks, rays: RayCounts::default(), seconds: 0.0 })
+        let planner = Planner::new(settings, &film)?;
+        Ok(Self::of_film(film, planner, shard))
+    }
+
+    /// Without samples.
+    fn of_film(film: Film, planner: Planner, shard: Shard) -> Self {
+        let rays = RayCounts::default();
+        Self { film, shard, done: 0, tiles_ahead: 0, torn: false, complete: false, planner, rays, seconds: 0.0 }
     }
 
     /// Continues from the state in a file.
@@ -78,20 +87,30 @@ impl RenderState {
         if reader.header().film != *state.film.shape() {
             return Err(reader.fault("the film has other layers"));
         }
-        (state.done, state.complete) = (reader.header().done, reader.header().complete);
-        state.tiles_ahead = (reader.header().tiles_ahead as usize).min(state.film.tiles().len() - 1);
-        state.rays = rays(reader.header().rays);
-        state.seconds = reader.header().render_seconds;
-        for tile in state.film.tiles_mut() {
-            let bytes = reader.block()?;
-            tile.load(&bytes).map_err(|e| reader.fault(e))?;
-        }
-        if let Some(blocks) = &mut state.blocks {
-            let bytes = reader.block()?;
-            blocks.load(&bytes).ok_or_else(|| reader.fault("the blocks of pixels are others"))?;
-        }
-        reader.finish()?;
+        state.load(&mut reader)?;
         Ok(state)
+    }
+
+    /// Replaces a state of the same shape and planner by that in a file.
+    fn load(&mut self, reader: &mut Reader) -> Result<()> {
+        (self.done, self.complete) = (reader.header().done, reader.header().complete);
+        self.tiles_ahead = (reader.header().tiles_ahead as usize).min(self.film.tiles().len() - 1);
+        self.rays = rays(reader.header().rays);
+        self.seconds = reader.header().render_seconds;
+        read_tiles(reader, &mut self.film)?;
+        match &mut self.planner {
+            Planner::Uniform => {}
+            Planner::Adaptive(planner) => {
+                let bytes = reader.block()?;
+                planner.load(&bytes).ok_or_else(|| reader.fault("the blocks of pixels are others"))?;
+            }
+            Planner::Guided(planner) => {
+                read_tiles(reader, &mut planner.iteration)?;
+                let bytes = reader.block()?;
+                planner.load(&bytes, self.done).ok_or_else(|| reader.fault("the guide is not what was saved of it"))?;
+            }
+        }
+        reader.finish()
     }
 
     /// Writes the state; `header` is that of the render.
@@ -115,19 +134,21 @@ impl RenderState {
             ..header.clone()
         };
         let mut writer = Writer::new(out, &header)?;
-        for tiles in self.film.tiles().chunks(TILES_AT_ONCE) {
-            let blocks: Vec<Vec<u8>> = tiles.par_iter().map(FilmTile::save).collect();
-            blocks.iter().try_for_each(|block| writer.block(block))?;
-        }
-        if let Some(blocks) = &self.blocks {
-            writer.block(&blocks.save())?;
+        write_tiles(&mut writer, &self.film)?;
+        match &self.planner {
+            Planner::Uniform => {}
+            Planner::Adaptive(planner) => writer.block(&planner.save())?,
+            Planner::Guided(planner) => {
+                write_tiles(&mut writer, &planner.iteration)?;
+                writer.block(&planner.save())?;
+            }
         }
         writer.finish()
     }
 
     /// The picture so far.
     pub fn picture(&self, settings: &Settings) -> Image {
-        super::picture(&self.film, settings.layers, settings.overscan)
+        super::picture(&self.whole_film(), settings.layers, settings.overscan)
     }
 
     /// The indices of the samples that every pixel is still to get.
@@ -135,6 +156,22 @@ impl RenderState {
         let all = self.shard.samples(spp);
         all.start + self.done..all.end
     }
+}
+
+fn write_tiles<W: Write>(writer: &mut Writer<W>, film: &Film) -> io::Result<()> {
+    for tiles in film.tiles().chunks(TILES_AT_ONCE) {
+        let blocks: Vec<Vec<u8>> = tiles.par_iter().map(FilmTile::save).collect();
+        blocks.iter().try_for_each(|block| writer.block(block))?;
+    }
+    Ok(())
+}
+
+fn read_tiles(reader: &mut Reader, film: &mut Film) -> Result<()> {
+    for tile in film.tiles_mut() {
+        let bytes = reader.block()?;
+        tile.load(&bytes).map_err(|e| reader.fault(e))?;
+    }
+    Ok(())
 }
 
 fn rays([camera, indirect, shadow]: [u64; 3]) -> RayCounts {
@@ -164,10 +201,11 @@ fn fits(reader: &Reader, wanted: &Header) -> Result<()> {
 /// # Errors
 /// [`Error::Usage`] naming the option if not.
 pub fn check_kept(settings: &Settings, shard: Shard) -> Result<()> {
-    let option = if shard == Shard::WHOLE { "--checkpoint" } else { "--shard" };
-    if settings.is_guided() {
-        let message = "not with guiding, for paths depend on all that were before; give --guiding off";
-        return Err(Error::Usage(format!("{option}: {message}")));
+    if shard != Shard::WHOLE && settings.is_guided() {
+        return Err(Error::Usage(
+            "--shard: not with guiding, for paths learn from nearly all samples before, which each part would render; give --guiding off"
+                .into(),
+        ));
     }
     if shard != Shard::WHOLE && settings.target_error.is_some() {
         return Err(Error::Usage(

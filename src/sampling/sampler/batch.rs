@@ -2,18 +2,18 @@
 
 use super::{PixelSeed, SOBOL_COLUMNS, Sampler, SamplerKind, SobolSeeds, owen_scramble, pcg_4d, unit};
 use crate::math::rows::BATCH;
-use crate::math::vectorize::{Kernel, vectorize};
+use crate::math::vectorize::vectorize;
 
 /// Samples of pixels for which numbers are wanted.
 #[derive(Clone, Debug)]
-pub struct Requests {
+pub struct SampleIdRows {
     /// Seeds of the pixels.
     pub pixels: [PixelSeed; BATCH],
     /// Indices of the samples.
     pub samples: [u32; BATCH],
 }
 
-impl Default for Requests {
+impl Default for SampleIdRows {
     fn default() -> Self {
         Self { pixels: [PixelSeed(0); BATCH], samples: [0; BATCH] }
     }
@@ -21,15 +21,15 @@ impl Default for Requests {
 
 /// Four numbers for each of many samples, by dimension.
 #[derive(Clone, Debug)]
-pub struct Numbers([[f32; BATCH]; 4]);
+pub struct SampleRows([[f32; BATCH]; 4]);
 
-impl Default for Numbers {
+impl Default for SampleRows {
     fn default() -> Self {
         Self([[0.0; BATCH]; 4])
     }
 }
 
-impl Numbers {
+impl SampleRows {
     /// The four numbers of one sample.
     #[inline(always)]
     pub fn of(&self, i: usize) -> [f32; 4] {
@@ -63,33 +63,22 @@ impl Numbers {
 impl Sampler {
     /// [`sample_4d`](Self::sample_4d) for the first `count` samples of `requests`, at most [`BATCH`].
     #[inline]
-    pub fn sample_4d_batch(&self, requests: &Requests, count: usize, set: u32, numbers: &mut Numbers) {
+    pub fn sample_4d_batch(&self, requests: &SampleIdRows, count: usize, set: u32, numbers: &mut SampleRows) {
         let count = count.min(BATCH);
         match self.kind {
-            SamplerKind::Sobol => vectorize(Draw::<true> { requests, count, set, numbers }),
-            SamplerKind::Independent => vectorize(Draw::<false> { requests, count, set, numbers }),
+            SamplerKind::Sobol => vectorize!(draw::<true>(requests, count, set, numbers)),
+            SamplerKind::Independent => vectorize!(draw::<false>(requests, count, set, numbers)),
         }
     }
 }
 
 /// Draws Sobol points or independent numbers.
-struct Draw<'a, const SOBOL: bool> {
-    requests: &'a Requests,
-    count: usize,
-    set: u32,
-    numbers: &'a mut Numbers,
-}
-
-impl<const SOBOL: bool> Kernel for Draw<'_, SOBOL> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for i in 0..self.count.min(BATCH) {
-            let (pixel, sample) = (self.requests.pixels[i], self.requests.samples[i]);
-            let bits = if SOBOL { sobol_4d_by_columns(pixel, sample, self.set) } else { pcg_4d([sample, self.set, pixel.0, 0]) };
-            self.numbers.set(i, bits);
-        }
+#[inline(always)]
+fn draw<const SOBOL: bool>(requests: &SampleIdRows, count: usize, set: u32, numbers: &mut SampleRows) {
+    for i in 0..count.min(BATCH) {
+        let (pixel, sample) = (requests.pixels[i], requests.samples[i]);
+        let bits = if SOBOL { sobol_4d_by_columns(pixel, sample, set) } else { pcg_4d([sample, set, pixel.0, 0]) };
+        numbers.set(i, bits);
     }
 }
 
@@ -136,7 +125,7 @@ mod tests {
     fn numbers_are_those_of_single_samples_on_every_instruction_set() {
         let mut rng = Rng::new(31);
         for round in 0..200u32 {
-            let mut requests = Requests::default();
+            let mut requests = SampleIdRows::default();
             for (pixel, sample) in requests.pixels.iter_mut().zip(&mut requests.samples) {
                 *pixel = PixelSeed(rng.bits() as u32);
                 *sample = rng.bits() as u32 >> (round % 32);
@@ -144,16 +133,16 @@ mod tests {
             let (set, count) = (rng.bits() as u32, 1 + rng.bits() as usize % BATCH);
             for kind in [SamplerKind::Sobol, SamplerKind::Independent] {
                 let sampler = Sampler::new(kind, 5);
-                let mut results = [(); 4].map(|()| Numbers::default());
+                let mut results = [(); 4].map(|()| SampleRows::default());
                 let [first, others @ ..] = &mut results;
                 sampler.sample_4d_batch(&requests, count, set, first);
                 let mut others = others.iter_mut();
                 match kind {
                     SamplerKind::Sobol => {
-                        with_each(|| Draw::<true> { requests: &requests, count, set, numbers: others.next().unwrap() });
+                        with_each!(draw::<true>(&requests, count, set, others.next().unwrap()));
                     }
                     SamplerKind::Independent => {
-                        with_each(|| Draw::<false> { requests: &requests, count, set, numbers: others.next().unwrap() });
+                        with_each!(draw::<false>(&requests, count, set, others.next().unwrap()));
                     }
                 }
                 let run = 4 - others.len();

@@ -4,18 +4,18 @@ use crate::import::{ImageData, Samples};
 use crate::texture::ImageError;
 use half::f16;
 
-fn image(width: usize, height: usize, channels: usize, samples: Samples) -> Arc<Image> {
-    Arc::new(Image::new(ImageData { width, height, channels, samples }).unwrap())
+fn image(width: usize, height: usize, channels: usize, samples: Samples) -> Arc<TextureImage> {
+    Arc::new(TextureImage::new(ImageData { width, height, channels, samples }).unwrap())
 }
 
 /// A grey image, the bottom row first: what it says of each texel is what uv means.
-fn grey(width: usize, rows_from_bottom: &[u8]) -> Arc<Image> {
+fn grey(width: usize, rows_from_bottom: &[u8]) -> Arc<TextureImage> {
     let rows: Vec<u8> = rows_from_bottom.chunks(width).rev().flatten().copied().collect();
     image(width, rows_from_bottom.len() / width, 1, Samples::U8(rows))
 }
 
-fn nearest(image: Arc<Image>) -> Bitmap {
-    Bitmap { filter: Filter::Nearest, ..Bitmap::new(image, Decoding::Linear) }
+fn nearest(image: Arc<TextureImage>) -> Bitmap {
+    Bitmap { filter: TextureFilter::Nearest, ..Bitmap::new(image, Decoding::Linear) }
 }
 
 fn code(value: f32) -> u8 {
@@ -64,7 +64,7 @@ fn texels_have_their_own_colours_at_their_middles_and_blend_between() {
 #[test]
 fn a_repeated_image_has_no_seam() {
     let noise: Vec<u8> = (0u32..35).map(|i| (i * 97 % 256) as u8).collect();
-    for (wrap, filter) in [(Wrap::Repeat, Filter::Bilinear), (Wrap::Mirror, Filter::Bilinear)] {
+    for (wrap, filter) in [(Wrap::Repeat, TextureFilter::Bilinear), (Wrap::Mirror, TextureFilter::Bilinear)] {
         let bitmap = Bitmap { wrap: [wrap; 2], filter, ..Bitmap::new(grey(5, &noise), Decoding::Linear) };
         for i in 0..200 {
             let s = i as f32 / 40.0 - 2.0;
@@ -83,7 +83,7 @@ fn every_uv_finds_a_number() {
     for (width, height) in [(1, 1), (1, 3), (7, 1), (5, 3)] {
         let bitmap = Bitmap::new(grey(width, &vec![51; width * height]), Decoding::Linear);
         for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
-            for filter in [Filter::Nearest, Filter::Bilinear] {
+            for filter in [TextureFilter::Nearest, TextureFilter::Bilinear] {
                 let bitmap = Bitmap { wrap: [wrap; 2], filter, ..bitmap.clone() };
                 for u in odd {
                     for v in odd {
@@ -97,7 +97,7 @@ fn every_uv_finds_a_number() {
 
 #[test]
 fn colours_of_8_and_16_bits_are_srgb_and_floats_and_alpha_are_linear() {
-    let at = |image: Arc<Image>, decoding| nearest_color(image, decoding);
+    let at = |image: Arc<TextureImage>, decoding| nearest_color(image, decoding);
     let bytes = image(1, 1, 4, Samples::U8(vec![188, 10, 255, 128]));
     let words = image(1, 1, 4, Samples::U16(vec![188 * 257, 10 * 257, 65_535, 128 * 257]));
     let floats = image(1, 1, 4, Samples::F32(vec![0.5, 3.0, -0.25, 0.5]));
@@ -121,8 +121,8 @@ fn colours_of_8_and_16_bits_are_srgb_and_floats_and_alpha_are_linear() {
     }
 }
 
-fn nearest_color(image: Arc<Image>, decoding: Decoding) -> Rgb {
-    let color = Bitmap { filter: Filter::Nearest, ..Bitmap::new(Arc::clone(&image), decoding) }.color(Vec2::ZERO);
+fn nearest_color(image: Arc<TextureImage>, decoding: Decoding) -> Rgb {
+    let color = Bitmap { filter: TextureFilter::Nearest, ..Bitmap::new(Arc::clone(&image), decoding) }.color(Vec2::ZERO);
     let blended = Bitmap::new(image, decoding).color(Vec2::ZERO);
     assert!((color.r - blended.r).abs() < 1e-6 && (color.g - blended.g).abs() < 1e-6 && (color.b - blended.b).abs() < 1e-6);
     color
@@ -131,7 +131,7 @@ fn nearest_color(image: Arc<Image>, decoding: Decoding) -> Rgb {
 #[test]
 fn numbers_are_channels_grey_or_luminance() {
     let color = image(1, 1, 4, Samples::U8(vec![51, 102, 153, 204]));
-    let of = |image: &Arc<Image>, channel| Bitmap { channel, ..Bitmap::new(Arc::clone(image), Decoding::Linear) };
+    let of = |image: &Arc<TextureImage>, channel| Bitmap { channel, ..Bitmap::new(Arc::clone(image), Decoding::Linear) };
     for (channel, expected) in [(Channel::R, 0.2), (Channel::G, 0.4), (Channel::B, 0.6), (Channel::A, 0.8)] {
         let bitmap = of(&color, Some(channel));
         assert!((bitmap.scalar(Vec2::ZERO) - expected).abs() < 1e-6);
@@ -169,7 +169,7 @@ fn scale_turn_and_offset_move_the_image() {
 
 #[test]
 fn what_is_no_image_is_refused() {
-    let new = |width, height, channels, samples| Image::new(ImageData { width, height, channels, samples });
+    let new = |width, height, channels, samples| TextureImage::new(ImageData { width, height, channels, samples });
     assert!(matches!(new(2, 2, 1, Samples::U8(vec![0; 3])), Err(ImageError::Count { count: 3, .. })));
     assert!(matches!(new(0, 2, 1, Samples::U8(vec![])), Err(ImageError::Count { .. })));
     assert!(matches!(new(1, 1, 5, Samples::U8(vec![0; 5])), Err(ImageError::Count { .. })));
@@ -217,7 +217,7 @@ fn footprints_choose_the_level_of_their_texels() {
 #[test]
 fn without_a_pyramid_a_footprint_is_a_point() {
     let noise: Vec<u8> = (0u32..35).map(|i| (i * 97 % 256) as u8).collect();
-    for filter in [Filter::Nearest, Filter::Bilinear] {
+    for filter in [TextureFilter::Nearest, TextureFilter::Bilinear] {
         let bitmap = Bitmap { filter, ..Bitmap::new(grey(5, &noise), Decoding::Linear) };
         let uv = vec2(0.3, 0.8);
         assert_eq!(bitmap.color_over(&over(uv, 20.0, 35)), bitmap.color(uv));

@@ -12,8 +12,8 @@ pub struct Kernel {
     pub down: Vec<f32>,
 }
 
-/// Sensitivity to contrast as sums of Gaussians `a sqrt(pi / b) exp(-pi² d² / b)` of the angle `d` in degrees: lightness, red against green,
-/// yellow against blue.
+/// Sensitivity to contrast as sums of Gaussians `a sqrt(pi / b) exp(-pi² d² / b)` of the angle `d` in degrees:
+/// lightness, red against green, yellow against blue.
 const SENSITIVITIES: [&[(f64, f64)]; 3] = [&[(1.0, 0.0047)], &[(1.0, 0.0053)], &[(34.1, 0.04), (13.5, 0.025)]];
 
 /// Twice the deviation of the detector of edges and points, in degrees.

@@ -1,9 +1,10 @@
 //! FLIP: how much two pictures seem to differ when they are shown in turn, from 0 to 1 by pixel.
 //!
-//! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, "FLIP: A Difference Evaluator for Alternating Images" (2020), for what a
-//! screen shows; Andersson, Nilsson, Shirley and Akenine-Möller, "Visualizing Errors in Rendered High Dynamic Range Images" (2021), for what a
-//! renderer makes: the largest such difference over exposures from where the brightest pixel is not blown out to where the median is bright.
-//! Seen from 0.7 m on a screen of 3840 pixels and 0.7 m, as the authors do by default.
+//! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, "FLIP: A Difference Evaluator for Alternating
+//! Images" (2020), for what a screen shows; Andersson, Nilsson, Shirley and Akenine-Möller, "Visualizing Errors in
+//! Rendered High Dynamic Range Images" (2021), for what a renderer makes: the largest such difference over exposures
+//! from where the brightest pixel is not blown out to where the median is bright. Seen from 0.7 m on a screen of 3840
+//! pixels and 0.7 m, as the authors do by default.
 
 mod color;
 mod filter;
@@ -29,7 +30,8 @@ const BEND_TO: f32 = 0.95;
 /// The brightness after tone mapping that the ends of the exposures give to the brightest pixel and to the median.
 const SHOWN: f64 = 0.85;
 
-/// Coefficients of the tone mapper `(k0 x² + k1 x) / (k3 x² + k4 x + k5)`, an approximation of the curve of ACES (Narkowicz) without its exposure.
+/// Coefficients of the tone mapper `(k0 x² + k1 x) / (k3 x² + k4 x + k5)`, an approximation of the curve of ACES
+/// (Narkowicz) without its exposure.
 const TONE: [f64; 5] = [0.36 * 2.51, 0.6 * 0.03, 0.36 * 2.43, 0.6 * 0.59, 0.14];
 
 /// The difference by pixel of two pictures in linear light, row by row from the top; what is negative or not finite counts as black.

@@ -11,7 +11,7 @@ use moving::f8_motion_bounds;
 use visits::f9_visits;
 
 use super::geometry::{Rng, grid, ids, ray, world};
-use super::scenes::{all, at_times, build, moving_scene, own, path_rays, same, scenes, test_rays};
+use super::scenes::{all, at_times, build, moving_scene, own, packets, path_rays, same, scenes, test_rays};
 use super::{Effort, Outcome};
 use crate::accel::{AccelKind, Accelerator, Coherence, LinearAccel};
 use crate::geometry::{Geometry, Hit, Shape};
@@ -104,7 +104,7 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let cases = cases(effort.pick(250, 10_000));
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
     let mut ours: Vec<(&str, usize)> = Vec::new();
-    let mut embree = Agreement::default();
+    let mut rounding = [Agreement::default(), Agreement::default()];
     for Case { geometry, asked } in &cases {
         let found = asked.iter().filter(|(_, hit)| hit.is_some()).count();
         rays += asked.len();
@@ -117,16 +117,20 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
                 None => ours.push((name, lost)),
             }
         }
-        let Agreement { flags, distances, ties } = Agreement::of(&*build(AccelKind::EMBREE, geometry), geometry, asked);
-        embree = Agreement { flags: embree.flags + flags, distances: embree.distances + distances, ties: embree.ties + ties };
+        for (sum, accel) in rounding.iter_mut().zip([build(AccelKind::EMBREE, geometry), packets(geometry)]) {
+            let Agreement { flags, distances, ties } = Agreement::of(&*accel, geometry, asked);
+            *sum = Agreement { flags: sum.flags + flags, distances: sum.distances + distances, ties: sum.ties + ties };
+        }
     }
     let outcome = Outcome::new().tell("rays", rays as f64).tell("hits", hits as f64).none("scenes hardly hit", poor);
     let outcome =
         ours.into_iter().fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
-    outcome
-        .none("Embree's distances beyond their rounding", embree.distances)
-        .none("rays that only Embree, or only the oracle, says to hit", embree.flags)
-        .tell("Embree's other primitives at the same distance", embree.ties as f64)
+    ["Embree", "packets"].iter().zip(rounding).fold(outcome, |outcome, (name, Agreement { flags, distances, ties })| {
+        outcome
+            .none(format!("distances of {name} beyond their rounding"), distances)
+            .none(format!("rays that only {name}, or only the oracle, says to hit"), flags)
+            .tell(format!("other primitives of {name} at the same distance"), ties as f64)
+    })
 }
 
 fn f2_ties(_: Effort) -> Outcome {
@@ -167,7 +171,8 @@ fn contradictions(geometry: &Geometry, accel: &dyn Accelerator, ray: &Ray) -> us
     let Some(hit) = accel.intersect(ray) else { return usize::from(accel.occluded(ray)) };
     let cuts = [hit.t, hit.t.next_up(), hit.t.next_down()].map(|t_max| Ray { t_max, ..*ray });
     let mut wrong = cuts.iter().chain([ray]).filter(|ray| !agree(ray)).count();
-    // The interval is closed at the distance that was reported; in f64 that may lie beyond it by half a float, on Embree's own triangles not.
+    // The interval is closed at the distance that was reported; in f64 that may lie beyond it by half a float, on
+    // Embree's own triangles not.
     let exact = accel.inspect().is_none() && matches!(geometry.shape(hit.shape), Shape::Mesh(_));
     wrong += usize::from(accel.intersect(&cuts[usize::from(!exact)]).map(|h| h.t) != Some(hit.t));
     let mut batch = [false; 3];
@@ -192,7 +197,8 @@ fn f3_any_hit(effort: Effort) -> Outcome {
             }
         }
     }
-    // A ray through an edge, nearly parallel to a side of the box around the triangle, may enter that box some ulp behind the triangle's own distance.
+    // A ray through an edge, nearly parallel to a side of the box around the triangle, may enter that box some ulp
+    // behind the triangle's own distance.
     let told = Outcome::new().tell("rays", total as f64);
     let judged = |told: Outcome, (name, wrong): (&str, usize)| {
         match (name, wrong) {

@@ -48,14 +48,22 @@ fn one_pixel() -> Film {
     film(FilmShape::new([1, 1], Crop::full([1, 1]), LayerSet::COLOR), 16)
 }
 
-/// Adds samples of a pixel as renders do; `splats` is flushed after each.
-fn add(tile: &mut FilmTile, at: (usize, u32), value: &PixelSample, filter: &Filter, rng: &mut Rng, splats: &mut Splats) {
-    let place = filter.sample(rng.pair());
-    if filter.is_shared() {
-        tile.splat(at, value, filter, place, splats);
-        tile.flush(at.0, splats);
-    } else {
-        tile.add(at.0, at.1, value, place.weight);
+/// Adds samples of pixels as renders do.
+struct Filtering {
+    filter: Filter,
+    rng: Rng,
+    splats: Splats,
+}
+
+impl Filtering {
+    fn add(&mut self, tile: &mut FilmTile, pixel: usize, sample: u32, value: &PixelSample) {
+        let place = self.filter.sample(self.rng.pair());
+        if self.filter.is_shared() {
+            tile.splat(pixel, sample, value, &self.filter.splat_taps(place), &mut self.splats);
+            tile.flush(pixel, &mut self.splats);
+        } else {
+            tile.add(pixel, sample, value, place.weight);
+        }
     }
 }
 
@@ -74,19 +82,18 @@ fn mean_by_film(values: impl Iterator<Item = f32>) -> f64 {
 }
 
 fn m3_constants(effort: Effort) -> Outcome {
-    let mut rng = Rng::new(3);
+    let mut filtering = Filtering { filter: Filter::new(&FilterDesc::default()), rng: Rng::new(3), splats: Splats::default() };
     let (mut worst, mut short) = (0f64, 0);
     let error = |image: &Image| image.layers[0].data.iter().map(|v| f64::from((v - 1.0).abs())).fold(0.0, f64::max);
-    let mut splats = Splats::default();
     for (desc, tile_size) in filters().flat_map(|desc| [1, 7, 64].map(|size| (desc, size))) {
-        let filter = Filter::new(&desc);
+        filtering.filter = Filter::new(&desc);
         for crop in [Crop::full([20, 13]), Crop { x: 3, y: 5, width: 11, height: 7 }] {
             for _ in 0..effort.pick(1, 40) {
                 let mut film = film(FilmShape { filter: desc, ..FilmShape::new([20, 13], crop, LayerSet::COLOR) }, tile_size);
                 for tile in film.tiles_mut() {
                     for pixel in 0..tile.size().iter().product::<u32>() as usize {
                         for sample in 0..(1 + pixel as u32 % 5) {
-                            add(tile, (pixel, sample), &gray(1.0), &filter, &mut rng, &mut splats);
+                            filtering.add(tile, pixel, sample, &gray(1.0));
                         }
                     }
                 }
@@ -142,16 +149,16 @@ fn bytes(image: &Image) -> Vec<u8> {
 /// A film whose tiles are filled in this order, each sample in that of its index.
 fn filled(order: &[usize], desc: &FilterDesc) -> Film {
     let mut film = film(FilmShape { filter: *desc, ..FilmShape::new([40, 30], Crop::full([40, 30]), LayerSet::FULL) }, 8);
-    let (filter, mut splats) = (Filter::new(desc), Splats::default());
+    let mut filtering = Filtering { filter: Filter::new(desc), rng: Rng::new(0), splats: Splats::default() };
     for &tile in order {
         // Films of shared samples have more.
         let Some(tile) = film.tiles_mut().get_mut(tile) else { continue };
         let [x, y] = tile.origin();
-        let mut rng = Rng::new(u64::from(x * 64 + y));
+        filtering.rng = Rng::new(u64::from(x * 64 + y));
         for sample in 0..5 {
             for pixel in 0..tile.size().iter().product::<u32>() as usize {
-                let value = gray((rng.magnitude(-3.0, 3.0)) as f32);
-                add(tile, (pixel, sample), &value, &filter, &mut rng, &mut splats);
+                let value = gray((filtering.rng.magnitude(-3.0, 3.0)) as f32);
+                filtering.add(tile, pixel, sample, &value);
             }
         }
     }
@@ -246,7 +253,7 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
             for sample in 0..effort.pick(50, 20_000) {
                 if rng.below(4) == 0 {
                     let (value, surface, weight) = spoilt(&mut rng);
-                    let value = Sample { pixel: &value, surface: Some(&surface), parts: &[] };
+                    let value = Sample { pixel: &value, surface: Some(&surface), light_aovs: &[] };
                     bad += 1;
                     taken += usize::from(tile.add(pixel, sample, value, weight));
                 } else {

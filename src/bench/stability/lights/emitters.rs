@@ -16,7 +16,8 @@ const PARTS: usize = 12;
 /// Cosine below which a surface counts as seen edge-on: there the density is unbounded.
 const EDGE_ON: f32 = 0.2;
 
-/// An emitter in its own space: how far a point lies outside of its clips, and what part of the area lies before the point, along both sides.
+/// An emitter in its own space: how far a point lies outside of its clips, and what part of the area lies before the
+/// point, along both sides.
 struct Emitter {
     name: &'static str,
     shape: Analytic,

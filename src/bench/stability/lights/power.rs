@@ -7,7 +7,7 @@ use super::{Effort, Outcome, TWO_SIDED, WHITE, first_light, place, quasi_random,
 use crate::bench::stability::geometry::{all_analytic_shapes, meshes, triangle};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Geometry, Profile, Revolution};
-use crate::light::{DirectionalLight, Environment, EnvironmentMap, FoundBy, IesLight, IesProfile, Light, PointLight, SpotLight};
+use crate::light::{DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, MisCompensation, PointLight, SpotLight};
 use crate::math::{DMat3, DVec3};
 
 /// Where lamps stand, and around which their light is gathered.
@@ -38,7 +38,7 @@ fn flux(lamp: &Lamp, count: u32) -> f64 {
     for [a, b, c, d] in quasi_random(count) {
         let outward = direction([a, b]);
         let p = CENTER + outward * REACH;
-        let Some(s) = lamp.light.sample(&lamp.geometry, &[], p, [c as f32, d as f32], FoundBy::Lights) else { continue };
+        let Some(s) = lamp.light.sample(&lamp.geometry, &[], p, [c as f32, d as f32], MisCompensation::Off) else { continue };
         let cos = outward.dot(s.wi.as_dvec3());
         let cos = if at_infinity { cos.max(0.0) } else { -cos };
         sum += f64::from(s.radiance.luminance()) * cos / f64::from(s.pdf);

@@ -8,7 +8,8 @@ use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Geometry, Placed, Quad, Shape, Sphere};
 use crate::id::{LightId, ShapeId};
 use crate::light::{
-    AreaLight, Emission, Environment, FoundBy, IesLight, IesProfile, Light, LightSelection, LightSet, PointLight, Receiver, SpotLight,
+    AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSampleContext, LightSelection, LightSet, MisCompensation,
+    PointLight, SpotLight,
 };
 use crate::math::{DMat3, DVec3, Rng, Vec3};
 
@@ -64,17 +65,17 @@ fn points(rng: &mut Rng) -> LightSet {
 }
 
 /// Points near and far, with a side and without.
-fn receivers(rng: &mut Rng, count: usize) -> Vec<Receiver> {
+fn receivers(rng: &mut Rng, count: usize) -> Vec<LightSampleContext> {
     let receiver = |i: usize| {
         let p = rng.direction() * rng.unit() * if i.is_multiple_of(5) { 50.0 } else { 3.0 };
         let n = if i.is_multiple_of(4) { Vec3::ZERO } else { rng.direction().as_vec3().normalize() };
-        Receiver { p, n }
+        LightSampleContext { p, n }
     };
     (0..count).map(receiver).collect()
 }
 
-fn probabilities(set: &LightSet, from: &Receiver) -> Vec<f64> {
-    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from, FoundBy::Lights))).collect()
+fn probabilities(set: &LightSet, from: &LightSampleContext) -> Vec<f64> {
+    (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from, MisCompensation::Off))).collect()
 }
 
 /// Where every light reaches every point, no choice may be without a light: how far sums are from 1. Elsewhere: how far they exceed 1.
@@ -83,7 +84,7 @@ fn sums(seed: u64) -> [f64; 2] {
     let set = points(&mut rng);
     let (mut exact, mut excess) = (0f64, 0f64);
     for from in receivers(&mut rng, 400) {
-        let everywhere = Receiver { n: Vec3::ZERO, ..from };
+        let everywhere = LightSampleContext { n: Vec3::ZERO, ..from };
         exact = exact.max((probabilities(&set, &everywhere).iter().sum::<f64>() - 1.0).abs());
     }
     for sky in [false, true] {
@@ -108,11 +109,11 @@ struct Choices {
     z: f64,
 }
 
-fn choose(set: &LightSet, from: &Receiver, probabilities: &[f64], count: u32, rng: &mut Rng) -> Choices {
+fn choose(set: &LightSet, from: &LightSampleContext, probabilities: &[f64], count: u32, rng: &mut Rng) -> Choices {
     let reachable = probabilities.iter().filter(|p| **p > 0.0).count().max(1) as f64;
     let (mut counts, mut difference, mut sum) = (vec![0u32; probabilities.len() + 1], 0f64, 0.0);
     for _ in 0..count {
-        let Some(choice) = set.choose(from, rng.pair(), FoundBy::Lights) else {
+        let Some(choice) = set.choose(from, rng.pair(), MisCompensation::Off) else {
             counts[probabilities.len()] += 1;
             continue;
         };
@@ -159,7 +160,7 @@ pub(super) fn l8_choice(effort: Effort) -> Outcome {
     let means: Vec<f64> = from
         .iter()
         .map(|from| {
-            let from = Receiver { p: 0.3 * from.p / from.p.length().max(1.0), n: Vec3::ZERO };
+            let from = LightSampleContext { p: 0.3 * from.p / from.p.length().max(1.0), n: Vec3::ZERO };
             let found = choose(&set, &from, &probabilities(&set, &from), n, &mut rng);
             difference = difference.max(found.difference);
             found.mean

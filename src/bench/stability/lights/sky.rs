@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::{Effort, Outcome, Tests};
 use crate::color::Rgb;
-use crate::light::{Environment, EnvironmentMap, FoundBy};
+use crate::light::{Environment, EnvironmentMap, MisCompensation};
 use crate::math::{DMat3, DVec3, Rng, Vec3};
 
 /// A map with what it is made of.
@@ -45,7 +45,7 @@ impl Sky {
             let solid_angle = TAU / width as f64 * (upper.cos() - lower.cos());
             for column in 0..width {
                 let middle = self.direction((column as f64 + 1.0) / width as f64, 0.5 * (upper + lower));
-                cells.push(f64::from(self.environment.eval(middle, FoundBy::Lights).pdf) * solid_angle);
+                cells.push(f64::from(self.environment.eval(middle, MisCompensation::Off).pdf) * solid_angle);
             }
         }
         cells
@@ -90,12 +90,12 @@ fn sample(sky: &Sky, count: u32) -> Found {
     let mut found = Found { counts: vec![0; sky.size[0] * (sky.size[1] + 1)], ..Found::default() };
     let mut rng = Rng::new(21);
     for _ in 0..count {
-        let Some(s) = sky.environment.sample(rng.pair(), FoundBy::Lights) else { continue };
+        let Some(s) = sky.environment.sample(rng.pair(), MisCompensation::Off) else { continue };
         found.counts[sky.cell(s.wi)] += 1;
         let weight = f64::from(s.radiance.g) / f64::from(s.pdf);
         let [low, high] = found.weights.unwrap_or([weight; 2]);
         found.weights = Some([low.min(weight), high.max(weight)]);
-        let at = sky.environment.eval(s.wi, FoundBy::Lights);
+        let at = sky.environment.eval(s.wi, MisCompensation::Off);
         found.strays += usize::from((at.pdf - s.pdf).abs() > 1e-5 * s.pdf);
         // Next to a pole the rounding of a direction turns its azimuth by one over the sine as much.
         let cos = sky.rotation.y_axis.dot(s.wi.as_dvec3());
@@ -140,7 +140,7 @@ fn bad_corners() -> usize {
     let directions = near_poles.into_iter().chain(corners.map(|(u, theta)| sky.direction(u, theta)));
     directions
         .filter(|&d| {
-            let at = sky.environment.eval(d, FoundBy::Lights);
+            let at = sky.environment.eval(d, MisCompensation::Off);
             !(at.pdf > 0.0 && at.pdf.is_finite() && at.radiance.is_finite())
         })
         .count()

@@ -109,7 +109,7 @@ impl Tally {
 }
 
 /// The surface that a ray meets, through an accelerator.
-fn found_by(accel: &dyn accel::Accelerator, geometry: &Geometry, ray: &Ray) -> Option<(DVec3, Vec3)> {
+fn compensation(accel: &dyn accel::Accelerator, geometry: &Geometry, ray: &Ray) -> Option<(DVec3, Vec3)> {
     closest(accel, geometry, ray).found.map(|at| (at.p, at.n_g))
 }
 
@@ -154,17 +154,17 @@ fn compare(rng: &mut Rng, case: &Case, setting: Setting, rays: usize, aim: impl 
         let reach = placed.bounds().min.abs().max(placed.bounds().max.abs()).max_element();
         let is_inside = passes_inside(placed.bounds(), &ray);
         let mut geometry = world(vec![Shape::Analytic(placed)]);
-        tallies.alone.judge(found_by(&LinearAccel::new(&geometry), &geometry, &ray), answer, reach);
+        tallies.alone.judge(compensation(&LinearAccel::new(&geometry), &geometry, &ray), answer, reach);
         // Building is dear.
         if i % 4 == 0 {
             let embree = accel::build(AccelKind::EMBREE, &geometry, 1).expect("Embree builds");
-            tallies.embree.judge(found_by(&*embree, &geometry, &ray), answer, reach);
+            tallies.embree.judge(compensation(&*embree, &geometry, &ray), answer, reach);
             drop(embree);
             let placed = geometry.shapes.swap_remove(0);
             geometry = world(std::iter::once(placed).chain(bystanders(&ray, unit)).collect());
             let embree = accel::build(AccelKind::EMBREE, &geometry, 1).expect("Embree builds");
             let tally = if is_inside { &mut tallies.among } else { &mut tallies.among_at_rims };
-            tally.judge(found_by(&*embree, &geometry, &ray), answer, reach);
+            tally.judge(compensation(&*embree, &geometry, &ray), answer, reach);
         }
     }
     tallies
@@ -177,6 +177,18 @@ fn half_at_rims(rng: &mut Rng) -> Aim {
     }
     let depth = rng.magnitude(-6.0, -1.0);
     Aim::Rim(if rng.unit() < 0.3 { -depth } else { depth })
+}
+
+/// The errors of a sphere or quadric in naive `f32` arithmetic, as a curve over `xs`.
+fn naive_curve(settings: &dyn Fn(f64) -> Setting, xs: &[f64], case: &Case, rays: usize) -> (String, Vec<(f64, f64)>) {
+    let mut rng = Rng::new(32);
+    let points = xs.iter().map(|&x| (x, naive_error(&mut rng, case, settings(x), rays))).collect();
+    (format!("{}, naive f32", case.name), points)
+}
+
+fn error_plot(caption: &str, x: &str, curves: Vec<(String, Vec<(f64, f64)>)>) -> Plot {
+    let y = "largest error of the point / (2^-24 max|p|)".into();
+    Plot { caption: caption.into(), x: x.into(), y, floor: 1e-3, curves }
 }
 
 pub(super) fn c1_hit_accuracy(effort: Effort) -> Outcome {
@@ -211,23 +223,12 @@ pub(super) fn c1_hit_accuracy(effort: Effort) -> Outcome {
         by_distance.push((case.name.to_string(), distances.to_vec()));
         by_scale.push((case.name.to_string(), scales.to_vec()));
     }
-    let naive = |settings: &dyn Fn(f64) -> Setting, xs: &[f64], case: &Case| {
-        let mut rng = Rng::new(32);
-        let points = xs.iter().map(|&x| (x, naive_error(&mut rng, case, settings(x), effort.pick(300, 5_000)))).collect();
-        (format!("{}, naive f32", case.name), points)
-    };
+    let naive = |settings: &dyn Fn(f64) -> Setting, xs: &[f64], case: &Case| naive_curve(settings, xs, case, effort.pick(300, 5_000));
     for case in &cases[..2] {
         let base = Setting { distance: 10.0, offset: 0.0, scale: 1.0, is_turned: false };
         by_distance.push(naive(&|distance| Setting { distance, ..base }, &DISTANCES, case));
         by_scale.push(naive(&|scale| Setting { scale, ..base }, &SCALES, case));
     }
-    let plot = |caption: &str, x: &str, curves| Plot {
-        caption: caption.into(),
-        x: x.into(),
-        y: "largest error of the point / (2^-24 max|p|)".into(),
-        floor: 1e-3,
-        curves,
-    };
     let share = all.alone.undecidable as f64 / all.alone.rays as f64;
     let lost_at_rims = all.among_at_rims.missed as f64 / all.among_at_rims.rays.max(1) as f64;
     let outcome = if all.among_at_rims.missed == 0 { outcome } else { outcome.short(EMBREE_BOXES) };
@@ -246,8 +247,8 @@ pub(super) fn c1_hit_accuracy(effort: Effort) -> Outcome {
         .at_most("distance from the tangent plane in half-ulp boxes", all.alone.off_surface, 1.0)
         .at_most("share of rays that cannot be decided", share, 1e-3)
         .tell("rays", all.alone.rays as f64)
-        .plot(plot("Error of hits by distance", "distance of the origin / size", by_distance))
-        .plot(plot("Error of hits by scale", "size of the shape", by_scale))
+        .plot(error_plot("Error of hits by distance", "distance of the origin / size", by_distance))
+        .plot(error_plot("Error of hits by scale", "size of the shape", by_scale))
 }
 
 /// The largest error of the textbook's formulas in `f32`, in the units of [`Tally::error`]; of rays that they hit at all.

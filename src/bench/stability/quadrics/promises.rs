@@ -43,14 +43,11 @@ fn hit_from_above(shape: &Analytic, p: DVec3, n: DVec3) -> Option<LocalSurface> 
     Some(shape.surface(&ray, &hit))
 }
 
-pub(super) fn c2_choice_of_root(effort: Effort) -> Outcome {
-    let mut rng = Rng::new(41);
-    let mut wrong = 0;
+/// Wrong distances of rays along the axes, at the heights beside the shapes, where each has the radius 2.
+fn wrong_roots(shapes: [(&Analytic, f64); 3]) -> usize {
     // Numbers with few digits: the answers are exact.
-    let sphere = Analytic::Sphere(Sphere::full(2.0).expect(VALID));
-    let cylinder = Analytic::Frustum(Frustum::cylinder(2.0, 4.0, TAU).expect(VALID));
-    let cone = Analytic::Frustum(Frustum::new(4.0, 0.0, 4.0, TAU).expect(VALID));
-    for (shape, z) in [(&sphere, 0.0), (&cylinder, 2.0), (&cone, 2.0)] {
+    let mut wrong = 0;
+    for (shape, z) in shapes {
         for axis in [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y] {
             let ray = |start: f64, t_min: f32, t_max: f32| Ray {
                 t_min,
@@ -75,6 +72,15 @@ pub(super) fn c2_choice_of_root(effort: Effort) -> Outcome {
             wrong += expected.iter().filter(|(ray, t)| distance(shape, ray) != *t).count();
         }
     }
+    wrong
+}
+
+pub(super) fn c2_choice_of_root(effort: Effort) -> Outcome {
+    let mut rng = Rng::new(41);
+    let sphere = Analytic::Sphere(Sphere::full(2.0).expect(VALID));
+    let cylinder = Analytic::Frustum(Frustum::cylinder(2.0, 4.0, TAU).expect(VALID));
+    let cone = Analytic::Frustum(Frustum::new(4.0, 0.0, 4.0, TAU).expect(VALID));
+    let wrong = wrong_roots([(&sphere, 0.0), (&cylinder, 2.0), (&cone, 2.0)]);
     // Exactly tangent: either answer, but a number.
     let mut not_numbers = 0;
     for shape in [&sphere, &cylinder] {

@@ -1,4 +1,5 @@
-//! All hits of a ray with a turned profile, in arithmetic of about 106 bits: one polynomial, whose roots lie between those of its derivative.
+//! All hits of a ray with a turned profile, in arithmetic of about 106 bits: one polynomial, whose roots lie between
+//! those of its derivative.
 
 use twofloat::TwoFloat;
 
@@ -43,8 +44,8 @@ fn cubic(c: [f64; 4]) -> Polynomial {
     vec![c[0], d0 * 3.0, (d1 - d0) * 3.0, d2 - d1 * 2.0 + d0]
 }
 
-/// Parameters in `[0, 1]` where the sign of a polynomial changes, ascending. Zero counts as positive, but the ends as negative that are said to
-/// be so.
+/// Parameters in `[0, 1]` where the sign of a polynomial changes, ascending. Zero counts as positive, but the ends as
+/// negative that are said to be so.
 fn sign_changes(p: &[TwoFloat], negative_ends: [bool; 2]) -> Vec<f64> {
     if p.len() < 2 {
         return Vec::new();

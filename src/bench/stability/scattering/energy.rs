@@ -25,8 +25,8 @@ fn scattered(count: u32, seed: u32, bsdf: &Bsdf, wo: Vec3) -> f64 {
     sums.into_iter().fold(f64::NEG_INFINITY, f64::max) / f64::from(count)
 }
 
-/// By two scrambles of Sobol's sequence: by more points where these do not show that the albedo is within `bounds`, as for the narrow lobe of a
-/// coat at grazing angles.
+/// By two scrambles of Sobol's sequence: by more points where these do not show that the albedo is within `bounds`, as
+/// for the narrow lobe of a coat at grazing angles.
 fn albedo(count: u32, bsdf: &Bsdf, wo: Vec3, bounds: [f64; 2]) -> f64 {
     let mut mean = 0.0;
     for more in [0, 3, 6] {
@@ -66,7 +66,8 @@ pub(super) fn g5_energy(effort: Effort) -> Outcome {
 /// What is left of white light in a furnace.
 const FURNACE: [f64; 2] = [0.99, 1.01];
 
-/// A white material and what it scatters at once: light scattered several times has a narrow chance to be sampled where there is little of it.
+/// A white material and what it scatters at once: light scattered several times has a narrow chance to be sampled where
+/// there is little of it.
 struct White {
     material: Material,
     once: Option<Bsdf>,
@@ -144,7 +145,7 @@ impl Family {
         let extremes = |cos: &f32| {
             let members = self.members.iter().flat_map(|white| self.azimuths.iter().map(move |&turns| (white, turns)));
             let albedos = members.flat_map(|(white, turns)| {
-                let inside = white.material.bsdf.transmits().then_some(-cos);
+                let inside = white.material.bsdf.flags().transmits().then_some(-cos);
                 [*cos].into_iter().chain(inside).map(move |cos| white.albedo(samples, direction(cos, turns)))
             });
             let (least, most) = albedos.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), a| (low.min(a), high.max(a)));
@@ -184,7 +185,7 @@ fn coated() -> [Vec<White>; 2] {
     let is_exact = |material: &Material| material.name.ends_with("lambert") || material.name.ends_with("mirror");
     let coats = coats(Rgb::WHITE, Rgb::WHITE).into_iter().filter(is_exact).map(|material| material.bsdf);
     let plastics = [[0.01; 2], [0.1; 2], [0.5; 2], [1.0; 2], ALPHAS[2], [0.1, 0.4]].map(plastic);
-    let (turned, round): (Vec<_>, Vec<_>) = coats.chain(plastics).partition(Bsdf::is_anisotropic);
+    let (turned, round): (Vec<_>, Vec<_>) = coats.chain(plastics).partition(|bsdf: &Bsdf| bsdf.flags().is_anisotropic());
     [round, turned].map(|list| list.into_iter().map(White::plain).collect())
 }
 
@@ -232,8 +233,8 @@ pub(super) fn g6_furnace(effort: Effort) -> Outcome {
     })
 }
 
-/// What microfacets that reflect all scatter at once, by the midpoint rule over the square of random numbers, denser towards the steep facets
-/// that reflect below the horizon.
+/// What microfacets that reflect all scatter at once, by the midpoint rule over the square of random numbers, denser
+/// towards the steep facets that reflect below the horizon.
 fn scattered_once(alpha: f32, cos: f32, steps: u32) -> f64 {
     let single: Conductor = white_metal([alpha; 2]).single_scattering();
     let wo = direction(cos, 0.3);
@@ -249,9 +250,9 @@ fn scattered_once(alpha: f32, cos: f32, steps: u32) -> f64 {
 /// Cosines of [`ONCE`].
 const ONCE_COSINES: [f32; 6] = [0.05, 0.1, 0.25, 0.5, 0.75, 1.0];
 
-/// Alpha, the fraction of light that height-correlated Smith GGX microfacets with a reflectance of 1 scatter at once for each cosine, and the
-/// mean under diffuse light: by two quadratures in `f64`, over visible normals and over outgoing directions, which agree in all digits. At alpha
-/// 1 and cosine 1 it is 1 - ln 2.
+/// Alpha, the fraction of light that height-correlated Smith GGX microfacets with a reflectance of 1 scatter at once
+/// for each cosine, and the mean under diffuse light: by two quadratures in `f64`, over visible normals and over
+/// outgoing directions, which agree in all digits. At alpha 1 and cosine 1 it is 1 - ln 2.
 const ONCE: [(f32, [f64; 6], f64); 4] = [
     (1.0, [0.84777, 0.76021, 0.59764, 0.45069, 0.36453, 0.30685], 0.4091),
     (0.5, [0.91255, 0.86011, 0.76520, 0.69825, 0.68208, 0.68785], 0.7002),

@@ -22,8 +22,8 @@ fn exact(cos: f64, eta: f64, k: f64) -> f64 {
     across * (1.0 + ((a - tilt).powi(2) + b * b) / ((a + tilt).powi(2) + b * b)) * 0.5
 }
 
-/// The distance of a reflectance from the exact ones of cosines and indices that differ by a rounding: close to the critical angle the root of
-/// Snell's law amplifies any rounding a thousandfold.
+/// The distance of a reflectance from the exact ones of cosines and indices that differ by a rounding: close to the
+/// critical angle the root of Snell's law amplifies any rounding a thousandfold.
 fn error(found: f32, cos: f32, eta: f32, k: f32) -> f64 {
     const STEP: f64 = 1.0 / (1 << 22) as f64;
     let (cos, eta, k) = (f64::from(cos), f64::from(eta), f64::from(k));

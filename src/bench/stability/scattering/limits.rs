@@ -55,7 +55,7 @@ fn judge_smooth_limit(outcome: Outcome, effort: Effort) -> Outcome {
         (glass(1.5, [4e-4; 2]).bsdf, glass(1.5, [0.0; 2]).bsdf),
         (plastic([1e-4; 2]), plastic([0.0; 2])),
     ];
-    let deltas = pairs.iter().filter(|(rough, _)| rough.is_delta()).count();
+    let deltas = pairs.iter().filter(|(rough, _)| rough.flags().is_delta()).count();
     let cases = pairs.iter().flat_map(|pair| [1.0, 0.8, 0.4, -0.9, -0.5].map(|cos| (pair, direction(cos, 0.3))));
     let found: Vec<_> = cases.map(|((rough, smooth), wo)| welch(rough, smooth, wo, effort.pick(20_000, 1_000_000))).collect();
     outcome

@@ -141,7 +141,7 @@ pub fn rough() -> Vec<Material> {
         list.push(glass(1.5, alpha));
         list.push(glass(0.8, alpha));
     }
-    list.extend(coats(COLOR, TINT).into_iter().filter(|material| !material.bsdf.is_delta()));
+    list.extend(coats(COLOR, TINT).into_iter().filter(|material| !material.bsdf.flags().is_delta()));
     list.extend(blends());
     list
 }
@@ -214,7 +214,7 @@ pub fn views(materials: Vec<Material>) -> Vec<View> {
     let mut list = Vec::new();
     for material in materials {
         let inside = OUTSIDE.map(|cos| -cos);
-        let beyond = if material.bsdf.transmits() { &inside[..] } else { &BEHIND[..] };
+        let beyond = if material.bsdf.flags().transmits() { &inside[..] } else { &BEHIND[..] };
         list.extend(OUTSIDE.iter().chain(beyond).map(|&cos| View { material: material.clone(), wo: direction(cos, 0.1) }));
     }
     list

@@ -65,8 +65,9 @@ fn cases() -> impl Iterator<Item = (bool, Value, [f64; 3])> {
     kinds.flat_map(|(by_map, material)| FROM.map(|from| (by_map, material.clone(), from)))
 }
 
-/// Pixels that are not black where all light comes from below the quad but from above the plane of its shading normal. Only with a normal map:
-/// vertex normals stand for a smooth surface, which may see below the plane of a facet that nothing covers.
+/// Pixels that are not black where all light comes from below the quad but from above the plane of its shading normal.
+/// Only with a normal map: vertex normals stand for a smooth surface, which may see below the plane of a facet that
+/// nothing covers.
 fn leaks() -> usize {
     let below = json!([{ "type": "directional", "direction": [-0.95, 0, 0.3], "irradiance": [9, 9, 9] }]);
     let lit = |(by_map, material, from)| render(&scene(from, 4, tilted(70.0, by_map, material), below.clone()));
@@ -83,9 +84,9 @@ fn steepest(effort: Effort) -> f64 {
         let (sin, cos) = (std::f64::consts::FRAC_PI_2 * (1.1 * f64::from(i) / f64::from(heights) - 0.1)).sin_cos();
         let light = json!([{ "type": "directional", "direction": [-cos, 0, -sin], "irradiance": [1, 1, 1] }]);
         let shape = tilted(40.0, true, json!({ "type": "diffuse", "albedo": 1.0 }));
-        let here = std::f64::consts::PI * Estimate::of(&render(&scene(FROM[0], 1, shape, light)), 1).mean;
-        steepest = steepest.max(last.map_or(0.0, |last| (here - last).abs()) * f64::from(heights));
-        last = Some(here);
+        let current = std::f64::consts::PI * Estimate::of(&render(&scene(FROM[0], 1, shape, light)), 1).mean;
+        steepest = steepest.max(last.map_or(0.0, |last| (current - last).abs()) * f64::from(heights));
+        last = Some(current);
     }
     steepest
 }
@@ -138,7 +139,7 @@ pub(super) fn g11_shading_normals(effort: Effort) -> Outcome {
         .none("terminator factors out of [0, 1] or not monotone", wrong)
         // The polynomial g + g^2 - g^3 is steepest at g = 1/3, by 4/3; a little more for rounding.
         .at_most("slope of the terminator factor", slope, 1.34)
-        // The cosine to the leaning normal changes by at most 1.1 pi / 2 over all heights, and the factor by 4/3 in g, which the sine of the
-        // height moves at 1 / (cos 40 cos 50) next to the terminator.
+        // The cosine to the leaning normal changes by at most 1.1 pi / 2 over all heights, and the factor by 4/3 in g,
+        // which the sine of the height moves at 1 / (cos 40 cos 50) next to the terminator.
         .at_most("change of the radiance with the height of the light", steepest(effort), 1.1 * std::f64::consts::FRAC_PI_2 * 2.8)
 }

@@ -30,9 +30,9 @@ fn largest<const N: usize>(a: [f32; N], b: [f32; N]) -> f64 {
 
 /// How much the rounding of `w` changes `f`, relative to `f(w)`.
 fn sensitivity<const N: usize>(w: Vec3, f: impl Fn(Vec3) -> [f32; N]) -> f64 {
-    let here = f(w);
+    let current = f(w);
     let steps = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|axis| [axis * ROUNDING, axis * -ROUNDING]);
-    steps.map(|step| largest(here, f(w + step))).fold(0.0, f64::max)
+    steps.map(|step| largest(current, f(w + step))).fold(0.0, f64::max)
 }
 
 /// A direction of either side, as likely grazing as not.
@@ -61,7 +61,7 @@ pub fn check_samples(found: &mut Weights, material: &Material, count: usize, rng
     for _ in 0..count {
         let wo = any_direction(rng);
         let Some(s) = bsdf.sample(wo, rng.unit_f32(), rng.pair()) else { continue };
-        let side = s.is_transmission == (s.wi.z * wo.z < 0.0) && (bsdf.transmits() || !s.is_transmission);
+        let side = s.is_transmission == (s.wi.z * wo.z < 0.0) && (bsdf.flags().transmits() || !s.is_transmission);
         let eta = match (s.is_transmission, wo.z > 0.0) {
             (false, _) => 1.0,
             (true, true) => material.ior,

@@ -1,6 +1,6 @@
 //! Boxes: closed ones that must not leak, and instances of them.
 
-use super::{Effort, Leavings, Outcome, accelerators};
+use super::{Effort, Leavings, NAMES, Outcome, accelerators};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::geometry::{Rng, closest, cube, instances, meshes, ray, ray_through, transform, world};
 use crate::geometry::{Analytic, Geometry, Instance, Mesh, MeshStep, Object, Placed, Shape, Sphere};
@@ -11,7 +11,7 @@ pub(super) fn b4_closed_boxes(effort: Effort) -> Outcome {
     let mut rng = Rng::new(4);
     let mut outcome = Outcome::new();
     for (half, offset) in [(1e-6, 0.0), (1.0, 0.0), (1e6, 0.0), (1e-6, 1e-2), (1.0, 1e4), (1e6, 1e10), (1000.0, 1e7)] {
-        let mut counts = [[0usize; 3]; 2];
+        let mut counts = [[0usize; 3]; NAMES.len()];
         for _ in 0..4 {
             let center = DVec3::new(0.8, -0.5, 0.3) * offset;
             let geometry = meshes(vec![cube(rng.rotation() * half, center)]);
@@ -27,7 +27,7 @@ pub(super) fn b4_closed_boxes(effort: Effort) -> Outcome {
             }
         }
         let allowed = if offset == 0.0 { 0.0 } else { 5e-4 };
-        for (name, [rays, own, leaks]) in ["embree", "ours"].iter().zip(counts) {
+        for (name, [rays, own, leaks]) in NAMES.iter().zip(counts) {
             let what = format!("half size {half:e} at {offset:e}, {name}");
             outcome = outcome
                 .at_least(format!("{what}: rays"), rays as f64, 0.999 * 4.0 * effort.pick(3_000.0, 30_000.0))
@@ -42,7 +42,7 @@ pub(super) fn b7_instances(effort: Effort) -> Outcome {
     let mut rng = Rng::new(7);
     let mut outcome = Outcome::new();
     for anisotropy in [1.0, 10.0, 100.0] {
-        let mut tally = <[Leavings; 2]>::default();
+        let mut tally = <[Leavings; NAMES.len()]>::default();
         for _ in 0..effort.pick(60, 600) {
             let scale = rng.magnitude(-2.0, 2.0);
             let mirror = if rng.unit() < 0.5 { -1.0 } else { 1.0 };
@@ -63,7 +63,7 @@ pub(super) fn b7_instances(effort: Effort) -> Outcome {
             }
         }
         let allowed = if anisotropy == 1.0 { 0.0 } else { 2e-4 };
-        for (name, tally) in ["embree", "ours"].iter().zip(&tally) {
+        for (name, tally) in NAMES.iter().zip(&tally) {
             outcome = tally.report_within(outcome, &format!("anisotropy {anisotropy}, {name}"), allowed);
         }
     }

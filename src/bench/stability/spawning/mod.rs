@@ -10,7 +10,8 @@ mod triangles;
 
 use super::geometry::{Closest, Rng, closest, ray_through};
 use super::{Effort, Outcome};
-use crate::accel::{self, AccelKind, Accelerator};
+use crate::accel::{self, Accelerator};
+use crate::bench::stability::scenes::packets;
 use crate::geometry::{Geometry, Mesh, SpawnPoint, SurfaceInteraction};
 use crate::id::PrimId;
 use crate::math::float::UNIT_ROUNDOFF;
@@ -57,14 +58,17 @@ checks! {
         "from a floor to sampled points of flat triangles of aspect 1e-2 and 1e-4, 1e-3 to 1e3 away";
 }
 
-/// The accelerators that leave a surface each in its way: Embree with `f32`, and ours (one primitive test) by the bounding volume hierarchy.
-const KINDS: [usize; 2] = [0, 1];
+/// What [`accelerators`] are called in reports.
+const NAMES: [&str; 3] = ["embree", "ours", "packets"];
 
 type Named<'g> = (&'static str, Box<dyn Accelerator + 'g>);
 
+/// The accelerators that leave a surface each in its way: Embree and packets with `f32`, and the others (one primitive
+/// test) by the bounding volume hierarchy.
 fn accelerators(geometry: &Geometry) -> Vec<Named<'_>> {
-    let kinds = KINDS.map(|i| AccelKind::ALL[i]);
-    kinds.into_iter().map(|(kind, name)| (name, accel::build(kind, geometry, 1).expect("accelerators build"))).collect()
+    let single =
+        |name: &'static str| (name, accel::build(name.parse().expect("names of accelerators"), geometry, 1).expect("accelerators build"));
+    vec![single("embree"), single("bvh"), ("packets", packets(geometry))]
 }
 
 /// A random point inside one triangle of a mesh.
@@ -74,10 +78,14 @@ fn point_on(rng: &mut Rng, mesh: &Mesh, prim: PrimId) -> DVec3 {
     points.a.as_dvec3() * a + points.b.as_dvec3() * b + points.c.as_dvec3() * c
 }
 
-/// The interaction of a ray aimed at `target` from the side `n`, at about the distance `far`; `None` if rounding takes it past an edge.
-fn seen(rng: &mut Rng, accel: &dyn Accelerator, geometry: &Geometry, target: DVec3, n: DVec3, far: f64) -> Option<SurfaceInteraction> {
-    let from = target + rng.direction_around(n) * far * rng.range(0.1, 2.0);
-    closest(accel, geometry, &ray_through(from, target)).found
+/// A ray aimed at `target` from the side `n`, at about the distance `far`.
+fn aimed(rng: &mut Rng, target: DVec3, n: DVec3, far: f64) -> Ray {
+    ray_through(target + rng.direction_around(n) * far * rng.range(0.1, 2.0), target)
+}
+
+/// The interaction of a ray aimed at a point; `None` if rounding takes it past an edge.
+fn seen(accel: &dyn Accelerator, geometry: &Geometry, ray: &Ray) -> Option<SurfaceInteraction> {
+    closest(accel, geometry, ray).found
 }
 
 /// Half of the time a random direction to the side `n`, else a grazing one down to 1e-5. It stays on that side when it is rounded.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Effort, Named, Outcome, accelerators, point_on, seen};
+use super::{Effort, NAMES, Named, Outcome, accelerators, aimed, point_on, seen};
 use crate::bench::stability::geometry::{Rng, grid, mesh, triangle, world};
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Disk, Frustum, Geometry, Mesh, Placed, Profile, Quad, Revolution, Shape, Sphere};
@@ -71,14 +71,14 @@ impl Room {
 }
 
 /// Samples each light of `emitter` from the floor; counts shadow rays and those that are occluded, by accelerator.
-fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, counts: &mut [[usize; 2]; 2]) {
+fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, counts: &mut [[usize; 2]; NAMES.len()]) {
     let room = Room::new(rng, emitter, distance);
     let lights = AreaLight::for_shape(ShapeId(1), Emission::constant(Rgb::WHITE), &room.geometry, &[]);
     let accels: Vec<Named> = accelerators(&room.geometry);
     for ((_, accel), [rays, occluded]) in accels.iter().zip(counts) {
         for _ in 0..count {
             let target = point_on(rng, &room.floor, PrimId(0));
-            let Some(si) = seen(rng, &**accel, &room.geometry, target, room.n, (0.4 * distance).min(1.0)) else { continue };
+            let Some(si) = seen(&**accel, &room.geometry, &aimed(rng, target, room.n, (0.4 * distance).min(1.0))) else { continue };
             let light = &lights[rng.below(lights.len())];
             if si.shape != ShapeId(0) {
                 continue;
@@ -94,8 +94,8 @@ fn shadow_rays(rng: &mut Rng, emitter: &Shape, distance: f64, count: usize, coun
     }
 }
 
-fn report(outcome: Outcome, what: &str, counts: [[usize; 2]; 2]) -> Outcome {
-    ["embree", "ours"].iter().zip(counts).fold(outcome, |outcome, (name, [rays, occluded])| {
+fn report(outcome: Outcome, what: &str, counts: [[usize; 2]; NAMES.len()]) -> Outcome {
+    NAMES.iter().zip(counts).fold(outcome, |outcome, (name, [rays, occluded])| {
         outcome.at_least(format!("{what}, {name}: shadow rays"), rays as f64, 500.0).none(format!("{what}, {name}: occluded"), occluded)
     })
 }
@@ -103,7 +103,7 @@ fn report(outcome: Outcome, what: &str, counts: [[usize; 2]; 2]) -> Outcome {
 pub(super) fn b12_emitters(effort: Effort) -> Outcome {
     let mut rng = Rng::new(12);
     emitters().iter().fold(Outcome::new(), |outcome, (name, emitter)| {
-        let mut counts = [[0; 2]; 2];
+        let mut counts = [[0; 2]; NAMES.len()];
         for _ in 0..effort.pick(60, 600) {
             let distance = rng.magnitude(-3.0, 6.0);
             shadow_rays(&mut rng, emitter, distance, effort.pick(60, 300), &mut counts);
@@ -115,7 +115,7 @@ pub(super) fn b12_emitters(effort: Effort) -> Outcome {
 pub(super) fn b15_sliver_emitters(effort: Effort) -> Outcome {
     let mut rng = Rng::new(15);
     [1e-2, 1e-4].iter().fold(Outcome::new(), |outcome, &aspect| {
-        let mut counts = [[0; 2]; 2];
+        let mut counts = [[0; 2]; NAMES.len()];
         for _ in 0..effort.pick(100, 1_000) {
             let tip = DVec3::new(rng.range(0.2, 0.8), aspect, 0.0);
             let emitter = Shape::Mesh(triangle(DVec3::ZERO, DVec3::X, tip));

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Effort, Leavings, Outcome, accelerators, leaving};
+use super::{Effort, Leavings, NAMES, Outcome, accelerators, leaving};
 use crate::accel::{self, AccelKind, Accelerator};
 use crate::bench::stability::geometry::{Rng, closest, grid, ray, ray_through, transform, world};
 use crate::geometry::{Analytic, Disk, Frustum, Geometry, Placed, Profile, Quad, Revolution, Shape, Sphere};
@@ -61,7 +61,7 @@ pub(super) fn b2_convex_shapes(effort: Effort) -> Outcome {
     let mut rng = Rng::new(2);
     let mut outcome = Outcome::new();
     for (kind, what) in CONVEX.into_iter().enumerate() {
-        let mut tally = <[Leavings; 2]>::default();
+        let mut tally = <[Leavings; NAMES.len()]>::default();
         for _ in 0..effort.pick(100, 1_000) {
             let size = rng.magnitude(-4.0, 4.0);
             let (shape, inside) = convex(&mut rng, kind, size);
@@ -89,7 +89,7 @@ pub(super) fn b2_convex_shapes(effort: Effort) -> Outcome {
                 }
             }
         }
-        for (name, tally) in ["embree", "ours"].iter().zip(&tally) {
+        for (name, tally) in NAMES.iter().zip(&tally) {
             outcome = tally.report(outcome, &format!("{what}, {name}"));
         }
     }

@@ -1,6 +1,6 @@
 //! Triangles, alone and among their neighbours.
 
-use super::{Effort, Leavings, Outcome, accelerators, either, leaving, point_on, seen};
+use super::{Effort, Leavings, NAMES, Outcome, accelerators, aimed, either, leaving, point_on, seen};
 use crate::accel::{Accelerator, LinearAccel};
 use crate::bench::stability::geometry::{Rng, closest, grid, meshes, triangle};
 use crate::geometry::{Mesh, Shape};
@@ -8,14 +8,14 @@ use crate::id::PrimId;
 use crate::math::{DVec3, Vec3};
 
 /// Leaves the one triangle of `mesh` `directions` times, through every accelerator.
-fn leave_triangle(rng: &mut Rng, mesh: Mesh, directions: usize, tally: &mut [Leavings; 2]) {
+fn leave_triangle(rng: &mut Rng, mesh: Mesh, directions: usize, tally: &mut [Leavings; NAMES.len()]) {
     let size = f64::from(mesh.bounds().size().max_element());
     let n = mesh.triangle_points(PrimId(0)).cross().normalize();
     let geometry = meshes(vec![mesh.clone()]);
     for ((_, accel), tally) in accelerators(&geometry).iter().zip(tally) {
         for _ in 0..directions {
             let target = point_on(rng, &mesh, PrimId(0));
-            let Some(si) = seen(rng, &**accel, &geometry, target, n, size) else { continue };
+            let Some(si) = seen(&**accel, &geometry, &aimed(rng, target, n, size)) else { continue };
             let side = either(rng, si.n_g);
             let direction = leaving(rng, side);
             tally.leave(&**accel, &geometry, &si, direction, size * rng.magnitude(-3.0, 3.0));
@@ -23,8 +23,8 @@ fn leave_triangle(rng: &mut Rng, mesh: Mesh, directions: usize, tally: &mut [Lea
     }
 }
 
-fn report(mut outcome: Outcome, what: &str, tally: &[Leavings; 2]) -> Outcome {
-    for (name, tally) in ["embree", "ours"].iter().zip(tally) {
+fn report(mut outcome: Outcome, what: &str, tally: &[Leavings; NAMES.len()]) -> Outcome {
+    for (name, tally) in NAMES.iter().zip(tally) {
         outcome = tally.report(outcome, &format!("{what}, {name}"));
     }
     outcome
@@ -33,13 +33,13 @@ fn report(mut outcome: Outcome, what: &str, tally: &[Leavings; 2]) -> Outcome {
 pub(super) fn b1_triangles(effort: Effort) -> Outcome {
     let mut rng = Rng::new(1);
     let (count, directions) = effort.pick((300, 40), (1_000, 1_000));
-    let mut even = <[Leavings; 2]>::default();
+    let mut even = <[Leavings; NAMES.len()]>::default();
     for _ in 0..count {
         let size = rng.magnitude(-8.0, 8.0);
         let mesh = triangle(rng.cube() * size, rng.cube() * size, rng.cube() * size);
         leave_triangle(&mut rng, mesh, directions, &mut even);
     }
-    let mut wild = <[Leavings; 2]>::default();
+    let mut wild = <[Leavings; NAMES.len()]>::default();
     for _ in 0..count {
         let mut coordinate = || rng.magnitude(-8.0, 8.0) * if rng.unit() < 0.5 { -1.0 } else { 1.0 };
         let [a, b, c] = [(); 3].map(|()| DVec3::new(coordinate(), coordinate(), coordinate()));
@@ -54,7 +54,7 @@ pub(super) fn b5_slivers(effort: Effort) -> Outcome {
     let (count, directions) = effort.pick((100, 60), (500, 1_000));
     for aspect in [1.0, 1e-2, 1e-4] {
         for (shape, tip) in [("flat", [0.2, 0.8]), ("needle", [0.0, aspect])] {
-            let mut tally = <[Leavings; 2]>::default();
+            let mut tally = <[Leavings; NAMES.len()]>::default();
             for _ in 0..count {
                 let frame = rng.rotation() * rng.magnitude(-3.0, 3.0);
                 let center = rng.cube() * rng.magnitude(-3.0, 3.0);
@@ -94,7 +94,7 @@ pub(super) fn b6_neighbours(effort: Effort) -> Outcome {
             let prim = PrimId::new(rng.below(plane.triangles().len()));
             let target = point_on(&mut rng, &plane, prim);
             for (_, accel) in &accels {
-                let Some(si) = seen(&mut rng, &**accel, &geometry, target, n, x.length()) else { continue };
+                let Some(si) = seen(&**accel, &geometry, &aimed(&mut rng, target, n, x.length())) else { continue };
                 let side = either(&mut rng, si.n_g);
                 let ray = si.spawn(leaving(&mut rng, side).as_vec3());
                 // Rounded corners make real bumps.
@@ -128,7 +128,7 @@ pub(super) fn b8_large_ground(effort: Effort) -> Outcome {
             let mut tally = Leavings::default();
             for _ in 0..effort.pick(10_000, 1_000_000) {
                 let target = 0.01 * rng.cube();
-                let Some(si) = seen(&mut rng, &*accel, &geometry, target, n, 1.0) else { continue };
+                let Some(si) = seen(&*accel, &geometry, &aimed(&mut rng, target, n, 1.0)) else { continue };
                 let side: Vec3 = either(&mut rng, si.n_g).as_vec3();
                 let direction = leaving(&mut rng, side.as_dvec3());
                 tally.leave(&*accel, &geometry, &si, direction, rng.magnitude(2.0, 6.0));

@@ -4,8 +4,8 @@ use super::furnaces::glowing_sphere;
 use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::Plot;
-use crate::film::{Crop, Film, FilmShape, LayerSet, PartNeeds, SampleBatch};
-use crate::integrator::{self, CameraBatch, CameraSample, RayCounts, Setup, SurfaceNeeds, World, dimensions};
+use crate::film::{Crop, Film, FilmShape, LayerSet, LightAovRequest};
+use crate::integrator::{self, CameraBatch, CameraSample, PassContext, Setup, SurfaceAovs, Workspace, World, dimensions};
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
 use crate::sampling::Sampler;
@@ -80,16 +80,16 @@ fn checkpoint(film: &Film, sums: &[Sum], squares: f64, spp: u32) -> Checkpoint {
 
 fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let sampler = Sampler::new(settings.sampler, settings.seed);
-    let setup = Setup { sampler, needs: SurfaceNeeds::default(), parts: PartNeeds::default(), guide: None };
+    let setup = Setup { sampler, needs: SurfaceAovs::default(), light_aovs: LightAovRequest::default() };
     let integrator = integrator::build(&settings.integrator, setup);
     let mut film = Film::new(FilmShape::new([WIDTH; 2], Crop::full([WIDTH; 2]), LayerSet::COLOR), WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
-    let mut out = SampleBatch::default();
+    let (pass, mut workspace) = (PassContext { world, guide: None }, Workspace::default());
     let (mut checkpoints, mut next) = (Vec::new(), 1);
     for first in (0..to).step_by(AT_ONCE as usize) {
         let samples = batch(world, &sampler, first);
-        integrator.render_batch(world, &samples, &mut out, &mut RayCounts::default());
-        for (i, (sample, value)) in samples.iter().zip(&out.pixels).enumerate() {
+        integrator.render_batch(&pass, &samples, &mut workspace);
+        for (i, (sample, value)) in samples.iter().zip(&workspace.out.pixels).enumerate() {
             let pixel = i % COUNT;
             film.tiles_mut()[0].add(pixel, sample.sample, value, 1.0);
             let radiance = f64::from(value.radiance.g);

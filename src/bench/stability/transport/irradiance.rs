@@ -7,9 +7,8 @@ use crate::bench::stability::lights::lambert;
 use crate::bench::stability::render::{Estimate, floor_probe, probe};
 use crate::math::DVec3;
 
-/// Irradiance on the floor at `at` from shapes of radiance 1 by each strategy against what is expected.
-fn compare(tests: &mut Tests, effort: Effort, name: &str, at: [f64; 3], shapes: Value, expected: f64) -> f64 {
-    let mut scene = floor_probe(at, shapes);
+/// Irradiance that a probe sees on the floor, from shapes of radiance 1 by each strategy, against what is expected.
+fn compare(tests: &mut Tests, effort: Effort, name: &str, mut scene: Value, expected: f64) -> f64 {
     merge(&mut scene, json!({ "film": { "width": SIDE, "height": SIDE } }));
     let mut worst = 0f64;
     for strategy in STRATEGIES {
@@ -48,7 +47,8 @@ pub(super) fn i4_disk(effort: Effort) -> Outcome {
         0.5 * (1.0 - (x2 + 1.0 - r2) / ((x2 + 1.0 + r2).powi(2) - 4.0 * r2 * x2).sqrt())
     };
     let mut tests = Tests::new();
-    let worst = [0.0, 0.7].map(|x| compare(&mut tests, effort, &format!("x = {x}"), [x, 0.0, 0.0], json!([disk]), PI * share(x)));
+    let worst =
+        [0.0, 0.7].map(|x| compare(&mut tests, effort, &format!("x = {x}"), floor_probe([x, 0.0, 0.0], json!([disk])), PI * share(x)));
     let form = (share(0.7) - 0.110_793_5).abs().max((share(0.0) - 0.2).abs());
     judge(tests, effort, worst[0].max(worst[1])).at_most("distance of the formula from the catalogue's number", form, 1e-6)
 }
@@ -65,10 +65,10 @@ pub(super) fn i5_quad(effort: Effort) -> Outcome {
     let square = lambert(&[[-0.3, 1.0, -0.5], [0.7, 1.0, -0.5], [0.7, 1.0, 0.5], [-0.3, 1.0, 0.5]].map(DVec3::from), DVec3::Y);
     let mut tests = Tests::new();
     let worst = [
-        compare(&mut tests, effort, "quad", [0.0; 3], json!([quad]), square),
-        compare(&mut tests, effort, "two triangles", [0.0; 3], json!([mesh]), square),
-        compare(&mut tests, effort, "two meshes", [0.0; 3], json!([one, other]), square),
-        compare(&mut tests, effort, "sheared", [0.0; 3], json!([sheared]), exact),
+        compare(&mut tests, effort, "quad", floor_probe([0.0; 3], json!([quad])), square),
+        compare(&mut tests, effort, "two triangles", floor_probe([0.0; 3], json!([mesh])), square),
+        compare(&mut tests, effort, "two meshes", floor_probe([0.0; 3], json!([one, other])), square),
+        compare(&mut tests, effort, "sheared", floor_probe([0.0; 3], json!([sheared])), exact),
     ];
     let form = (square - 0.718_688_9).abs();
     judge(tests, effort, worst.into_iter().fold(0.0, f64::max)).at_most("distance of the formula from the catalogue's number", form, 1e-6)
@@ -86,10 +86,10 @@ pub(super) fn i6_sphere(effort: Effort) -> Outcome {
     let expected = PI * 0.0625 * 0.8;
     let mut tests = Tests::new();
     let worst = [
-        compare(&mut tests, effort, "sphere", [0.0; 3], json!([sphere(0.5, [1.2, 1.6, 0.0])]), expected),
-        compare(&mut tests, effort, "scaled", [0.0; 3], json!([placed]), expected),
-        compare(&mut tests, effort, "two parts", [0.0; 3], json!([half(-0.5, 0.1), half(0.1, 0.5)]), expected),
-        compare(&mut tests, effort, "overhead", [0.0; 3], json!([sphere(0.5, [0.0, 1.0, 0.0])]), PI * 0.25),
+        compare(&mut tests, effort, "sphere", floor_probe([0.0; 3], json!([sphere(0.5, [1.2, 1.6, 0.0])])), expected),
+        compare(&mut tests, effort, "scaled", floor_probe([0.0; 3], json!([placed])), expected),
+        compare(&mut tests, effort, "two parts", floor_probe([0.0; 3], json!([half(-0.5, 0.1), half(0.1, 0.5)])), expected),
+        compare(&mut tests, effort, "overhead", floor_probe([0.0; 3], json!([sphere(0.5, [0.0, 1.0, 0.0])])), PI * 0.25),
     ];
     judge(tests, effort, worst.into_iter().fold(0.0, f64::max))
 }

@@ -15,27 +15,21 @@ enum Whiteness {
 
 use Whiteness::{Exact, Lossy, Tabulated};
 
+/// The material `m` with further parameters.
+fn with(mut m: Value, rest: Value) -> Value {
+    super::merge(&mut m, rest);
+    json!({ "m": m })
+}
+
 /// Every material at its whitest, with what `docs/materials.md` says of it; the object has the material `m`.
 fn materials() -> Vec<(&'static str, Whiteness, Value)> {
-    let metal = |rest: Value| {
-        let mut m = json!({ "type": "conductor", "eta": [0.01, 0.01, 0.01], "k": [1e4, 1e4, 1e4] });
-        super::merge(&mut m, rest);
-        json!({ "m": m })
-    };
-    let glass = |rest: Value| {
-        let mut m = json!({ "type": "dielectric", "ior": 1.5 });
-        super::merge(&mut m, rest);
-        json!({ "m": m })
-    };
+    let metal = |rest: Value| with(json!({ "type": "conductor", "eta": [0.01, 0.01, 0.01], "k": [1e4, 1e4, 1e4] }), rest);
+    let glass = |rest: Value| with(json!({ "type": "dielectric", "ior": 1.5 }), rest);
     let plastic = |alpha: Value| json!({ "m": { "type": "plastic", "albedo": 1.0, "ior": 1.5, "alpha": alpha } });
     let coated = |alpha: Value, base: Value| json!({ "m": { "type": "coated", "base": "b", "alpha": alpha }, "b": base });
     let white = json!({ "type": "diffuse", "albedo": 1.0 });
     let mirror = json!({ "type": "mirror", "reflectance": 1.0 });
-    let principled = |rest: Value| {
-        let mut m = json!({ "type": "principled", "base_color": 1.0 });
-        super::merge(&mut m, rest);
-        json!({ "m": m })
-    };
+    let principled = |rest: Value| with(json!({ "type": "principled", "base_color": 1.0 }), rest);
     vec![
         ("diffuse", Exact, json!({ "m": white })),
         ("rough diffuse", Exact, json!({ "m": { "type": "diffuse", "albedo": 1.0, "roughness": 0.5 } })),

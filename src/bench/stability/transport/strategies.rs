@@ -4,7 +4,8 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{Effort, Estimate, Outcome, STRATEGIES, Tests, Value, json, mean, scene, with_strategy};
 
-/// A plate of metal below a lamp in the direction of its mirror image, the camera at 45 degrees and so narrow that all pixels see one point.
+/// A plate of metal below a lamp in the direction of its mirror image, the camera at 45 degrees and so narrow that all
+/// pixels see one point.
 fn plate(spp: u32, side: u32, alpha: f64, radius: f64) -> Value {
     scene(
         spp,

@@ -30,8 +30,8 @@ The library is loaded when it is needed: `pip install pyoidn` brings it.";
 pub struct OidnArgs {
     /// Intel Open Image Denoise: its file libOpenImageDenoise.so.2, or a folder with it
     ///
-    /// Else that of the environment variable STERADIAN_OIDN; else the system's; else that of Python's package pyoidn, in the active environment,
-    /// that of python3, or ~/.local.
+    /// Else that of the environment variable STERADIAN_OIDN; else the system's; else that of Python's package pyoidn,
+    /// in the active environment, that of python3, or ~/.local.
     #[arg(long, value_name = "PATH", help_heading = "Run")]
     pub oidn_library: Option<PathBuf>,
 }
@@ -41,8 +41,9 @@ pub struct OidnArgs {
 pub struct RenderDenoiseArgs {
     /// Denoise the picture with Intel Open Image Denoise; EXR files keep the original as layer noisy
     ///
-    /// The render also makes the layers feature_albedo and feature_normal, which are stored only if asked for. Light groups are denoised so that they
-    /// still sum to the picture. Shards are denoised when they are merged, by `steradian denoise`.
+    /// The render also makes the layers feature_albedo and feature_normal, which are stored only if asked for. Light
+    /// groups are denoised so that they still sum to the picture. Shards are denoised when they are merged, by
+    /// `steradian denoise`.
     #[arg(long, conflicts_with = "shard", help_heading = "Picture")]
     pub denoise: bool,
     #[command(flatten)]

@@ -51,8 +51,8 @@ pub struct JobArgs {
     /// Render these frames, as `render --frames` has them
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     pub frames: Option<FrameList>,
-    /// File to write, .exr or .png; repeat for several. With --frames, .#### is put before the extension unless the name has a place for the
-    /// number. Default: SCENE.exr in the working directory
+    /// File to write, .exr or .png; repeat for several. With --frames, .#### is put before the extension unless the
+    /// name has a place for the number. Default: SCENE.exr in the working directory
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
     /// Samples per pixel, all shards together

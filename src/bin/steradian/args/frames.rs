@@ -2,19 +2,20 @@
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use steradian::farm::{FORMATS, Format, FrameList};
+use steradian::farm::{FORMATS, FrameList, ProgressFormat};
 
 /// How progress is told, and which frames are rendered.
 #[derive(Clone, Debug, Default, Args)]
 pub struct SequenceArgs {
     /// How progress is told on stderr. Default: human on a terminal, plain elsewhere
     #[arg(long, value_name = "FORMAT", value_parser = formats(), long_help = progress_help(), help_heading = "Messages")]
-    pub progress: Option<&'static Format>,
+    pub progress: Option<&'static ProgressFormat>,
     /// Render these frames: 1-100, 1-100x5 (every fifth), 3,7,9-12
     ///
-    /// Names of files may hold a place for the number, #### or %04d (outputs without one get .#### before the extension). A scene with such a
-    /// name is read for each frame. Any other scene is read once, and the shutter opens at frame F as much later as F is above 0: times of
-    /// keyframes are frames. The animations of glTF files stand at --time plus F / --fps seconds. Each frame has noise of its own.
+    /// Names of files may hold a place for the number, #### or %04d (outputs without one get .#### before the
+    /// extension). A scene with such a name is read for each frame. Any other scene is read once, and the shutter opens
+    /// at frame F as much later as F is above 0: times of keyframes are frames. The animations of glTF files stand at
+    /// --time plus F / --fps seconds. Each frame has noise of its own.
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true, help_heading = "Frames")]
     pub frames: Option<FrameList>,
     /// Frames in a second, for the animations of glTF files
@@ -28,9 +29,9 @@ pub struct SequenceArgs {
     pub keep_going: bool,
 }
 
-fn formats() -> impl TypedValueParser<Value = &'static Format> {
+fn formats() -> impl TypedValueParser<Value = &'static ProgressFormat> {
     let names = FORMATS.iter().map(|format| format.name);
-    PossibleValuesParser::new(names).try_map(|name| Format::by_name(&name).ok_or("no such format"))
+    PossibleValuesParser::new(names).try_map(|name| ProgressFormat::by_name(&name).ok_or("no such format"))
 }
 
 fn progress_help() -> String {

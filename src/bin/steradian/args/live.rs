@@ -18,8 +18,8 @@ pub struct LiveArgs {
     pub tev: Option<String>,
     /// Serve a web page that shows the picture as it grows, at this port; 0 stands for any that is free
     ///
-    /// The address is told on stderr. The page shows every layer, with exposure, views, zoom, the exact values of pixels and what is left to do. It is
-    /// there for this machine alone unless --preview-bind says otherwise.
+    /// The address is told on stderr. The page shows every layer, with exposure, views, zoom, the exact values of
+    /// pixels and what is left to do. It is there for this machine alone unless --preview-bind says otherwise.
     #[arg(long, value_name = "PORT")]
     pub preview: Option<u16>,
     /// Serve the page at this address of this machine, such as 0.0.0.0: everyone who reaches it sees the picture

@@ -120,14 +120,15 @@ pub enum Command {
     CheckExr(CheckExrArgs),
     /// Render the picture of an EXR file again
     ///
-    /// The file names its scene with all settings; the picture is the same bit for bit. A scene or file of it that has changed is named and refused.
-    /// Nothing that the file says is loaded, written or connected to.
+    /// The file names its scene with all settings; the picture is the same bit for bit. A scene or file of it that has
+    /// changed is named and refused. Nothing that the file says is loaded, written or connected to.
     #[command(after_help = exr::RERENDER_EXAMPLES)]
     Rerender(RerenderArgs),
     /// Compare a picture with its reference
     ///
     /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of (test - reference)² /
-    /// (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels, psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
+    /// (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels, psnr relates mse to the
+    /// reference's peak, mean ratio is the test's mean over the reference's.
     #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
     Compare(CompareArgs),
     /// Write jobs for render farms
@@ -206,8 +207,9 @@ pub struct RenderArgs {
     pub exposure: Option<f32>,
     /// PNG: how light becomes colours of the display; EXR files stay linear
     ///
-    /// agx shows 16.5 stops and lets bright colours tend to white, filmic is the curve of Uncharted 2, srgb is the sRGB curve alone: 1 is white.
-    /// Default: the scene's; else agx, or srgb with integrators that show data, such as normal.
+    /// agx shows 16.5 stops and lets bright colours tend to white, filmic is the curve of Uncharted 2, srgb is the sRGB
+    /// curve alone: 1 is white. Default: the scene's; else agx, or srgb with integrators that show data, such as
+    /// normal.
     #[arg(long, value_name = "NAME", value_parser = names::plain::<ViewDesc>(), help_heading = "Picture")]
     pub view: Option<ViewDesc>,
 
@@ -223,14 +225,16 @@ pub struct RenderArgs {
     /// Limit what a single path of indirect light brings: less noise, but biased (too dark). Off unless given; inf for no limit
     #[arg(long, value_name = "LIMIT", help_heading = "Algorithm")]
     pub clamp: Option<f32>,
-    /// Make surfaces that a path meets after a rough one at least as rough as this alpha, falling with the samples: less noise of caustics, but biased.
-    /// Off by default; 0 for off
+    /// Make surfaces that a path meets after a rough one at least as rough as this alpha, falling with the samples:
+    /// less noise of caustics, but biased. Off by default; 0 for off
     #[arg(long, value_name = "ALPHA", help_heading = "Algorithm")]
     pub regularize: Option<f32>,
     /// Whether paths learn from earlier ones where light comes from: on or off
     ///
-    /// For scenes whose light comes by few ways, such as through a door ajar. Passes double; each follows what those before have taught, and their
-    /// samples count by how good they are. It is given up where it does not pay.
+    /// For scenes whose light comes by few ways, such as through a door ajar. Iterations double; each is guided by the
+    /// samples of those before, and weighted by its inverse variance. Guiding is given up where it does not pay. With
+    /// --checkpoint and --resume the picture is the same bit for bit. Unsupported with --shard: each part would have to
+    /// render nearly all samples to train the guide.
     #[arg(long, value_name = "SWITCH", value_parser = parse_switch, help_heading = "Algorithm")]
     pub guiding: Option<bool>,
     /// How samples are chosen

@@ -20,8 +20,10 @@ Examples:
 pub struct StateArgs {
     /// Keep the state of the render in this file, for --resume
     ///
-    /// It is replaced as a whole, so a render killed at any moment loses at most what the last interval brought. SIGUSR1 writes it at once; Ctrl-C and
-    /// SIGTERM write it before the picture. It stays when the picture is done: --resume with a larger --spp adds the missing samples.
+    /// It is replaced as a whole, so a render killed at any moment loses at most what the last interval brought.
+    /// SIGUSR1 writes it at once; Ctrl-C and SIGTERM write it before the picture. It stays when the picture is done:
+    /// --resume with a larger --spp adds the missing samples (not with --guiding on, where they depend on how many
+    /// there are).
     #[arg(long, value_name = "FILE", help_heading = "State")]
     pub checkpoint: Option<PathBuf>,
     /// Write the checkpoint at least this often
@@ -32,8 +34,9 @@ pub struct StateArgs {
     pub resume: bool,
     /// Render only part I of N of the samples of every pixel, counted from 1, into a file for `steradian merge`
     ///
-    /// -o names the file, which ends with .shard; without it, that is SCENE.I-of-N.shard. All parts are to have the same options; merged, they are the
-    /// same picture bit for bit as in one run.
+    /// -o names the file, which ends with .shard; without it, that is SCENE.I-of-N.shard. All parts are to have the
+    /// same options; merged, they are the same picture bit for bit as in one run. Not with --target-error or
+    /// --guiding on.
     #[arg(long, value_name = "I/N", help_heading = "State")]
     pub shard: Option<Shard>,
 }

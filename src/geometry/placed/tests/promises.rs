@@ -264,8 +264,8 @@ fn points_resolved_in_rows_are_those_of_single_hits() {
                 let found = (points.p.get(i), points.t[i] as f32, normals.n.get(i), placed.error());
                 assert_eq!(found, (at.p, at.t, at.n_g, at.error), "{placed:?} {i}");
                 if matches!(placed.shape, Analytic::Quad(_)) {
-                    let found = (normals.dp_du.get(i), normals.uv_x[i], normals.uv_y[i]);
-                    assert_eq!(found, (at.dp_du, at.uv.x, at.uv.y), "{placed:?} {i}");
+                    let found = (normals.dp_du.get(i), normals.uv.get(i));
+                    assert_eq!(found, (at.dp_du, at.uv), "{placed:?} {i}");
                 }
                 resolved += 1;
             }
@@ -306,7 +306,7 @@ fn packets_hit_what_single_rays_hit() {
                     assert!(placed.intersect_packet(&rows).is_undecided.iter().all(|&open| open != 0));
                     continue;
                 }
-                for hits in with_each(|| IntersectPacket { placed: &placed, rays: &rows }) {
+                for hits in with_each!(intersect_packet(&placed, &rows)) {
                     for (i, ray) in rays.iter().enumerate().filter(|(i, _)| hits.is_undecided[*i] == 0) {
                         let single = placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32);
                         assert_eq!(hits.t[i].to_bits(), single.to_bits(), "{placed:?} {ray:?}");

@@ -11,7 +11,7 @@ use crate::error::Result;
 
 /// The elements of an accessor.
 #[derive(Clone, Debug)]
-pub struct Column<'a> {
+pub(crate) struct Column<'a> {
     /// From the first element on; without bytes all elements are zero.
     bytes: Option<&'a [u8]>,
     stride: usize,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use gltf::json::accessor::Type;
-use gltf::json::animation::{Channel, Interpolation, Property, Sampler};
+use gltf::json::animation::{Interpolation, Property, Sampler};
 use gltf::json::validation::Checked;
 
 use super::Source;
@@ -15,15 +15,15 @@ use crate::math::{DQuat, DVec3};
 
 /// What animations give nodes in place of their own properties.
 #[derive(Debug, Default)]
-pub struct Motion {
+pub(crate) struct Motion {
     pub translations: BTreeMap<usize, DVec3>,
     pub rotations: BTreeMap<usize, DQuat>,
     pub scales: BTreeMap<usize, DVec3>,
     pub weights: BTreeMap<usize, Vec<f32>>,
 }
 
-/// All animations at a time in seconds. Where several move the same property of a node the first counts: what a file has as one animation for
-/// each of its parts moves together, and of several for the same parts one is seen.
+/// All animations at a time in seconds. Where several move the same property of a node the first counts: what a file
+/// has as one animation for each of its parts moves together, and of several for the same parts one is seen.
 pub fn evaluate(source: Source, time: f64, draft: &mut Draft) -> Result<Motion> {
     let mut motion = Motion::default();
     let mut taken: BTreeSet<(usize, u8)> = BTreeSet::new();
@@ -39,49 +39,46 @@ pub fn evaluate(source: Source, time: f64, draft: &mut Draft) -> Result<Motion> 
             }
             let sampler = animation.samplers.get(channel.sampler.value());
             let sampler = sampler.ok_or_else(|| source.fault(&format!("{path}.sampler"), "there is no such sampler"))?;
-            apply(source, &path, channel, sampler, property, time, &mut motion)?;
+            let curve = Curve::new(source, &path, sampler, value_type(property))?;
+            motion.set(node, property, &curve, time).ok_or_else(|| source.fault(&path, "does not give a rotation"))?;
             draft.mapped(&path, &element, "channel");
         }
     }
     Ok(motion)
 }
 
-fn apply(
-    source: Source,
-    path: &str,
-    channel: &Channel,
-    sampler: &Sampler,
-    property: Property,
-    time: f64,
-    motion: &mut Motion,
-) -> Result<()> {
-    let node = channel.target.node.value();
-    let types = match property {
+/// The elements of the values of a property.
+fn value_type(property: Property) -> Type {
+    match property {
         Property::Translation | Property::Scale => Type::Vec3,
         Property::Rotation => Type::Vec4,
         Property::MorphTargetWeights => Type::Scalar,
-    };
-    let curve = Curve::new(source, path, sampler, types)?;
-    let at = curve.moment(time);
-    let vector = |at: &Moment| DVec3::from_array(curve.blend(at, 0, |column, i| column.floats::<3>(i).map(f64::from)));
-    match property {
-        Property::Translation => {
-            motion.translations.insert(node, vector(&at));
-        }
-        Property::Scale => {
-            motion.scales.insert(node, vector(&at));
-        }
-        Property::Rotation => {
-            let rotation = curve.rotation(&at);
-            motion.rotations.insert(node, rotation.ok_or_else(|| source.fault(path, "does not give a rotation"))?);
-        }
-        Property::MorphTargetWeights => {
-            let width = curve.values.count() / curve.slots().max(1);
-            let weights = (0..width).map(|k| curve.blend(&at, k, |column, i| column.floats::<1>(i).map(f64::from))[0] as f32);
-            motion.weights.insert(node, weights.collect());
-        }
     }
-    Ok(())
+}
+
+impl Motion {
+    /// Sets a property of a node to its value at a time; `None` if that is no rotation.
+    fn set(&mut self, node: usize, property: Property, curve: &Curve, time: f64) -> Option<()> {
+        let at = curve.moment(time);
+        let vector = |at: &Moment| DVec3::from_array(curve.blend(at, 0, |column, i| column.floats::<3>(i).map(f64::from)));
+        match property {
+            Property::Translation => {
+                self.translations.insert(node, vector(&at));
+            }
+            Property::Scale => {
+                self.scales.insert(node, vector(&at));
+            }
+            Property::Rotation => {
+                self.rotations.insert(node, curve.rotation(&at)?);
+            }
+            Property::MorphTargetWeights => {
+                let width = curve.values.count() / curve.slots().max(1);
+                let weights = (0..width).map(|k| curve.blend(&at, k, |column, i| column.floats::<1>(i).map(f64::from))[0] as f32);
+                self.weights.insert(node, weights.collect());
+            }
+        }
+        Some(())
+    }
 }
 
 /// Values over time.

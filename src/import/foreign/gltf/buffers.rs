@@ -26,7 +26,7 @@ enum Bytes<'a> {
 
 /// A view of a buffer.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub(crate) struct View<'a> {
     pub bytes: &'a [u8],
     /// From one element to the next; the size of an element if not given.
     pub stride: Option<usize>,

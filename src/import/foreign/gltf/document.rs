@@ -12,7 +12,7 @@ use crate::import::Draft;
 
 /// The JSON of a file, its indices checked, and the binary chunk of a GLB.
 #[derive(Debug)]
-pub struct Document<'a> {
+pub(crate) struct Document<'a> {
     pub root: Root,
     pub bin: Option<&'a [u8]>,
 }

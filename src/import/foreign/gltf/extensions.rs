@@ -121,7 +121,7 @@ extensions! {
 
 /// A light of the list.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Light {
+pub(crate) struct Light {
     #[serde(rename = "type")]
     pub kind: LightKind,
     #[serde(default)]

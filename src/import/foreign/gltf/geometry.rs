@@ -63,7 +63,8 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
     let Checked::Valid(mode) = primitive.mode else {
         return Err(source.fault(&format!("{path}.mode"), "is not one that glTF knows"));
     };
-    let corners = corners(source, path, primitive, count)?;
+    let reader = PrimitiveReader { source, path, primitive, count };
+    let corners = reader.corners()?;
     let mut triangles = assemble(mode, &corners);
     drop(corners);
     if triangles.is_empty() {
@@ -71,11 +72,8 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
     }
     let used = compact(&mut triangles, count);
 
-    let column = |name: &str, semantic: Semantic, types: &[Type], wanted: Wanted| {
-        column(source, path, primitive, count, name, semantic, types, wanted)
-    };
-    let normals = column("NORMAL", Semantic::Normals, &[Type::Vec3], Wanted::Floats)?;
-    let colors = column("COLOR_0", Semantic::Colors(0), &[Type::Vec3, Type::Vec4], Wanted::Floats)?;
+    let normals = reader.column("NORMAL", Semantic::Normals, &[Type::Vec3], Wanted::Floats)?;
+    let colors = reader.column("COLOR_0", Semantic::Colors(0), &[Type::Vec3, Type::Vec4], Wanted::Floats)?;
     let colors: Option<Vec<[f32; 4]>> = colors.map(|colors| used.iter().map(|&i| color(&colors, i as usize)).collect());
     let mut data = MeshData {
         positions: used.iter().map(|&i| positions.floats(i as usize)).collect(),
@@ -85,9 +83,9 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
         ..MeshData::default()
     }
     .with_colors(colors.as_ref().map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect()));
-    morph(source, path, primitive, deformation.weights, count, &used, &mut data)?;
+    reader.morph(deformation.weights, &used, &mut data)?;
     if let Some(joints) = deformation.joints {
-        skin(source, path, primitive, joints, &column, &used, &mut data)?;
+        reader.skin(joints, &used, &mut data)?;
     }
     Ok(Some(Triangles { data, colors: colors.as_deref().map(VertexColors::of), used, count }))
 }
@@ -96,7 +94,8 @@ impl Triangles {
     /// Reads the uv of one set, if the primitive has it.
     pub fn read_uvs(&mut self, source: Source, path: &str, primitive: &Primitive, set: u32) -> Result<()> {
         let name = format!("TEXCOORD_{set}");
-        let uvs = column(source, path, primitive, self.count, &name, Semantic::TexCoords(set), &[Type::Vec2], Wanted::Floats)?;
+        let reader = PrimitiveReader { source, path, primitive, count: self.count };
+        let uvs = reader.column(&name, Semantic::TexCoords(set), &[Type::Vec2], Wanted::Floats)?;
         // Their origin is the upper left corner; ours is the lower left one.
         let flipped = |uvs: Column| self.used.iter().map(|&i| uvs.floats::<2>(i as usize)).map(|[u, v]| [u, 1.0 - v]).collect();
         self.data.uvs = uvs.map(flipped);
@@ -104,39 +103,106 @@ impl Triangles {
     }
 }
 
-/// An attribute that has an element for each of `count` vertices, if the primitive has it.
-#[allow(clippy::too_many_arguments)]
-fn column<'a>(
+/// Reads the data of a primitive with `count` vertices.
+struct PrimitiveReader<'a, 'p> {
     source: Source<'a>,
-    path: &str,
-    primitive: &Primitive,
+    path: &'p str,
+    primitive: &'p Primitive,
     count: usize,
-    name: &str,
-    semantic: Semantic,
-    types: &[Type],
-    wanted: Wanted,
-) -> Result<Option<Column<'a>>> {
-    let Some(index) = attribute(primitive, semantic) else { return Ok(None) };
-    let place = format!("{path}.attributes.{name}");
-    let column = source.column(&place, index, types, wanted)?;
-    if column.count() != count {
-        return Err(source.fault(&place, format!("has {} elements, but there are {count} positions", column.count())));
-    }
-    Ok(Some(column))
 }
 
-/// The vertices in the order in which they are used.
-fn corners(source: Source, path: &str, primitive: &Primitive, count: usize) -> Result<Vec<u32>> {
-    let path = format!("{path}.indices");
-    let Some(index) = primitive.indices else {
-        let count = u32::try_from(count).map_err(|_| source.fault(&path, "more vertices than 32-bit numbers can name"))?;
-        return Ok((0..count).collect());
-    };
-    let indices = source.column(&path, index, &[Type::Scalar], Wanted::Indices)?;
-    let corners: Vec<u32> = (0..indices.count()).map(|i| indices.indices::<1>(i)[0]).collect();
-    match corners.iter().position(|&i| i as usize >= count) {
-        Some(at) => Err(source.fault(&path, format!("index {at} is {}, but there are {count} vertices", corners[at]))),
-        None => Ok(corners),
+impl<'a> PrimitiveReader<'a, '_> {
+    /// An attribute that has an element for each vertex, if the primitive has it.
+    fn column(&self, name: &str, semantic: Semantic, types: &[Type], wanted: Wanted) -> Result<Option<Column<'a>>> {
+        let Self { source, path, primitive, count } = *self;
+        let Some(index) = attribute(primitive, semantic) else { return Ok(None) };
+        let place = format!("{path}.attributes.{name}");
+        let column = source.column(&place, index, types, wanted)?;
+        if column.count() != count {
+            return Err(source.fault(&place, format!("has {} elements, but there are {count} positions", column.count())));
+        }
+        Ok(Some(column))
+    }
+
+    /// The vertices in the order in which they are used.
+    fn corners(&self) -> Result<Vec<u32>> {
+        let Self { source, path, primitive, count } = *self;
+        let path = format!("{path}.indices");
+        let Some(index) = primitive.indices else {
+            let count = u32::try_from(count).map_err(|_| source.fault(&path, "more vertices than 32-bit numbers can name"))?;
+            return Ok((0..count).collect());
+        };
+        let indices = source.column(&path, index, &[Type::Scalar], Wanted::Indices)?;
+        let corners: Vec<u32> = (0..indices.count()).map(|i| indices.indices::<1>(i)[0]).collect();
+        match corners.iter().position(|&i| i as usize >= count) {
+            Some(at) => Err(source.fault(&path, format!("index {at} is {}, but there are {count} vertices", corners[at]))),
+            None => Ok(corners),
+        }
+    }
+
+    /// Moves vertices and normals by the morph targets.
+    fn morph(&self, weights: &[f32], used: &[u32], data: &mut MeshData) -> Result<()> {
+        let Self { source, path, primitive, count } = *self;
+        let targets = primitive.targets.as_deref().unwrap_or_default();
+        for (t, (target, &weight)) in targets.iter().zip(weights).enumerate() {
+            if weight == 0.0 {
+                continue;
+            }
+            for (name, index, moved) in
+                [("POSITION", target.positions, Some(&mut data.positions)), ("NORMAL", target.normals, data.normals.as_mut())]
+            {
+                let (Some(index), Some(moved)) = (index, moved) else { continue };
+                let place = format!("{path}.targets[{t}].{name}");
+                let steps = source.column(&place, index, &[Type::Vec3], Wanted::Floats)?;
+                if steps.count() != count {
+                    return Err(source.fault(&place, format!("has {} elements, but there are {count} positions", steps.count())));
+                }
+                for (value, &i) in moved.iter_mut().zip(used) {
+                    let step = steps.floats::<3>(i as usize);
+                    *value = std::array::from_fn(|k| value[k] + weight * step[k]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves vertices and normals to where joints carry them.
+    fn skin(&self, joints: &[DAffine3], used: &[u32], data: &mut MeshData) -> Result<()> {
+        let Self { source, path, primitive, .. } = *self;
+        let mut sets = Vec::new();
+        for set in 0.. {
+            if attribute(primitive, Semantic::Joints(set)).is_none() {
+                break;
+            }
+            let indices = self.column(&format!("JOINTS_{set}"), Semantic::Joints(set), &[Type::Vec4], Wanted::Indices)?;
+            let weights = self.column(&format!("WEIGHTS_{set}"), Semantic::Weights(set), &[Type::Vec4], Wanted::Floats)?;
+            let (Some(indices), Some(weights)) = (indices, weights) else {
+                return Err(source.fault(path, format!("has JOINTS_{set}, but not WEIGHTS_{set}")));
+            };
+            sets.push((indices, weights));
+        }
+        for (v, &i) in used.iter().enumerate() {
+            let i = i as usize;
+            let carried = sets.iter().flat_map(|(indices, weights)| indices.indices::<4>(i).into_iter().zip(weights.floats::<4>(i)));
+            let carried: Vec<(usize, f64)> = carried.map(|(joint, weight)| (joint as usize, f64::from(weight))).collect();
+            if let Some((joint, _)) = carried.iter().find(|(joint, weight)| *weight > 0.0 && *joint >= joints.len()) {
+                return Err(source.fault(path, format!("vertex {i} hangs on joint {joint} of {}", joints.len())));
+            }
+            let Some(map) = skins::blend(joints, carried.into_iter()) else { continue };
+            let place = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+            if let Some(p) = data.positions.get_mut(v) {
+                *p = map.transform_point3(place(*p)).as_vec3().to_array();
+            }
+            if let Some(n) = data.normals.as_mut().and_then(|normals| normals.get_mut(v)) {
+                // The cofactors turn normals as the inverse transpose does, and are there for every matrix.
+                let m = &map.matrix3;
+                let (x, y, z) = (m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+                let n0 = place(*n);
+                let turned = (x * n0.x + y * n0.y + z * n0.z) * m.determinant().signum();
+                *n = turned.normalize_or_zero().as_vec3().to_array();
+            }
+        }
+        Ok(())
     }
 }
 
@@ -167,85 +233,6 @@ fn compact(triangles: &mut [[u32; 3]], count: usize) -> Vec<u32> {
         }
     }
     used
-}
-
-/// Moves vertices and normals by the morph targets.
-fn morph(
-    source: Source,
-    path: &str,
-    primitive: &Primitive,
-    weights: &[f32],
-    count: usize,
-    used: &[u32],
-    data: &mut MeshData,
-) -> Result<()> {
-    let targets = primitive.targets.as_deref().unwrap_or_default();
-    for (t, (target, &weight)) in targets.iter().zip(weights).enumerate() {
-        if weight == 0.0 {
-            continue;
-        }
-        for (name, index, moved) in
-            [("POSITION", target.positions, Some(&mut data.positions)), ("NORMAL", target.normals, data.normals.as_mut())]
-        {
-            let (Some(index), Some(moved)) = (index, moved) else { continue };
-            let place = format!("{path}.targets[{t}].{name}");
-            let steps = source.column(&place, index, &[Type::Vec3], Wanted::Floats)?;
-            if steps.count() != count {
-                return Err(source.fault(&place, format!("has {} elements, but there are {count} positions", steps.count())));
-            }
-            for (value, &i) in moved.iter_mut().zip(used) {
-                let step = steps.floats::<3>(i as usize);
-                *value = std::array::from_fn(|k| value[k] + weight * step[k]);
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Moves vertices and normals to where joints carry them.
-fn skin<'a>(
-    source: Source<'a>,
-    path: &str,
-    primitive: &Primitive,
-    joints: &[DAffine3],
-    column: &impl Fn(&str, Semantic, &[Type], Wanted) -> Result<Option<Column<'a>>>,
-    used: &[u32],
-    data: &mut MeshData,
-) -> Result<()> {
-    let mut sets = Vec::new();
-    for set in 0.. {
-        if attribute(primitive, Semantic::Joints(set)).is_none() {
-            break;
-        }
-        let indices = column(&format!("JOINTS_{set}"), Semantic::Joints(set), &[Type::Vec4], Wanted::Indices)?;
-        let weights = column(&format!("WEIGHTS_{set}"), Semantic::Weights(set), &[Type::Vec4], Wanted::Floats)?;
-        let (Some(indices), Some(weights)) = (indices, weights) else {
-            return Err(source.fault(path, format!("has JOINTS_{set}, but not WEIGHTS_{set}")));
-        };
-        sets.push((indices, weights));
-    }
-    for (v, &i) in used.iter().enumerate() {
-        let i = i as usize;
-        let carried = sets.iter().flat_map(|(indices, weights)| indices.indices::<4>(i).into_iter().zip(weights.floats::<4>(i)));
-        let carried: Vec<(usize, f64)> = carried.map(|(joint, weight)| (joint as usize, f64::from(weight))).collect();
-        if let Some((joint, _)) = carried.iter().find(|(joint, weight)| *weight > 0.0 && *joint >= joints.len()) {
-            return Err(source.fault(path, format!("vertex {i} hangs on joint {joint} of {}", joints.len())));
-        }
-        let Some(map) = skins::blend(joints, carried.into_iter()) else { continue };
-        let place = |p: [f32; 3]| DVec3::from(p.map(f64::from));
-        if let Some(p) = data.positions.get_mut(v) {
-            *p = map.transform_point3(place(*p)).as_vec3().to_array();
-        }
-        if let Some(n) = data.normals.as_mut().and_then(|normals| normals.get_mut(v)) {
-            // The cofactors turn normals as the inverse transpose does, and are there for every matrix.
-            let m = &map.matrix3;
-            let (x, y, z) = (m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-            let n0 = place(*n);
-            let turned = (x * n0.x + y * n0.y + z * n0.z) * m.determinant().signum();
-            *n = turned.normalize_or_zero().as_vec3().to_array();
-        }
-    }
-    Ok(())
 }
 
 /// The colour of a vertex, clamped as the format has it.

@@ -31,23 +31,27 @@ pub fn add(source: Source, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Resul
             Some(name) => format!("light \"{name}\""),
             None => format!("light of {}", label(node, i)),
         };
-        place(source, &path, &element, light, &pose.world[i], draft)?;
+        let desc = desc(source, &path, light, &pose.world[i])?;
+        draft.mapped(&path, &element, "intensity");
+        if light.range.is_some() {
+            draft.ignored(&path, &element, "range", "light falls with the square of the distance and nothing else");
+        }
+        if matches!(desc, LightDesc::Spot(_)) {
+            draft.approximated(&path, &element, "spot", "the fall between the cones has a slightly different shape");
+        }
+        draft.add_light(&path, desc);
     }
     Ok(found)
 }
 
-fn place(source: Source, path: &str, element: &str, light: &Light, world: &DAffine3, draft: &mut Draft) -> Result<()> {
+fn desc(source: Source, path: &str, light: &Light, world: &DAffine3) -> Result<LightDesc> {
     let intensity = light.color.map(|c| c * light.intensity);
     if !intensity.iter().all(|i| i.is_finite() && *i >= 0.0) {
         return Err(source.fault(path, "the light's intensity is not finite, or negative"));
     }
-    draft.mapped(path, element, "intensity");
-    if light.range.is_some() {
-        draft.ignored(path, element, "range", "light falls with the square of the distance and nothing else");
-    }
     let position = world.translation.to_array();
     let direction = world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
-    let desc = match light.kind {
+    Ok(match light.kind {
         LightKind::Point => LightDesc::Point(PointLightDesc { position, intensity, group: None }),
         LightKind::Directional => LightDesc::Directional(DirectionalLightDesc {
             direction: direction.to_array(),
@@ -61,7 +65,6 @@ fn place(source: Source, path: &str, element: &str, light: &Light, world: &DAffi
             if !(outer > 0.0 && outer <= std::f64::consts::PI && inner >= 0.0 && inner <= outer) {
                 return Err(source.fault(path, format!("a spot light cannot have cones of {inner} and {outer} radians")));
             }
-            draft.approximated(path, element, "spot", "the fall between the cones has a slightly different shape");
             LightDesc::Spot(SpotLightDesc {
                 position,
                 look_at: (world.translation + direction * world.translation.length().max(1.0)).to_array(),
@@ -73,7 +76,5 @@ fn place(source: Source, path: &str, element: &str, light: &Light, world: &DAffi
                 group: None,
             })
         }
-    };
-    draft.add_light(path, desc);
-    Ok(())
+    })
 }

@@ -20,7 +20,7 @@ use crate::math::{DAffine3, DQuat, DVec3, Transform};
 
 /// What has been placed.
 #[derive(Debug)]
-pub struct Placed {
+pub(crate) struct Placed {
     /// The corners of a box around each mesh.
     pub corners: Vec<DVec3>,
     /// Whether a surface gives off more light than a white one reflects in the default light.
@@ -163,25 +163,17 @@ impl Builder<'_, '_> {
                 self.draft.ignored(&path, "primitive", "mode", "points and lines have no surface");
                 continue;
             }
-            if let Some(shape) = self.shape(&path, &name, primitive, deformation, &mut shapes.bounds)? {
-                shapes.list.push((path, shape));
-            }
+            self.add_shape(&path, &name, primitive, deformation, &mut shapes)?;
         }
         Ok(shapes)
     }
 
-    fn shape(
-        &mut self,
-        path: &str,
-        name: &str,
-        primitive: &Primitive,
-        deformation: Deformation,
-        bounds: &mut Option<[DVec3; 2]>,
-    ) -> Result<Option<ShapeDesc>> {
+    /// Adds the triangles of a primitive to the shapes of its form.
+    fn add_shape(&mut self, path: &str, name: &str, primitive: &Primitive, deformation: Deformation, shapes: &mut Shapes) -> Result<()> {
         let source = self.source;
         let Some(mut triangles) = geometry::triangles(source, path, primitive, deformation)? else {
             self.draft.ignored(path, "primitive", "", "has no triangles");
-            return Ok(None);
+            return Ok(());
         };
         let look = self.materials.look(source, self.draft, primitive.material, triangles.colors)?;
         if let Some(set) = look.uv_set {
@@ -197,7 +189,7 @@ impl Builder<'_, '_> {
         self.gives_light |= look.emission.as_ref().is_some_and(|emission| emission.radiance.iter().any(|r| *r > 1.0));
 
         for p in data.positions.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
-            grow(bounds, DVec3::from(p.map(f64::from)));
+            shapes.grow(DVec3::from(p.map(f64::from)));
         }
         let bytes = data.positions.len() * (32 + if look.vertex_colors { 12 } else { 0 }) + data.triangles.len() * 12;
         self.budget = self.budget.checked_sub(bytes).ok_or_else(|| {
@@ -208,7 +200,8 @@ impl Builder<'_, '_> {
         desc.material = look.material;
         desc.opacity = look.opacity;
         desc.emission = look.emission;
-        Ok(Some(ShapeDesc::Mesh(desc)))
+        shapes.list.push((path.into(), ShapeDesc::Mesh(desc)));
+        Ok(())
     }
 
     /// Says what became of the attributes.
@@ -258,8 +251,10 @@ pub fn transform(map: &DAffine3) -> TransformDesc {
     TransformDesc(vec![TransformStepDesc::Matrix([row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]])])
 }
 
-fn grow(bounds: &mut Option<[DVec3; 2]>, p: DVec3) {
-    *bounds = Some(bounds.map_or([p, p], |[min, max]| [min.min(p), max.max(p)]));
+impl Shapes {
+    fn grow(&mut self, p: DVec3) {
+        self.bounds = Some(self.bounds.map_or([p, p], |[min, max]| [min.min(p), max.max(p)]));
+    }
 }
 
 /// The corners of a box.

@@ -14,7 +14,7 @@ use crate::import::closest_name;
 
 /// What a BSDF has become.
 #[derive(Clone, Debug)]
-pub struct Look {
+pub(crate) struct Look {
     /// The material by name.
     pub material: String,
     /// Whether Mitsuba's is black from behind, and ours not.

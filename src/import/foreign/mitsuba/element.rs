@@ -9,7 +9,7 @@ use crate::math::DAffine3;
 
 /// A plugin while it is read. What is asked for counts as mapped unless something else is said of it; what nobody asks for is ignored.
 #[derive(Debug)]
-pub struct Element<'a> {
+pub(crate) struct Element<'a> {
     /// The plugin.
     pub plugin: &'a Plugin,
     document: &'a Document,

@@ -26,16 +26,6 @@ impl Reader<'_> {
     fn integrator_within(&mut self, id: PluginId) -> Result<()> {
         let mut element = Element::new(self.document, id);
         let kind = element.kind();
-        let ends = |element: &mut Element| -> Result<(u32, u32)> {
-            let max_depth = element.integer("max_depth")?.unwrap_or(-1);
-            // A path of no segments sees nothing; the shortest one here sees what gives off light.
-            let max_depth = u32::try_from(max_depth).unwrap_or(UNLIMITED);
-            if max_depth == 0 {
-                element.approximated("max_depth", "1 in place of 0: what gives off light is seen");
-            }
-            let rr_depth = element.count("rr_depth", 1)?.unwrap_or(5);
-            Ok((max_depth.max(1), rr_depth))
-        };
         match kind {
             "moment" | "aov" | "stokes" => {
                 match element.one("integrator")? {
@@ -50,22 +40,19 @@ impl Reader<'_> {
                 return Ok(());
             }
             "path" | "prb" | "prb_basic" | "direct_projective" | "prb_projective" => {
-                let (max_depth, rr_depth) = ends(&mut element)?;
-                self.draft.desc.integrator = IntegratorDesc::path(max_depth, rr_depth);
+                self.draft.desc.integrator = path(&mut element)?;
                 if kind != "path" {
                     element.approximated("", "path tracing, without derivatives");
                 }
             }
             "volpath" | "volpathmis" | "prbvolpath" => {
-                let (max_depth, rr_depth) = ends(&mut element)?;
-                self.draft.desc.integrator = IntegratorDesc::path(max_depth, rr_depth);
+                self.draft.desc.integrator = path(&mut element)?;
                 if self.document.plugins.iter().any(|plugin| plugin.class == "medium") {
                     element.approximated("", "path tracing: there are no participating media");
                 }
             }
             "ptracer" => {
-                let (max_depth, rr_depth) = ends(&mut element)?;
-                self.draft.desc.integrator = IntegratorDesc::path(max_depth, rr_depth);
+                self.draft.desc.integrator = path(&mut element)?;
                 element.approximated("", "path tracing from the camera, which has the same mean, in place of light tracing");
             }
             "direct" | "emission_direct" => {
@@ -91,4 +78,16 @@ impl Reader<'_> {
         element.finish(&mut self.draft);
         Ok(())
     }
+}
+
+/// A path tracer with the depths of an integrator.
+fn path(element: &mut Element) -> Result<IntegratorDesc> {
+    let max_depth = element.integer("max_depth")?.unwrap_or(-1);
+    // A path of no segments sees nothing; the shortest one here sees what gives off light.
+    let max_depth = u32::try_from(max_depth).unwrap_or(UNLIMITED);
+    if max_depth == 0 {
+        element.approximated("max_depth", "1 in place of 0: what gives off light is seen");
+    }
+    let rr_depth = element.count("rr_depth", 1)?.unwrap_or(5);
+    Ok(IntegratorDesc::path(max_depth.max(1), rr_depth))
 }

@@ -11,6 +11,23 @@ use crate::math::{DAffine3, DMat3, DVec3};
 /// Mitsuba's camera looks along +Z with +X to the left of the picture; this turns ours into it.
 const HALF_TURN: DMat3 = DMat3 { x_axis: DVec3::NEG_X, y_axis: DVec3::Y, z_axis: DVec3::NEG_Z };
 
+/// The lens of a `thinlens`; `None` if it is a pinhole.
+fn lens(element: &mut Element, far_clip: Option<f64>) -> Result<Option<LensDesc>> {
+    let radius = element.float("aperture_radius")?;
+    let radius = radius.ok_or_else(|| element.place().error("a thinlens needs \"aperture_radius\""))?;
+    let focus_distance = Some(element.float("focus_distance")?.or(far_clip).unwrap_or(1e4));
+    Ok((radius > 0.0).then_some(LensDesc {
+        radius: Some(radius),
+        f_number: None,
+        focal_length: None,
+        focus_distance,
+        focus_point: None,
+        sensor_distance: None,
+        sensor_height: None,
+        blades: None,
+    }))
+}
+
 impl Reader<'_> {
     /// Reads a sensor with its film and sampler, which becomes the camera.
     pub(super) fn sensor(&mut self, id: PluginId) -> Result<()> {
@@ -49,23 +66,7 @@ impl Reader<'_> {
             }
         }
         if kind == "thinlens" {
-            let needed =
-                |value: Option<f64>, name: &str, e: &Element| value.ok_or_else(|| e.place().error(format!("a thinlens needs \"{name}\"")));
-            let radius = needed(element.float("aperture_radius")?, "aperture_radius", &element)?;
-            let focus_distance = Some(element.float("focus_distance")?.or(far).unwrap_or(1e4));
-            if radius > 0.0 {
-                let lens = LensDesc {
-                    radius: Some(radius),
-                    f_number: None,
-                    focal_length: None,
-                    focus_distance,
-                    focus_point: None,
-                    sensor_distance: None,
-                    sensor_height: None,
-                    blades: None,
-                };
-                camera.lens = Some(lens);
-            }
+            camera.lens = lens(&mut element, far)?;
         }
         for name in ["shutter_open", "shutter_close"] {
             if element.take(name).is_some() {

@@ -157,8 +157,8 @@ impl<'a> Reader<'a> {
         matches!(plugin.kind.as_str(), "bitmap" | "checkerboard") || parts.any(|part| self.has_image(part, seen))
     }
 
-    /// Gives a mesh of a file the uv that Mitsuba gives it if the file has none: each triangle's barycentric coordinates. What is wrong with
-    /// the file is found when the scene is compiled.
+    /// Gives a mesh of a file the uv that Mitsuba gives it if the file has none: each triangle's barycentric
+    /// coordinates. What is wrong with the file is found when the scene is compiled.
     fn give_uvs(&mut self, desc: &mut MeshDesc, uv: UvOrigin, place: &str) {
         let Some(file) = desc.file.clone() else { return };
         let path = self.scene.parent().unwrap_or(std::path::Path::new("")).join(&file);

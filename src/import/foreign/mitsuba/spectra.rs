@@ -114,7 +114,8 @@ fn file_samples(text: &str) -> Result<Vec<[f64; 2]>, String> {
     Ok(samples)
 }
 
-/// The largest spectral radiance of a black body, in watts per square metre, steradian and nanometre (Planck's law where Wien's has its peak).
+/// The largest spectral radiance of a black body, in watts per square metre, steradian and nanometre (Planck's law
+/// where Wien's has its peak).
 fn peak_radiance(kelvin: f64) -> f64 {
     // 2 h c², in W m², and the wavelength of the peak times the temperature and h c / (k of it).
     const FIRST: f64 = 1.191_042_972e-16;

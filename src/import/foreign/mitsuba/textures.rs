@@ -25,7 +25,7 @@ pub enum UvOrigin {
 
 /// What a texture is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
+pub(crate) enum Role {
     /// A colour.
     Color,
     /// A number.

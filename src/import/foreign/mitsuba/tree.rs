@@ -11,7 +11,7 @@ use crate::math::DAffine3;
 
 /// Where something stands in a file.
 #[derive(Clone, Debug)]
-pub struct Place {
+pub(crate) struct Place {
     /// The file.
     pub file: Rc<Path>,
     /// Line, from 1.
@@ -64,7 +64,7 @@ pub enum Value {
 
 /// A spectrum as written.
 #[derive(Clone, Debug)]
-pub enum Spectrum {
+pub(crate) enum Spectrum {
     /// The same at all wavelengths.
     Uniform(f64),
     /// Wavelengths in nanometres, and values there.
@@ -108,7 +108,7 @@ impl Plugin {
 
 /// A scene file with all that it includes.
 #[derive(Clone, Debug, Default)]
-pub struct Document {
+pub(crate) struct Document {
     /// All plugins; the last one is the scene.
     pub plugins: Vec<Plugin>,
     /// Plugins by id.

@@ -264,7 +264,6 @@ impl Parser {
     fn child(&mut self, source: &Source, node: Node, outer: &str, properties: &mut Vec<Property>, depth: usize) -> Result<()> {
         let tag = node.tag_name().name();
         let place = source.place(node);
-        let fault = |message: Fault| place.error(message);
         match tag {
             "default" | "alias" | "include" | "path" if outer != "scene" => {
                 return Err(place.error(format!("<{tag}> can only stand in <scene>")));
@@ -290,7 +289,26 @@ impl Parser {
             _ => {}
         }
         let name = self.attribute(source, node, "name")?.map(|name| source.name(name)).unwrap_or_default();
-        let value = match tag {
+        let Some(value) = self.value(source, node)? else {
+            if tag == "spectrum" || CLASSES.contains(&tag) && tag != "scene" {
+                return self.nested(source, node, name, properties, depth);
+            }
+            let hint = closest_name(tag, CLASSES.into_iter().chain(OTHERS));
+            let hint = hint.map_or(String::new(), |near| format!(" (did you mean <{near}>?)"));
+            return Err(place.error(format!("unknown element <{tag}>{hint}")));
+        };
+        if name.is_empty() && !matches!(value, Value::Reference(_)) {
+            return Err(place.error(format!("<{tag}> needs the attribute \"name\"")));
+        }
+        properties.push(Property { name, value, place });
+        Ok(())
+    }
+
+    /// The value of a property; `None` for other elements.
+    fn value(&mut self, source: &Source, node: Node) -> Result<Option<Value>> {
+        let place = source.place(node);
+        let fault = |message: Fault| place.error(message);
+        Ok(Some(match node.tag_name().name() {
             "ref" => Value::Reference(self.needed(source, node, "id")?),
             "transform" => {
                 let mut read = |node: Node, name: &str| self.attribute(source, node, name);
@@ -312,20 +330,8 @@ impl Parser {
             "boolean" => Value::Boolean(values::boolean(&self.needed(source, node, "value")?).map_err(fault)?),
             "string" => Value::Text(self.needed(source, node, "value")?),
             "rgb" => Value::Rgb(values::rgb(&self.needed(source, node, "value")?).map_err(fault)?),
-            _ if tag == "spectrum" || CLASSES.contains(&tag) && tag != "scene" => {
-                return self.nested(source, node, name, properties, depth);
-            }
-            _ => {
-                let hint = closest_name(tag, CLASSES.into_iter().chain(OTHERS));
-                let hint = hint.map_or(String::new(), |near| format!(" (did you mean <{near}>?)"));
-                return Err(place.error(format!("unknown element <{tag}>{hint}")));
-            }
-        };
-        if name.is_empty() && !matches!(value, Value::Reference(_)) {
-            return Err(place.error(format!("<{tag}> needs the attribute \"name\"")));
-        }
-        properties.push(Property { name, value, place });
-        Ok(())
+            _ => return Ok(None),
+        }))
     }
 
     /// A plugin in a plugin.

@@ -10,7 +10,7 @@ use crate::import::foreign::Draft;
 ///
 /// pbrt divides each light by what its spectrum measures in nits and the film takes a nit as 1, so that an `rgb L` of 1 is a pixel of 1.
 #[derive(Clone, Debug, PartialEq)]
-pub struct AreaLight {
+pub(crate) struct AreaLight {
     radiance: [f32; 3],
     /// The name of a texture that multiplies it.
     texture: Option<String>,

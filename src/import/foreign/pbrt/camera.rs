@@ -77,6 +77,64 @@ fn pbrt_from_ours(kind: &str) -> DMat3 {
     }
 }
 
+/// Sets the projection of a camera; `scale` is that of its transformation.
+fn set_projection(draft: &mut Draft, camera: &mut CameraDesc, directive: &CameraDirective, size: [u32; 2], scale: f64) -> Result<()> {
+    let params = &directive.params;
+    match directive.kind.as_str() {
+        "perspective" => {
+            let screen = Screen::read(params, size)?;
+            let fov = params.number_or("fov", 90.0)?;
+            if !(fov > 0.0 && fov < 180.0) {
+                return Err(params.error(format!("fov must be above 0 and below 180 degrees, not {fov}")));
+            }
+            let half_height = (0.5 * fov.to_radians()).tan() * 0.5 * screen.size(1);
+            camera.vertical_fov_degrees = Some(2.0 * half_height.atan().to_degrees());
+            screen.frame(camera, size);
+            let radius = params.number_or("lensradius", 0.0)?;
+            let focus = params.positive_or("focaldistance", 1e6)?;
+            if radius > 0.0 {
+                camera.lens = Some(LensDesc {
+                    radius: Some(radius * scale),
+                    f_number: None,
+                    focal_length: None,
+                    focus_distance: Some(focus * scale),
+                    focus_point: None,
+                    sensor_distance: None,
+                    sensor_height: None,
+                    blades: None,
+                });
+            }
+        }
+        "orthographic" => {
+            let screen = Screen::read(params, size)?;
+            camera.kind = CameraKindDesc::Orthographic;
+            camera.view_height = Some(screen.size(1) * scale);
+            screen.frame(camera, size);
+            if params.number_or("lensradius", 0.0)? > 0.0 {
+                params.ignore("lensradius", "orthographic cameras have no lens");
+            }
+            params.number("focaldistance")?;
+        }
+        "spherical" => {
+            camera.kind = CameraKindDesc::Environment;
+            if params.string("mapping")?.unwrap_or("equalarea") != "equirectangular" {
+                let how = "an equirectangular picture in place of an equal-area one";
+                draft.approximated(&params.place, &params.element, "mapping", how);
+                params.approximate("mapping", how);
+            }
+        }
+        "realistic" => {
+            camera.vertical_fov_degrees = Some(40.0);
+            draft.approximated(&params.place, &params.element, "", "lens systems become a pinhole of 40 degrees");
+            for name in ["lensfile", "aperturediameter", "focusdistance", "aperture"] {
+                params.ignore(name, "lens systems are not known");
+            }
+        }
+        other => return Err(params.error(format!("there is no camera \"{other}\""))),
+    }
+    Ok(())
+}
+
 /// Sets the camera; the result says how the world becomes ours.
 pub fn set_camera(draft: &mut Draft, directive: &CameraDirective, size: [u32; 2], times: Times) -> Result<World> {
     let params = &directive.params;
@@ -112,58 +170,7 @@ pub fn set_camera(draft: &mut Draft, directive: &CameraDirective, size: [u32; 2]
     } else {
         camera.transform = Some(matrix(&rigid[0]));
     }
-    match directive.kind.as_str() {
-        "perspective" => {
-            let screen = Screen::read(params, size)?;
-            let fov = params.number_or("fov", 90.0)?;
-            if !(fov > 0.0 && fov < 180.0) {
-                return Err(params.error(format!("fov must be above 0 and below 180 degrees, not {fov}")));
-            }
-            let half_height = (0.5 * fov.to_radians()).tan() * 0.5 * screen.size(1);
-            camera.vertical_fov_degrees = Some(2.0 * half_height.atan().to_degrees());
-            screen.frame(&mut camera, size);
-            let radius = params.number_or("lensradius", 0.0)?;
-            let focus = params.positive_or("focaldistance", 1e6)?;
-            if radius > 0.0 {
-                camera.lens = Some(LensDesc {
-                    radius: Some(radius * scale),
-                    f_number: None,
-                    focal_length: None,
-                    focus_distance: Some(focus * scale),
-                    focus_point: None,
-                    sensor_distance: None,
-                    sensor_height: None,
-                    blades: None,
-                });
-            }
-        }
-        "orthographic" => {
-            let screen = Screen::read(params, size)?;
-            camera.kind = CameraKindDesc::Orthographic;
-            camera.view_height = Some(screen.size(1) * scale);
-            screen.frame(&mut camera, size);
-            if params.number_or("lensradius", 0.0)? > 0.0 {
-                params.ignore("lensradius", "orthographic cameras have no lens");
-            }
-            params.number("focaldistance")?;
-        }
-        "spherical" => {
-            camera.kind = CameraKindDesc::Environment;
-            if params.string("mapping")?.unwrap_or("equalarea") != "equirectangular" {
-                let how = "an equirectangular picture in place of an equal-area one";
-                draft.approximated(&params.place, &params.element, "mapping", how);
-                params.approximate("mapping", how);
-            }
-        }
-        "realistic" => {
-            camera.vertical_fov_degrees = Some(40.0);
-            draft.approximated(&params.place, &params.element, "", "lens systems become a pinhole of 40 degrees");
-            for name in ["lensfile", "aperturediameter", "focusdistance", "aperture"] {
-                params.ignore(name, "lens systems are not known");
-            }
-        }
-        other => return Err(params.error(format!("there is no camera \"{other}\""))),
-    }
+    set_projection(draft, &mut camera, directive, size, scale)?;
     params.report(draft);
     draft.set_camera(&params.place, camera);
     Ok(world)

@@ -13,7 +13,7 @@ use super::options::{self, Typed};
 use super::params::{Params, Values};
 use super::shapes::Shapes;
 use super::state::{Ctm, Graphics, Look, MAX_DEPTH, Material, Times, World};
-use super::textures::Textures;
+use super::textures::{TextureDirective, Textures};
 use super::tokens::{Lexer, Position, TokenKind};
 use super::transforms::{self, Change};
 use crate::desc::{InstanceDesc, ShapeDesc};
@@ -41,7 +41,7 @@ struct Object {
 }
 
 /// Reads a scene.
-pub struct Reader {
+pub(crate) struct Reader {
     scene: PathBuf,
     folder: PathBuf,
     lexers: Vec<Lexer>,
@@ -126,17 +126,10 @@ impl Reader {
         Ok(params)
     }
 
-    /// Carries out a directive; the result is a file to read next.
-    fn directive(&mut self, lexer: &mut Lexer, at: Position, directive: &str) -> Result<Option<Lexer>> {
-        if let Some(change) = transforms::read(lexer, at, directive)? {
-            match change {
-                Change::Concatenate(map) => self.graphics.concatenate(map),
-                Change::Replace(map) => self.graphics.change(|_| map),
-            }
-            return Ok(None);
-        }
+    /// Carries out a directive that changes the graphics state: attributes, transformations, orientation, colour space.
+    /// False for any other directive.
+    fn change_graphics_state(&mut self, lexer: &mut Lexer, at: Position, directive: &str) -> Result<bool> {
         match directive {
-            "Include" | "Import" => return self.include(lexer, at).map(Some),
             "AttributeBegin" => self.push(lexer, at, |graphics| Open::Attribute(Box::new(graphics.clone())))?,
             "TransformBegin" => self.push(lexer, at, |graphics| Open::Transform(graphics.ctm))?,
             "AttributeEnd" => match self.open.pop() {
@@ -182,6 +175,25 @@ impl Reader {
                 let space = ColorSpace::named(&name);
                 self.graphics.color_space = space.ok_or_else(|| lexer.error(at, format!("there is no colour space \"{name}\"")))?;
             }
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Carries out a directive; the result is a file to read next.
+    fn directive(&mut self, lexer: &mut Lexer, at: Position, directive: &str) -> Result<Option<Lexer>> {
+        if let Some(change) = transforms::read(lexer, at, directive)? {
+            match change {
+                Change::Concatenate(map) => self.graphics.concatenate(map),
+                Change::Replace(map) => self.graphics.change(|_| map),
+            }
+            return Ok(None);
+        }
+        if self.change_graphics_state(lexer, at, directive)? {
+            return Ok(None);
+        }
+        match directive {
+            "Include" | "Import" => return self.include(lexer, at).map(Some),
             "WorldBegin" => self.world_begin(lexer, at)?,
             "WorldEnd" => {}
             "Option" => {
@@ -434,7 +446,8 @@ impl Reader {
             _ => return Err(lexer.error(at, format!("textures are of float or spectrum, not \"{of}\""))),
         };
         let colors = Colors { folder: &self.folder, space: self.graphics.color_space };
-        self.textures.define(&mut self.draft, &name, of_numbers, &kind, &params, &colors)
+        let directive = TextureDirective { name: &name, of_numbers, kind: &kind, params };
+        self.textures.define(&mut self.draft, &directive, &colors)
     }
 
     fn shape(&mut self, lexer: &mut Lexer, at: Position) -> Result<()> {

@@ -23,6 +23,25 @@ pub struct Lights<'a> {
 }
 
 impl Lights<'_> {
+    /// A spot light from one point towards another.
+    fn spot(&self, params: &Params, from: DVec3, to: DVec3) -> Result<LightDesc> {
+        let (outer, delta) = (params.positive_or("coneangle", 30.0)?, params.number_or("conedeltaangle", 5.0)?);
+        let (cutoff, beam) = (outer.min(180.0), (outer - delta).clamp(0.0, outer.min(180.0)));
+        params.approximate("conedeltaangle", "the fall is even with the angle, not smooth with its cosine");
+        let [cos_outer, cos_beam] = [cutoff, beam].map(|angle| angle.to_radians().cos());
+        let whole = 2.0 * std::f64::consts::PI * ((1.0 - cos_beam) + (cos_beam - cos_outer) / 2.0);
+        Ok(LightDesc::Spot(SpotLightDesc {
+            position: from.to_array(),
+            look_at: to.to_array(),
+            intensity: self.emitted(params, "I", whole)?,
+            cutoff_angle_degrees: cutoff,
+            beam_angle_degrees: Some(beam),
+            texture: None,
+            up: None,
+            group: None,
+        }))
+    }
+
     /// Adds a light.
     pub fn add(&self, draft: &mut Draft, kind: &str, params: &Params, ctm: &Ctm) -> Result<()> {
         if ctm.is_moving() {
@@ -43,24 +62,7 @@ impl Lights<'_> {
                 let intensity = self.emitted(params, "I", 4.0 * std::f64::consts::PI)?;
                 LightDesc::Point(PointLightDesc { position: map.translation.to_array(), intensity, group: None })
             }
-            "spot" => {
-                let (from, to) = (point("from", [0.0; 3])?, point("to", [0.0, 0.0, 1.0])?);
-                let (outer, delta) = (params.positive_or("coneangle", 30.0)?, params.number_or("conedeltaangle", 5.0)?);
-                let (cutoff, beam) = (outer.min(180.0), (outer - delta).clamp(0.0, outer.min(180.0)));
-                params.approximate("conedeltaangle", "the fall is even with the angle, not smooth with its cosine");
-                let [cos_outer, cos_beam] = [cutoff, beam].map(|angle| angle.to_radians().cos());
-                let whole = 2.0 * std::f64::consts::PI * ((1.0 - cos_beam) + (cos_beam - cos_outer) / 2.0);
-                LightDesc::Spot(SpotLightDesc {
-                    position: from.to_array(),
-                    look_at: to.to_array(),
-                    intensity: self.emitted(params, "I", whole)?,
-                    cutoff_angle_degrees: cutoff,
-                    beam_angle_degrees: Some(beam),
-                    texture: None,
-                    up: None,
-                    group: None,
-                })
-            }
+            "spot" => self.spot(params, point("from", [0.0; 3])?, point("to", [0.0, 0.0, 1.0])?)?,
             "distant" => {
                 let direction = point("to", [0.0, 0.0, 1.0])? - point("from", [0.0; 3])?;
                 let mut scale = params.number_or("scale", 1.0)? * self.exposure;

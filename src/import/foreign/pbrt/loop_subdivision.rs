@@ -1,5 +1,5 @@
-//! Charles Loop's subdivision of triangle meshes ("Smooth Subdivision Surfaces Based on Triangles"), with vertices moved to the limit surface
-//! and its normals at the end.
+//! Charles Loop's subdivision of triangle meshes ("Smooth Subdivision Surfaces Based on Triangles"), with vertices
+//! moved to the limit surface and its normals at the end.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};

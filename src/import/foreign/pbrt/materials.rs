@@ -42,20 +42,7 @@ impl Materials<'_> {
                 self.plastic(params, 1.5)?
             }
             "conductor" => self.conductor(params, "", 0.0, 1.0)?,
-            "coatedconductor" => {
-                let (ior, _) = self.colors.index(params, "interface.eta", 1.5)?;
-                let base = self.conductor(params, "conductor.", 0.0, ior)?;
-                let base = self.draft.add_material(&format!("{name}_base"), &params.place, base);
-                let alpha = self.alpha(params, "interface.", 0.0)?;
-                self.note_layers(params);
-                MaterialDesc::Coated {
-                    base,
-                    ior: RangedDesc::Constant(ior.clamp(1.0, 10.0)),
-                    roughness: None,
-                    alpha,
-                    tint: ColorDesc::Grey(1.0),
-                }
-            }
+            "coatedconductor" => self.coated_conductor(name, params)?,
             "dielectric" => {
                 let (ior, abbe) = self.colors.index(params, "eta", 1.5)?;
                 MaterialDesc::Dielectric(Box::new(DielectricDesc {
@@ -101,6 +88,16 @@ impl Materials<'_> {
             }
             other => return Err(params.error(format!("there is no material \"{other}\""))),
         })
+    }
+
+    fn coated_conductor(&mut self, name: &str, params: &Params) -> Result<MaterialDesc> {
+        let (ior, _) = self.colors.index(params, "interface.eta", 1.5)?;
+        let base = self.conductor(params, "conductor.", 0.0, ior)?;
+        let base = self.draft.add_material(&format!("{name}_base"), &params.place, base);
+        let alpha = self.alpha(params, "interface.", 0.0)?;
+        self.note_layers(params);
+        let (ior, tint) = (RangedDesc::Constant(ior.clamp(1.0, 10.0)), ColorDesc::Grey(1.0));
+        Ok(MaterialDesc::Coated { base, ior, roughness: None, alpha, tint })
     }
 
     fn color(&mut self, params: &Params, name: &str, default: f32) -> Result<ColorDesc> {

@@ -43,7 +43,7 @@ impl Ctm {
 
 /// What a shape looks like.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Look {
+pub(crate) enum Look {
     /// A material of the scene.
     Material(Material),
     /// Nothing: a boundary of media only.
@@ -52,7 +52,7 @@ pub enum Look {
 
 /// A material of the scene and what it asks of shapes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Material {
+pub(crate) struct Material {
     /// Its name in the scene.
     pub name: String,
     /// Whether it needs uv.
@@ -110,10 +110,10 @@ impl Graphics {
 
 /// How the world is turned into ours.
 ///
-/// pbrt's camera space is left-handed (x right, y up, z forward), ours right-handed (z backward). Where the camera's transform has no mirror in
-/// it, the world is left-handed too and all of it is mirrored: pictures stay the same.
+/// pbrt's camera space is left-handed (x right, y up, z forward), ours right-handed (z backward). Where the camera's
+/// transform has no mirror in it, the world is left-handed too and all of it is mirrored: pictures stay the same.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct World {
+pub(crate) struct World {
     /// Whether x is negated.
     pub mirrored: bool,
     /// When `Ctm`'s two transforms hold.

@@ -13,7 +13,7 @@ use crate::import::{ImageData, Samples, read_image};
 
 /// A texture, or a colour or number in its place.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Texture {
+pub(crate) enum Texture {
     /// The same everywhere.
     Constant([f32; 3]),
     /// A texture of the scene by its name, times a factor.
@@ -80,6 +80,18 @@ impl Texture {
     }
 }
 
+/// A `Texture` directive.
+pub struct TextureDirective<'a> {
+    /// The texture's name.
+    pub name: &'a str,
+    /// Whether its values are numbers, not colours.
+    pub of_numbers: bool,
+    /// The class, such as `imagemap`.
+    pub kind: &'a str,
+    /// The parameters.
+    pub params: Params,
+}
+
 /// The textures of a file by name; those of numbers and those of colours have names of their own.
 #[derive(Clone, Debug, Default)]
 pub struct Textures {
@@ -120,7 +132,8 @@ impl Textures {
     }
 
     /// Reads a `Texture` directive.
-    pub fn define(&mut self, draft: &mut Draft, name: &str, of_numbers: bool, kind: &str, params: &Params, colors: &Colors) -> Result<()> {
+    pub fn define(&mut self, draft: &mut Draft, directive: &TextureDirective, colors: &Colors) -> Result<()> {
+        let &TextureDirective { name, of_numbers, kind, ref params } = directive;
         let read = |key: &str, default: f32| -> Result<Texture> {
             let found = self.get(params, colors, key, Meaning::Number, of_numbers)?;
             Ok(found.unwrap_or(Texture::grey(default)))

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::import::Draft;
 
 /// The inputs of one material.
-pub struct Inputs<'b> {
+pub(crate) struct Inputs<'b> {
     textures: &'b mut TextureSet,
     sets: Vec<u32>,
     clamped: bool,

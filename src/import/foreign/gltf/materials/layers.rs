@@ -149,6 +149,11 @@ impl Builder<'_, '_> {
             }
             return Ok(MaterialDesc::Principled(Box::new(desc)));
         }
+        Ok(self.solid_glass(desc, volume.as_ref(), abbe))
+    }
+
+    /// Glass that is not thin: a dielectric if it absorbs or disperses and is glass all over.
+    fn solid_glass(&mut self, mut desc: PrincipledDesc, volume: Option<&ext::Volume>, abbe: Option<f32>) -> MaterialDesc {
         // Glass that is not thin has an index that bends light.
         let ior = match desc.ior {
             Some(RangedDesc::Constant(ior)) => ior.max(1.05),
@@ -156,15 +161,15 @@ impl Builder<'_, '_> {
         };
         desc.ior = Some(RangedDesc::Constant(ior));
         desc.specular = None;
-        let absorption = volume.as_ref().and_then(absorption);
+        let absorption = volume.and_then(absorption);
         if absorption.is_none() && abbe.is_none() {
             self.mapped(VOLUME);
-            return Ok(MaterialDesc::Principled(Box::new(desc)));
+            return MaterialDesc::Principled(Box::new(desc));
         }
         let is_glass = matches!((&desc.transmission, &desc.metallic), (ScalarDesc::Constant(1.0), ScalarDesc::Constant(0.0)));
         if !is_glass {
             self.approximated(VOLUME, "nothing is absorbed within what is glass only in part");
-            return Ok(MaterialDesc::Principled(Box::new(desc)));
+            return MaterialDesc::Principled(Box::new(desc));
         }
         let is_white = matches!(desc.base_color, ColorDesc::Rgb([1.0, 1.0, 1.0]));
         if is_white {
@@ -180,7 +185,7 @@ impl Builder<'_, '_> {
             ScalarDesc::Constant(roughness) => Some(RoughnessDesc::Isotropic(roughness)),
             ScalarDesc::Texture { texture } => Some(RoughnessDesc::Texture { texture }),
         };
-        Ok(MaterialDesc::Dielectric(Box::new(DielectricDesc {
+        MaterialDesc::Dielectric(Box::new(DielectricDesc {
             ior: RangedDesc::Constant(ior),
             roughness,
             alpha: None,
@@ -191,7 +196,7 @@ impl Builder<'_, '_> {
             priority: None,
             absorption,
             abbe: abbe.map(|abbe| abbe.clamp(1.0, 1000.0)),
-        })))
+        }))
     }
 
     /// Adds the material with its clear coat; the result is its name.

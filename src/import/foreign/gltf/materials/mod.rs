@@ -24,7 +24,7 @@ const UNLIT: &str = "KHR_materials_unlit";
 
 /// What a shape gets from a material.
 #[derive(Clone, Debug, Default)]
-pub struct Look {
+pub(crate) struct Look {
     pub material: Option<String>,
     pub opacity: Option<OpacityDesc>,
     pub emission: Option<EmissionDesc>,

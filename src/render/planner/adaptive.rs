@@ -1,22 +1,19 @@
 //! Adaptive sampling: samples go where the picture's relative squared error needs them, until that is below a target.
 //!
-//! Blocks of 4 x 4 pixels get samples in groups of eight, a stretch of each pixel's own sequence. The means of a pixel's groups tell their
-//! variance, which is that of well-spread samples (single ones would tell of independent samples and overestimate it). With `v` a block's
-//! variance of a group over `color² + 0.01` and `n` its groups, the picture's error is the mean of `v / n`, and for a given cost it is least with
-//! `n` in proportion to `sqrt(v)` (Neyman).
+//! Blocks of 4 x 4 pixels get samples in groups of eight, a stretch of each pixel's own sequence. The means of a
+//! pixel's groups tell their variance, which is that of well-spread samples (single ones would tell of independent
+//! samples and overestimate it). With `v` a block's variance of a group over `color² + 0.01` and `n` its groups, the
+//! picture's error is the mean of `v / n`, and for a given cost it is least with `n` in proportion to `sqrt(v)`
+//! (Neyman).
 //!
-//! A block that met a bright path by luck must not get more samples for it, for that would take weight from the path: the picture would be
-//! too dark where such paths are rare. So what a block gets depends on the blocks around it alone. In the first stage its samples
-//! are thus independent of their number; later ones depend on it only through how precisely its neighbours know their variance.
+//! A block that met a bright path by luck must not get more samples for it, for that would take weight from the path:
+//! the picture would be too dark where such paths are rare. So what a block gets depends on the blocks around it alone.
+//! In the first stage its samples are thus independent of their number; later ones depend on it only through how
+//! precisely its neighbours know their variance.
 
-use std::time::Instant;
-
-use rayon::prelude::*;
-
-use super::run::{Run, next_pass};
-use super::{BLOCK_SIZE, Batch, Job, Progress, RenderState, Stats, TILE_SIZE, radiance};
 use crate::film::{Crop, Film, FilmTile};
-use crate::integrator::RayCounts;
+use crate::render::tile_renderer::{TileRenderer, TileWorkspace};
+use crate::render::{BLOCK_SIZE, Progress, TILE_SIZE};
 
 /// Samples of a group.
 const GROUP: u32 = 8;
@@ -30,7 +27,8 @@ const GROWTH: u32 = 8;
 /// Blocks this far away tell how much a block needs. Nearer ones alone would tell of chance.
 const REACH: u32 = 2;
 
-/// How much of what a block seems to need is what blocks need on average: rare bright paths are still to be met where there was none yet.
+/// How much of what a block seems to need is what blocks need on average: rare bright paths are still to be met where
+/// there was none yet.
 const EVEN_SHARE: f64 = 0.15;
 
 /// By this factor one stage may lower the error.
@@ -48,9 +46,10 @@ const BLOCK_PIXELS: u32 = BLOCK_SIZE * BLOCK_SIZE;
 /// Pairs of a block and a group in a batch.
 const BATCH_GROUPS: usize = (TILE_SIZE * TILE_SIZE / (BLOCK_PIXELS * GROUP)) as usize;
 
-/// The blocks of the pixels whose samples reach the picture, on the full picture's grid.
+/// Decides how many groups of samples each block of pixels gets. Blocks are those whose samples reach the picture, on
+/// the full picture's grid.
 #[derive(Clone, Debug)]
-pub(super) struct Blocks {
+pub(in crate::render) struct AdaptivePlanner {
     /// First column and row.
     first: [u32; 2],
     /// Columns and rows.
@@ -59,9 +58,13 @@ pub(super) struct Blocks {
     done: Vec<u32>,
     /// Groups that each block is to have.
     wanted: Vec<u32>,
+    /// Of the picture's relative squared error.
+    target: f64,
+    /// The error by the samples so far, if it was estimated since the last pass.
+    error: Option<f64>,
 }
 
-/// What the picture's samples say of it.
+/// An estimate from the picture's samples.
 struct Estimate {
     /// Each block's variance of a group, relative and mean over its pixels.
     variances: Vec<f64>,
@@ -71,14 +74,14 @@ struct Estimate {
     deviation: f64,
 }
 
-impl Blocks {
-    /// All of them, to get the first samples.
-    pub fn new(crop: Crop) -> Self {
+impl AdaptivePlanner {
+    /// Of a render that begins; `crop` are the pixels whose samples reach the picture.
+    pub fn new(crop: Crop, target: f64) -> Self {
         let first = [crop.x / BLOCK_SIZE, crop.y / BLOCK_SIZE];
         let last = [(crop.x + crop.width - 1) / BLOCK_SIZE, (crop.y + crop.height - 1) / BLOCK_SIZE];
         let count = [last[0] - first[0] + 1, last[1] - first[1] + 1];
         let blocks = count[0] as usize * count[1] as usize;
-        Self { first, count, done: vec![0; blocks], wanted: vec![PILOT; blocks] }
+        Self { first, count, done: vec![0; blocks], wanted: vec![PILOT; blocks], target, error: None }
     }
 
     /// As bytes: what each block has and is to have, little endian.
@@ -167,8 +170,9 @@ impl Blocks {
         Estimate { variances, error, deviation: (spread + actual).sqrt() }
     }
 
-    /// Sets what is wanted so that the error becomes `goal`, as far as one stage may go; the most groups of a block are `most`.
-    fn plan(&mut self, variances: &[f64], goal: f64, most: u32) {
+    /// Sets what is wanted so that the error becomes `goal`, as far as one stage may go; the most groups of a block are
+    /// `most`.
+    fn distribute(&mut self, variances: &[f64], goal: f64, most: u32) {
         let roots: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
         let everywhere = (variances.iter().sum::<f64>() / variances.len() as f64).sqrt();
         let share = |i: usize| (1.0 - EVEN_SHARE) * self.around(i, &roots) + EVEN_SHARE * everywhere;
@@ -235,7 +239,7 @@ struct PixelStatistics {
 }
 
 impl PixelStatistics {
-    fn new(blocks: &Blocks, film: &Film) -> Self {
+    fn new(blocks: &AdaptivePlanner, film: &Film) -> Self {
         let area = film.sampled();
         let mut all = Self { area, pixels: vec![PixelStatistic::default(); area.area() as usize] };
         for tile in film.tiles() {
@@ -268,123 +272,85 @@ impl PixelStatistics {
     }
 }
 
-/// Renders until the relative squared error is below `target`, or a pixel would get more samples than the settings allow.
-pub(super) fn render(run: &mut Run, state: &mut RenderState, target: f64) -> Stats {
-    let mut stats = Stats::default();
-    let pixels = state.film.sampled().area();
-    let most = run.settings.spp.div_ceil(GROUP).max(PILOT);
-    run.progress.start(PILOT * GROUP, pixels);
-    tell_of_earlier_runs(run, state, target);
-    loop {
-        let finished = render_stage(run, state, &mut stats);
-        if state.torn {
-            break;
+impl AdaptivePlanner {
+    /// Reports what is planned at first, and what is there from an earlier run.
+    pub fn start(&self, film: &Film, progress: &dyn Progress) {
+        progress.start(PILOT * GROUP, film.sampled().area());
+        let [done, wanted] = self.samples(film);
+        if done > 0 {
+            progress.resumed(done);
+            if self.has_pilot() {
+                progress.plan(wanted, self.estimate(film).error, self.target);
+            }
         }
-        let RenderState { film, blocks: Some(blocks), .. } = state else { return stats };
-        let estimate = blocks.estimate(film);
-        stats.estimated_error = Some(estimate.error);
-        let reached = estimate.error + CONFIDENCE * estimate.deviation <= target;
-        if reached || !finished || blocks.done.iter().all(|&n| n >= most) {
-            state.complete = finished;
-            break;
-        }
-        // What few samples tell of the deviation is no reason to go far: the next estimate knows more.
-        let deviation = (estimate.deviation / estimate.error).min(0.1);
-        let goal = (0.97 * target / (1.0 + CONFIDENCE * deviation)).max(estimate.error / STEP);
-        blocks.plan(&estimate.variances, goal, most);
-        let [mut done, mut wanted] = blocks.samples(film);
-        if wanted < done + done / 50 {
-            blocks.add_to_all(most);
-            [done, wanted] = blocks.samples(film);
-        }
-        debug_assert!(wanted >= done, "samples are never taken back");
-        run.progress.plan(wanted, estimate.error, target);
     }
-    stats.samples = state.film.samples();
-    stats
-}
 
-/// What was done before this run is progress, too.
-fn tell_of_earlier_runs(run: &Run, state: &RenderState, target: f64) {
-    let Some(blocks) = state.blocks.as_ref().filter(|_| state.done > 0) else { return };
-    let [done, wanted] = blocks.samples(&state.film);
-    run.progress.resumed(done);
-    if blocks.done.iter().all(|&n| n >= PILOT) {
-        run.progress.plan(wanted, blocks.estimate(&state.film).error, target);
+    /// Whether every block has the groups without which nothing is known of the error.
+    pub fn has_pilot(&self) -> bool {
+        self.done.iter().all(|&n| n >= PILOT)
     }
-}
 
-/// Renders what is wanted, in passes that end soon when asked to; says whether all of it is there.
-fn render_stage(run: &mut Run, state: &mut RenderState, stats: &mut Stats) -> bool {
-    let pixels = state.film.sampled().area();
-    let mut step = 1;
-    loop {
-        let RenderState { film, blocks: Some(blocks), rays, .. } = state else { return true };
-        if blocks.done.iter().zip(&blocks.wanted).all(|(done, wanted)| done >= wanted) {
-            return true;
+    /// Plans the next stage if the last one is done; `false` if none follows: the error is below the target, or a pixel
+    /// would get more samples than `spp`.
+    pub fn plan(&mut self, film: &Film, spp: u32, progress: &dyn Progress) -> bool {
+        let most = spp.div_ceil(GROUP).max(PILOT);
+        while self.done.iter().zip(&self.wanted).all(|(done, wanted)| done >= wanted) {
+            let estimate = self.estimate(film);
+            self.error = Some(estimate.error);
+            let is_reached = estimate.error + CONFIDENCE * estimate.deviation <= self.target;
+            if is_reached || self.done.iter().all(|&n| n >= most) {
+                return false;
+            }
+            // The deviation by few samples is uncertain, and no reason to go far: the next estimate is better.
+            let deviation = (estimate.deviation / estimate.error).min(0.1);
+            let goal = (0.97 * self.target / (1.0 + CONFIDENCE * deviation)).max(estimate.error / STEP);
+            self.distribute(&estimate.variances, goal, most);
+            let [mut done, mut wanted] = self.samples(film);
+            if wanted < done + done / 50 {
+                self.add_to_all(most);
+                [done, wanted] = self.samples(film);
+            }
+            debug_assert!(wanted >= done, "samples are never taken back");
+            progress.plan(wanted, estimate.error, self.target);
         }
-        // Fewer groups than the pilot's would say nothing of the error.
-        let has_pilot = blocks.done.iter().all(|&n| n >= PILOT);
-        if has_pilot && run.limits.end(stats, true) {
-            return false;
+        true
+    }
+
+    /// Blocks got `groups` more groups, as far as they lacked them; the result is the mean number of samples of a
+    /// pixel.
+    pub fn complete_pass(&mut self, film: &Film, groups: u32) -> u32 {
+        self.error = None;
+        for (done, wanted) in self.done.iter_mut().zip(&self.wanted) {
+            *done = (*done + groups).min(*wanted);
         }
-        let start = Instant::now();
-        rays.add(&render_pass(run.job, run.pool, film, blocks, step, run.progress));
-        if run.has_given_up(stats) {
-            state.torn = true;
-            return false;
-        }
-        for (done, wanted) in blocks.done.iter_mut().zip(&blocks.wanted) {
-            *done = (*done + step).min(*wanted);
-        }
-        state.done = (blocks.samples(film)[0] as f64 / pixels as f64).round() as u32;
-        let elapsed = start.elapsed();
-        if stats.first_pass_seconds == 0.0 {
-            stats.first_pass_seconds = run.limits.elapsed().as_secs_f64();
-            run.has_picture();
-        }
-        let next = next_pass(step, elapsed, run.limits.remaining());
-        run.pass_done(state, elapsed.mul_f64(f64::from(next) / f64::from(step)));
-        step = next;
+        (self.samples(film)[0] as f64 / film.sampled().area() as f64).round() as u32
+    }
+
+    /// The picture's relative squared error.
+    pub fn estimated_error(&self, film: &Film) -> f64 {
+        self.error.unwrap_or_else(|| self.estimate(film).error)
+    }
+
+    /// Renders at most `most` more groups of every block of a tile that lacks them; the result is how many samples are
+    /// in the picture.
+    pub fn render_tile(&self, renderer: &TileRenderer, tile: &mut FilmTile, most: u32, workspace: &mut TileWorkspace) -> u64 {
+        let missing = |index: usize| self.done[index]..(self.done[index] + most).min(self.wanted[index]);
+        let of_block = |index: usize| missing(index).map(move |group| (self.place(index), group));
+        let groups: Vec<([u32; 2], u32)> = self.of_tile(tile).flat_map(of_block).collect();
+        groups.chunks(BATCH_GROUPS).map(|groups| render_groups(renderer, tile, groups, workspace)).sum()
     }
 }
 
-/// Renders at most `step` more groups of every block that wants them.
-fn render_pass(job: &Job, pool: &rayon::ThreadPool, film: &mut Film, blocks: &Blocks, step: u32, progress: &dyn Progress) -> RayCounts {
-    pool.install(|| {
-        film.tiles_mut()
-            .par_iter_mut()
-            .with_max_len(1)
-            .map_init(Batch::new, |batch, tile| {
-                let missing = |index: usize| blocks.done[index]..(blocks.done[index] + step).min(blocks.wanted[index]);
-                let of_block = |index: usize| missing(index).map(move |group| (index, group));
-                let groups: Vec<([u32; 2], u32)> =
-                    blocks.of_tile(tile).flat_map(of_block).map(|(index, group)| (blocks.place(index), group)).collect();
-                let mut counts = RayCounts::default();
-                let mut samples = 0;
-                for groups in groups.chunks(BATCH_GROUPS) {
-                    samples += render_groups(job, tile, groups, batch, &mut counts);
-                }
-                progress.tile_done(samples);
-                counts
-            })
-            .reduce(RayCounts::default, |mut a, b| {
-                a.add(&b);
-                a
-            })
-    })
-}
-
-/// Renders a group of samples of each of these blocks; says how many samples are in the picture.
-fn render_groups(job: &Job, tile: &mut FilmTile, groups: &[([u32; 2], u32)], batch: &mut Batch, counts: &mut RayCounts) -> u64 {
+/// Renders a group of samples of each of these blocks; the result is how many samples are in the picture.
+fn render_groups(renderer: &TileRenderer, tile: &mut FilmTile, groups: &[([u32; 2], u32)], workspace: &mut TileWorkspace) -> u64 {
     let pixel = |[x, y]: [u32; 2], within: u32| [x * BLOCK_SIZE + within % BLOCK_SIZE, y * BLOCK_SIZE + within / BLOCK_SIZE];
     // The pixels of a block side by side, for their rays are alike.
     let of_group = |&(block, group): &([u32; 2], u32)| {
         let of_sample = move |sample: u32| (0..BLOCK_PIXELS).map(move |within| (pixel(block, within), sample));
         (group * GROUP..(group + 1) * GROUP).flat_map(of_sample)
     };
-    job.render_samples(groups.iter().flat_map(of_group), batch, counts);
-    if job.world.has_given_up() {
+    renderer.render_samples(groups.iter().flat_map(of_group), None, workspace);
+    if renderer.world.has_given_up() {
         return 0;
     }
     let active = tile.active();
@@ -399,19 +365,19 @@ fn render_groups(job: &Job, tile: &mut FilmTile, groups: &[([u32; 2], u32)], bat
             let (mut sum, mut kept) = ([0.0; 3], 0.0);
             for i in 0..GROUP {
                 let slot = g * (BLOCK_PIXELS * GROUP) as usize + (i * BLOCK_PIXELS + within) as usize;
-                if job.add(tile, (index, group * GROUP + i), slot, batch) {
-                    let value = radiance(&batch.out.pixels[slot]);
+                if renderer.add(tile, index, group * GROUP + i, slot, workspace) {
+                    let value = workspace.radiance(slot);
                     sum = [0, 1, 2].map(|k| sum[k] + value[k]);
                     kept += 1.0;
                 }
             }
             if kept > 0.0 {
-                tile.add_group(index, sum.map(|s| s / kept));
+                tile.add_moments(index, sum.map(|s| s / kept));
             }
             count += u64::from(GROUP);
         }
         let corner = block_area(tile, block);
-        tile.flush(tile.index(corner.x, corner.y), &mut batch.splats);
+        tile.flush(tile.index(corner.x, corner.y), &mut workspace.splats);
     }
     count
 }

@@ -1,11 +1,12 @@
 //! The parts of a sample's radiance: by how light left the first surface towards the camera, and by the group of the light that gave it.
 //!
-//! Light that is scattered by several lobes at once is shared out between diffuse and specular by what the lobes have of the BSDF's value for its
-//! direction. Light that was scattered once is direct, whether light sampling found it or the path met the light.
+//! Light that is scattered by several lobes at once is shared out between diffuse and specular by what the lobes have
+//! of the BSDF's value for its direction. Light that was scattered once is direct, whether light sampling found it or
+//! the path met the light.
 
 use crate::bsdf::{Bsdf, BsdfSample};
 use crate::color::Rgb;
-use crate::film::{Part, PartNeeds};
+use crate::film::{LightAov, LightAovRequest};
 use crate::id::{LightGroupId, LightId};
 use crate::math::Vec3;
 use crate::scene::Scene;
@@ -60,16 +61,16 @@ pub(super) fn group_of(scene: &Scene, light: LightId) -> usize {
 }
 
 /// Adds light to the parts of its sample by the course it took.
-pub(super) fn add_by_scattering(needs: PartNeeds, parts: &mut [Rgb], light: Rgb, course: LightEvent) {
+pub(super) fn add_by_scattering(needs: LightAovRequest, light_aovs: &mut [Rgb], light: Rgb, course: LightEvent) {
     if !needs.by_scattering {
         return;
     }
-    let mut add = |part: Part, light: Rgb| parts[part as usize] += light;
+    let mut add = |part: LightAov, light: Rgb| light_aovs[part as usize] += light;
     let (way, [diffuse, specular, transmission]) = match course {
-        LightEvent::Emission => return add(Part::Emission, light),
-        LightEvent::Environment => return add(Part::Background, light),
-        LightEvent::Direct(way) => (way, [Part::DiffuseDirect, Part::SpecularDirect, Part::TransmissionDirect]),
-        LightEvent::Indirect(way) => (way, [Part::DiffuseIndirect, Part::SpecularIndirect, Part::TransmissionIndirect]),
+        LightEvent::Emission => return add(LightAov::Emission, light),
+        LightEvent::Environment => return add(LightAov::Background, light),
+        LightEvent::Direct(way) => (way, [LightAov::DiffuseDirect, LightAov::SpecularDirect, LightAov::TransmissionDirect]),
+        LightEvent::Indirect(way) => (way, [LightAov::DiffuseIndirect, LightAov::SpecularIndirect, LightAov::TransmissionIndirect]),
     };
     match way {
         LobeWeights::Transmitted => add(transmission, light),
@@ -82,14 +83,14 @@ pub(super) fn add_by_scattering(needs: PartNeeds, parts: &mut [Rgb], light: Rgb,
 }
 
 /// Adds light to the parts of its sample by the group of the light that gave it.
-pub(super) fn add_by_group(needs: PartNeeds, parts: &mut [Rgb], light: Rgb, group: usize) {
+pub(super) fn add_by_group(needs: LightAovRequest, light_aovs: &mut [Rgb], light: Rgb, group: usize) {
     if needs.light_groups > 0 {
-        parts[needs.first_group() + group] += light;
+        light_aovs[needs.first_group() + group] += light;
     }
 }
 
 /// Adds all light of a sample whose course and source are not told apart.
-pub(super) fn add_undivided(needs: PartNeeds, parts: &mut [Rgb], light: Rgb) {
-    add_by_scattering(needs, parts, light, LightEvent::Emission);
-    add_by_group(needs, parts, light, needs.light_groups.saturating_sub(1) as usize);
+pub(super) fn add_emission(needs: LightAovRequest, light_aovs: &mut [Rgb], light: Rgb) {
+    add_by_scattering(needs, light_aovs, light, LightEvent::Emission);
+    add_by_group(needs, light_aovs, light, needs.light_groups.saturating_sub(1) as usize);
 }

@@ -1,0 +1,91 @@
+//! A bounding volume hierarchy that whole packets of rays traverse together, in `f32`: for scenes of few primitives, where most rays of a
+//! packet meet the same boxes whatever their directions.
+
+mod hierarchy;
+mod lanes;
+mod primitives;
+#[cfg(test)]
+mod tests;
+mod traverse;
+
+use super::bvh::Bvh;
+use super::inspect::Inspect;
+use super::tree::TwoLevel;
+use super::{Accelerator, BvhOptions, Coherence, HitRows};
+use crate::geometry::{Geometry, Hit, Shape};
+use crate::math::rows::BATCH;
+use crate::math::{Aabb, Ray, RayRows};
+use hierarchy::Hierarchy;
+
+/// Up to so many polygons and analytic shapes packets are faster than Embree (`docs/performance.md`).
+const FEW: usize = 40;
+
+/// Traces batches in packets, and single rays as the BVH does.
+///
+/// An answer of a batch depends on its ray alone, and is the same on every machine. Edges are widened by a bound of the rounding errors: no
+/// ray slips between triangles that share an edge or a corner.
+pub struct PacketBvh<'g> {
+    single: TwoLevel<'g, Bvh>,
+    /// `None` where something moves, is instanced or has holes: rays of batches are traced one by one then.
+    packets: Option<Hierarchy<'g>>,
+}
+
+impl<'g> PacketBvh<'g> {
+    /// Builds both forms with `threads` threads (0: all).
+    pub fn new(geometry: &'g Geometry, threads: usize) -> Self {
+        let packets = is_static(geometry).then(|| Hierarchy::new(geometry));
+        Self { single: TwoLevel::new(geometry, &BvhOptions::default(), threads), packets: packets.flatten() }
+    }
+
+    /// Whether packets are faster than Embree for `geometry`.
+    pub fn suits(geometry: &Geometry) -> bool {
+        // Two triangles may make one polygon.
+        let count: usize = geometry.world.iter().map(|&id| geometry.shape(id).prim_count()).sum();
+        count <= 2 * FEW && is_static(geometry) && Hierarchy::new(geometry).is_some_and(|packets| packets.len() <= FEW)
+    }
+}
+
+/// Whether all shapes are in the world, at rest, and without holes.
+fn is_static(geometry: &Geometry) -> bool {
+    let is_at_rest = |shape: &Shape| !matches!(shape, Shape::Mesh(mesh) if mesh.is_deforming());
+    geometry.instances.is_empty() && geometry.cutouts.is_empty() && geometry.shapes.iter().all(is_at_rest)
+}
+
+impl Accelerator for PacketBvh<'_> {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.single.intersect(ray)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.single.occluded(ray)
+    }
+
+    fn intersect_rows(&self, rays: &RayRows, count: usize, hits: &mut HitRows, coherence: Coherence) {
+        let Some(packets) = &self.packets else { return self.single.intersect_rows(rays, count, hits, coherence) };
+        packets.intersect(rays, count.min(BATCH), hits, |ray| self.single.intersect(ray));
+    }
+
+    fn occluded_rows(&self, rays: &RayRows, count: usize, occluded: &mut [bool; BATCH], coherence: Coherence) {
+        let Some(packets) = &self.packets else { return self.single.occluded_rows(rays, count, occluded, coherence) };
+        packets.occluded(rays, count.min(BATCH), occluded, |ray| self.single.occluded(ray));
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.single.bounds()
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.single.memory_bytes() + self.packets.as_ref().map_or(0, Hierarchy::memory_bytes)
+    }
+
+    fn description(&self) -> String {
+        match &self.packets {
+            Some(_) => "BVH, packets of rays".into(),
+            None => self.single.description(),
+        }
+    }
+
+    fn inspect(&self) -> Option<&dyn Inspect> {
+        self.single.inspect()
+    }
+}

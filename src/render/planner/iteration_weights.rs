@@ -1,0 +1,171 @@
+//! How much the samples of each iteration of a guided render count: by the inverse of their variance.
+//!
+//! An iteration that met a bright path by luck has a larger variance for it; if that took weight from the path, the
+//! picture would be too dark. So the weights of a tile's samples depend on the other tiles alone.
+
+use crate::bytes::{ByteReader, ByteWriter};
+use crate::film::{Film, FilmTile};
+use crate::render::BLOCK_SIZE;
+
+/// What relative variances are related to beside the square of the colour.
+const FLOOR: f64 = 0.01;
+
+/// By this factor weights may change from one iteration to the next.
+const MAX_CHANGE: f64 = 32.0;
+
+/// Variance of a sample, by channel, mean over the pixels of a block.
+type BlockVariances = Vec<[f64; 3]>;
+
+/// The noise of an iteration and its cost.
+#[derive(Clone, Debug)]
+struct IterationStatistics {
+    /// By tile.
+    variances: Vec<BlockVariances>,
+    /// Rays of a sample.
+    rays: f64,
+}
+
+/// The weights of the samples of the last iteration.
+#[derive(Clone, Debug)]
+pub(super) struct IterationWeights {
+    /// By tile.
+    factors: Vec<f64>,
+    first: Option<IterationStatistics>,
+    last: Option<IterationStatistics>,
+}
+
+/// Blocks of a tile that reach the picture, each with its pixels' indices.
+fn blocks(tile: &FilmTile) -> impl Iterator<Item = Vec<usize>> + '_ {
+    let area = tile.active();
+    let step = BLOCK_SIZE as usize;
+    let (rows, columns) = (area.y..area.y + area.height, area.x..area.x + area.width);
+    rows.step_by(step).flat_map(move |y| {
+        columns.clone().step_by(step).map(move |x| {
+            let rows = y..(y + BLOCK_SIZE).min(area.y + area.height);
+            let columns = x..(x + BLOCK_SIZE).min(area.x + area.width);
+            rows.flat_map(|y| columns.clone().map(move |x| (x, y))).map(|(x, y)| tile.index(x, y)).collect()
+        })
+    })
+}
+
+/// Variance of a sample by block.
+fn block_variances(tile: &FilmTile, samples: u32) -> BlockVariances {
+    let of_block = |pixels: Vec<usize>| {
+        let scale = f64::from(samples) / pixels.len() as f64;
+        let mut sum = [0.0; 3];
+        for (_, variance) in pixels.iter().filter_map(|&pixel| tile.group_statistics(pixel)) {
+            sum = [0, 1, 2].map(|k| sum[k] + scale * variance[k]);
+        }
+        sum
+    };
+    blocks(tile).map(of_block).collect()
+}
+
+/// Mean colour by block.
+fn block_means(tile: &FilmTile) -> Vec<[f64; 3]> {
+    let of_block = |pixels: Vec<usize>| {
+        let mut sum = [0.0; 3];
+        for mean in pixels.iter().map(|&pixel| tile.mean(pixel)) {
+            sum = [0, 1, 2].map(|k| sum[k] + mean[k] / pixels.len() as f64);
+        }
+        sum
+    };
+    blocks(tile).map(of_block).collect()
+}
+
+/// Mean colour by block of the samples of two tiles, so that luck in one iteration does not change the ratios of
+/// variances.
+fn common_means(a: &FilmTile, b: &FilmTile) -> Vec<[f64; 3]> {
+    let both = |(a, b): ([f64; 3], [f64; 3])| [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]));
+    block_means(a).into_iter().zip(block_means(b)).map(both).collect()
+}
+
+/// Sum of the blocks' variances over the squares of their colours.
+fn relative(variances: &BlockVariances, colors: &[[f64; 3]]) -> f64 {
+    let of_block = |(v, c): (&[f64; 3], &[f64; 3])| (0..3).map(|k| v[k] / (c[k] * c[k] + FLOOR)).sum::<f64>();
+    variances.iter().zip(colors).map(of_block).sum()
+}
+
+/// `a / b`, where both are known.
+fn ratio(a: f64, b: f64) -> f64 {
+    if a > 0.0 && b > 0.0 && a < f64::INFINITY && b < f64::INFINITY { a / b } else { 1.0 }
+}
+
+/// Mean of all channels of all blocks.
+pub(super) fn mean(film: &Film) -> f64 {
+    let of_tile = |tile: &FilmTile| {
+        let means = block_means(tile);
+        let count = means.len().max(1) as f64;
+        means.iter().flatten().map(|v| v.max(0.0)).sum::<f64>() / (3.0 * count)
+    };
+    film.tiles().iter().map(of_tile).sum::<f64>() / film.tiles().len().max(1) as f64
+}
+
+impl IterationWeights {
+    /// Before the first iteration.
+    pub fn new(film: &Film) -> Self {
+        Self { factors: vec![1.0; film.tiles().len()], first: None, last: None }
+    }
+
+    /// Adds an iteration of so many samples per pixel to the film of those before; the result is the variance times
+    /// rays of the first iteration over that of this one.
+    pub fn add(&mut self, film: &mut Film, iteration: &Film, samples: u32, rays: u64) -> f64 {
+        let variances: Vec<_> = iteration.tiles().iter().map(|tile| block_variances(tile, samples)).collect();
+        let pixels = iteration.sampled().area() as f64;
+        let statistics = IterationStatistics { variances, rays: rays as f64 / (pixels * f64::from(samples)) };
+        let gain = if samples >= 2 { self.update(film, iteration, &statistics) } else { 1.0 };
+        for ((tile, other), factor) in film.tiles_mut().iter_mut().zip(iteration.tiles()).zip(&self.factors) {
+            tile.merge_inverse_variance(other, *factor);
+        }
+        if samples >= 2 {
+            self.first.get_or_insert_with(|| statistics.clone());
+            self.last = Some(statistics);
+        }
+        gain
+    }
+
+    /// Sets the weights of an iteration by its variance and that of the last one; the result is its gain over the
+    /// first.
+    fn update(&mut self, film: &Film, iteration: &Film, statistics: &IterationStatistics) -> f64 {
+        let (Some(first), Some(last)) = (&self.first, &self.last) else { return 1.0 };
+        let colors: Vec<_> = film.tiles().iter().zip(iteration.tiles()).map(|(a, b)| common_means(a, b)).collect();
+        let by_tile = |statistics: &IterationStatistics| -> Vec<f64> {
+            statistics.variances.iter().zip(&colors).map(|(variances, colors)| relative(variances, colors)).collect()
+        };
+        let (current, before) = (by_tile(statistics), by_tile(last));
+        let total = |sums: &[f64]| sums.iter().sum::<f64>();
+        let (all_current, all_before) = (total(&current), total(&before));
+        for (t, factor) in self.factors.iter_mut().enumerate() {
+            *factor *= ratio(all_before - before[t], all_current - current[t]).clamp(1.0 / MAX_CHANGE, MAX_CHANGE);
+        }
+        ratio(total(&by_tile(first)) * first.rays, all_current * statistics.rays)
+    }
+
+    /// Writes the weights and what the next ones depend on.
+    pub fn write(&self, out: &mut ByteWriter) {
+        out.floats(self.factors.iter().copied());
+        for statistics in [&self.first, &self.last] {
+            let values = statistics.iter().flat_map(|s| [s.rays].into_iter().chain(s.variances.iter().flatten().flatten().copied()));
+            out.floats(values.collect::<Vec<_>>().into_iter());
+        }
+    }
+
+    /// Reads what [`write`](Self::write) gave for a film of the same tiles; `None` if it is something else.
+    pub fn read(data: &mut ByteReader, film: &Film) -> Option<Self> {
+        let is_weight = |factor: &f64| *factor > 0.0 && *factor < f64::INFINITY;
+        let factors = data.floats().filter(|list| list.len() == film.tiles().len() && list.iter().all(is_weight))?;
+        let counts: Vec<usize> = film.tiles().iter().map(|tile| blocks(tile).count()).collect();
+        let mut statistics = || -> Option<Option<IterationStatistics>> {
+            let list = data.floats()?;
+            let Some((&rays, values)) = list.split_first() else { return Some(None) };
+            let (mut values, rest) = values.as_chunks::<3>();
+            if !rest.is_empty() || values.len() != counts.iter().sum::<usize>() {
+                return None;
+            }
+            let mut next = |count: usize| values.split_off(..count).map(<[_]>::to_vec);
+            let variances = counts.iter().map(|&count| next(count)).collect::<Option<_>>()?;
+            Some(Some(IterationStatistics { variances, rays }))
+        };
+        Some(Self { factors, first: statistics()?, last: statistics()? })
+    }
+}

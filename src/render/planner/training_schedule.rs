@@ -1,0 +1,51 @@
+//! When a guide is refined, and which samples share a weight. Both follow from the number of samples alone, so that a
+//! render that is resumed anywhere has the guides and the weights of one run.
+
+/// Samples per pixel of the first iteration. One estimates how bright the scene is, the other is learned from.
+const FIRST_ITERATION: u32 = 2;
+
+/// How often the guide is refined while the samples double, at most.
+const REFINEMENTS: u64 = 4;
+
+/// The first sample of the iteration that the sample with this index belongs to: each has as many samples as all before
+/// it.
+pub(super) fn iteration_start(sample: u32) -> u32 {
+    if sample < FIRST_ITERATION { 0 } else { 1 << sample.ilog2() }
+}
+
+/// The first sample of the iteration after that.
+pub(super) fn iteration_end(sample: u32) -> u32 {
+    if sample < FIRST_ITERATION { FIRST_ITERATION } else { iteration_start(sample).saturating_mul(2) }
+}
+
+/// The next refinement of a guide after `done` samples per pixel, the first after one.
+pub(super) fn next_refinement(done: u32) -> u32 {
+    let mut next = 1u64;
+    while next <= u64::from(done) {
+        next += (next / REFINEMENTS).max(1);
+    }
+    u32::try_from(next).unwrap_or(u32::MAX)
+}
+
+/// Whether a guide is refined after `done` samples per pixel.
+pub(super) fn is_refinement(done: u32) -> bool {
+    done > 0 && next_refinement(done - 1) == done
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn iterations_double_and_refinements_come_four_times_in_each() {
+        let starts: Vec<u32> = (0..=9).map(iteration_start).collect();
+        assert_eq!(starts, [0, 0, 2, 2, 4, 4, 4, 4, 8, 8]);
+        assert_eq!([0, 1, 2, 3, 4, 9, u32::MAX].map(iteration_end), [2, 2, 4, 4, 8, 16, u32::MAX]);
+        let refinements: Vec<u32> = (0..64).filter(|&done| is_refinement(done)).collect();
+        assert_eq!(refinements, [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 15, 18, 22, 27, 33, 41, 51, 63]);
+        for done in [0, 1, 7, 8, 9, 63, 1000, u32::MAX - 1] {
+            assert!(next_refinement(done) > done);
+        }
+        assert_eq!(next_refinement(u32::MAX), u32::MAX);
+    }
+}

@@ -1,0 +1,213 @@
+//! Samples of the pixels of a tile: camera rays, the integrator, and the film.
+
+use std::ops::Range;
+
+use super::pixel_order::{pixel_of_slot, slots};
+use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
+use crate::accel::Accelerator;
+use crate::desc::IntegratorDesc;
+use crate::film::{FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, Splats};
+use crate::guiding::Guide;
+use crate::integrator::{self, CameraBatch, CameraBlock, Integrator, PassContext, Setup, SurfaceAovs, Workspace, World, dimensions};
+use crate::math::Vec2;
+use crate::math::rows::{BATCH, Row, pair};
+use crate::sampling::{SampleIdRows, SampleRows, Sampler};
+use crate::scene::Scene;
+
+/// What renders samples of tiles; it does not change during a render.
+pub(super) struct TileRenderer<'a> {
+    pub world: World<'a>,
+    integrator: Box<dyn Integrator>,
+    sampler: Sampler,
+    filter: Filter,
+    /// Pixels on each side of the picture.
+    overscan: u32,
+    /// Width and height of what the camera shows.
+    view: [u32; 2],
+    /// Where the film's pixels are.
+    pub grid: FilmGrid,
+}
+
+/// The buffers of one thread.
+pub(super) struct TileWorkspace {
+    samples: CameraBatch,
+    /// Of each sample, its place in the pixel and its weight.
+    places: Vec<FilterSample>,
+    pub splats: Splats,
+    pixels: [[u32; 2]; BATCH],
+    /// Points of the film.
+    film: [Row; 2],
+    numbers: SampleRows,
+    /// With the values of the batch's samples.
+    pub integrator: Workspace,
+}
+
+impl Default for TileWorkspace {
+    fn default() -> Self {
+        let count = (TILE_SIZE * TILE_SIZE) as usize;
+        Self {
+            samples: CameraBatch::default(),
+            places: vec![FilterSample { offset: Vec2::ZERO, weight: 1.0 }; count],
+            splats: Splats::default(),
+            pixels: [[0; 2]; BATCH],
+            film: [[0.0; BATCH]; 2],
+            numbers: SampleRows::default(),
+            integrator: Workspace::default(),
+        }
+    }
+}
+
+impl TileWorkspace {
+    /// The radiance of a sample of the batch.
+    pub fn radiance(&self, slot: usize) -> [f64; 3] {
+        self.integrator.out.pixels[slot].radiance.to_array().map(f64::from)
+    }
+}
+
+impl<'a> TileRenderer<'a> {
+    pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator, settings: &Settings) -> Self {
+        let sampler = Sampler::new(settings.sampler, settings.seed);
+        let wanted = |kind| settings.layers.contains(kind);
+        let needs = SurfaceAovs {
+            // The distance decides which sample's data counts.
+            geometry: settings.layers.surfaces(Filtering::Nearest).next().is_some() || settings.layers.needs_coverage(),
+            uv: wanted(LayerKind::Uv),
+            motion: wanted(LayerKind::Motion),
+            albedo: wanted(LayerKind::Albedo),
+            features: wanted(LayerKind::FeatureAlbedo) || wanted(LayerKind::FeatureNormal),
+        };
+        let (shape, filter) = (film_shape(scene, settings), Filter::new(&settings.filter));
+        let light_aovs = LightAovRequest {
+            by_scattering: settings.layers.needs_light_aovs(),
+            light_groups: if wanted(LayerKind::LightGroups) { shape.light_groups.len() as u32 } else { 0 },
+        };
+        let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
+        let world = if settings.transparent { world.without_background() } else { world };
+        // Analytic shapes have their parameters only with the whole parametrisation.
+        let in_full = settings.integrator == IntegratorDesc::Uv || (needs.uv && scene.features.analytic_shapes);
+        Self {
+            world: if in_full { world.in_full() } else { world },
+            integrator: integrator::build(&settings.integrator, Setup { sampler, needs, light_aovs }),
+            sampler,
+            grid: FilmGrid::new(&shape, &filter, TILE_SIZE),
+            overscan: settings.overscan,
+            filter,
+            view: settings.size,
+        }
+    }
+
+    /// Renders one sample of every pixel of the tile with this origin, in the order of [`slots`].
+    pub fn render_batch(&self, origin: [u32; 2], sample: u32, guide: Option<&Guide>, workspace: &mut TileWorkspace) {
+        let pixels = slots(self.grid.area, origin).map(pixel_of_slot);
+        self.render_samples(pixels.map(|[dx, dy]| ([origin[0] + dx, origin[1] + dy], sample)), guide, workspace);
+    }
+
+    /// Renders samples of pixels, at most as many as a tile has pixels; the values are in their order.
+    #[inline]
+    pub fn render_samples(&self, samples: impl Iterator<Item = ([u32; 2], u32)>, guide: Option<&Guide>, workspace: &mut TileWorkspace) {
+        let mut samples = samples.fuse();
+        workspace.samples.clear();
+        loop {
+            let start = workspace.samples.len();
+            let TileWorkspace { samples: camera_batch, places, film, pixels, numbers, .. } = workspace;
+            let block = camera_batch.next_block();
+            let count = self.request(&mut samples, pixels, &mut block.requests);
+            if count == 0 {
+                break;
+            }
+            self.sampler.sample_4d_batch(&block.requests, count, dimensions::CAMERA, numbers);
+            for i in 0..count {
+                let u = numbers.of(i);
+                let filter = self.filter.sample([u[0], u[1]]);
+                places[start + i] = filter;
+                for (k, offset) in filter.offset.to_array().into_iter().enumerate() {
+                    film[k][i] = pixels[i][k] as i32 as f32 + 0.5 + offset;
+                }
+            }
+            self.camera_rays(count, film, numbers, block);
+            camera_batch.extend(count);
+        }
+        let pass = PassContext { world: &self.world, guide };
+        self.integrator.render_batch(&pass, &workspace.samples, &mut workspace.integrator);
+    }
+
+    /// Takes up the next samples of pixels; the result is how many.
+    #[inline]
+    fn request(
+        &self,
+        samples: &mut impl Iterator<Item = ([u32; 2], u32)>,
+        pixels: &mut [[u32; 2]; BATCH],
+        requests: &mut SampleIdRows,
+    ) -> usize {
+        let mut count = 0;
+        for ([x, y], sample) in samples.take(BATCH) {
+            // Of what the camera shows; beyond its left and upper edge coordinates wrap.
+            let [x, y] = [x, y].map(|x| x.wrapping_sub(self.grid.offset + self.overscan));
+            pixels[count] = [x, y];
+            requests.pixels[count] = self.sampler.pixel(x, y);
+            requests.samples[count] = sample;
+            count += 1;
+        }
+        count
+    }
+
+    /// Sets the rays through the points of the film.
+    #[inline]
+    fn camera_rays(&self, count: usize, film: &[Row; 2], numbers: &SampleRows, block: &mut CameraBlock) {
+        let CameraBlock { rays, requests } = block;
+        let (camera, moves) = (&self.world.scene.camera, self.world.scene.features.motion);
+        rays.time = [0.0; BATCH];
+        if moves {
+            for i in 0..count {
+                rays.time[i] = camera.time(self.sampler.sample_4d(requests.pixels[i], requests.samples[i], dimensions::TIME)[0]);
+            }
+        }
+        if camera.is_pinhole() {
+            camera.pinhole_rays(self.view, film, rays, count);
+        } else {
+            for i in 0..count {
+                let (u, at) = (numbers.of(i), Vec2::from(pair(film, i)));
+                rays.set(i, &camera.ray(at, self.view, [u[2], u[3]], rays.time[i]));
+            }
+        }
+        self.world.clip_to_scene(rays, count);
+    }
+
+    /// Renders these samples of every pixel of a tile; the result is how many samples that are.
+    pub fn render_tile(&self, tile: &mut FilmTile, samples: Range<u32>, guide: Option<&Guide>, workspace: &mut TileWorkspace) -> u64 {
+        let active = tile.active();
+        let origin = tile.origin().map(|x| x / TILE_SIZE * TILE_SIZE);
+        let count = samples.len() as u64 * active.area();
+        for sample in samples {
+            self.render_batch(origin, sample, guide, workspace);
+            if self.world.has_given_up() {
+                break;
+            }
+            for (i, slot) in slots(self.grid.area, origin).enumerate() {
+                let [dx, dy] = pixel_of_slot(slot);
+                let (x, y) = (origin[0] + dx, origin[1] + dy);
+                if active.contains(x, y) {
+                    let pixel = tile.index(x, y);
+                    if self.add(tile, pixel, sample, i, workspace) && tile.tracks_variance() {
+                        tile.add_moments(pixel, workspace.radiance(i));
+                    }
+                }
+            }
+            let first = tile.index(active.x, active.y);
+            tile.flush(first, &mut workspace.splats);
+        }
+        count
+    }
+
+    /// Adds a sample of the batch to the film; `false` if it was dropped. Shared samples stay in the splats until these
+    /// are flushed.
+    #[inline]
+    pub fn add(&self, tile: &mut FilmTile, pixel: usize, sample: u32, slot: usize, workspace: &mut TileWorkspace) -> bool {
+        let (value, place) = (workspace.integrator.out.sample(slot), workspace.places[slot]);
+        if self.filter.is_shared() {
+            tile.splat(pixel, sample, value, &self.filter.splat_taps(place), &mut workspace.splats)
+        } else {
+            tile.add(pixel, sample, value, place.weight)
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! Rules for functions and public names, on the syntax trees of the sources.
+
+use std::collections::BTreeMap;
+
+use proc_macro2::Span;
+use syn::spanned::Spanned;
+use syn::visit::{self, Visit};
+use syn::{Attribute, Block, FnArg, ImplItemFn, ItemEnum, ItemFn, ItemImpl, ItemMod, ItemStruct, ItemTrait, ItemType, TraitItemFn};
+use syn::{Ident, Item, Signature, Type, Visibility};
+
+use super::{UNCHECKED, sources};
+
+const MAX_FUNCTION_LINES: usize = 60;
+/// Beside `self`.
+const MAX_PARAMETERS: usize = 5;
+
+/// Why a kernel has many parameters.
+const ROWS: &str = "rows are separate parameters, so that the compiler knows that they do not overlap";
+
+/// Functions that break a rule of [`Rule`], by file and name, with the reason.
+const EXCEPTIONS: &[(Rule, &str, &str, &str)] = &[
+    (Rule::Parameters, "src/geometry/placed/points.rs", "resolve", ROWS),
+    (Rule::Parameters, "src/geometry/placed/points.rs", "resolve_on", ROWS),
+    (Rule::Parameters, "src/geometry/placed/points.rs", "resolve_rows", ROWS),
+    (Rule::Parameters, "src/integrator/path/direct.rs", "illuminate", ROWS),
+    (Rule::Parameters, "src/integrator/path/scatter.rs", "spawn_rays", ROWS),
+    (Rule::Parameters, "src/light/area/queue.rs", "sample_by_area", ROWS),
+    (Rule::Parameters, "src/light/area/queue.rs", "set_samples", ROWS),
+];
+
+/// Names of public types with several definitions, with the reason.
+const SHARED_NAMES: &[(&str, &str)] = &[
+    ("Frame", "`math::Frame`, and the frames of a sequence in src/render, which is unchecked yet"),
+    ("Row", "`math::rows::Row`, and a row of samples of an EXR block, which src/output/exr names, unchecked yet"),
+    ("Source", "where a layer comes from, and that of a plane in src/output/exr, which is unchecked yet"),
+];
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Rule {
+    Length,
+    Parameters,
+    TupleParameter,
+    OutParameter,
+}
+
+/// Whether an item is only compiled for tests.
+fn is_test(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|a| {
+        a.path().is_ident("test") || a.path().is_ident("cfg") && a.meta.require_list().is_ok_and(|list| list.tokens.to_string() == "test")
+    })
+}
+
+fn is_tuple(ty: &Type) -> bool {
+    match ty {
+        Type::Tuple(tuple) => tuple.elems.len() > 1,
+        Type::Reference(reference) => is_tuple(&reference.elem),
+        _ => false,
+    }
+}
+
+/// Whether a type is `&mut Option<..>`.
+fn is_out_parameter(ty: &Type) -> bool {
+    let Type::Reference(reference) = ty else { return false };
+    let Type::Path(path) = &*reference.elem else { return false };
+    let last = path.path.segments.last().unwrap();
+    reference.mutability.is_some() && last.ident == "Option" && !last.arguments.is_none()
+}
+
+/// Walks one file.
+struct Checker<'a> {
+    path: &'a str,
+    /// Functions within `impl Trait for ..`, whose parameters the trait decides.
+    in_trait_impl: bool,
+    faults: Vec<(Rule, String, String)>,
+}
+
+impl Checker<'_> {
+    fn add(&mut self, rule: Rule, signature: &Signature, what: &str) {
+        let line = signature.span().start().line;
+        self.faults.push((rule, signature.ident.to_string(), format!("{}:{line}: {}: {what}", self.path, signature.ident)));
+    }
+
+    fn check(&mut self, signature: &Signature, body: Option<&Block>) {
+        if let Some(body) = body {
+            let close: Span = body.brace_token.span.close();
+            let lines = close.end().line - signature.span().start().line + 1;
+            if lines > MAX_FUNCTION_LINES {
+                self.add(Rule::Length, signature, &format!("{lines} lines"));
+            }
+        }
+        if self.in_trait_impl {
+            return;
+        }
+        let parameters =
+            || signature.inputs.iter().filter_map(|input| if let FnArg::Typed(typed) = input { Some(&*typed.ty) } else { None });
+        if parameters().count() > MAX_PARAMETERS {
+            self.add(Rule::Parameters, signature, &format!("{} parameters", parameters().count()));
+        }
+        if parameters().any(is_tuple) {
+            self.add(Rule::TupleParameter, signature, "a tuple as parameter");
+        }
+        if parameters().any(is_out_parameter) {
+            self.add(Rule::OutParameter, signature, "an `Option` to write to");
+        }
+    }
+}
+
+impl<'ast> Visit<'ast> for Checker<'_> {
+    fn visit_item_mod(&mut self, item: &'ast ItemMod) {
+        if !is_test(&item.attrs) {
+            visit::visit_item_mod(self, item);
+        }
+    }
+
+    fn visit_item_impl(&mut self, item: &'ast ItemImpl) {
+        let outer = std::mem::replace(&mut self.in_trait_impl, item.trait_.is_some());
+        if !is_test(&item.attrs) {
+            visit::visit_item_impl(self, item);
+        }
+        self.in_trait_impl = outer;
+    }
+
+    fn visit_item_fn(&mut self, item: &'ast ItemFn) {
+        let outer = std::mem::replace(&mut self.in_trait_impl, false);
+        if !is_test(&item.attrs) {
+            self.check(&item.sig, Some(&item.block));
+            visit::visit_item_fn(self, item);
+        }
+        self.in_trait_impl = outer;
+    }
+
+    fn visit_impl_item_fn(&mut self, item: &'ast ImplItemFn) {
+        if !is_test(&item.attrs) {
+            self.check(&item.sig, Some(&item.block));
+            visit::visit_impl_item_fn(self, item);
+        }
+    }
+
+    fn visit_trait_item_fn(&mut self, item: &'ast TraitItemFn) {
+        self.check(&item.sig, item.default.as_ref());
+        visit::visit_trait_item_fn(self, item);
+    }
+}
+
+/// The files of the crate without their tests, as syntax trees.
+fn trees() -> Vec<(String, syn::File)> {
+    sources(&["src"])
+        .into_iter()
+        .filter(|s| !s.path.contains("/tests/") && !s.path.ends_with("tests.rs"))
+        .map(|s| (syn::parse_file(&s.text).unwrap_or_else(|e| panic!("{}: {e}", s.path)), s.path))
+        .map(|(tree, path)| (path, tree))
+        .collect()
+}
+
+#[test]
+fn functions_are_short_with_few_plain_parameters() {
+    let mut faults = Vec::new();
+    let mut used = vec![false; EXCEPTIONS.len()];
+    for (path, tree) in trees().iter().filter(|(path, _)| !UNCHECKED.iter().any(|u| path.starts_with(u))) {
+        let mut checker = Checker { path, in_trait_impl: false, faults: Vec::new() };
+        checker.visit_file(tree);
+        for (rule, function, text) in checker.faults {
+            match EXCEPTIONS.iter().position(|(r, p, f, _)| (r, p, *f) == (&rule, &path.as_str(), &function)) {
+                Some(i) => used[i] = true,
+                None => faults.push(text),
+            }
+        }
+    }
+    faults.extend(EXCEPTIONS.iter().zip(used).filter(|(_, used)| !used).map(|(e, _)| format!("needless exception: {e:?}")));
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+/// A type of a module with its visibility.
+fn defined_type(item: &Item) -> Option<(&Visibility, &Ident)> {
+    match item {
+        Item::Struct(ItemStruct { vis, ident, .. })
+        | Item::Enum(ItemEnum { vis, ident, .. })
+        | Item::Trait(ItemTrait { vis, ident, .. })
+        | Item::Type(ItemType { vis, ident, .. }) => Some((vis, ident)),
+        _ => None,
+    }
+}
+
+#[test]
+fn public_types_have_names_of_their_own() {
+    let mut files: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (path, tree) in trees().iter().filter(|(path, _)| !path.starts_with("src/bench/") && !path.starts_with("src/bin/")) {
+        for (visibility, name) in tree.items.iter().filter_map(defined_type) {
+            if matches!(visibility, Visibility::Public(_)) {
+                files.entry(name.to_string()).or_default().push(path.clone());
+            }
+        }
+    }
+    files.retain(|_, files| files.len() > 1);
+    let mut faults: Vec<String> =
+        SHARED_NAMES.iter().filter(|(name, _)| files.remove(*name).is_none()).map(|e| format!("needless exception: {e:?}")).collect();
+    faults.extend(files.iter().map(|(name, files)| format!("{name}: {}", files.join(", "))));
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
