@@ -156,7 +156,9 @@ fn memory_that_runs_out_is_one_error() {
             let (code, text) = (output.status.code(), told(&output));
             assert!(matches!(code, Some(0 | 33)), "{accel} {megabytes} MB: {:?} {text}", output.status);
             if code == Some(33) {
-                assert!(text.starts_with("error: ") && text.lines().count() == 1, "{accel} {megabytes} MB: {text}");
+                // glibc has a line of its own where it cannot register the destructor of a thread's variable.
+                let text = text.lines().filter(|line| !line.is_empty() && !line.starts_with("Fatal glibc error: ")).collect::<Vec<_>>();
+                assert!(matches!(text[..], [line] if line.starts_with("error: ")), "{accel} {megabytes} MB: {text:?}");
             }
             assert!(start.elapsed() < Duration::from_secs(60), "{accel} {megabytes} MB");
             codes.push(code);
@@ -166,6 +168,16 @@ fn memory_that_runs_out_is_one_error() {
     let output = shell(folder.path(), "ulimit -v 300000; exec \"$0\" render scene.json --size 8000x8000 -o a.png --log-format json");
     assert_eq!(output.status.code(), Some(33), "{}", told(&output));
     assert!(serde_json::from_str::<Value>(told(&output).trim()).is_ok_and(|line| line["level"] == "error"), "{}", told(&output));
+}
+
+/// Only aborts without memory are errors of memory.
+#[test]
+fn other_aborts_stay_aborts() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = steradian(folder.path(), "render scene.json -q -o a.exr --spp 1000000 --size 256x256").spawn().unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(Command::new("kill").args(["-ABRT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().signal(), Some(6));
 }
 
 #[test]

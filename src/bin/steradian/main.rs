@@ -45,7 +45,7 @@ const INTERNAL: u8 = 1;
 
 fn main() -> ExitCode {
     report_panics();
-    memory::watch_exceptions();
+    memory::handle_library_failures();
     match config::parse().and_then(start) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {

@@ -13,6 +13,9 @@ use std::os::fd::FromRawFd;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous, munmap};
+use signal_hook::consts::SIGABRT;
+use signal_hook::low_level::{emulate_default_handler, register};
 use steradian::accel::on_uncaught_exception;
 use steradian::memory::is_fallible;
 
@@ -63,9 +66,27 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
-/// Exceptions of C++ that nobody catches end the program in the same way from here on.
-pub fn watch_exceptions() {
+/// Uncaught C++ exceptions, and aborts of the C library without memory, end the program in the same way from here on.
+pub fn handle_library_failures() {
     on_uncaught_exception(uncaught);
+    // SAFETY: the handler makes system calls only.
+    let registered = unsafe { register(SIGABRT, aborted) };
+    // Without a handler, such aborts have the exit code of other aborts.
+    drop(registered);
+}
+
+/// glibc aborts where it cannot register the destructor of a thread's variable.
+fn aborted() {
+    const PROBE: usize = 1 << 20;
+    // SAFETY: a new mapping at any place is in the way of no other.
+    match unsafe { mmap_anonymous(std::ptr::null_mut(), PROBE, ProtFlags::READ | ProtFlags::WRITE, MapFlags::PRIVATE) } {
+        Err(_) => end(OUT_OF_MEMORY, format_args!("out of memory in the C library")),
+        Ok(probe) => {
+            // SAFETY: the mapping made above, which nothing refers to.
+            let _ = unsafe { munmap(probe, PROBE) };
+            drop(emulate_default_handler(SIGABRT));
+        }
+    }
 }
 
 extern "C" fn uncaught(out_of_memory: bool, what: *const c_char) {
