@@ -44,6 +44,7 @@ use log::Level;
 const INTERNAL: u8 = 1;
 
 fn main() -> ExitCode {
+    memory::grow_stack();
     report_panics();
     memory::handle_library_failures();
     match config::parse().and_then(start) {
@@ -148,6 +149,7 @@ fn chain(error: &Error) -> String {
 fn report_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let message = panic.payload_as_str().unwrap_or("unknown");
+        memory::end_if_out_of_memory(message);
         let place = panic.location().map(ToString::to_string).unwrap_or_default();
         let version = env!("CARGO_PKG_VERSION");
         let text = format!("internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the scene)");

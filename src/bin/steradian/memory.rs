@@ -66,6 +66,20 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
+/// Grows the main thread's stack to what a command needs. Without memory it would end the program later, by SIGSEGV.
+#[inline(never)]
+pub fn grow_stack() {
+    std::hint::black_box([1_u8; 1 << 20]);
+}
+
+/// Panics of the standard library for want of memory end the program as other failures of memory do.
+pub fn end_if_out_of_memory(panic: &str) {
+    // ENOMEM, as `std::io::Error` displays it.
+    if panic.contains("(os error 12)") {
+        end(OUT_OF_MEMORY, format_args!("out of memory: {panic}"));
+    }
+}
+
 /// Uncaught C++ exceptions, and aborts of the C library without memory, end the program in the same way from here on.
 pub fn handle_library_failures() {
     on_uncaught_exception(uncaught);
