@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use steradian::film::{FilmTile, Image, Sums};
+use steradian::film::{FilmTile, Image, SumPlane};
 use steradian::math::Rng;
 use steradian::render::{self, Overrides, Shard, StateFile};
 
@@ -168,16 +168,16 @@ fn sums_do_not_depend_on_how_their_terms_are_split() {
                 (0..24).for_each(|i| terms[49 - i] = -terms[i]);
             }
             let sum = |terms: &[f64]| {
-                let mut sum = Sums::<1>::default();
-                terms.iter().for_each(|&x| sum.add([x]));
+                let mut sum = SumPlane::<1>::new(1);
+                terms.iter().for_each(|&x| sum.add(0, [x]));
                 sum
             };
-            let mut parts: Vec<Sums<1>> = terms.chunks(1 + rng.below(50)).map(sum).collect();
-            let mut merged = Sums::default();
+            let mut parts: Vec<SumPlane<1>> = terms.chunks(1 + rng.below(50)).map(sum).collect();
+            let mut merged = SumPlane::new(1);
             while !parts.is_empty() {
-                merged.merge(&parts.swap_remove(rng.below(parts.len())));
+                merged.merge(&parts.swap_remove(rng.below(parts.len())), 1.0);
             }
-            assert_eq!(merged.values()[0].to_bits(), sum(&terms).values()[0].to_bits(), "{decades}, {signed}, {cancelling}: {terms:?}");
+            assert_eq!(merged.values(0)[0].to_bits(), sum(&terms).values(0)[0].to_bits(), "{decades}, {signed}, {cancelling}: {terms:?}");
         }
     }
 }

@@ -5,38 +5,64 @@ use super::ShapeKey;
 /// Samples of each pixel by the shape that they show, [`ShapeKey::NONE`] included, in units of coverage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CoverageCounts {
-    /// By pixel, in the order in which shapes were met.
-    pixels: Vec<Vec<(ShapeKey, u64)>>,
+    /// By pixel: the shape met first, then for each further one a link to where it is behind the pixels.
+    entries: Vec<CoverageEntry>,
+    pixels: usize,
+}
+
+/// A shape of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct CoverageEntry {
+    key: ShapeKey,
+    /// Index of the pixel's next entry; 0 if there is none.
+    next: u32,
+    /// 0 in pixels without samples.
+    units: u64,
 }
 
 impl CoverageCounts {
+    /// Bytes of a pixel that shows one shape.
+    pub(super) const PIXEL_BYTES: usize = size_of::<CoverageEntry>();
+
     /// No samples of so many pixels.
     pub fn new(pixels: usize) -> Self {
-        Self { pixels: vec![Vec::new(); pixels] }
+        Self { entries: vec![CoverageEntry::default(); pixels], pixels }
     }
 
-    /// Adds samples.
+    /// Adds samples; `units` is above 0.
     #[inline]
     pub fn add(&mut self, pixel: usize, shown: ShapeKey, units: u64) {
-        let list = &mut self.pixels[pixel];
-        match list.iter_mut().find(|(key, _)| *key == shown) {
-            Some((_, count)) => *count = count.saturating_add(units),
-            None => list.push((shown, units)),
+        let mut place = pixel;
+        loop {
+            let entry = &mut self.entries[place];
+            if entry.units == 0 {
+                entry.key = shown;
+            }
+            if entry.key == shown {
+                entry.units = entry.units.saturating_add(units);
+                return;
+            }
+            if entry.next == 0 {
+                break;
+            }
+            place = entry.next as usize;
         }
+        self.entries[place].next = self.entries.len() as u32;
+        self.entries.push(CoverageEntry { key: shown, next: 0, units });
     }
 
     /// Adds all samples of others.
     pub fn merge(&mut self, other: &Self) {
-        for (pixel, list) in other.pixels.iter().enumerate() {
-            for &(key, count) in list {
-                self.add(pixel, key, count);
-            }
+        for pixel in 0..other.pixels {
+            other.of(pixel).for_each(|(key, count)| self.add(pixel, key, count));
         }
     }
 
     /// What a pixel shows, in no particular order.
-    pub fn of(&self, pixel: usize) -> &[(ShapeKey, u64)] {
-        &self.pixels[pixel]
+    pub fn of(&self, pixel: usize) -> impl Iterator<Item = (ShapeKey, u64)> {
+        let next = |entry: &&CoverageEntry| (entry.next > 0).then(|| &self.entries[entry.next as usize]);
+        let first = Some(&self.entries[pixel]).filter(|entry| entry.units > 0);
+        std::iter::successors(first, next).map(|entry| (entry.key, entry.units))
     }
 }
 
@@ -99,7 +125,7 @@ mod tests {
         other.add(1, key(9), 2);
         counts.merge(&other);
         counts.add(0, ShapeKey::NONE, 5);
-        let weights = |pixel| counts.of(pixel).iter().map(|&(key, units)| (key, units as f64)).collect();
+        let weights = |pixel| counts.of(pixel).map(|(key, units)| (key, units as f64)).collect();
         let mut coverage = Coverage::default();
         [0, 1].map(weights).into_iter().for_each(|weights| coverage.push(weights));
         assert_eq!(coverage.of(0), [(key(1), 0.2), (key(2), 0.2), (key(3), 0.1)]);

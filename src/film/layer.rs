@@ -108,6 +108,39 @@ pub(super) const fn channels_of(filtering: Filtering) -> usize {
     total
 }
 
+/// How the values of samples become the channels of layers of surfaces.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SurfaceChannels {
+    layers: [Option<&'static LayerInfo>; LayerKind::ALL.len()],
+    channels: usize,
+}
+
+impl SurfaceChannels {
+    /// Those of a set that are filtered so, in the table's order.
+    pub fn new(set: LayerSet, filtering: Filtering) -> Self {
+        let mut layers = [None; LayerKind::ALL.len()];
+        layers.iter_mut().zip(set.surfaces(filtering)).for_each(|(layer, info)| *layer = Some(info));
+        Self { layers, channels: set.surfaces(filtering).map(|info| info.channels.len()).sum() }
+    }
+
+    /// How many there are.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Reads those of a sample; `out` has room for all of them.
+    #[inline]
+    pub fn read(&self, surface: &SurfaceSample, out: &mut [f32]) {
+        let mut start = 0;
+        for info in self.layers.iter().map_while(|info| *info) {
+            if let Source::Surface(read, _) = info.source {
+                read(surface, &mut out[start..start + info.channels.len()]);
+            }
+            start += info.channels.len();
+        }
+    }
+}
+
 /// What the table says of a layer.
 #[derive(Clone, Copy, Debug)]
 pub struct LayerInfo {

@@ -26,7 +26,7 @@ pub use image::{Crop, Image, Layer};
 pub use layer::{Filtering, LayerInfo, LayerKind, LayerSet, Source};
 pub use sample::{LightAov, LightAovRequest, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};
 pub use splats::Splats;
-pub use sum::Sums;
+pub use sum::SumPlane;
 pub use tile::{DroppedSample, FilmTile};
 pub use tiles::{Film, FilmGrid, FilmShape, bytes_per_pixel};
 

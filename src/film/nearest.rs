@@ -1,10 +1,7 @@
 //! Layers of data, which are not averaged: what the nearest of a pixel's own samples shows.
 
-use super::layer::channels_of;
-use super::{Filtering, LayerSet, ShapeKey, Source, SurfaceSample};
-
-/// Most channels of such layers.
-const MAX_DATA: usize = channels_of(Filtering::Nearest);
+use super::layer::SurfaceChannels;
+use super::{ShapeKey, SurfaceSample};
 
 /// By pixel, the sample that counts: of those that hit something the nearest, of samples equally near (and where
 /// nothing was hit) the first.
@@ -27,23 +24,17 @@ impl Nearest {
 
     /// Takes a sample into account; `false` if a value of it is not finite.
     #[inline]
-    pub fn add(&mut self, pixel: usize, sample: u32, surface: &SurfaceSample, set: LayerSet) -> bool {
+    pub fn add(&mut self, pixel: usize, sample: u32, surface: &SurfaceSample, layers: &SurfaceChannels) -> bool {
         if self.channels == 0 {
             return true;
         }
-        let mut values = [0.0; MAX_DATA];
-        let mut start = 0;
-        for info in set.surfaces(Filtering::Nearest) {
-            if let Source::Surface(read, _) = info.source {
-                read(surface, &mut values[start..start + info.channels.len()]);
-            }
-            start += info.channels.len();
-        }
-        let depth = if surface.shown != ShapeKey::NONE { surface.depth } else { f32::INFINITY };
-        if depth.is_nan() || !values[..start].iter().all(|value| value.is_finite()) {
+        if !surface.is_finite() {
             return false;
         }
-        self.set(pixel, depth, sample, &values[..start]);
+        let depth = if surface.shown != ShapeKey::NONE { surface.depth } else { f32::INFINITY };
+        if let Some(values) = self.nearer(pixel, depth, sample) {
+            layers.read(surface, values);
+        }
         true
     }
 
@@ -52,18 +43,22 @@ impl Nearest {
         for pixel in 0..other.depths.len() {
             if !other.depths[pixel].is_nan() {
                 let values = &other.values[pixel * self.channels..(pixel + 1) * self.channels];
-                self.set(pixel, other.depths[pixel], other.samples[pixel], values);
+                if let Some(ours) = self.nearer(pixel, other.depths[pixel], other.samples[pixel]) {
+                    ours.copy_from_slice(values);
+                }
             }
         }
     }
 
+    /// The channels of a pixel, if this sample is the one that counts so far.
     #[inline]
-    fn set(&mut self, pixel: usize, depth: f32, sample: u32, values: &[f32]) {
+    fn nearer(&mut self, pixel: usize, depth: f32, sample: u32) -> Option<&mut [f32]> {
         let known = (self.depths[pixel], self.samples[pixel]);
-        if known.0.is_nan() || (depth, sample) < known {
+        let counts = known.0.is_nan() || (depth, sample) < known;
+        counts.then(|| {
             (self.depths[pixel], self.samples[pixel]) = (depth, sample);
-            self.values[pixel * self.channels..(pixel + 1) * self.channels].copy_from_slice(values);
-        }
+            &mut self.values[pixel * self.channels..(pixel + 1) * self.channels]
+        })
     }
 
     /// Whether a pixel's sample hit something.

@@ -1,6 +1,5 @@
 //! From the sums of a film to the picture.
 
-use super::sum::slice;
 use super::tile::FilmTile;
 use super::{Coverage, Film, Filtering, Image, Layer, LayerInfo, LayerKind, Layout, ShapeKey, Source, VarianceKernel};
 
@@ -56,7 +55,7 @@ impl<'a> Estimator<'a> {
         }
         let count = tile.count_at(pixel);
         self.expected = if is_scaled { 1.0 } else { count };
-        self.weight = if film.layout.is_weighted() { self.sum(|tile, entry| tile.weights[entry].values()[0]) } else { count };
+        self.weight = if film.layout.is_weighted() { self.sum(|tile, entry| tile.weights.values(entry)[0]) } else { count };
         true
     }
 
@@ -82,20 +81,23 @@ impl<'a> Estimator<'a> {
     fn color(&self, out: &mut [f32]) {
         let mut weighted = [0.0; 4];
         for &(tile, entry, scale) in &self.entries {
-            let sums = tile.filtered.color[entry].values();
+            let sums = tile.filtered.color.values(entry);
             weighted = std::array::from_fn(|k| weighted[k] + scale * sums[k]);
         }
         for (k, out) in out.iter_mut().enumerate() {
-            *out = self.mean(weighted[k], || self.own.0.own.color[self.own.1].values()[k]);
+            *out = self.mean(weighted[k], || self.own.0.own.color.values(self.own.1)[k]);
         }
     }
 
-    /// The averaged channels from `first` on.
-    fn channels(&self, first: usize, out: &mut [f32]) {
-        let stride = self.film.layout.channel_stride();
+    /// The average with this index.
+    fn average(&self, index: usize, out: &mut [f32]) {
+        let mut weighted = [0.0; 3];
+        for &(tile, entry, scale) in &self.entries {
+            let sums = tile.filtered.average(index, entry);
+            weighted = std::array::from_fn(|k| weighted[k] + scale * sums[k]);
+        }
         for (k, out) in out.iter_mut().enumerate() {
-            let of = |sums: &[f64], index: usize| slice::value(&sums[index * stride..(index + 1) * stride], first + k);
-            *out = self.mean(self.sum(|tile, entry| of(&tile.filtered.channels, entry)), || of(&self.own.0.own.channels, self.own.1));
+            *out = self.mean(weighted[k], || self.own.0.own.average(index, self.own.1)[k]);
         }
     }
 
@@ -113,8 +115,8 @@ impl<'a> Estimator<'a> {
     fn coverage(&self) -> Vec<(ShapeKey, f64)> {
         let mut weights = Vec::new();
         for &(tile, entry, scale) in &self.entries {
-            let counts = tile.coverage.as_ref().map_or(&[][..], |coverage| coverage.of(entry));
-            weights.extend(counts.iter().map(|&(key, units)| (key, scale * units as f64)));
+            let counts = tile.coverage.as_ref().map(|coverage| coverage.of(entry));
+            weights.extend(counts.into_iter().flatten().map(|(key, units)| (key, scale * units as f64)));
         }
         weights
     }
@@ -127,7 +129,7 @@ impl Film {
     /// layers of surfaces are those of the pixel's nearest sample. Coverage has the filter's absolute value as weight.
     pub fn resolve(&self) -> Image {
         let crop = self.grid().crop;
-        let (mut layers, mut firsts, mut nearest, mut mean) = (Vec::new(), Vec::new(), 0, 3 * self.light_aovs().count());
+        let (mut layers, mut firsts, mut nearest, mut mean) = (Vec::new(), Vec::new(), 0, self.light_aovs().count());
         for (kind, group) in self.stored() {
             let info = kind.info();
             let channels = info.channels.len();
@@ -136,12 +138,12 @@ impl Film {
                 group: group.map(|group| self.shape().light_groups[group].clone()),
                 data: Vec::with_capacity(crop.area() as usize * channels),
             });
-            let take = |next: &mut usize| std::mem::replace(next, *next + channels);
+            let take = |next: &mut usize, count: usize| std::mem::replace(next, *next + count);
             firsts.push(match info.source {
-                Source::LightAov(part) => 3 * part as usize,
-                Source::LightGroups => 3 * (self.light_aovs().first_group() + group.unwrap_or_default()),
-                Source::Surface(_, Filtering::Nearest) => take(&mut nearest),
-                Source::Surface(_, Filtering::Mean) => take(&mut mean),
+                Source::LightAov(part) => part as usize,
+                Source::LightGroups => self.light_aovs().first_group() + group.unwrap_or_default(),
+                Source::Surface(_, Filtering::Nearest) => take(&mut nearest, channels),
+                Source::Surface(_, Filtering::Mean) => take(&mut mean, 1),
                 _ => 0,
             });
         }
@@ -159,7 +161,7 @@ impl Film {
                 let out = &mut layer.data[start..];
                 match info.source {
                     Source::Color => estimator.color(out),
-                    Source::LightAov(_) | Source::LightGroups | Source::Surface(_, Filtering::Mean) => estimator.channels(first, out),
+                    Source::LightAov(_) | Source::LightGroups | Source::Surface(_, Filtering::Mean) => estimator.average(first, out),
                     Source::Surface(_, Filtering::Nearest) => estimator.data(info, first, out),
                     Source::Film if info.kind == LayerKind::Samples => out[0] = estimator.own.0.samples[estimator.own.1] as f32,
                     Source::Film => out.copy_from_slice(&self.variance(&kernel, x, y).map(to_f32)),

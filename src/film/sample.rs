@@ -60,6 +60,18 @@ pub struct SurfaceSample {
     pub shown: ShapeKey,
 }
 
+impl SurfaceSample {
+    /// Whether every number is finite.
+    #[inline]
+    pub fn is_finite(&self) -> bool {
+        let vectors = [self.normal, self.geometric_normal, self.position, self.feature_normal].map(|v| v.x.abs() + v.y.abs() + v.z.abs());
+        let colors = [self.albedo, self.feature_albedo].map(|c| c.r.abs() + c.g.abs() + c.b.abs());
+        let rest = [self.depth, self.uv[0], self.uv[1], self.motion[0], self.motion[1]].map(f32::abs);
+        let all = vectors.into_iter().chain(colors).chain(rest);
+        all.fold(0.0, |sum, value| sum + value * 0.0) == 0.0
+    }
+}
+
 /// A part of the picture's radiance, by how the light came to the camera. The parts of a sample sum to its radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LightAov {

@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use super::filter::Taps;
-use super::sum::{Sums, slice};
+use super::sum::SumPlane;
 use super::tile::{Accumulator, Values};
 
 /// Sums over few samples of one cell, in the order in which they come: a pass over the cell. Sums of passes then go
@@ -11,9 +11,8 @@ use super::tile::{Accumulator, Values};
 pub struct Splats {
     /// By entry: weighted red, green, blue and alpha, then the weight.
     color: Vec<[f32; 8]>,
-    /// By entry: weighted channels.
-    channels: Vec<f32>,
-    channel_count: usize,
+    /// By average and entry: weighted red, green and blue. Averages that were black so far are empty.
+    averages: Vec<Vec<[f32; 4]>>,
 }
 
 impl Splats {
@@ -23,12 +22,11 @@ impl Splats {
     /// Adds a sample of the pixel with this entry.
     #[inline]
     pub(super) fn add(&mut self, cells: &Cells, entry: usize, taps: &[Taps; 2], values: &Values) {
+        let count = cells.entries_of_cell();
         if self.color.is_empty() {
-            self.color.resize(cells.entries_of_cell(), [0.0; 8]);
-            self.channel_count = values.channels();
-            self.channels.resize(cells.entries_of_cell() * self.channel_count, 0.0);
+            self.color.resize(count, [0.0; 8]);
         }
-        let entry = entry % cells.entries_of_cell();
+        let entry = entry % count;
         let [r, g, b, a] = values.color;
         let terms = [r, g, b, a, 1.0, 0.0, 0.0, 0.0];
         cells.for_each_tap(entry, taps, |entry, weight| {
@@ -36,31 +34,45 @@ impl Splats {
                 *sum += weight * term;
             }
         });
-        if self.channel_count > 0 {
+        values.for_each_average(|k, value| {
+            let sums = plane(&mut self.averages, k, count);
+            let terms = [value.r, value.g, value.b, 0.0];
             cells.for_each_tap(entry, taps, |entry, weight| {
-                let sums = &mut self.channels[entry * self.channel_count..(entry + 1) * self.channel_count];
-                values.for_each_channel(|k, value| sums[k] += weight * value);
+                for (sum, term) in sums[entry].iter_mut().zip(terms) {
+                    *sum += weight * term;
+                }
             });
-        }
+        });
     }
 
     /// Adds all samples to the entries of a cell, and empties itself.
-    pub(super) fn flush(&mut self, cells: &Cells, cell: usize, filtered: &mut Accumulator, weights: &mut [Sums<1>]) {
+    pub(super) fn flush(&mut self, cells: &Cells, cell: usize, filtered: &mut Accumulator, weights: &mut SumPlane<1>) {
         let first = cell * cells.entries_of_cell();
-        let stride = 2 * self.channel_count;
-        let (colors, weights) = (&mut filtered.color[first..], &mut weights[first..]);
-        for ((sums, color), weight) in self.color.iter().zip(colors).zip(weights) {
-            let [r, g, b, a, w, ..] = sums.map(f64::from);
-            color.add([r, g, b, a]);
-            weight.add([w]);
+        for (entry, color) in (first..).zip(&self.color) {
+            let [r, g, b, a, w, ..] = color.map(f64::from);
+            filtered.color.add(entry, [r, g, b, a]);
+            weights.add(entry, [w]);
         }
-        if stride > 0 {
-            let channels = self.channels.chunks_exact(self.channel_count);
-            for (channels, to) in channels.zip(filtered.channels[first * stride..].chunks_exact_mut(stride)) {
-                slice::add(to, channels.iter().map(|&value| f64::from(value)));
+        for (k, sums) in self.averages.iter().enumerate().filter(|(_, sums)| !sums.is_empty()) {
+            let plane = filtered.average_mut(k);
+            for (entry, &[r, g, b, _]) in (first..).zip(sums) {
+                plane.add(entry, [r, g, b].map(f64::from));
             }
         }
         self.color.clear();
-        self.channels.clear();
+        self.averages.iter_mut().for_each(Vec::clear);
     }
+}
+
+/// The sums of an average.
+#[inline(always)]
+fn plane(averages: &mut Vec<Vec<[f32; 4]>>, index: usize, entries: usize) -> &mut [[f32; 4]] {
+    if averages.len() <= index {
+        averages.resize_with(index + 1, Vec::new);
+    }
+    let plane = &mut averages[index];
+    if plane.is_empty() {
+        plane.resize(entries, [0.0; 4]);
+    }
+    plane
 }

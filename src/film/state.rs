@@ -3,7 +3,6 @@
 use super::FilmTile;
 use super::coverage::CoverageCounts;
 use super::sample::ShapeKey;
-use super::sum::Sums;
 use super::tile::{DROPPED_KEPT, DroppedSample, InverseVarianceSums, SampleMoments};
 use crate::bytes::{ByteReader, ByteWriter};
 
@@ -11,11 +10,9 @@ impl FilmTile {
     /// All that the tile holds.
     pub fn save(&self) -> Vec<u8> {
         let mut out = ByteWriter::default();
-        for sums in [&self.filtered, &self.own] {
-            write_sums(&mut out, &sums.color);
-            out.floats(sums.channels.iter().copied());
-        }
-        write_sums(&mut out, &self.weights);
+        self.filtered.save(&mut out);
+        self.own.save(&mut out);
+        self.weights.save(&mut out);
         out.integers(&self.samples);
         out.integers(&self.nearest.depths.iter().map(|depth| depth.to_bits()).collect::<Vec<_>>());
         out.integers(&self.nearest.samples);
@@ -23,9 +20,11 @@ impl FilmTile {
         if let Some(coverage) = &self.coverage {
             write_coverage(&mut out, coverage, self.cells.entries());
         }
-        out.integers(&self.spread.iter().map(|spread| spread.groups).collect::<Vec<_>>());
-        write_sums(&mut out, &self.spread.iter().map(|spread| spread.sums).collect::<Vec<_>>());
-        write_sums(&mut out, &self.spread.iter().map(|spread| spread.squares).collect::<Vec<_>>());
+        if let Some(SampleMoments { groups, sums, squares }) = &self.moments {
+            out.integers(groups);
+            sums.save(&mut out);
+            squares.save(&mut out);
+        }
         let of_pixel = |w: &InverseVarianceSums| [w.count, w.variance[0], w.variance[1], w.variance[2]];
         out.floats(self.weighed.iter().map(of_pixel).collect::<Vec<_>>().as_flattened().iter().copied());
         out.long(self.dropped_count);
@@ -42,11 +41,9 @@ impl FilmTile {
     }
 
     fn read(&mut self, data: &mut ByteReader) -> Option<()> {
-        for sums in [&mut self.filtered, &mut self.own] {
-            sums.color = read_sums(data).filter(|list| list.len() == sums.color.len())?;
-            sums.channels = data.floats().filter(|list| list.len() == sums.channels.len())?;
-        }
-        self.weights = read_sums(data).filter(|list| list.len() == self.weights.len())?;
+        self.filtered.load(data)?;
+        self.own.load(data)?;
+        self.weights = self.weights.load_same(data)?;
         self.samples = data.integers().filter(|list| list.len() == self.samples.len())?;
         let floats = |list: Vec<u32>| list.into_iter().map(f32::from_bits).collect::<Vec<_>>();
         self.nearest.depths = data.integers().map(floats).filter(|list| list.len() == self.nearest.depths.len())?;
@@ -55,15 +52,11 @@ impl FilmTile {
         if let Some(coverage) = &mut self.coverage {
             *coverage = read_coverage(data, self.cells.entries())?;
         }
-        let spreads = self.spread.len();
-        let groups = data.integers().filter(|list| list.len() == spreads)?;
-        let sums = read_sums(data).filter(|list| list.len() == spreads)?;
-        let squares = read_sums(data).filter(|list| list.len() == spreads)?;
-        self.spread = groups
-            .into_iter()
-            .zip(sums.into_iter().zip(squares))
-            .map(|(groups, (sums, squares))| SampleMoments { groups, sums, squares })
-            .collect();
+        if let Some(SampleMoments { groups, sums, squares }) = &mut self.moments {
+            *groups = data.integers().filter(|list| list.len() == groups.len())?;
+            *sums = sums.load_same(data)?;
+            *squares = squares.load_same(data)?;
+        }
         let weighed = data.floats().filter(|list| list.is_empty() || list.len() == 4 * self.samples.len())?;
         let of_pixel = |&[count, r, g, b]: &[f64; 4]| InverseVarianceSums { count, variance: [r, g, b] };
         self.weighed = weighed.as_chunks().0.iter().map(of_pixel).collect();
@@ -74,22 +67,15 @@ impl FilmTile {
     }
 }
 
-fn write_sums<const N: usize>(out: &mut ByteWriter, sums: &[Sums<N>]) {
-    let pairs: Vec<[[f64; N]; 2]> = sums.iter().map(Sums::pairs).collect();
-    out.floats(pairs.as_flattened().as_flattened().iter().copied());
-}
-
-fn read_sums<const N: usize>(data: &mut ByteReader) -> Option<Vec<Sums<N>>> {
-    let values = data.floats()?;
-    let pair = |values: &[f64]| Some(Sums::from_pairs([values.get(..N)?.try_into().ok()?, values.get(N..)?.try_into().ok()?]));
-    values.chunks(2 * N).map(pair).collect()
-}
-
 fn write_coverage(out: &mut ByteWriter, coverage: &CoverageCounts, entries: usize) {
     let mut values = Vec::new();
-    for list in (0..entries).map(|entry| coverage.of(entry)) {
-        values.push(list.len() as u32);
-        values.extend(list.iter().flat_map(|&(key, units)| [key.instance, key.shape, units as u32, (units >> 32) as u32]));
+    for entry in 0..entries {
+        let start = values.len();
+        values.push(0);
+        for (key, units) in coverage.of(entry) {
+            values.extend([key.instance, key.shape, units as u32, (units >> 32) as u32]);
+            values[start] += 1;
+        }
     }
     out.integers(&values);
 }

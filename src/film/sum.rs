@@ -1,53 +1,88 @@
 //! Sums that do not depend on the order of their terms.
 //!
-//! Each is an unevaluated pair of `f64`: what adding to the high part rounds away goes into the low one, exactly (the error-free sum of two
-//! floats of Knuth, "The Art of Computer Programming", volume 2, 4.2.2). Terms with the 24 bits of an `f32` are summed
-//! exactly as long as the sum is less than 2^65 times the smallest of 2^17 terms, so that films of any parts of the
-//! samples merge to the same bits.
+//! Each is an unevaluated pair: an `f64`, and an `f32` for what adding to it rounds away (the error-free sum of two floats of
+//! Knuth, "The Art of Computer Programming", volume 2, 4.2.2). Terms with the 24 bits of an `f32` are summed exactly as
+//! long as the sum is less than 2^36 times the smallest of 2^17 terms (beyond that, the `f32` is rounded). So films of any
+//! parts of the samples merge to the same bits.
 
-/// `N` sums side by side.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sums<const N: usize> {
-    high: [f64; N],
-    low: [f64; N],
+use crate::bytes::{ByteReader, ByteWriter};
+
+/// `N` sums for each of a number of entries; those of an entry side by side.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SumPlane<const N: usize> {
+    high: Vec<[f64; N]>,
+    low: Vec<[f32; N]>,
 }
 
-impl<const N: usize> Default for Sums<N> {
-    fn default() -> Self {
-        Self { high: [0.0; N], low: [0.0; N] }
+impl<const N: usize> SumPlane<N> {
+    /// Bytes of an entry.
+    pub const ENTRY_BYTES: usize = N * (size_of::<f64>() + size_of::<f32>());
+
+    /// Zeros.
+    pub fn new(entries: usize) -> Self {
+        Self { high: vec![[0.0; N]; entries], low: vec![[0.0; N]; entries] }
     }
-}
 
-impl<const N: usize> Sums<N> {
-    /// Adds to each sum.
+    /// Whether there is no entry.
     #[inline(always)]
-    pub fn add(&mut self, terms: [f64; N]) {
-        let sums: [(f64, f64); N] = std::array::from_fn(|k| two_sum(self.high[k], terms[k]));
-        self.high = std::array::from_fn(|k| sums[k].0);
-        self.low = std::array::from_fn(|k| self.low[k] + sums[k].1);
+    pub fn is_empty(&self) -> bool {
+        self.high.is_empty()
     }
 
-    /// Adds the sums of other terms.
-    pub fn merge(&mut self, other: &Self) {
+    /// Adds to each sum of an entry.
+    #[inline(always)]
+    pub fn add(&mut self, entry: usize, terms: [f64; N]) {
+        let (high, low) = (&mut self.high[entry], &mut self.low[entry]);
         for k in 0..N {
-            merge_pair(&mut self.high[k], &mut self.low[k], other.high[k], other.low[k]);
+            let (sum, error) = two_sum(high[k], terms[k]);
+            high[k] = sum;
+            low[k] += error as f32;
         }
     }
 
-    /// The high parts and the low ones.
-    pub(super) fn pairs(&self) -> [[f64; N]; 2] {
-        [self.high, self.low]
+    /// Adds the sums of other terms, each times `factor`.
+    pub fn merge(&mut self, other: &Self, factor: f64) {
+        for (entry, (other_high, other_low)) in other.high.iter().zip(&other.low).enumerate() {
+            if factor == 1.0 {
+                self.add(entry, *other_high);
+                self.low[entry].iter_mut().zip(other_low).for_each(|(low, other)| *low += other);
+            } else {
+                self.add(entry, other.values(entry).map(|sum| factor * sum));
+            }
+        }
     }
 
-    /// Inverts [`pairs`](Self::pairs).
-    pub(super) fn from_pairs([high, low]: [[f64; N]; 2]) -> Self {
-        Self { high, low }
-    }
-
-    /// The sums, rounded.
+    /// The sums of an entry, rounded.
     #[inline]
-    pub fn values(&self) -> [f64; N] {
-        std::array::from_fn(|k| self.high[k] + self.low[k])
+    pub fn values(&self, entry: usize) -> [f64; N] {
+        let (high, low) = (&self.high[entry], &self.low[entry]);
+        std::array::from_fn(|k| high[k] + f64::from(low[k]))
+    }
+
+    /// Writes all sums.
+    pub fn save(&self, out: &mut ByteWriter) {
+        out.floats(self.high.as_flattened().iter().copied());
+        out.integers(&self.low.as_flattened().iter().map(|low| low.to_bits()).collect::<Vec<_>>());
+    }
+
+    /// What [`save`](Self::save) wrote; `None` if it is something else.
+    pub fn load(data: &mut ByteReader) -> Option<Self> {
+        let (high, low) = (data.floats()?, data.integers()?);
+        if high.len() != low.len() || !high.len().is_multiple_of(N) {
+            return None;
+        }
+        let low: Vec<f32> = low.into_iter().map(f32::from_bits).collect();
+        Some(Self { high: high.as_chunks().0.to_vec(), low: low.as_chunks().0.to_vec() })
+    }
+
+    /// [`load`](Self::load) of as many entries as there are here.
+    pub fn load_same(&self, data: &mut ByteReader) -> Option<Self> {
+        Self::load(data).filter(|plane| plane.has_entries(self.high.len()))
+    }
+
+    /// Whether there are so many entries.
+    pub fn has_entries(&self, entries: usize) -> bool {
+        self.high.len() == entries
     }
 }
 
@@ -60,55 +95,6 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - of_a) + (b - of_b))
 }
 
-#[inline]
-fn merge_pair(high: &mut f64, low: &mut f64, other_high: f64, other_low: f64) {
-    let (sum, error) = two_sum(*high, other_high);
-    *high = sum;
-    *low = (*low + other_low) + error;
-}
-
-/// Sums of a number that is not known beforehand: the high parts, then the low ones.
-pub mod slice {
-    use super::{merge_pair, two_sum};
-
-    /// Adds `terms`, half as many as there are numbers in `sums`.
-    #[inline]
-    pub fn add(sums: &mut [f64], terms: impl ExactSizeIterator<Item = f64>) {
-        let (high, low) = sums.split_at_mut(terms.len());
-        for ((high, low), term) in high.iter_mut().zip(low).zip(terms) {
-            let (sum, error) = two_sum(*high, term);
-            *high = sum;
-            *low += error;
-        }
-    }
-
-    /// Adds terms to the sums from this index on.
-    #[inline]
-    pub fn add_at<const N: usize>(sums: &mut [f64], first: usize, terms: [f64; N]) {
-        let (high, low) = sums.split_at_mut(sums.len() / 2);
-        for ((high, low), term) in high[first..first + N].iter_mut().zip(&mut low[first..first + N]).zip(terms) {
-            let (sum, error) = two_sum(*high, term);
-            *high = sum;
-            *low += error;
-        }
-    }
-
-    /// Adds the sums of other terms.
-    pub fn merge(sums: &mut [f64], other: &[f64]) {
-        let count = sums.len() / 2;
-        let (high, low) = sums.split_at_mut(count);
-        for k in 0..count {
-            merge_pair(&mut high[k], &mut low[k], other[k], other[count + k]);
-        }
-    }
-
-    /// The sum with this index, rounded.
-    #[inline]
-    pub fn value(sums: &[f64], index: usize) -> f64 {
-        sums[index] + sums[sums.len() / 2 + index]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,37 +105,43 @@ mod tests {
         (0..count).map(|_| f64::from((rng.unit_f32() - 0.3) * 10f32.powf(10.0 * rng.unit_f32() - 5.0))).collect()
     }
 
+    fn sums<'a>(terms: impl IntoIterator<Item = &'a f64>) -> SumPlane<2> {
+        let mut plane = SumPlane::new(2);
+        terms.into_iter().for_each(|&x| plane.add(1, [x, -x]));
+        plane
+    }
+
     #[test]
     fn sums_do_not_depend_on_order_or_on_splits() {
         let mut rng = Rng::new(7);
         for _ in 0..200 {
             let terms = terms(&mut rng, 1000);
-            let mut forward = Sums::<2>::default();
-            terms.iter().for_each(|&x| forward.add([x, -x]));
-            let mut backward = Sums::<2>::default();
-            terms.iter().rev().for_each(|&x| backward.add([x, -x]));
-            let mut merged = Sums::<2>::default();
-            let mut in_slice = vec![0.0; 4];
-            for part in terms.chunks(37) {
-                let (mut sums, mut slice) = (Sums::<2>::default(), vec![0.0; 4]);
-                part.iter().for_each(|&x| sums.add([x, -x]));
-                part.iter().for_each(|&x| slice::add(&mut slice, [x, -x].into_iter()));
-                merged.merge(&sums);
-                slice::merge(&mut in_slice, &slice);
-            }
-            assert_eq!(forward.values(), backward.values());
-            assert_eq!(forward.values(), merged.values());
-            assert_eq!(forward.values(), [slice::value(&in_slice, 0), slice::value(&in_slice, 1)]);
-            assert_eq!(forward.values()[0], -forward.values()[1]);
+            let forward = sums(&terms).values(1);
+            let mut merged = SumPlane::new(2);
+            terms.chunks(37).for_each(|part| merged.merge(&sums(part), 1.0));
+            assert_eq!(forward, sums(terms.iter().rev()).values(1));
+            assert_eq!(forward, merged.values(1));
+            assert_eq!((forward[0], merged.values(0)), (-forward[1], [0.0; 2]));
         }
     }
 
     #[test]
     fn what_a_plain_sum_loses_is_kept() {
-        let mut sums = Sums::<1>::default();
-        for x in [1e16, 1.0, 1.0, -1e16] {
-            sums.add([x]);
-        }
-        assert_eq!(sums.values(), [2.0]);
+        let plane = sums(&[1e16, 1.0, 1.0, -1e16]);
+        assert_eq!(plane.values(1), [2.0, -2.0]);
+        let mut thrice = SumPlane::new(2);
+        thrice.merge(&plane, 3.0);
+        assert_eq!(thrice.values(1), [6.0, -6.0]);
+    }
+
+    #[test]
+    fn saved_planes_come_back_and_others_are_refused() {
+        let plane = sums(&[1e16, 1.0]);
+        let mut out = ByteWriter::default();
+        plane.save(&mut out);
+        let bytes = out.into_bytes();
+        assert_eq!(SumPlane::load(&mut ByteReader::new(&bytes)), Some(plane));
+        assert_eq!(SumPlane::<3>::load(&mut ByteReader::new(&bytes)), None);
+        assert_eq!(SumPlane::<2>::new(1).load_same(&mut ByteReader::new(&bytes)), None);
     }
 }

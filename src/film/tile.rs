@@ -4,8 +4,9 @@ use super::cells::Cells;
 use super::layer::channels_of;
 use super::nearest::Nearest;
 use super::splats::Splats;
-use super::sum::{Sums, slice};
-use super::{CoverageCounts, Crop, Filtering, LayerKind, Layout, PixelSample, Sample, Source, SurfaceSample, Taps};
+use super::sum::SumPlane;
+use super::{CoverageCounts, Crop, Filtering, LayerKind, Layout, PixelSample, Sample, Taps};
+use crate::bytes::{ByteReader, ByteWriter};
 use crate::color::Rgb;
 
 /// How many dropped samples a tile remembers; it counts all of them.
@@ -22,12 +23,35 @@ pub struct DroppedSample {
     pub sample: u32,
 }
 
-/// How far groups of a pixel's samples lie apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Sums over groups of each pixel's samples, of their means and the squares of these.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SampleMoments {
-    pub groups: u32,
-    pub sums: Sums<3>,
-    pub squares: Sums<3>,
+    /// Number of groups, by pixel.
+    pub groups: Vec<u32>,
+    pub sums: SumPlane<3>,
+    pub squares: SumPlane<3>,
+}
+
+impl SampleMoments {
+    /// Bytes of a pixel.
+    pub const PIXEL_BYTES: usize = size_of::<u32>() + 2 * SumPlane::<3>::ENTRY_BYTES;
+
+    fn new(pixels: usize) -> Self {
+        Self { groups: vec![0; pixels], sums: SumPlane::new(pixels), squares: SumPlane::new(pixels) }
+    }
+
+    #[inline]
+    fn add(&mut self, pixel: usize, mean: [f64; 3]) {
+        self.groups[pixel] += 1;
+        self.sums.add(pixel, mean);
+        self.squares.add(pixel, mean.map(|value| value * value));
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.groups.iter_mut().zip(&other.groups).for_each(|(sum, groups)| *sum = sum.saturating_add(*groups));
+        self.sums.merge(&other.sums, 1.0);
+        self.squares.merge(&other.squares, 1.0);
+    }
 }
 
 /// A pixel of samples that do not all count the same.
@@ -42,86 +66,85 @@ pub(super) struct Values<'a> {
     /// Radiance and alpha.
     pub color: [f32; 4],
     light_aovs: &'a [Rgb],
-    /// Of layers of surfaces that are averaged.
-    means: [f32; MAX_MEANS],
-    /// Channels of parts, and of these layers.
-    counts: [usize; 2],
+    /// Of layers of surfaces that are averaged; the others are black.
+    means: [Rgb; MAX_MEANS],
+    /// The index of the first of these among the averages.
+    first_mean: usize,
 }
 
 impl Values<'_> {
-    fn read_means(&mut self, layout: Layout, surface: Option<&SurfaceSample>) {
-        let Some(surface) = surface else { return };
-        let mut start = 0;
-        for info in layout.set.surfaces(Filtering::Mean) {
-            if let Source::Surface(read, _) = info.source {
-                read(surface, &mut self.means[start..start + info.channels.len()]);
-            }
-            start += info.channels.len();
-        }
-    }
-
-    /// Number of channels beside the colour.
-    #[inline]
-    pub fn channels(&self) -> usize {
-        self.counts[0] + self.counts[1]
-    }
-
-    /// Calls `f` with the index and value of each channel beside the colour that is not 0.
-    #[inline]
-    pub fn for_each_channel(&self, mut f: impl FnMut(usize, f32)) {
-        // Most parts of a sample are black.
-        for (i, part) in self.light_aovs.iter().enumerate().filter(|(_, part)| !part.is_black()) {
-            part.to_array().into_iter().enumerate().for_each(|(k, value)| f(3 * i + k, value));
-        }
-        let means = &self.means[..self.counts[1]];
-        means.iter().enumerate().filter(|(_, value)| **value != 0.0).for_each(|(k, &value)| f(self.counts[0] + k, value));
+    /// Calls `f` with the index and value of each average beside the colour that is not black.
+    #[inline(always)]
+    pub fn for_each_average(&self, mut f: impl FnMut(usize, Rgb)) {
+        // Most light AOVs of a sample are black.
+        self.light_aovs.iter().enumerate().filter(|(_, value)| !value.is_black()).for_each(|(i, &value)| f(i, value));
+        let means = self.means.iter().enumerate().filter(|(_, value)| !value.is_black());
+        means.for_each(|(i, &value)| f(self.first_mean + i, value));
     }
 }
 
-/// Most channels of layers of surfaces that are averaged.
-const MAX_MEANS: usize = channels_of(Filtering::Mean);
+/// Most layers of surfaces that are averaged: each has three channels.
+pub(super) const MAX_MEANS: usize = channels_of(Filtering::Mean) / 3;
 
 /// Sums over the weighted samples that reach an entry of the tile's cells, or over the samples of a pixel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Accumulator {
+    entries: usize,
     /// Radiance and alpha.
-    pub color: Vec<Sums<4>>,
-    /// The channels beside the colour that are averaged: those of parts, then those of surfaces; an entry's
-    /// [values](mod@slice) side by side.
-    pub channels: Vec<f64>,
+    pub color: SumPlane<4>,
+    /// The averages beside the colour: light AOVs, then layers of surfaces. Those that are black everywhere are empty.
+    pub averages: Vec<SumPlane<3>>,
 }
 
 impl Accumulator {
-    fn new(count: usize, layout: Layout) -> Self {
-        Self { color: vec![Sums::default(); count], channels: vec![0.0; count * layout.channel_stride()] }
+    fn new(entries: usize, layout: &Layout) -> Self {
+        Self { entries, color: SumPlane::new(entries), averages: vec![SumPlane::default(); layout.averages()] }
+    }
+
+    /// The sums of an average, which is not black everywhere.
+    #[inline(always)]
+    pub fn average_mut(&mut self, index: usize) -> &mut SumPlane<3> {
+        let plane = &mut self.averages[index];
+        if plane.is_empty() {
+            *plane = SumPlane::new(self.entries);
+        }
+        plane
     }
 
     #[inline(always)]
-    fn add(&mut self, index: usize, value: &Values, weight: f32) {
+    fn add(&mut self, entry: usize, value: &Values, weight: f32) {
         let weight = f64::from(weight);
-        let [r, g, b, a] = value.color;
-        self.color[index].add([weight * f64::from(r), weight * f64::from(g), weight * f64::from(b), weight * f64::from(a)]);
-        let stride = 2 * value.channels();
-        if stride > 0 {
-            let sums = &mut self.channels[index * stride..(index + 1) * stride];
-            value.for_each_channel(|k, value| slice::add_at(sums, k, [weight * f64::from(value)]));
-        }
+        self.color.add(entry, value.color.map(|value| weight * f64::from(value)));
+        value.for_each_average(|k, value| self.average_mut(k).add(entry, value.to_array().map(|value| weight * f64::from(value))));
     }
 
     /// Adds the sums of another, times a factor.
-    fn merge(&mut self, other: &Self, stride: usize, factor: f64) {
-        for (sums, others) in self.color.iter_mut().zip(&other.color) {
-            if factor == 1.0 { sums.merge(others) } else { sums.add(others.values().map(|sum| factor * sum)) }
+    fn merge(&mut self, other: &Self, factor: f64) {
+        self.color.merge(&other.color, factor);
+        for (k, average) in other.averages.iter().enumerate().filter(|(_, average)| !average.is_empty()) {
+            self.average_mut(k).merge(average, factor);
         }
-        if stride > 0 {
-            for (sums, others) in self.channels.chunks_exact_mut(stride).zip(other.channels.chunks_exact(stride)) {
-                if factor == 1.0 {
-                    slice::merge(sums, others);
-                } else {
-                    slice::add(sums, (0..stride / 2).map(|k| factor * slice::value(others, k)));
-                }
-            }
+    }
+
+    /// The sum of an average at an entry.
+    #[inline]
+    pub fn average(&self, index: usize, entry: usize) -> [f64; 3] {
+        let plane = &self.averages[index];
+        if plane.is_empty() { [0.0; 3] } else { plane.values(entry) }
+    }
+
+    pub fn save(&self, out: &mut ByteWriter) {
+        self.color.save(out);
+        self.averages.iter().for_each(|average| average.save(out));
+    }
+
+    /// Replaces the sums by saved ones.
+    pub fn load(&mut self, data: &mut ByteReader) -> Option<()> {
+        self.color = self.color.load_same(data)?;
+        for average in &mut self.averages {
+            *average = SumPlane::load(data).filter(|plane| plane.is_empty() || plane.has_entries(self.entries))?;
         }
+        Some(())
     }
 }
 
@@ -138,7 +161,7 @@ pub struct FilmTile {
     /// By entry of the cells: sums of weighted samples.
     pub(super) filtered: Accumulator,
     /// By entry of the cells: sums of the weights. Empty if every weight is 1.
-    pub(super) weights: Vec<Sums<1>>,
+    pub(super) weights: SumPlane<1>,
     /// By pixel: sums of its own samples. Empty unless the filter has negative lobes.
     pub(super) own: Accumulator,
     /// Samples of each pixel that were kept.
@@ -147,8 +170,8 @@ pub struct FilmTile {
     pub(super) nearest: Nearest,
     /// By entry of the cells; only of layers that need it.
     pub(super) coverage: Option<CoverageCounts>,
-    /// Empty unless the variance is asked for.
-    pub(super) spread: Vec<SampleMoments>,
+    /// Only if the variance is a layer.
+    pub(super) moments: Option<SampleMoments>,
     /// What each pixel's samples count together and the variance of their mean. Empty while each counts once.
     pub(super) weighed: Vec<InverseVarianceSums>,
     pub(super) dropped_count: u64,
@@ -157,6 +180,7 @@ pub struct FilmTile {
 
 impl FilmTile {
     pub(super) fn new(area: Crop, active: Crop, layout: Layout) -> Self {
+        let (set, signed) = (layout.set, layout.signed);
         let pixels = area.area() as usize;
         let cells = Cells::new([area.width, area.height], layout.cell_size, layout.border);
         let entries = cells.entries();
@@ -165,13 +189,13 @@ impl FilmTile {
             active,
             layout,
             cells,
-            filtered: Accumulator::new(entries, layout),
-            weights: vec![Sums::default(); if layout.is_weighted() { entries } else { 0 }],
-            own: Accumulator::new(if layout.signed { pixels } else { 0 }, layout),
+            filtered: Accumulator::new(entries, &layout),
+            weights: SumPlane::new(if layout.is_weighted() { entries } else { 0 }),
+            own: Accumulator::new(if signed { pixels } else { 0 }, &layout),
             samples: vec![0; pixels],
-            nearest: Nearest::new(pixels, layout.data_channels),
-            coverage: layout.set.needs_coverage().then(|| CoverageCounts::new(entries)),
-            spread: vec![SampleMoments::default(); if layout.set.contains(LayerKind::Variance) { pixels } else { 0 }],
+            nearest: Nearest::new(pixels, layout.nearest.channels()),
+            coverage: set.needs_coverage().then(|| CoverageCounts::new(entries)),
+            moments: set.contains(LayerKind::Variance).then(|| SampleMoments::new(pixels)),
             weighed: Vec::new(),
             dropped_count: 0,
             dropped: Vec::new(),
@@ -215,8 +239,8 @@ impl FilmTile {
         let Some(values) = self.take(pixel, sample, value, weight) else { return false };
         let entry = self.cells.entry_of(pixel);
         self.filtered.add(entry, &values, weight);
-        if let Some(sum) = self.weights.get_mut(entry) {
-            sum.add([f64::from(weight)]);
+        if !self.weights.is_empty() {
+            self.weights.add(entry, [f64::from(weight)]);
         }
         if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
             coverage.add(entry, surface.shown, 1);
@@ -233,7 +257,7 @@ impl FilmTile {
         }
         let weight = f64::from(weight);
         let color = [radiance.r, radiance.g, radiance.b, *alpha].map(|value| weight * f64::from(value));
-        self.filtered.color[self.cells.entry_of(pixel)].add(color);
+        self.filtered.color.add(self.cells.entry_of(pixel), color);
         self.samples[pixel] += 1;
         true
     }
@@ -265,15 +289,19 @@ impl FilmTile {
     #[inline(always)]
     fn take<'a>(&mut self, pixel: usize, sample: u32, value: Sample<'a>, weight: f32) -> Option<Values<'a>> {
         let Sample { pixel: PixelSample { radiance, alpha }, surface, light_aovs } = value;
-        let mut values =
-            Values { color: [radiance.r, radiance.g, radiance.b, *alpha], light_aovs: &[], means: [0.0; MAX_MEANS], counts: [0; 2] };
+        let color = [radiance.r, radiance.g, radiance.b, *alpha];
+        let count = self.layout.light_aovs.count();
+        let mut values = Values { color, light_aovs: &[], means: [Rgb::BLACK; MAX_MEANS], first_mean: count };
         let mut finite = is_finite(weight, *radiance, *alpha);
         if self.layout.beside_color() {
-            values.light_aovs = &light_aovs[..self.layout.light_aovs.count().min(light_aovs.len())];
-            values.counts = [3 * self.layout.light_aovs.count(), self.layout.mean_channels];
-            values.read_means(self.layout, surface);
-            values.for_each_channel(|_, value| finite &= (weight * value).is_finite());
-            finite = finite && surface.is_none_or(|surface| self.nearest.add(pixel, sample, surface, self.layout.set));
+            values.light_aovs = &light_aovs[..count.min(light_aovs.len())];
+            if let Some(surface) = surface {
+                let mut means = [[0.0; 3]; MAX_MEANS];
+                self.layout.means.read(surface, means.as_flattened_mut());
+                values.means = means.map(Rgb::from);
+            }
+            values.for_each_average(|_, value| finite &= is_finite(weight, value, 0.0));
+            finite = finite && surface.is_none_or(|surface| self.nearest.add(pixel, sample, surface, &self.layout.nearest));
         }
         if !finite {
             self.drop_sample(pixel, sample);
@@ -291,24 +319,23 @@ impl FilmTile {
     /// pixel are of one size.
     #[inline]
     pub fn add_moments(&mut self, pixel: usize, radiance: [f64; 3]) {
-        let Some(spread) = self.spread.get_mut(pixel) else { return };
-        spread.groups += 1;
-        spread.sums.add(radiance);
-        spread.squares.add(radiance.map(|value| value * value));
+        if let Some(moments) = &mut self.moments {
+            moments.add(pixel, radiance);
+        }
     }
 
     /// Whether [`add_moments`](Self::add_moments) does anything.
     #[inline]
     pub fn tracks_variance(&self) -> bool {
-        !self.spread.is_empty()
+        self.moments.is_some()
     }
 
     /// Mean of a pixel's own groups and the variance of that mean, by channel; `None` with fewer than two groups.
     pub fn group_statistics(&self, pixel: usize) -> Option<([f64; 3], [f64; 3])> {
-        let spread = self.spread.get(pixel).filter(|spread| spread.groups >= 2)?;
-        let n = f64::from(spread.groups);
-        let mean = spread.sums.values().map(|sum| sum / n);
-        let square = spread.squares.values().map(|sum| sum / n);
+        let moments = self.moments.as_ref().filter(|moments| moments.groups[pixel] >= 2)?;
+        let n = f64::from(moments.groups[pixel]);
+        let mean = moments.sums.values(pixel).map(|sum| sum / n);
+        let square = moments.squares.values(pixel).map(|sum| sum / n);
         let variance = [0, 1, 2].map(|k| ((square[k] - mean[k] * mean[k]) / (n - 1.0)).max(0.0));
         Some((mean, variance))
     }
@@ -321,7 +348,8 @@ impl FilmTile {
 
     /// The mean radiance of a pixel's own groups.
     pub fn mean(&self, pixel: usize) -> [f64; 3] {
-        self.spread.get(pixel).map_or([0.0; 3], |spread| spread.sums.values().map(|sum| sum / f64::from(spread.groups.max(1))))
+        let mean = |moments: &SampleMoments| moments.sums.values(pixel).map(|sum| sum / f64::from(moments.groups[pixel].max(1)));
+        self.moments.as_ref().map_or([0.0; 3], mean)
     }
 
     /// What a pixel's own samples count together.
@@ -342,10 +370,8 @@ impl FilmTile {
     /// Adds all samples of another tile of the same pixels and layers.
     pub fn merge(&mut self, other: &Self) {
         self.merge_sums(other, 1.0);
-        for (spread, others) in self.spread.iter_mut().zip(&other.spread) {
-            spread.groups = spread.groups.saturating_add(others.groups);
-            spread.sums.merge(&others.sums);
-            spread.squares.merge(&others.squares);
+        if let (Some(moments), Some(other)) = (&mut self.moments, &other.moments) {
+            moments.merge(other);
         }
     }
 
@@ -371,12 +397,9 @@ impl FilmTile {
     }
 
     fn merge_sums(&mut self, other: &Self, factor: f64) {
-        let stride = self.layout.channel_stride();
-        self.filtered.merge(&other.filtered, stride, factor);
-        self.own.merge(&other.own, stride, factor);
-        for (sum, others) in self.weights.iter_mut().zip(&other.weights) {
-            if factor == 1.0 { sum.merge(others) } else { sum.add(others.values().map(|sum| factor * sum)) }
-        }
+        self.filtered.merge(&other.filtered, factor);
+        self.own.merge(&other.own, factor);
+        self.weights.merge(&other.weights, factor);
         for (sum, count) in self.samples.iter_mut().zip(&other.samples) {
             *sum = sum.saturating_add(*count);
         }

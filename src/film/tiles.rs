@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::sum::Sums;
+use super::layer::SurfaceChannels;
+use super::sum::SumPlane;
 use super::tile::{DROPPED_KEPT, DroppedSample, FilmTile, SampleMoments};
-use super::{Crop, Filter, Filtering, LayerKind, LayerSet, LightAovRequest, VarianceKernel};
+use super::{CoverageCounts, Crop, Filter, Filtering, LayerKind, LayerSet, LightAovRequest, VarianceKernel};
 use crate::desc::FilterDesc;
 use crate::error::{Error, Result};
 
@@ -85,10 +86,10 @@ pub(super) struct Layout {
     pub set: LayerSet,
     /// The parts of the radiance.
     pub light_aovs: LightAovRequest,
-    /// Channels of the layers of surfaces that are averaged.
-    pub mean_channels: usize,
-    /// Channels of the layers of surfaces that are data.
-    pub data_channels: usize,
+    /// The layers of surfaces that are averaged.
+    pub means: SurfaceChannels,
+    /// The layers of surfaces that are data.
+    pub nearest: SurfaceChannels,
     /// Width and height of cells, whose pixels have equally many samples.
     pub cell_size: u32,
     /// How many pixels beyond its own a sample reaches.
@@ -101,15 +102,14 @@ impl Layout {
     fn new(set: LayerSet, light_groups: usize, filter: &Filter, cell_size: u32) -> Self {
         let light_groups = if set.contains(LayerKind::LightGroups) { light_groups as u32 } else { 0 };
         let light_aovs = LightAovRequest { by_scattering: set.needs_light_aovs(), light_groups };
-        let channels = |filtering| set.surfaces(filtering).map(|info| info.channels.len()).sum();
-        let (mean_channels, data_channels) = (channels(Filtering::Mean), channels(Filtering::Nearest));
-        Self { set, light_aovs, mean_channels, data_channels, cell_size, border: filter.border(), signed: filter.is_signed() }
+        let [means, nearest] = [Filtering::Mean, Filtering::Nearest].map(|filtering| SurfaceChannels::new(set, filtering));
+        Self { set, light_aovs, means, nearest, cell_size, border: filter.border(), signed: filter.is_signed() }
     }
 
-    /// Numbers that the averaged channels beside the colour take.
+    /// Averages of three channels beside the colour: light AOVs, then layers of surfaces.
     #[inline]
-    pub fn channel_stride(&self) -> usize {
-        2 * (3 * self.light_aovs.count() + self.mean_channels)
+    pub fn averages(&self) -> usize {
+        self.light_aovs.count() + self.means.channels() / 3
     }
 
     /// Whether samples bring more than colour.
@@ -246,19 +246,19 @@ impl Film {
     }
 }
 
-/// Bytes that a film holds for each pixel, without the borders of cells and the lists of shapes that layers of objects need.
+/// Bytes that a film holds for each pixel at most, without the borders of cells and where pixels show one shape.
 pub fn bytes_per_pixel(shape: &FilmShape) -> usize {
     pixel_bytes(Layout::new(shape.layers, shape.light_groups.len(), &Filter::new(&shape.filter), 1))
 }
 
 fn pixel_bytes(layout: Layout) -> usize {
-    let filtered = size_of::<Sums<4>>() + size_of::<f64>() * layout.channel_stride();
-    let weights = if layout.is_weighted() { size_of::<Sums<1>>() } else { 0 };
+    let filtered = SumPlane::<4>::ENTRY_BYTES + layout.averages() * SumPlane::<3>::ENTRY_BYTES;
+    let weights = if layout.is_weighted() { SumPlane::<1>::ENTRY_BYTES } else { 0 };
     let own = if layout.signed { filtered } else { 0 };
-    let spread = if layout.set.contains(LayerKind::Variance) { size_of::<SampleMoments>() } else { 0 };
-    let lists = if layout.set.needs_coverage() { size_of::<Vec<()>>() } else { 0 };
-    let data = if layout.data_channels > 0 { size_of::<f32>() * (2 + layout.data_channels) } else { 0 };
-    filtered + weights + own + spread + lists + data + size_of::<u32>()
+    let moments = if layout.set.contains(LayerKind::Variance) { SampleMoments::PIXEL_BYTES } else { 0 };
+    let coverage = if layout.set.needs_coverage() { CoverageCounts::PIXEL_BYTES } else { 0 };
+    let data = if layout.nearest.channels() > 0 { size_of::<f32>() * (2 + layout.nearest.channels()) } else { 0 };
+    filtered + weights + own + moments + coverage + data + size_of::<u32>()
 }
 
 fn check_memory(shape: &FilmShape, sampled: &Crop, layout: Layout) -> Result<()> {

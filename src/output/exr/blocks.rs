@@ -116,14 +116,17 @@ impl Zip {
 
 /// The first bytes of all pairs and then the second ones, each less the one before it, plus 128. Blocks have an even number of bytes.
 fn predict(block: &[u8], out: &mut Vec<u8>) {
-    let pairs = block.as_chunks::<2>().0;
     out.resize(block.len(), 0);
+    let pairs = block.as_chunks::<2>().0;
+    let (Some(first), Some(last)) = (pairs.first(), pairs.last()) else { return };
+    let difference = |byte: u8, before: u8| byte.wrapping_sub(before).wrapping_add(128);
     let (firsts, seconds) = out.split_at_mut(pairs.len());
-    let mut before = [128, pairs.last().map_or(128, |last| last[0])];
-    for ((pair, first), second) in pairs.iter().zip(firsts).zip(seconds) {
-        *first = pair[0].wrapping_sub(before[0]).wrapping_add(128);
-        *second = pair[1].wrapping_sub(before[1]).wrapping_add(128);
-        before = *pair;
+    // Nothing is before the first one.
+    (firsts[0], seconds[0]) = (first[0], difference(first[1], last[0]));
+    let neighbours = pairs.iter().zip(&pairs[1..]);
+    for ((before, pair), (first, second)) in neighbours.zip(firsts[1..].iter_mut().zip(&mut seconds[1..])) {
+        *first = difference(pair[0], before[0]);
+        *second = difference(pair[1], before[1]);
     }
 }
 
