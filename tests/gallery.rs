@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use steradian::accel::AccelKind;
-use steradian::desc::LayerDesc;
+use steradian::desc::LayerKind;
 use steradian::film::LayerSet;
 use steradian::render::{Overrides, Settings};
 use steradian::{compile, import};
@@ -42,7 +42,7 @@ fn assert_same_with_layers(scenes: Vec<String>) {
         spp: Some(1),
         size: Some([40, 40]),
         threads: Some(2),
-        layers: vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo],
+        layers: vec![LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo],
         outputs: vec!["all.exr".into()],
         ..Overrides::default()
     };

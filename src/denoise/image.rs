@@ -4,7 +4,7 @@ use super::oidn::Triple;
 use super::prepared::Prepared;
 use super::{Denoiser, Report};
 use crate::error::Result;
-use crate::film::{Image, Layer, LayerKind, LayerSet, Source};
+use crate::film::{Image, Layer, LayerInfo, LayerKind, LayerSet, Source};
 
 /// The layers that help to denoise a picture.
 pub const FEATURE_LAYERS: [LayerKind; 2] = [LayerKind::FeatureAlbedo, LayerKind::FeatureNormal];
@@ -21,7 +21,7 @@ pub fn denoise_image(denoiser: &Denoiser, image: &mut Image) -> Result<Report> {
     let mut prepared = Prepared::new(denoiser, size, albedo, normal)?;
     let Some(color) = image.layers.iter().position(|layer| layer.kind == LayerKind::Color) else { return Ok(prepared.finish()) };
     let noisy = Layer::new(LayerKind::Noisy, image.layers[color].data.clone());
-    let total = prepared.picture(LayerKind::Color.info().name, triples(&noisy))?;
+    let total = prepared.picture(LayerInfo::of(LayerKind::Color).name, triples(&noisy))?;
     let alpha: Vec<f32> = noisy.channel(3).collect();
     let alpha = prepared.alpha(&alpha)?;
 
@@ -56,18 +56,21 @@ fn light_groups(image: &Image) -> Vec<usize> {
 /// The layers of kinds of light, if all are there.
 fn kinds_of_light(image: &Image) -> Vec<usize> {
     let found: Vec<usize> = (0..image.layers.len()).filter(|i| is_kind_of_light(image.layers[*i].kind)).collect();
-    let all = LayerKind::ALL.iter().filter(|info| is_kind_of_light(info.kind)).count();
+    let all = LayerInfo::ALL.iter().filter(|info| is_kind_of_light(info.kind)).count();
     if found.len() == all { found } else { Vec::new() }
 }
 
 fn is_kind_of_light(kind: LayerKind) -> bool {
-    matches!(kind.info().source, Source::LightAov(_))
+    matches!(LayerInfo::of(kind).source, Source::LightAov(_))
 }
 
 /// A layer's name in a file.
 fn name(layer: &Layer) -> String {
     let names = layer.channel_names();
-    names.first().and_then(|name| name.rsplit_once('.')).map_or_else(|| layer.kind.info().name.to_owned(), |(layer, _)| layer.to_owned())
+    names
+        .first()
+        .and_then(|name| name.rsplit_once('.'))
+        .map_or_else(|| LayerInfo::of(layer.kind).name.to_owned(), |(layer, _)| layer.to_owned())
 }
 
 /// The first three channels.

@@ -13,7 +13,7 @@ pub struct OutputDesc {
     pub file: String,
     /// EXR: what to store beside the picture. Default: nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub layers: Vec<LayerDesc>,
+    pub layers: Vec<LayerKind>,
     /// EXR: how channels are named and put into parts, for the program that reads the file. Default: default.
     #[serde(default, skip_serializing_if = "is_default")]
     pub profile: ExrProfileDesc,
@@ -22,7 +22,7 @@ pub struct OutputDesc {
     pub pixel_type: PixelTypeDesc,
     /// EXR: how single layers are stored in place of that, such as `{ "albedo": "float" }`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub pixel_types: BTreeMap<LayerDesc, PixelTypeDesc>,
+    pub pixel_types: BTreeMap<LayerKind, PixelTypeDesc>,
     /// EXR: compression. Default: zip; zips with the profile nuke.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compression: Option<CompressionDesc>,
@@ -78,9 +78,12 @@ impl OutputDesc {
     }
 }
 
-/// A layer beside the picture.
+/// A layer of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
-pub enum LayerDesc {
+pub enum LayerKind {
+    /// The picture: radiance, premultiplied by coverage, and coverage. It is always there, so scenes do not name it.
+    #[serde(skip)]
+    Color,
     /// Depth along the view axis (not ray length), or the distance from an environment camera, in world units; 1e10 where nothing was hit.
     Z,
     /// Shading normal in world space; zero where nothing was hit.
@@ -137,6 +140,9 @@ pub enum LayerDesc {
     /// Mean shading normal of that surface in world space: what denoisers ask for.
     #[serde(rename = "feature_normal")]
     FeatureNormal,
+    /// The picture before it was denoised, which denoisers add.
+    #[serde(skip)]
+    Noisy,
     /// A number for the object that covers most of the pixel, 0 for none.
     #[serde(rename = "object_id")]
     ObjectId,

@@ -2,7 +2,10 @@ use super::*;
 
 use crate::color::Rgb;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
-use crate::film::{FilmTile, Filter, LayerKind, PixelSample, Sample, Splats, SurfaceSample};
+use crate::film::{
+    FilmTile, Filter, LayerKind, LightAovRequest, LightAovRows, LightAovSample, PixelSample, PlacedSample, Sample, SampleBatch, Splats,
+    SurfaceSample,
+};
 use crate::math::Vec3;
 
 fn gray(v: f32) -> PixelSample {
@@ -52,9 +55,11 @@ fn samples_that_are_not_finite_are_dropped_and_counted() {
     }
     assert!(!tile.add(pixel, 90, &gray(1.0), f32::NAN));
     let bad_depth = SurfaceSample { depth: f32::NAN, ..SurfaceSample::default() };
-    assert!(!tile.add(pixel, 91, Sample { pixel: &gray(1.0), surface: Some(&bad_depth), light_aovs: &[] }, 1.0));
-    let bad_part = Rgb::new(0.0, f32::NAN, 0.0);
-    assert!(!tile.add(pixel, 92, Sample { pixel: &gray(1.0), surface: None, light_aovs: &[bad_part] }, 1.0));
+    assert!(!tile.add(pixel, 91, Sample { pixel: &gray(1.0), surface: Some(&bad_depth), light_aovs: LightAovSample::default() }, 1.0));
+    let mut bad_aov = LightAovRows::default();
+    bad_aov.reset(1, tile.layout.light_aovs);
+    bad_aov.add(0, 0, Rgb::new(0.0, f32::NAN, 0.0));
+    assert!(!tile.add(pixel, 92, Sample { pixel: &gray(1.0), surface: None, light_aovs: bad_aov.of(0) }, 1.0));
     for i in 0..100 {
         tile.add(0, i, &gray(f32::NAN), 1.0);
     }
@@ -82,7 +87,7 @@ fn data_is_that_of_the_nearest_sample_and_albedo_is_a_mean() {
     let miss = (PixelSample::default(), SurfaceSample { motion: [5.0, 6.0], ..SurfaceSample::default() });
     for (pixel, samples) in [(0, [(gray(1.0), far), miss, (gray(1.0), near)].as_slice()), (1, &[miss])] {
         for (i, (value, surface)) in (0..).zip(samples) {
-            assert!(tile.add(pixel, i, Sample { pixel: value, surface: Some(surface), light_aovs: &[] }, 1.0));
+            assert!(tile.add(pixel, i, Sample { pixel: value, surface: Some(surface), light_aovs: LightAovSample::default() }, 1.0));
         }
     }
     let image = film.resolve();
@@ -237,5 +242,49 @@ fn crops_merges_and_states_of_shared_samples_have_the_same_bits() {
             to.merge(&tile);
         }
         assert_eq!(loaded.resolve(), image, "{desc:?}");
+    }
+}
+
+/// Batches are summed one average after the other, and have the bits of their samples added one by one; what is not finite is dropped.
+#[test]
+fn batches_have_the_bits_of_single_samples() {
+    let request = LightAovRequest { by_scattering: true, light_groups: 2 };
+    let size = [8, 8];
+    let shape = FilmShape { light_groups: vec!["a".into(), "b".into()], ..FilmShape::new(size, Crop::full(size), LayerSet::FULL) };
+    for bad in [None, Some(3), Some(40)] {
+        let (mut alone, mut together) = (Film::new(shape.clone(), 8).unwrap(), Film::new(shape.clone(), 8).unwrap());
+        let mut rng = crate::math::Rng::new(5);
+        for sample in 0..5 {
+            let mut batch = SampleBatch::default();
+            batch.reset(64, true, request);
+            for i in 0..64 {
+                let mut color = || Rgb::new(rng.unit_f32(), rng.unit_f32(), rng.unit_f32());
+                batch.pixels[i] = PixelSample { radiance: color(), alpha: 1.0 };
+                batch.surfaces[i] =
+                    SurfaceSample { albedo: color(), feature_albedo: color(), depth: color().r, ..SurfaceSample::default() };
+                batch.surfaces[i].shown.shape = (color().r * 3.0) as u32;
+                // The others stay black.
+                batch.light_aovs.add(i, 2 * (i % 3), color());
+                batch.light_aovs.add(i, 9, color());
+            }
+            match bad {
+                Some(3) => batch.light_aovs.add(3, 1, Rgb::splat(f32::NAN)),
+                Some(pixel) => batch.surfaces[pixel].uv[1] = f32::INFINITY,
+                None => {}
+            }
+            let placed = |i: u32| PlacedSample { slot: i, pixel: 63 - i, sample, weight: 1.0 };
+            let (one, mut all) = (&mut alone.tiles_mut()[0], (0..64).map(placed).collect::<Vec<_>>());
+            for PlacedSample { slot, pixel, sample, weight } in all.clone() {
+                if one.add(pixel as usize, sample, batch.sample(slot as usize), weight) {
+                    one.add_moments(pixel as usize, batch.radiance(slot as usize));
+                }
+            }
+            together.tiles_mut()[0].add_batch(&batch, &mut all);
+            assert_eq!(all.len(), if bad.is_some() { 63 } else { 64 });
+        }
+        let (alone, together) = (&alone.tiles()[0], &together.tiles()[0]);
+        assert!(alone.save() == together.save(), "{bad:?}");
+        assert_eq!(together.dropped_count, if bad.is_some() { 5 } else { 0 });
+        assert_eq!(together.filtered.averages.iter().map(|plane| plane.is_empty()).filter(|empty| *empty).count(), 7);
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Coverage, LayerKind};
+use super::{Coverage, LayerInfo, LayerKind};
 
 /// A rectangle of pixels; `x` and `y` count from the upper left corner of the full picture. Serialized as `[x, y, width, height]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -99,12 +99,12 @@ impl Layer {
     /// The channels' full names in a file.
     pub fn channel_names(&self) -> Vec<String> {
         let prefix = self.group.as_ref().map(|group| format!("light_{group}.")).unwrap_or_default();
-        self.kind.info().channels.iter().map(|name| format!("{prefix}{name}")).collect()
+        LayerInfo::of(self.kind).channels.iter().map(|name| format!("{prefix}{name}")).collect()
     }
 
     /// Channels of a pixel.
     pub fn channels(&self) -> usize {
-        self.kind.info().channels.len()
+        LayerInfo::of(self.kind).channels.len()
     }
 
     /// The pixels in order, each as a slice of its channels.

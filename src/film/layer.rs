@@ -3,68 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{LightAov, SurfaceSample};
-use crate::desc::LayerDesc;
-
-/// A layer of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum LayerKind {
-    /// The picture: radiance, premultiplied by coverage, and coverage.
-    Color,
-    /// Depth along the view axis.
-    Z,
-    /// Shading normal, world.
-    N,
-    /// Geometric normal, world.
-    Ng,
-    /// Position, world.
-    P,
-    /// Surface parameters.
-    Uv,
-    /// Motion in the picture.
-    Motion,
-    /// Fraction of light scattered.
-    Albedo,
-    /// [`LightAov::DiffuseDirect`].
-    DiffuseDirect,
-    /// [`LightAov::DiffuseIndirect`].
-    DiffuseIndirect,
-    /// [`LightAov::SpecularDirect`].
-    SpecularDirect,
-    /// [`LightAov::SpecularIndirect`].
-    SpecularIndirect,
-    /// [`LightAov::TransmissionDirect`].
-    TransmissionDirect,
-    /// [`LightAov::TransmissionIndirect`].
-    TransmissionIndirect,
-    /// [`LightAov::Emission`].
-    Emission,
-    /// [`LightAov::Background`].
-    Background,
-    /// What each group of lights gives to the picture: a layer for each.
-    LightGroups,
-    /// Variance of the picture.
-    Variance,
-    /// Number of samples.
-    Samples,
-    /// Albedo of the first surface that is no mirror and no clear glass, for denoisers.
-    FeatureAlbedo,
-    /// Normal of that surface, for denoisers.
-    FeatureNormal,
-    /// The picture before it was denoised.
-    Noisy,
-    /// Number of the object that covers most of the pixel.
-    ObjectId,
-    /// Number of the material that covers most of the pixel.
-    MaterialId,
-    /// Number of the instance that covers most of the pixel.
-    InstanceId,
-    /// Cryptomatte of objects.
-    CryptoObject,
-    /// Cryptomatte of materials.
-    CryptoMaterial,
-    /// Cryptomatte of assets.
-    CryptoAsset,
-}
+use crate::color::Rgb;
+use crate::desc::LayerKind;
 
 /// Where a layer's numbers come from.
 #[derive(Clone, Copy, Debug)]
@@ -97,28 +37,31 @@ pub enum Filtering {
 /// Channels of all layers of surfaces that are filtered so.
 pub(super) const fn channels_of(filtering: Filtering) -> usize {
     let (mut total, mut i) = (0, 0);
-    while i < LayerKind::ALL.len() {
-        if let Source::Surface(_, other) = LayerKind::ALL[i].source
+    while i < LayerInfo::ALL.len() {
+        if let Source::Surface(_, other) = LayerInfo::ALL[i].source
             && other as u8 == filtering as u8
         {
-            total += LayerKind::ALL[i].channels.len();
+            total += LayerInfo::ALL[i].channels.len();
         }
         i += 1;
     }
     total
 }
 
+/// Most layers of surfaces that are averaged: each has three channels.
+pub(super) const MAX_MEANS: usize = channels_of(Filtering::Mean) / 3;
+
 /// How the values of samples become the channels of layers of surfaces.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfaceChannels {
-    layers: [Option<&'static LayerInfo>; LayerKind::ALL.len()],
+    layers: [Option<&'static LayerInfo>; LayerInfo::ALL.len()],
     channels: usize,
 }
 
 impl SurfaceChannels {
     /// Those of a set that are filtered so, in the table's order.
     pub fn new(set: LayerSet, filtering: Filtering) -> Self {
-        let mut layers = [None; LayerKind::ALL.len()];
+        let mut layers = [None; LayerInfo::ALL.len()];
         layers.iter_mut().zip(set.surfaces(filtering)).for_each(|(layer, info)| *layer = Some(info));
         Self { layers, channels: set.surfaces(filtering).map(|info| info.channels.len()).sum() }
     }
@@ -128,20 +71,35 @@ impl SurfaceChannels {
         self.channels
     }
 
+    /// How the channels of each layer are read.
+    #[inline]
+    pub fn readers(&self) -> impl Iterator<Item = fn(&SurfaceSample, &mut [f32])> {
+        self.layers.iter().map_while(|info| *info).filter_map(|info| match info.source {
+            Source::Surface(read, _) => Some(read),
+            _ => None,
+        })
+    }
+
     /// Reads those of a sample; `out` has room for all of them.
     #[inline]
-    pub fn read(&self, surface: &SurfaceSample, out: &mut [f32]) {
-        let mut start = 0;
-        for info in self.layers.iter().map_while(|info| *info) {
-            if let Source::Surface(read, _) = info.source {
-                read(surface, &mut out[start..start + info.channels.len()]);
-            }
-            start += info.channels.len();
+    pub fn read(&self, surface: &SurfaceSample, mut out: &mut [f32]) {
+        for (info, read) in self.layers.iter().flatten().zip(self.readers()) {
+            let (values, rest) = out.split_at_mut(info.channels.len());
+            read(surface, values);
+            out = rest;
         }
+    }
+
+    /// Reads those of layers that are averaged; layers that there are not are black.
+    #[inline]
+    pub fn means(&self, surface: &SurfaceSample) -> [Rgb; MAX_MEANS] {
+        let mut means = [[0.0; 3]; MAX_MEANS];
+        means.iter_mut().zip(self.readers()).for_each(|(mean, read)| read(surface, mean));
+        means.map(Rgb::from)
     }
 }
 
-/// What the table says of a layer.
+/// A row of the table of layers.
 #[derive(Clone, Copy, Debug)]
 pub struct LayerInfo {
     /// Which layer.
@@ -182,50 +140,50 @@ macro_rules! part {
     };
 }
 
-impl LayerKind {
+impl LayerInfo {
     /// Every layer, in the order of files and of memory.
-    pub const ALL: [LayerInfo; 28] = [
-        LayerInfo::new(Self::Color, "color", &["R", "G", "B", "A"], Source::Color, ""),
-        LayerInfo::new(
-            Self::Z,
+    pub const ALL: [Self; 28] = [
+        Self::new(LayerKind::Color, "color", &["R", "G", "B", "A"], Source::Color, ""),
+        Self::new(
+            LayerKind::Z,
             "Z",
             &["Z"],
             Source::Surface(|s, out| out[0] = s.depth, Filtering::Nearest),
             "Z: depth along the view axis of the nearest sample; 1e10 where nothing was hit",
         )
         .float(),
-        LayerInfo::new(
-            Self::N,
+        Self::new(
+            LayerKind::N,
             "N",
             &["N.X", "N.Y", "N.Z"],
             Source::Surface(|s, out| out.copy_from_slice(&s.normal.to_array()), Filtering::Nearest),
             "N: shading normal of the nearest sample, world; 0 where nothing was hit",
         ),
-        LayerInfo::new(
-            Self::Ng,
+        Self::new(
+            LayerKind::Ng,
             "Ng",
             &["Ng.X", "Ng.Y", "Ng.Z"],
             Source::Surface(|s, out| out.copy_from_slice(&s.geometric_normal.to_array()), Filtering::Nearest),
             "Ng: geometric normal of the nearest sample, world; 0 where nothing was hit",
         ),
-        LayerInfo::new(
-            Self::P,
+        Self::new(
+            LayerKind::P,
             "P",
             &["P.X", "P.Y", "P.Z"],
             Source::Surface(|s, out| out.copy_from_slice(&s.position.to_array()), Filtering::Nearest),
             "P: position of the nearest sample, world; 0 where nothing was hit",
         )
         .float(),
-        LayerInfo::new(
-            Self::Uv,
+        Self::new(
+            LayerKind::Uv,
             "uv",
             &["uv.U", "uv.V"],
             Source::Surface(|s, out| out.copy_from_slice(&s.uv), Filtering::Nearest),
             "uv: surface parameters of the nearest sample; 0 where nothing was hit",
         )
         .float(),
-        LayerInfo::new(
-            Self::Motion,
+        Self::new(
+            LayerKind::Motion,
             "motion",
             &["motion.X", "motion.Y"],
             Source::Surface(|s, out| out.copy_from_slice(&s.motion), Filtering::Nearest),
@@ -233,8 +191,8 @@ impl LayerKind {
              surface, that of a point infinitely far away",
         )
         .float(),
-        LayerInfo::new(
-            Self::Albedo,
+        Self::new(
+            LayerKind::Albedo,
             "albedo",
             &["albedo.R", "albedo.G", "albedo.B"],
             Source::Surface(|s, out| out.copy_from_slice(&s.albedo.to_array()), Filtering::Mean),
@@ -248,110 +206,77 @@ impl LayerKind {
         part!(TransmissionIndirect, "transmission_indirect", "light scattered more than once, last through a surface"),
         part!(Emission, "emission", "light given off by what is seen; sums with the seven others to RGB"),
         part!(Background, "background", "light from infinity that is seen directly"),
-        LayerInfo::new(
-            Self::LightGroups,
+        Self::new(
+            LayerKind::LightGroups,
             "light_groups",
             &["R", "G", "B"],
             Source::LightGroups,
             "light_*: what each group of lights gives; they sum to RGB",
         ),
-        LayerInfo::new(
-            Self::Variance,
+        Self::new(
+            LayerKind::Variance,
             "variance",
             &["variance.R", "variance.G", "variance.B"],
             Source::Film,
             "variance: of the filtered picture's R, G and B, their expected squared error",
         )
         .float(),
-        LayerInfo::new(Self::Samples, "samples", &["stats.samples"], Source::Film, "stats.samples: samples of the pixel").float(),
-        LayerInfo::new(
-            Self::FeatureAlbedo,
+        Self::new(LayerKind::Samples, "samples", &["stats.samples"], Source::Film, "stats.samples: samples of the pixel").float(),
+        Self::new(
+            LayerKind::FeatureAlbedo,
             "feature_albedo",
             &["feature_albedo.R", "feature_albedo.G", "feature_albedo.B"],
             Source::Surface(|s, out| out.copy_from_slice(&s.feature_albedo.to_array()), Filtering::Mean),
             "feature_albedo: fraction of light scattered by the first surface that is no mirror and no clear glass",
         ),
-        LayerInfo::new(
-            Self::FeatureNormal,
+        Self::new(
+            LayerKind::FeatureNormal,
             "feature_normal",
             &["feature_normal.X", "feature_normal.Y", "feature_normal.Z"],
             Source::Surface(|s, out| out.copy_from_slice(&s.feature_normal.to_array()), Filtering::Mean),
             "feature_normal: mean shading normal of that surface, world, not of unit length",
         ),
-        LayerInfo::new(
-            Self::Noisy,
+        Self::new(
+            LayerKind::Noisy,
             "noisy",
             &["noisy.R", "noisy.G", "noisy.B", "noisy.A"],
             Source::Denoiser,
             "noisy: the picture before it was denoised",
         ),
-        LayerInfo::new(
-            Self::ObjectId,
+        Self::new(
+            LayerKind::ObjectId,
             "object_id",
             &["object_id.id"],
             Source::Coverage,
             "object_id: the object that covers most of the pixel",
         )
         .float(),
-        LayerInfo::new(
-            Self::MaterialId,
+        Self::new(
+            LayerKind::MaterialId,
             "material_id",
             &["material_id.id"],
             Source::Coverage,
             "material_id: the material that covers most of the pixel",
         )
         .float(),
-        LayerInfo::new(
-            Self::InstanceId,
+        Self::new(
+            LayerKind::InstanceId,
             "instance_id",
             &["instance_id.id"],
             Source::Coverage,
             "instance_id: the instance that covers most of the pixel",
         )
         .float(),
-        LayerInfo::new(Self::CryptoObject, "crypto_object", &[], Source::Coverage, "").float(),
-        LayerInfo::new(Self::CryptoMaterial, "crypto_material", &[], Source::Coverage, "").float(),
-        LayerInfo::new(Self::CryptoAsset, "crypto_asset", &[], Source::Coverage, "").float(),
+        Self::new(LayerKind::CryptoObject, "crypto_object", &[], Source::Coverage, "").float(),
+        Self::new(LayerKind::CryptoMaterial, "crypto_material", &[], Source::Coverage, "").float(),
+        Self::new(LayerKind::CryptoAsset, "crypto_asset", &[], Source::Coverage, "").float(),
     ];
 
-    /// What the table says of this layer.
+    /// The row of a layer.
     #[inline]
-    pub const fn info(self) -> &'static LayerInfo {
+    pub const fn of(kind: LayerKind) -> &'static Self {
         // The table is in the order of the variants; a test holds it to that.
-        &Self::ALL[self as usize]
-    }
-}
-
-impl From<LayerDesc> for LayerKind {
-    fn from(desc: LayerDesc) -> Self {
-        match desc {
-            LayerDesc::Z => Self::Z,
-            LayerDesc::N => Self::N,
-            LayerDesc::Ng => Self::Ng,
-            LayerDesc::P => Self::P,
-            LayerDesc::Uv => Self::Uv,
-            LayerDesc::Motion => Self::Motion,
-            LayerDesc::Albedo => Self::Albedo,
-            LayerDesc::DiffuseDirect => Self::DiffuseDirect,
-            LayerDesc::DiffuseIndirect => Self::DiffuseIndirect,
-            LayerDesc::SpecularDirect => Self::SpecularDirect,
-            LayerDesc::SpecularIndirect => Self::SpecularIndirect,
-            LayerDesc::TransmissionDirect => Self::TransmissionDirect,
-            LayerDesc::TransmissionIndirect => Self::TransmissionIndirect,
-            LayerDesc::Emission => Self::Emission,
-            LayerDesc::Background => Self::Background,
-            LayerDesc::LightGroups => Self::LightGroups,
-            LayerDesc::Variance => Self::Variance,
-            LayerDesc::Samples => Self::Samples,
-            LayerDesc::FeatureAlbedo => Self::FeatureAlbedo,
-            LayerDesc::FeatureNormal => Self::FeatureNormal,
-            LayerDesc::ObjectId => Self::ObjectId,
-            LayerDesc::MaterialId => Self::MaterialId,
-            LayerDesc::InstanceId => Self::InstanceId,
-            LayerDesc::CryptoObject => Self::CryptoObject,
-            LayerDesc::CryptoMaterial => Self::CryptoMaterial,
-            LayerDesc::CryptoAsset => Self::CryptoAsset,
-        }
+        &Self::ALL[kind as usize]
     }
 }
 
@@ -366,8 +291,8 @@ pub struct LayerSet {
 macro_rules! layers_from {
     ($source:pat) => {{
         let (mut bits, mut i) = (0u32, 0);
-        while i < LayerKind::ALL.len() {
-            bits |= (matches!(LayerKind::ALL[i].source, $source) as u32) << i;
+        while i < LayerInfo::ALL.len() {
+            bits |= (matches!(LayerInfo::ALL[i].source, $source) as u32) << i;
             i += 1;
         }
         bits
@@ -378,7 +303,7 @@ impl LayerSet {
     /// Only the colour.
     pub const COLOR: Self = Self { bits: 0 };
     /// Every layer that a render fills.
-    pub const FULL: Self = Self { bits: ((1 << LayerKind::ALL.len()) - 1) & !layers_from!(Source::Denoiser) & !Self::COLOR_BIT };
+    pub const FULL: Self = Self { bits: ((1 << LayerInfo::ALL.len()) - 1) & !layers_from!(Source::Denoiser) & !Self::COLOR_BIT };
     /// Never set, so that equal sets have equal bits.
     const COLOR_BIT: u32 = 1 << LayerKind::Color as u32;
 
@@ -418,7 +343,7 @@ impl LayerSet {
 
     /// All layers, in the table's order.
     pub fn iter(self) -> impl Iterator<Item = &'static LayerInfo> {
-        LayerKind::ALL.iter().filter(move |info| self.contains(info.kind))
+        LayerInfo::ALL.iter().filter(move |info| self.contains(info.kind))
     }
 }
 
@@ -433,7 +358,7 @@ impl TryFrom<Vec<String>> for LayerSet {
 
     fn try_from(names: Vec<String>) -> Result<Self, String> {
         let kind = |name: String| {
-            let info = LayerKind::ALL.iter().find(|info| info.name == name);
+            let info = LayerInfo::ALL.iter().find(|info| info.name == name);
             info.map(|info| info.kind).ok_or_else(|| format!("unknown layer `{name}`"))
         };
         names.into_iter().map(kind).collect()
@@ -450,8 +375,8 @@ impl FromIterator<LayerKind> for LayerSet {
     }
 }
 
-impl<'a> FromIterator<&'a LayerDesc> for LayerSet {
-    fn from_iter<I: IntoIterator<Item = &'a LayerDesc>>(descs: I) -> Self {
+impl<'a> FromIterator<&'a LayerKind> for LayerSet {
+    fn from_iter<I: IntoIterator<Item = &'a LayerKind>>(descs: I) -> Self {
         descs.into_iter().map(|desc| LayerKind::from(*desc)).collect()
     }
 }
@@ -472,9 +397,9 @@ mod tests {
 
     #[test]
     fn the_table_is_in_the_order_of_the_variants() {
-        for (i, info) in LayerKind::ALL.iter().enumerate() {
+        for (i, info) in LayerInfo::ALL.iter().enumerate() {
             assert_eq!(info.kind as usize, i);
-            assert_eq!(info.kind.info().name, info.name);
+            assert_eq!(LayerInfo::of(info.kind).name, info.name);
         }
     }
 
@@ -484,10 +409,10 @@ mod tests {
         assert_eq!(set.iter().map(|info| info.kind).collect::<Vec<_>>(), [LayerKind::Color, LayerKind::Z, LayerKind::P]);
         assert!(set.needs_surface() && !LayerSet::COLOR.needs_surface());
         assert!(LayerSet::COLOR.contains(LayerKind::Color));
-        assert_eq!([LayerDesc::Albedo, LayerDesc::Samples].iter().collect::<LayerSet>().surfaces(Filtering::Mean).count(), 1);
-        assert!(!LayerSet::from_iter(&[LayerDesc::Variance, LayerDesc::Samples]).needs_surface());
-        assert_eq!(LayerSet::FULL.iter().count(), LayerKind::ALL.len() - 1);
-        assert!(LayerSet::from_iter(&[LayerDesc::CryptoObject]).needs_coverage() && !set.needs_coverage());
-        assert!(LayerSet::from_iter(&[LayerDesc::Emission]).needs_light_aovs() && !set.needs_light_aovs());
+        assert_eq!([LayerKind::Albedo, LayerKind::Samples].iter().collect::<LayerSet>().surfaces(Filtering::Mean).count(), 1);
+        assert!(!LayerSet::from_iter(&[LayerKind::Variance, LayerKind::Samples]).needs_surface());
+        assert_eq!(LayerSet::FULL.iter().count(), LayerInfo::ALL.len() - 1);
+        assert!(LayerSet::from_iter(&[LayerKind::CryptoObject]).needs_coverage() && !set.needs_coverage());
+        assert!(LayerSet::from_iter(&[LayerKind::Emission]).needs_light_aovs() && !set.needs_light_aovs());
     }
 }

@@ -4,6 +4,7 @@
 //! they share nothing. Sums do not depend on the order of their terms. So any number of threads gives the same picture,
 //! and so does any split of the samples.
 
+mod accumulator;
 mod cells;
 mod coverage;
 mod filter;
@@ -19,15 +20,16 @@ mod sum;
 mod tile;
 mod tiles;
 
+pub use crate::desc::LayerKind;
 pub use coverage::{Coverage, CoverageCounts};
 pub use filter::{Filter, FilterSample, Taps, VarianceKernel};
 pub use identities::{Identities, Label, NameId, PlacementId, ShapeIdentity};
 pub use image::{Crop, Image, Layer};
-pub use layer::{Filtering, LayerInfo, LayerKind, LayerSet, Source};
-pub use sample::{LightAov, LightAovRequest, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};
+pub use layer::{Filtering, LayerInfo, LayerSet, Source};
+pub use sample::{LightAov, LightAovRequest, LightAovRows, LightAovSample, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};
 pub use splats::Splats;
 pub use sum::SumPlane;
-pub use tile::{DroppedSample, FilmTile};
+pub use tile::{DroppedSample, FilmTile, PlacedSample};
 pub use tiles::{Film, FilmGrid, FilmShape, bytes_per_pixel};
 
 use tiles::Layout;

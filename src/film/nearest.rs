@@ -22,20 +22,16 @@ impl Nearest {
         Self { channels, depths: vec![f32::NAN; count], samples: vec![0; count], values: vec![0.0; count * channels] }
     }
 
-    /// Takes a sample into account; `false` if a value of it is not finite.
+    /// Takes a sample into account, whose values are finite.
     #[inline]
-    pub fn add(&mut self, pixel: usize, sample: u32, surface: &SurfaceSample, layers: &SurfaceChannels) -> bool {
+    pub fn add(&mut self, pixel: usize, sample: u32, surface: &SurfaceSample, layers: &SurfaceChannels) {
         if self.channels == 0 {
-            return true;
-        }
-        if !surface.is_finite() {
-            return false;
+            return;
         }
         let depth = if surface.shown != ShapeKey::NONE { surface.depth } else { f32::INFINITY };
         if let Some(values) = self.nearer(pixel, depth, sample) {
             layers.read(surface, values);
         }
-        true
     }
 
     /// Adds all samples of another.

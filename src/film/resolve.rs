@@ -131,7 +131,7 @@ impl Film {
         let crop = self.grid().crop;
         let (mut layers, mut firsts, mut nearest, mut mean) = (Vec::new(), Vec::new(), 0, self.light_aovs().count());
         for (kind, group) in self.stored() {
-            let info = kind.info();
+            let info = LayerInfo::of(kind);
             let channels = info.channels.len();
             layers.push(Layer {
                 kind,
@@ -155,7 +155,7 @@ impl Film {
                 continue;
             }
             for (layer, &first) in layers.iter_mut().zip(&firsts) {
-                let info = layer.kind.info();
+                let info = LayerInfo::of(layer.kind);
                 let start = layer.data.len();
                 layer.data.resize(start + info.channels.len(), 0.0);
                 let out = &mut layer.data[start..];

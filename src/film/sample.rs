@@ -98,7 +98,7 @@ impl LightAov {
     pub const COUNT: usize = 8;
 }
 
-/// Which [light AOVs](SampleBatch::light_aovs) samples have.
+/// Which light AOVs samples have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LightAovRequest {
     /// Those of [`LightAov`].
@@ -108,77 +108,139 @@ pub struct LightAovRequest {
 }
 
 impl LightAovRequest {
-    /// Parts of each sample.
+    /// How many AOVs that are.
     #[inline]
     pub const fn count(self) -> usize {
         self.first_group() + self.light_groups as usize
     }
 
-    /// The place of the first group of lights among the parts.
+    /// The index of the first group of lights among them.
     #[inline]
     pub const fn first_group(self) -> usize {
         if self.by_scattering { LightAov::COUNT } else { 0 }
     }
 }
 
-/// What a batch of samples brings.
+/// The light AOVs of the samples of a batch.
+#[derive(Clone, Debug, Default)]
+pub struct LightAovRows {
+    request: LightAovRequest,
+    samples: usize,
+    /// By AOV: those of [`LightAov`], then those of groups of lights; each only if wanted. Empty where all samples are black.
+    rows: Vec<Vec<Rgb>>,
+}
+
+impl LightAovRows {
+    /// Black AOVs of so many samples.
+    pub fn reset(&mut self, samples: usize, request: LightAovRequest) {
+        (self.samples, self.request) = (samples, request);
+        self.rows.iter_mut().for_each(Vec::clear);
+        self.rows.resize_with(request.count(), Vec::new);
+    }
+
+    /// Which AOVs there are.
+    #[inline]
+    pub fn request(&self) -> LightAovRequest {
+        self.request
+    }
+
+    /// Adds to the AOV with this index of a sample.
+    #[inline]
+    pub fn add(&mut self, sample: usize, aov: usize, light: Rgb) {
+        if light.is_black() {
+            return;
+        }
+        let row = &mut self.rows[aov];
+        if row.is_empty() {
+            row.resize(self.samples, Rgb::BLACK);
+        }
+        row[sample] += light;
+    }
+
+    /// Those that are not black in all samples, with their indices.
+    pub fn rows(&self) -> impl Iterator<Item = (usize, &[Rgb])> {
+        self.rows.iter().map(Vec::as_slice).enumerate().filter(|(_, row)| !row.is_empty())
+    }
+
+    /// Whether all are finite, and far from what `f32` can hold.
+    pub fn are_bounded(&self) -> bool {
+        let is_bounded = |value: &Rgb| [value.r, value.g, value.b].iter().fold(true, |all, value| all & (value.abs() < 1e30));
+        self.rows().all(|(_, row)| row.iter().fold(true, |all, value| all & is_bounded(value)))
+    }
+
+    /// Those of a sample.
+    #[inline]
+    pub fn of(&self, sample: usize) -> LightAovSample<'_> {
+        LightAovSample { rows: &self.rows, sample }
+    }
+}
+
+/// The light AOVs of a sample; by default it has none.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LightAovSample<'a> {
+    rows: &'a [Vec<Rgb>],
+    sample: usize,
+}
+
+impl LightAovSample<'_> {
+    /// Calls `f` with the index and value of each AOV that is not black.
+    #[inline(always)]
+    pub fn for_each(&self, mut f: impl FnMut(usize, Rgb)) {
+        for (aov, row) in self.rows.iter().enumerate() {
+            if let Some(value) = row.get(self.sample).filter(|value| !value.is_black()) {
+                f(aov, *value);
+            }
+        }
+    }
+}
+
+/// The values of a batch of samples.
 #[derive(Clone, Debug, Default)]
 pub struct SampleBatch {
     /// For the picture.
     pub pixels: Vec<PixelSample>,
     /// For layers of surfaces; empty if there are none.
     pub surfaces: Vec<SurfaceSample>,
-    /// For each sample, its [`light_aovs_per_sample`](Self::light_aovs_per_sample) parts: those of [`LightAov`], then
-    /// those of groups of lights; each only if wanted.
-    pub light_aovs: Vec<Rgb>,
-    /// How many parts each sample has.
-    pub light_aovs_per_sample: usize,
+    /// For light AOVs.
+    pub light_aovs: LightAovRows,
 }
 
 impl SampleBatch {
-    /// Makes place for `count` samples, which bring nothing yet.
+    /// Makes place for `count` samples, all black and without a surface.
     pub fn reset(&mut self, count: usize, surfaces: bool, light_aovs: LightAovRequest) {
         self.pixels.clear();
         self.pixels.resize(count, PixelSample::default());
         self.surfaces.clear();
         self.surfaces.resize(if surfaces { count } else { 0 }, SurfaceSample::default());
-        self.light_aovs_per_sample = light_aovs.count();
-        self.light_aovs.clear();
-        self.light_aovs.resize(count * self.light_aovs_per_sample, Rgb::BLACK);
+        self.light_aovs.reset(count, light_aovs);
     }
 
-    /// What the sample with this index brings.
+    /// The radiance of the sample with this index.
+    #[inline]
+    pub fn radiance(&self, index: usize) -> [f64; 3] {
+        self.pixels[index].radiance.to_array().map(f64::from)
+    }
+
+    /// The values of the sample with this index.
     #[inline]
     pub fn sample(&self, index: usize) -> Sample<'_> {
-        let first = index * self.light_aovs_per_sample;
-        Sample {
-            pixel: &self.pixels[index],
-            surface: self.surfaces.get(index),
-            light_aovs: &self.light_aovs[first..first + self.light_aovs_per_sample],
-        }
-    }
-
-    /// The parts of the sample with this index.
-    #[inline]
-    pub fn light_aovs_mut(&mut self, index: usize) -> &mut [Rgb] {
-        let first = index * self.light_aovs_per_sample;
-        &mut self.light_aovs[first..first + self.light_aovs_per_sample]
+        Sample { pixel: &self.pixels[index], surface: self.surfaces.get(index), light_aovs: self.light_aovs.of(index) }
     }
 }
 
-/// What one sample brings.
+/// The values of one sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<'a> {
     /// For the picture.
     pub pixel: &'a PixelSample,
     /// For layers of surfaces, if there are any.
     pub surface: Option<&'a SurfaceSample>,
-    /// As in [`SampleBatch::light_aovs`].
-    pub light_aovs: &'a [Rgb],
+    /// For light AOVs.
+    pub light_aovs: LightAovSample<'a>,
 }
 
 impl<'a> From<&'a PixelSample> for Sample<'a> {
     fn from(pixel: &'a PixelSample) -> Self {
-        Self { pixel, surface: None, light_aovs: &[] }
+        Self { pixel, surface: None, light_aovs: LightAovSample::default() }
     }
 }

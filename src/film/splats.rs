@@ -1,9 +1,9 @@
 //! Shared samples of a cell, weighted for each pixel that they reach.
 
+use super::accumulator::{Accumulator, Values};
 use super::cells::Cells;
 use super::filter::Taps;
 use super::sum::SumPlane;
-use super::tile::{Accumulator, Values};
 
 /// Sums over few samples of one cell, in the order in which they come: a pass over the cell. Sums of passes then go
 /// into exact sums, so that each sample touches several pixels at little cost.

@@ -1,9 +1,10 @@
 //! Tiles as bytes and back, exactly.
 
 use super::FilmTile;
+use super::accumulator::SampleMoments;
 use super::coverage::CoverageCounts;
 use super::sample::ShapeKey;
-use super::tile::{DROPPED_KEPT, DroppedSample, InverseVarianceSums, SampleMoments};
+use super::tile::{DROPPED_KEPT, DroppedSample, InverseVarianceSums};
 use crate::bytes::{ByteReader, ByteWriter};
 
 impl FilmTile {

@@ -1,12 +1,12 @@
 //! A rectangle of the film, which sums samples.
 
+use super::accumulator::{Accumulator, SampleMoments, Values};
 use super::cells::Cells;
-use super::layer::channels_of;
+use super::layer::MAX_MEANS;
 use super::nearest::Nearest;
 use super::splats::Splats;
 use super::sum::SumPlane;
-use super::{CoverageCounts, Crop, Filtering, LayerKind, Layout, PixelSample, Sample, Taps};
-use crate::bytes::{ByteReader, ByteWriter};
+use super::{CoverageCounts, Crop, LayerKind, Layout, LightAovSample, PixelSample, Sample, SampleBatch, SurfaceSample, Taps};
 use crate::color::Rgb;
 
 /// How many dropped samples a tile remembers; it counts all of them.
@@ -23,35 +23,17 @@ pub struct DroppedSample {
     pub sample: u32,
 }
 
-/// Sums over groups of each pixel's samples, of their means and the squares of these.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct SampleMoments {
-    /// Number of groups, by pixel.
-    pub groups: Vec<u32>,
-    pub sums: SumPlane<3>,
-    pub squares: SumPlane<3>,
-}
-
-impl SampleMoments {
-    /// Bytes of a pixel.
-    pub const PIXEL_BYTES: usize = size_of::<u32>() + 2 * SumPlane::<3>::ENTRY_BYTES;
-
-    fn new(pixels: usize) -> Self {
-        Self { groups: vec![0; pixels], sums: SumPlane::new(pixels), squares: SumPlane::new(pixels) }
-    }
-
-    #[inline]
-    fn add(&mut self, pixel: usize, mean: [f64; 3]) {
-        self.groups[pixel] += 1;
-        self.sums.add(pixel, mean);
-        self.squares.add(pixel, mean.map(|value| value * value));
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.groups.iter_mut().zip(&other.groups).for_each(|(sum, groups)| *sum = sum.saturating_add(*groups));
-        self.sums.merge(&other.sums, 1.0);
-        self.squares.merge(&other.squares, 1.0);
-    }
+/// Where a sample of a batch belongs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PlacedSample {
+    /// Index in the batch.
+    pub slot: u32,
+    /// Index of the pixel (row by row within the tile).
+    pub pixel: u32,
+    /// Index of the sample in its pixel.
+    pub sample: u32,
+    /// Weight of the filter.
+    pub weight: f32,
 }
 
 /// A pixel of samples that do not all count the same.
@@ -59,93 +41,6 @@ impl SampleMoments {
 pub(super) struct InverseVarianceSums {
     pub count: f64,
     pub variance: [f64; 3],
-}
-
-/// What is summed of a sample.
-pub(super) struct Values<'a> {
-    /// Radiance and alpha.
-    pub color: [f32; 4],
-    light_aovs: &'a [Rgb],
-    /// Of layers of surfaces that are averaged; the others are black.
-    means: [Rgb; MAX_MEANS],
-    /// The index of the first of these among the averages.
-    first_mean: usize,
-}
-
-impl Values<'_> {
-    /// Calls `f` with the index and value of each average beside the colour that is not black.
-    #[inline(always)]
-    pub fn for_each_average(&self, mut f: impl FnMut(usize, Rgb)) {
-        // Most light AOVs of a sample are black.
-        self.light_aovs.iter().enumerate().filter(|(_, value)| !value.is_black()).for_each(|(i, &value)| f(i, value));
-        let means = self.means.iter().enumerate().filter(|(_, value)| !value.is_black());
-        means.for_each(|(i, &value)| f(self.first_mean + i, value));
-    }
-}
-
-/// Most layers of surfaces that are averaged: each has three channels.
-pub(super) const MAX_MEANS: usize = channels_of(Filtering::Mean) / 3;
-
-/// Sums over the weighted samples that reach an entry of the tile's cells, or over the samples of a pixel.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Accumulator {
-    entries: usize,
-    /// Radiance and alpha.
-    pub color: SumPlane<4>,
-    /// The averages beside the colour: light AOVs, then layers of surfaces. Those that are black everywhere are empty.
-    pub averages: Vec<SumPlane<3>>,
-}
-
-impl Accumulator {
-    fn new(entries: usize, layout: &Layout) -> Self {
-        Self { entries, color: SumPlane::new(entries), averages: vec![SumPlane::default(); layout.averages()] }
-    }
-
-    /// The sums of an average, which is not black everywhere.
-    #[inline(always)]
-    pub fn average_mut(&mut self, index: usize) -> &mut SumPlane<3> {
-        let plane = &mut self.averages[index];
-        if plane.is_empty() {
-            *plane = SumPlane::new(self.entries);
-        }
-        plane
-    }
-
-    #[inline(always)]
-    fn add(&mut self, entry: usize, value: &Values, weight: f32) {
-        let weight = f64::from(weight);
-        self.color.add(entry, value.color.map(|value| weight * f64::from(value)));
-        value.for_each_average(|k, value| self.average_mut(k).add(entry, value.to_array().map(|value| weight * f64::from(value))));
-    }
-
-    /// Adds the sums of another, times a factor.
-    fn merge(&mut self, other: &Self, factor: f64) {
-        self.color.merge(&other.color, factor);
-        for (k, average) in other.averages.iter().enumerate().filter(|(_, average)| !average.is_empty()) {
-            self.average_mut(k).merge(average, factor);
-        }
-    }
-
-    /// The sum of an average at an entry.
-    #[inline]
-    pub fn average(&self, index: usize, entry: usize) -> [f64; 3] {
-        let plane = &self.averages[index];
-        if plane.is_empty() { [0.0; 3] } else { plane.values(entry) }
-    }
-
-    pub fn save(&self, out: &mut ByteWriter) {
-        self.color.save(out);
-        self.averages.iter().for_each(|average| average.save(out));
-    }
-
-    /// Replaces the sums by saved ones.
-    pub fn load(&mut self, data: &mut ByteReader) -> Option<()> {
-        self.color = self.color.load_same(data)?;
-        for average in &mut self.averages {
-            *average = SumPlane::load(data).filter(|plane| plane.is_empty() || plane.has_entries(self.entries))?;
-        }
-        Some(())
-    }
 }
 
 /// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own; what shared samples
@@ -236,16 +131,59 @@ impl FilmTile {
         if !self.layout.beside_color() && self.weights.is_empty() {
             return self.add_color(pixel, sample, value.pixel, weight);
         }
-        let Some(values) = self.take(pixel, sample, value, weight) else { return false };
+        let Some(values) = self.take::<true>(pixel, sample, value, weight) else { return false };
+        self.add_values(pixel, &value, &values, weight);
+        true
+    }
+
+    /// As [`add`](Self::add) for samples of a batch, each of which is a [group](Self::add_moments) of its own. `samples`
+    /// keeps those that were not dropped.
+    pub fn add_batch(&mut self, batch: &SampleBatch, samples: &mut Vec<PlacedSample>) {
+        if !self.layout.beside_color() || self.layout.signed || !batch.light_aovs.are_bounded() {
+            samples.retain(|at| self.add(at.pixel as usize, at.sample, batch.sample(at.slot as usize), at.weight));
+        } else {
+            samples.retain(|at| {
+                let (pixel, value) = (at.pixel as usize, batch.sample(at.slot as usize));
+                let values = self.take::<false>(pixel, at.sample, value, at.weight);
+                values.is_some_and(|values| {
+                    self.add_values(pixel, &value, &values, at.weight);
+                    true
+                })
+            });
+            self.add_averages(batch, samples);
+        }
+        if let Some(moments) = &mut self.moments {
+            samples.iter().for_each(|at| moments.add(at.pixel as usize, batch.radiance(at.slot as usize)));
+        }
+    }
+
+    /// Adds the averages of samples one after the other, so that the sums of each stay in the cache.
+    fn add_averages(&mut self, batch: &SampleBatch, samples: &[PlacedSample]) {
+        for (k, row) in batch.light_aovs.rows() {
+            self.filtered.add_average(k, samples.iter().map(|at| (at, row[at.slot as usize])));
+        }
+        let (first, means) = (self.layout.light_aovs.count(), self.layout.means);
+        for (k, read) in means.readers().enumerate() {
+            let value = |at: &PlacedSample| {
+                let mut value = [0.0; 3];
+                read(&batch.surfaces[at.slot as usize], &mut value);
+                Rgb::from(value)
+            };
+            self.filtered.add_average(first + k, samples.iter().map(|at| (at, value(at))));
+        }
+    }
+
+    /// Adds a sample that was taken to what is filtered.
+    #[inline(always)]
+    fn add_values(&mut self, pixel: usize, value: &Sample, values: &Values, weight: f32) {
         let entry = self.cells.entry_of(pixel);
-        self.filtered.add(entry, &values, weight);
+        self.filtered.add(entry, values, weight);
         if !self.weights.is_empty() {
             self.weights.add(entry, [f64::from(weight)]);
         }
         if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
             coverage.add(entry, surface.shown, 1);
         }
-        true
     }
 
     /// [`add`](Self::add) where nothing but the colour is kept, and all samples weigh the same.
@@ -269,7 +207,7 @@ impl FilmTile {
     pub fn splat<'a>(&mut self, pixel: usize, sample: u32, value: impl Into<Sample<'a>>, taps: &[Taps; 2], splats: &mut Splats) -> bool {
         let value = value.into();
         // A sum of as many terms as a pixel has neighbours is to be finite, too.
-        let Some(values) = self.take(pixel, sample, value, Splats::MOST_TERMS) else { return false };
+        let Some(values) = self.take::<true>(pixel, sample, value, Splats::MOST_TERMS) else { return false };
         let first = self.cells.entry_of(pixel);
         splats.add(&self.cells, first, taps, &values);
         if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
@@ -285,23 +223,28 @@ impl FilmTile {
         splats.flush(&self.cells, self.cells.cell_of(pixel), &mut self.filtered, &mut self.weights);
     }
 
-    /// Adds a sample to what is kept of its own pixel and returns what is filtered; `None` if it is not finite.
+    /// Adds a sample to what is kept of its own pixel and returns what is filtered, with or without averages beside the
+    /// colour; `None` if it is not finite.
     #[inline(always)]
-    fn take<'a>(&mut self, pixel: usize, sample: u32, value: Sample<'a>, weight: f32) -> Option<Values<'a>> {
+    fn take<'a, const AVERAGES: bool>(&mut self, pixel: usize, sample: u32, value: Sample<'a>, weight: f32) -> Option<Values<'a>> {
         let Sample { pixel: PixelSample { radiance, alpha }, surface, light_aovs } = value;
         let color = [radiance.r, radiance.g, radiance.b, *alpha];
-        let count = self.layout.light_aovs.count();
-        let mut values = Values { color, light_aovs: &[], means: [Rgb::BLACK; MAX_MEANS], first_mean: count };
-        let mut finite = is_finite(weight, *radiance, *alpha);
-        if self.layout.beside_color() {
-            values.light_aovs = &light_aovs[..count.min(light_aovs.len())];
+        let mut values = Values {
+            color,
+            light_aovs: LightAovSample::default(),
+            means: [Rgb::BLACK; MAX_MEANS],
+            first_mean: self.layout.light_aovs.count(),
+        };
+        let mut finite = is_finite(weight, *radiance, *alpha) && surface.is_none_or(SurfaceSample::is_finite);
+        if AVERAGES && self.layout.beside_color() {
+            values.light_aovs = light_aovs;
             if let Some(surface) = surface {
-                let mut means = [[0.0; 3]; MAX_MEANS];
-                self.layout.means.read(surface, means.as_flattened_mut());
-                values.means = means.map(Rgb::from);
+                values.means = self.layout.means.means(surface);
             }
             values.for_each_average(|_, value| finite &= is_finite(weight, value, 0.0));
-            finite = finite && surface.is_none_or(|surface| self.nearest.add(pixel, sample, surface, &self.layout.nearest));
+        }
+        if let (true, Some(surface)) = (finite, surface) {
+            self.nearest.add(pixel, sample, surface, &self.layout.nearest);
         }
         if !finite {
             self.drop_sample(pixel, sample);

@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::accumulator::SampleMoments;
 use super::layer::SurfaceChannels;
 use super::sum::SumPlane;
-use super::tile::{DROPPED_KEPT, DroppedSample, FilmTile, SampleMoments};
+use super::tile::{DROPPED_KEPT, DroppedSample, FilmTile};
 use super::{CoverageCounts, Crop, Filter, Filtering, LayerKind, LayerSet, LightAovRequest, VarianceKernel};
 use crate::desc::FilterDesc;
 use crate::error::{Error, Result};

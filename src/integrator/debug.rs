@@ -132,7 +132,7 @@ fn for_each_first_surface(
         };
         let radiance = shade(sample, ray, &at);
         out.pixels[i] = PixelSample { radiance, alpha: 1.0 };
-        add_emission(light_aovs, out.light_aovs_mut(i), radiance);
+        add_emission(&mut out.light_aovs, i, radiance);
         if wants_surface {
             out.surfaces[i] =
                 surface_sample(world, needs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || world.scene.texture_point(&at));

@@ -6,7 +6,7 @@
 
 use crate::bsdf::{Bsdf, BsdfSample};
 use crate::color::Rgb;
-use crate::film::{LightAov, LightAovRequest};
+use crate::film::{LightAov, LightAovRows};
 use crate::id::{LightGroupId, LightId};
 use crate::math::Vec3;
 use crate::scene::Scene;
@@ -60,19 +60,19 @@ pub(super) fn group_of(scene: &Scene, light: LightId) -> usize {
     scene.light_groups.of(light).map_or(scene.light_groups.names().len(), LightGroupId::index)
 }
 
-/// Adds light to the parts of its sample by the course it took.
-pub(super) fn add_by_scattering(needs: LightAovRequest, light_aovs: &mut [Rgb], light: Rgb, course: LightEvent) {
-    if !needs.by_scattering {
+/// Adds light to the AOVs by scattering of a sample.
+pub(super) fn add_by_scattering(light_aovs: &mut LightAovRows, sample: usize, light: Rgb, event: LightEvent) {
+    if !light_aovs.request().by_scattering {
         return;
     }
-    let mut add = |part: LightAov, light: Rgb| light_aovs[part as usize] += light;
-    let (way, [diffuse, specular, transmission]) = match course {
+    let mut add = |aov: LightAov, light: Rgb| light_aovs.add(sample, aov as usize, light);
+    let (lobes, [diffuse, specular, transmission]) = match event {
         LightEvent::Emission => return add(LightAov::Emission, light),
         LightEvent::Environment => return add(LightAov::Background, light),
-        LightEvent::Direct(way) => (way, [LightAov::DiffuseDirect, LightAov::SpecularDirect, LightAov::TransmissionDirect]),
-        LightEvent::Indirect(way) => (way, [LightAov::DiffuseIndirect, LightAov::SpecularIndirect, LightAov::TransmissionIndirect]),
+        LightEvent::Direct(lobes) => (lobes, [LightAov::DiffuseDirect, LightAov::SpecularDirect, LightAov::TransmissionDirect]),
+        LightEvent::Indirect(lobes) => (lobes, [LightAov::DiffuseIndirect, LightAov::SpecularIndirect, LightAov::TransmissionIndirect]),
     };
-    match way {
+    match lobes {
         LobeWeights::Transmitted => add(transmission, light),
         LobeWeights::Reflected { diffuse: share } => {
             let part = light * share;
@@ -82,15 +82,17 @@ pub(super) fn add_by_scattering(needs: LightAovRequest, light_aovs: &mut [Rgb], 
     }
 }
 
-/// Adds light to the parts of its sample by the group of the light that gave it.
-pub(super) fn add_by_group(needs: LightAovRequest, light_aovs: &mut [Rgb], light: Rgb, group: usize) {
-    if needs.light_groups > 0 {
-        light_aovs[needs.first_group() + group] += light;
+/// Adds light to the AOV of a group of lights.
+pub(super) fn add_by_group(light_aovs: &mut LightAovRows, sample: usize, light: Rgb, group: usize) {
+    let request = light_aovs.request();
+    if request.light_groups > 0 {
+        light_aovs.add(sample, request.first_group() + group, light);
     }
 }
 
-/// Adds all light of a sample whose course and source are not told apart.
-pub(super) fn add_emission(needs: LightAovRequest, light_aovs: &mut [Rgb], light: Rgb) {
-    add_by_scattering(needs, light_aovs, light, LightEvent::Emission);
-    add_by_group(needs, light_aovs, light, needs.light_groups.saturating_sub(1) as usize);
+/// Adds all light of a sample that is of no lobe and of no light.
+pub(super) fn add_emission(light_aovs: &mut LightAovRows, sample: usize, light: Rgb) {
+    add_by_scattering(light_aovs, sample, light, LightEvent::Emission);
+    let last = light_aovs.request().light_groups.saturating_sub(1) as usize;
+    add_by_group(light_aovs, sample, light, last);
 }

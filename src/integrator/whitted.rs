@@ -9,7 +9,7 @@ use super::surface::{FirstSurface, surface_sample};
 use super::vertex::Vertex;
 use super::{CameraBatch, CameraSample, Integrator, PassContext, RayCounts, SurfaceAovs, Workspace, World, dimensions};
 use crate::color::Rgb;
-use crate::film::{LightAovRequest, PixelSample, SurfaceSample};
+use crate::film::{LightAovRequest, LightAovRows, PixelSample, SurfaceSample};
 use crate::geometry::{Hit, SurfaceInteraction};
 use crate::id::LightId;
 use crate::light::MisCompensation;
@@ -65,7 +65,7 @@ impl Integrator for Whitted {
                     None => SurfaceSample::default(),
                 };
             }
-            let mut tally = Tally { needs: self.light_aovs, light_aovs: out.light_aovs_mut(i), rays: counts, sample, light_samples: 0 };
+            let mut tally = Tally { light_aovs: &mut out.light_aovs, index: i, rays: counts, sample, light_samples: 0 };
             let view = View { depth: 1, throughput: segment.transmittance, way: None };
             out.pixels[i] = match &segment.end {
                 Some(at) => PixelSample { radiance: self.shade(world, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
@@ -103,8 +103,9 @@ impl View {
 
 /// A camera sample, and what is counted of it beside its radiance.
 struct Tally<'a> {
-    needs: LightAovRequest,
-    light_aovs: &'a mut [Rgb],
+    light_aovs: &'a mut LightAovRows,
+    /// Index of the sample in its batch.
+    index: usize,
     rays: &'a mut RayCounts,
     sample: &'a CameraSample,
     /// How many times a light was sampled.
@@ -113,14 +114,14 @@ struct Tally<'a> {
 
 impl Tally<'_> {
     fn sorts(&self) -> bool {
-        self.needs.count() > 0
+        self.light_aovs.request().count() > 0
     }
 
     /// Adds light at the camera; that of no light is in the last group.
     fn add(&mut self, world: &World, light: Rgb, course: LightEvent, source: Option<LightId>) {
-        add_by_scattering(self.needs, self.light_aovs, light, course);
-        let group = source.map_or(self.needs.light_groups.saturating_sub(1) as usize, |id| group_of(world.scene, id));
-        add_by_group(self.needs, self.light_aovs, light, group);
+        add_by_scattering(self.light_aovs, self.index, light, course);
+        let last = self.light_aovs.request().light_groups.saturating_sub(1) as usize;
+        add_by_group(self.light_aovs, self.index, light, source.map_or(last, |id| group_of(world.scene, id)));
     }
 }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ExrOverrides;
 use crate::accel::AccelKind;
-use crate::desc::{FilterDesc, IntegratorDesc, LayerDesc, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc, ViewDesc};
+use crate::desc::{FilterDesc, IntegratorDesc, LayerKind, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc, ViewDesc};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
 use crate::output::check_output;
@@ -114,7 +114,7 @@ pub struct Overrides {
     /// The files if neither the scene nor the command line names one.
     pub default_outputs: Vec<String>,
     /// `--layers`: for every EXR output.
-    pub layers: Vec<LayerDesc>,
+    pub layers: Vec<LayerKind>,
     /// `--float`: for every EXR output.
     pub float: bool,
     /// Of every EXR output.
@@ -394,7 +394,7 @@ mod tests {
             strategy: Some(StrategyDesc::Light),
             clamp: Some(2.5),
             time_limit: Some(1.5),
-            layers: vec![LayerDesc::Z, LayerDesc::Albedo],
+            layers: vec![LayerKind::Z, LayerKind::Albedo],
             float: true,
             exposure: Some(-2.0),
             view: Some(ViewDesc::Filmic),
@@ -418,7 +418,7 @@ mod tests {
         assert_eq!(s.time_limit, Some(Duration::from_millis(1500)));
         assert_eq!(
             (s.outputs[0].layers.as_slice(), s.outputs[0].pixel_type),
-            (&[LayerDesc::Z, LayerDesc::Albedo][..], PixelTypeDesc::Float)
+            (&[LayerKind::Z, LayerKind::Albedo][..], PixelTypeDesc::Float)
         );
         assert_eq!((s.outputs[1].exposure, s.outputs[1].view, s.outputs[1].layers.len()), (-2.0, Some(ViewDesc::Filmic), 0));
         assert_eq!(s.outputs[0].view, None);
@@ -476,7 +476,7 @@ mod tests {
             ("--regularize", Overrides { regularize: Some(0.1), integrator: Some(IntegratorDesc::Uv), ..d() }),
             ("--time-limit", Overrides { time_limit: Some(0.0), ..d() }),
             ("--time-limit", Overrides { time_limit: Some(f64::NAN), ..d() }),
-            ("--layers", Overrides { layers: vec![LayerDesc::Z], outputs: vec!["a.png".to_owned()], ..d() }),
+            ("--layers", Overrides { layers: vec![LayerKind::Z], outputs: vec!["a.png".to_owned()], ..d() }),
             ("--float", Overrides { float: true, outputs: vec!["a.png".to_owned()], ..d() }),
             ("--exposure", Overrides { exposure: Some(1.0), outputs: vec!["a.exr".to_owned()], ..d() }),
             ("--exposure", Overrides { exposure: Some(f32::INFINITY), ..d() }),

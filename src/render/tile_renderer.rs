@@ -6,7 +6,7 @@ use super::pixel_order::{pixel_of_slot, slots};
 use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
 use crate::accel::Accelerator;
 use crate::desc::IntegratorDesc;
-use crate::film::{FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, Splats};
+use crate::film::{FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, PlacedSample, Splats};
 use crate::guiding::Guide;
 use crate::integrator::{self, CameraBatch, CameraBlock, Integrator, PassContext, Setup, SurfaceAovs, Workspace, World, dimensions};
 use crate::math::Vec2;
@@ -33,6 +33,8 @@ pub(super) struct TileWorkspace {
     samples: CameraBatch,
     /// Of each sample, its place in the pixel and its weight.
     places: Vec<FilterSample>,
+    /// Samples to be added to the film.
+    placed: Vec<PlacedSample>,
     pub splats: Splats,
     pixels: [[u32; 2]; BATCH],
     /// Points of the film.
@@ -48,6 +50,7 @@ impl Default for TileWorkspace {
         Self {
             samples: CameraBatch::default(),
             places: vec![FilterSample { offset: Vec2::ZERO, weight: 1.0 }; count],
+            placed: Vec::with_capacity(count),
             splats: Splats::default(),
             pixels: [[0; 2]; BATCH],
             film: [[0.0; BATCH]; 2],
@@ -60,7 +63,7 @@ impl Default for TileWorkspace {
 impl TileWorkspace {
     /// The radiance of a sample of the batch.
     pub fn radiance(&self, slot: usize) -> [f64; 3] {
-        self.integrator.out.pixels[slot].radiance.to_array().map(f64::from)
+        self.integrator.out.radiance(slot)
     }
 }
 
@@ -183,20 +186,35 @@ impl<'a> TileRenderer<'a> {
             if self.world.has_given_up() {
                 break;
             }
-            for (i, slot) in slots(self.grid.area, origin).enumerate() {
-                let [dx, dy] = pixel_of_slot(slot);
+            workspace.placed.clear();
+            for (slot, [dx, dy]) in slots(self.grid.area, origin).map(pixel_of_slot).enumerate() {
                 let (x, y) = (origin[0] + dx, origin[1] + dy);
                 if active.contains(x, y) {
-                    let pixel = tile.index(x, y);
-                    if self.add(tile, pixel, sample, i, workspace) && tile.tracks_variance() {
-                        tile.add_moments(pixel, workspace.radiance(i));
-                    }
+                    let (pixel, weight) = (tile.index(x, y) as u32, workspace.places[slot].weight);
+                    workspace.placed.push(PlacedSample { slot: slot as u32, pixel, sample, weight });
                 }
             }
-            let first = tile.index(active.x, active.y);
-            tile.flush(first, &mut workspace.splats);
+            self.add_batch(tile, workspace);
         }
         count
+    }
+
+    /// Adds the placed samples of the batch to the film, each as a group of its own.
+    fn add_batch(&self, tile: &mut FilmTile, workspace: &mut TileWorkspace) {
+        if !self.filter.is_shared() {
+            tile.add_batch(&workspace.integrator.out, &mut workspace.placed);
+            return;
+        }
+        for i in 0..workspace.placed.len() {
+            let PlacedSample { slot, pixel, sample, .. } = workspace.placed[i];
+            let (slot, pixel) = (slot as usize, pixel as usize);
+            if self.add(tile, pixel, sample, slot, workspace) {
+                tile.add_moments(pixel, workspace.radiance(slot));
+            }
+        }
+        if let Some(first) = workspace.placed.first() {
+            tile.flush(first.pixel as usize, &mut workspace.splats);
+        }
     }
 
     /// Adds a sample of the batch to the film; `false` if it was dropped. Shared samples stay in the splats until these

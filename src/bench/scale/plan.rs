@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::quantity::Quantity;
 use crate::accel::AccelKind;
-use crate::desc::LayerDesc;
+use crate::desc::LayerKind;
 use crate::error::{Error, Result};
 
 /// What is asked of the benchmark.
@@ -72,7 +72,7 @@ pub struct Case {
     /// Largest number of segments of a path; none ends before it by chance.
     pub depth: u32,
     /// What is stored beside the colour.
-    pub layers: Vec<LayerDesc>,
+    pub layers: Vec<LayerKind>,
     /// Threads of the build and of the render.
     pub threads: usize,
     /// The accelerator's name.
@@ -144,17 +144,17 @@ fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Swee
 }
 
 /// Sets of layers with their names and numbers of channels.
-fn layer_sets() -> [(&'static str, u8, Vec<LayerDesc>); 6] {
+fn layer_sets() -> [(&'static str, u8, Vec<LayerKind>); 6] {
     [
         ("color", 4, vec![]),
-        ("color, Z", 5, vec![LayerDesc::Z]),
-        ("color, Z, N", 8, vec![LayerDesc::Z, LayerDesc::N]),
-        ("color, Z, N, P", 11, vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P]),
-        ("color, Z, N, P, albedo", 14, vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo]),
+        ("color, Z", 5, vec![LayerKind::Z]),
+        ("color, Z, N", 8, vec![LayerKind::Z, LayerKind::N]),
+        ("color, Z, N, P", 11, vec![LayerKind::Z, LayerKind::N, LayerKind::P]),
+        ("color, Z, N, P, albedo", 14, vec![LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo]),
         (
             "all (variance and samples too)",
             18,
-            vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo, LayerDesc::Variance, LayerDesc::Samples],
+            vec![LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo, LayerKind::Variance, LayerKind::Samples],
         ),
     ]
 }

@@ -70,14 +70,14 @@ fn check_plain(name: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use steradian::desc::LayerDesc;
+    use steradian::desc::LayerKind;
 
     #[test]
     fn files_have_the_layers_of_the_render() {
-        let of_render = vec![OutputDesc { layers: vec![LayerDesc::Z], ..OutputDesc::new("a.exr") }];
+        let of_render = vec![OutputDesc { layers: vec![LayerKind::Z], ..OutputDesc::new("a.exr") }];
         let header = Header { outputs: of_render, ..Header::default() };
         let named = outputs(&header, &["b.EXR".to_owned(), "c.png".to_owned()]).unwrap();
-        assert_eq!((named[0].file.as_str(), named[0].layers.as_slice()), ("b.EXR", &[LayerDesc::Z][..]));
+        assert_eq!((named[0].file.as_str(), named[0].layers.as_slice()), ("b.EXR", &[LayerKind::Z][..]));
         assert_eq!((named[1].file.as_str(), named[1].layers.len()), ("c.png", 0));
         assert_eq!(outputs(&header, &[]).unwrap()[0].file, "a.exr");
         assert!(matches!(outputs(&header, &["d.jpg".to_owned()]), Err(Error::Usage(_))));

@@ -5,7 +5,7 @@ use std::fmt;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::value::{MapDeserializer, StrDeserializer};
 use serde::de::{Deserialize, DeserializeOwned, Error, IntoDeserializer};
-use steradian::desc::LayerDesc;
+use steradian::desc::LayerKind;
 
 /// The names that deserialisation accepts, caught from its complaint about one it does not.
 #[derive(Debug)]
@@ -51,13 +51,13 @@ pub fn plain<T: DeserializeOwned + Clone + Send + Sync + 'static>() -> impl Type
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Layers {
     All,
-    One(LayerDesc),
+    One(LayerKind),
 }
 
 impl Layers {
-    pub fn list(self) -> Vec<LayerDesc> {
+    pub fn list(self) -> Vec<LayerKind> {
         match self {
-            Self::All => names(from_name::<LayerDesc>).iter().filter_map(|name| from_name(name).ok()).collect(),
+            Self::All => names(from_name::<LayerKind>).iter().filter_map(|name| from_name(name).ok()).collect(),
             Self::One(layer) => vec![layer],
         }
     }
@@ -65,9 +65,9 @@ impl Layers {
 
 /// Parses the name of a layer, or `all`.
 pub fn layers() -> impl TypedValueParser<Value = Layers> {
-    let all = names(from_name::<LayerDesc>).iter().copied().chain(["all"]);
+    let all = names(from_name::<LayerKind>).iter().copied().chain(["all"]);
     PossibleValuesParser::new(all.collect::<Vec<_>>())
-        .try_map(|name| if name == "all" { Ok(Layers::All) } else { from_name::<LayerDesc>(&name).map(Layers::One) })
+        .try_map(|name| if name == "all" { Ok(Layers::All) } else { from_name::<LayerKind>(&name).map(Layers::One) })
 }
 
 /// Parses an enum whose variants are objects with a `type`; everything else has its default.
@@ -79,13 +79,13 @@ pub fn tagged<T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static>() ->
 mod tests {
     use super::*;
     use steradian::desc::{IntegratorDesc, SamplerKindDesc};
-    use steradian::film::LayerKind;
+    use steradian::film::LayerInfo;
 
     #[test]
     fn names_are_those_of_the_scene_format() {
         // All of the film's, but the picture itself and what denoisers add.
-        let of_film = LayerKind::ALL.iter().map(|info| info.name).filter(|name| !["color", "noisy"].contains(name));
-        assert_eq!(names(from_name::<LayerDesc>), of_film.collect::<Vec<_>>());
+        let of_film = LayerInfo::ALL.iter().map(|info| info.name).filter(|name| !["color", "noisy"].contains(name));
+        assert_eq!(names(from_name::<LayerKind>), of_film.collect::<Vec<_>>());
         assert_eq!(names(from_name::<SamplerKindDesc>), ["sobol", "independent"]);
         let integrators = names(from_type::<IntegratorDesc>);
         assert_eq!(integrators[..3], ["path", "whitted", "normal"]);

@@ -113,7 +113,7 @@ impl PathIntegrator {
     fn render_wave(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
         let PassContext { world, guide } = *pass;
         let Workspace { out, counts, paths: PathBuffers(wave) } = workspace;
-        let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out, config: self });
+        let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out });
         let mut context = Context { config: self, world, scene: world.scene, bounce: 0, is_last: false, compensation };
         wave.start(&context, samples);
         for bounce in 0..self.max_depth {

@@ -1,6 +1,6 @@
 //! The only writer of radiance: the picture, and the light AOVs that it is divided into.
 
-use super::{Context, PathIntegrator};
+use super::Context;
 use crate::color::Rgb;
 use crate::film::SampleBatch;
 use crate::id::LightId;
@@ -9,7 +9,6 @@ use crate::integrator::light_events::{LightEvent, add_by_group, add_by_scatterin
 /// The samples of a wave.
 pub(super) struct Output<'a> {
     pub batch: &'a mut SampleBatch,
-    pub config: &'a PathIntegrator,
 }
 
 impl Output<'_> {
@@ -27,11 +26,11 @@ impl Output<'_> {
 
     /// Adds light to the light AOVs by scattering of a sample.
     pub fn add_by_scattering(&mut self, slot: u32, light: Rgb, event: LightEvent) {
-        add_by_scattering(self.config.light_aovs, self.batch.light_aovs_mut(slot as usize), light, event);
+        add_by_scattering(&mut self.batch.light_aovs, slot as usize, light, event);
     }
 
     /// Adds light to the AOV of the group that has the light `id`.
     pub fn add_to_group_of(&mut self, context: &Context, slot: u32, light: Rgb, id: LightId) {
-        add_by_group(self.config.light_aovs, self.batch.light_aovs_mut(slot as usize), light, group_of(context.scene, id));
+        add_by_group(&mut self.batch.light_aovs, slot as usize, light, group_of(context.scene, id));
     }
 }

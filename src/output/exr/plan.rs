@@ -2,9 +2,9 @@
 
 use exr::compression::Compression;
 
-use crate::desc::{CompressionDesc, ExrProfileDesc, LayerDesc, OutputDesc, PixelTypeDesc};
+use crate::desc::{CompressionDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc};
 use crate::error::{Error, Result};
-use crate::film::{LayerKind, Source};
+use crate::film::{LayerInfo, Source};
 use crate::output::role::Role;
 
 /// Ranks of Cryptomatte if nothing is said.
@@ -68,10 +68,8 @@ pub fn find_output_fault(output: &OutputDesc) -> Option<OutputFault> {
         );
         return fault("compression", message);
     }
-    let spoiled = output
-        .pixel_types
-        .iter()
-        .find(|(layer, pixel_type)| **pixel_type == PixelTypeDesc::Half && LayerKind::from(**layer).info().always_float);
+    let spoiled =
+        output.pixel_types.iter().find(|(layer, pixel_type)| **pixel_type == PixelTypeDesc::Half && LayerInfo::of(**layer).always_float);
     if let Some((layer, _)) = spoiled {
         return fault("pixel_types", format!("the layer {} needs 32 bits: its pixel type cannot be half", layer_name(*layer)));
     }
@@ -100,8 +98,8 @@ pub fn crypto_depth(output: &OutputDesc) -> usize {
 
 /// Whether a layer is stored in 16 bits.
 pub fn is_half(output: &OutputDesc, kind: LayerKind) -> bool {
-    let own = output.pixel_types.iter().find(|(layer, _)| LayerKind::from(**layer) == kind).map(|(_, pixel_type)| *pixel_type);
-    !kind.info().always_float && own.unwrap_or(output.pixel_type) == PixelTypeDesc::Half
+    let own = output.pixel_types.iter().find(|(layer, _)| **layer == kind).map(|(_, pixel_type)| *pixel_type);
+    !LayerInfo::of(kind).always_float && own.unwrap_or(output.pixel_type) == PixelTypeDesc::Half
 }
 
 /// How a part is compressed.
@@ -123,13 +121,13 @@ fn is_lossy(compression: CompressionDesc) -> bool {
     matches!(compression, CompressionDesc::Dwaa | CompressionDesc::Dwab)
 }
 
-fn is_data(layer: LayerDesc) -> bool {
-    let info = LayerKind::from(layer).info();
+fn is_data(layer: LayerKind) -> bool {
+    let info = LayerInfo::of(layer);
     matches!(info.source, Source::Coverage) || info.channels.iter().any(|name| Role::of(name).is_data())
 }
 
-fn layer_name(layer: LayerDesc) -> &'static str {
-    LayerKind::from(layer).info().name
+fn layer_name(layer: LayerKind) -> &'static str {
+    LayerInfo::of(layer).name
 }
 
 fn compression_name(compression: CompressionDesc) -> &'static str {

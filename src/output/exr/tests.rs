@@ -9,12 +9,12 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, LayerAttributes, ReadChannels, ReadLayers, Vec2, WritableImage, read,
 };
 
-use crate::desc::{CompressionDesc, ExrProfileDesc, LayerDesc, OutputDesc, PixelTypeDesc};
+use crate::desc::{CompressionDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc};
 use crate::error::Error;
-use crate::film::{Coverage, Crop, Identities, Image, Label, Layer, LayerInfo, LayerKind, ShapeIdentity, ShapeKey};
+use crate::film::{Coverage, Crop, Identities, Image, Label, Layer, LayerInfo, ShapeIdentity, ShapeKey};
 use crate::output::{RenderInfo, check_exr, cryptomatte};
 
-const LAYERS: [LayerDesc; 6] = [LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo, LayerDesc::Variance, LayerDesc::Samples];
+const LAYERS: [LayerKind; 6] = [LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo, LayerKind::Variance, LayerKind::Samples];
 
 /// The layers of the pictures below.
 const LAYERS_OF_PICTURE: [LayerKind; 7] =
@@ -28,7 +28,7 @@ fn picture() -> Image {
         let scale = if info.always_float { std::f32::consts::PI } else { 1.0 / 64.0 };
         Layer::new(info.kind, (0..values).map(|i| ((i * 37) % 1999) as f32 * scale - 3.0).collect())
     };
-    Image { size: [40, 30], crop, layers: LAYERS_OF_PICTURE.iter().map(|kind| layer(kind.info())).collect(), ..Image::default() }
+    Image { size: [40, 30], crop, layers: LAYERS_OF_PICTURE.iter().map(|kind| layer(LayerInfo::of(*kind))).collect(), ..Image::default() }
 }
 
 fn info() -> RenderInfo {
@@ -69,10 +69,10 @@ fn files_come_back_exactly() {
             let channels = all_channels(&path);
             assert_eq!(channels.len(), 18);
             for layer in &image.layers[1..] {
-                for (i, name) in layer.kind.info().channels.iter().enumerate() {
+                for (i, name) in LayerInfo::of(layer.kind).channels.iter().enumerate() {
                     let samples = &channels.iter().find(|(n, _)| n == name).unwrap().1;
                     assert!(samples.values_as_f32().eq(layer.channel(i)), "{name}");
-                    assert!(!layer.kind.info().always_float || matches!(samples, FlatSamples::F32(_)), "{name}");
+                    assert!(!LayerInfo::of(layer.kind).always_float || matches!(samples, FlatSamples::F32(_)), "{name}");
                 }
             }
         }
@@ -83,7 +83,7 @@ fn files_come_back_exactly() {
 fn only_the_layers_asked_for_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
-    let desc = OutputDesc { layers: vec![LayerDesc::Z], ..OutputDesc::new("a.exr") };
+    let desc = OutputDesc { layers: vec![LayerKind::Z], ..OutputDesc::new("a.exr") };
     write_exr(&path, &picture(), &desc, &RenderInfo::default()).unwrap();
     let names: Vec<String> = all_channels(&path).into_iter().map(|(name, _)| name).collect();
     assert_eq!(names, ["A", "B", "G", "R", "Z"]);
@@ -200,7 +200,7 @@ fn full_picture() -> Image {
     // A quarter torus, half bunny in every pixel; the rest shows nothing.
     let weights = vec![(key(0), 1.0), (key(1), 2.0), (ShapeKey::NONE, 1.0)];
     let mut layers = Vec::new();
-    for info in LayerKind::ALL.iter().filter(|info| !matches!(info.source, crate::film::Source::Coverage)) {
+    for info in LayerInfo::ALL.iter().filter(|info| !matches!(info.source, crate::film::Source::Coverage)) {
         let data: Vec<f32> = (0..pixels * info.channels.len()).map(|i| (i % 101) as f32 / 64.0).collect();
         let groups: &[Option<&str>] = if info.kind == LayerKind::LightGroups { &[Some("key light"), Some("default")] } else { &[None] };
         layers.extend(groups.iter().map(|group| Layer { kind: info.kind, group: group.map(str::to_owned), data: data.clone() }));
@@ -210,8 +210,8 @@ fn full_picture() -> Image {
     Image { size, crop: Crop::full(size), overscan: 2, layers, coverage: Some(coverage) }
 }
 
-fn every_layer() -> Vec<LayerDesc> {
-    let names = LayerKind::ALL.iter().map(|info| serde_json::from_value(info.name.into()));
+fn every_layer() -> Vec<LayerKind> {
+    let names = LayerInfo::ALL.iter().map(|info| serde_json::from_value(info.name.into()));
     names.filter_map(Result::ok).collect()
 }
 
@@ -255,7 +255,7 @@ fn mattes_and_numbers_hold_what_covers_the_pixels() {
     let path = folder.path().join("a.exr");
     let identities = identities();
     let info = RenderInfo { identities: Some(identities), ..info() };
-    let layers = vec![LayerDesc::CryptoObject, LayerDesc::CryptoMaterial, LayerDesc::ObjectId, LayerDesc::InstanceId];
+    let layers = vec![LayerKind::CryptoObject, LayerKind::CryptoMaterial, LayerKind::ObjectId, LayerKind::InstanceId];
     let output = OutputDesc { layers, crypto_depth: Some(4), ..OutputDesc::new("a.exr") };
     write_exr(&path, &full_picture(), &output, &info).unwrap();
     let channels = channels_of_parts(&path);
@@ -326,9 +326,9 @@ fn pixels_around_a_crop_are_black_if_asked_for() {
 fn types_of_single_layers_and_impossible_outputs() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
-    let layers = vec![LayerDesc::Albedo, LayerDesc::N, LayerDesc::Z];
+    let layers = vec![LayerKind::Albedo, LayerKind::N, LayerKind::Z];
     let mut output = OutputDesc { layers, ..OutputDesc::new("a.exr") };
-    output.pixel_types.insert(LayerDesc::Albedo, PixelTypeDesc::Float);
+    output.pixel_types.insert(LayerKind::Albedo, PixelTypeDesc::Float);
     write_exr(&path, &picture(), &output, &info()).unwrap();
     for (_, name, samples) in channels_of_parts(&path) {
         let float = name.starts_with("albedo") || name == "Z";
@@ -346,7 +346,7 @@ fn types_of_single_layers_and_impossible_outputs() {
     assert!(dwa.contains("layer N") && dwa.contains("multipart") && dwa.contains("dwaa"), "{dwa}");
     assert!(
         refusal(|o| {
-            o.pixel_types.insert(LayerDesc::Z, PixelTypeDesc::Half);
+            o.pixel_types.insert(LayerKind::Z, PixelTypeDesc::Half);
         })
         .contains("Z needs 32 bits")
     );

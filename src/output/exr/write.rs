@@ -15,7 +15,7 @@ use super::plan::{self, PartKind};
 use super::plane::{Plane, Region, Source, planes};
 use crate::desc::{CryptoManifestDesc, ExrProfileDesc, OutputDesc};
 use crate::error::Result;
-use crate::film::{Crop, Identities, Image, Layer, LayerKind, LayerSet};
+use crate::film::{Crop, Identities, Image, Layer, LayerInfo, LayerKind, LayerSet};
 use crate::output::color_space::REC709;
 use crate::output::{RenderInfo, write_atomically};
 
@@ -94,7 +94,7 @@ impl<'a> Contents<'a> {
             }
             let group = layer.group.as_ref().map(|group| format!("light_{}.", plain_word(group)));
             let names = match group {
-                Some(prefix) => layer.kind.info().channels.iter().map(|name| format!("{prefix}{name}")).collect(),
+                Some(prefix) => LayerInfo::of(layer.kind).channels.iter().map(|name| format!("{prefix}{name}")).collect(),
                 None => layer.channel_names(),
             };
             contents.add(layer.kind, names, Cow::Borrowed(&layer.data), output);
@@ -133,8 +133,8 @@ impl<'a> Contents<'a> {
 
     fn add(&mut self, kind: LayerKind, names: Vec<String>, data: Cow<'a, [f32]>, output: &OutputDesc) {
         let part = names.first().map_or(PartKind::Beauty, |name| PartKind::of(crate::output::role::Role::of(name)));
-        if !self.comments.contains(&(part, kind.info().comment)) {
-            self.comments.push((part, kind.info().comment));
+        if !self.comments.contains(&(part, LayerInfo::of(kind).comment)) {
+            self.comments.push((part, LayerInfo::of(kind).comment));
         }
         let names = names.iter().map(|name| channel_name(output.profile, name)).collect();
         self.sources.push(Source { names, data, half: plan::is_half(output, kind) });

@@ -5,8 +5,8 @@ use half::f16;
 use super::{Effort, Outcome, bytes, mean_by_film};
 use crate::bench::stability::geometry::Rng;
 use crate::color::linear_from_srgb;
-use crate::desc::{CompressionDesc, LayerDesc, OutputDesc, PixelTypeDesc, ViewDesc};
-use crate::film::{Crop, Image, Layer, LayerInfo, LayerKind};
+use crate::desc::{CompressionDesc, LayerKind, OutputDesc, PixelTypeDesc, ViewDesc};
+use crate::film::{Crop, Image, Layer, LayerInfo};
 use crate::output::{RenderInfo, read_exr, write_exr, write_png};
 
 const COMPRESSIONS: [CompressionDesc; 5] =
@@ -20,7 +20,7 @@ fn picture(rng: &mut Rng) -> Image {
         let values = crop.area() as usize * info.channels.len();
         Layer::new(info.kind, (0..values).map(|_| number()).collect())
     };
-    Image { size: [40, 30], crop, layers: LayerKind::ALL.iter().map(&mut layer).collect(), ..Image::default() }
+    Image { size: [40, 30], crop, layers: LayerInfo::ALL.iter().map(&mut layer).collect(), ..Image::default() }
 }
 
 /// How many of the pictures end in a PNG of other bytes than the first. (An EXR tells the seconds it took.)
@@ -87,7 +87,7 @@ pub(super) fn m7_files(effort: Effort) -> Outcome {
     for _ in 0..effort.pick(2, 50) {
         let image = picture(&mut rng);
         for (compression, pixel_type) in COMPRESSIONS.into_iter().flat_map(|c| [(c, PixelTypeDesc::Float), (c, PixelTypeDesc::Half)]) {
-            let layers = vec![LayerDesc::Z, LayerDesc::N, LayerDesc::P, LayerDesc::Albedo];
+            let layers = vec![LayerKind::Z, LayerKind::N, LayerKind::P, LayerKind::Albedo];
             let desc = OutputDesc { layers, pixel_type, compression: Some(compression), ..OutputDesc::new("a.exr") };
             let written = write_exr(&path, &image, &desc, &RenderInfo::default());
             let Ok(read) = written.and_then(|()| read_exr(&path)) else {

@@ -15,7 +15,9 @@ use super::{Effort, Outcome, sidak_level};
 use crate::accel::AccelKind;
 use crate::color::Rgb;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
-use crate::film::{Crop, Film, FilmShape, FilmTile, Filter, Image, LayerKind, LayerSet, PixelSample, Sample, Splats, SurfaceSample};
+use crate::film::{
+    Crop, Film, FilmShape, FilmTile, Filter, Image, LayerKind, LayerSet, LightAovSample, PixelSample, Sample, Splats, SurfaceSample,
+};
 use crate::render::Overrides;
 
 checks! {
@@ -253,7 +255,7 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
             for sample in 0..effort.pick(50, 20_000) {
                 if rng.below(4) == 0 {
                     let (value, surface, weight) = spoilt(&mut rng);
-                    let value = Sample { pixel: &value, surface: Some(&surface), light_aovs: &[] };
+                    let value = Sample { pixel: &value, surface: Some(&surface), light_aovs: LightAovSample::default() };
                     bad += 1;
                     taken += usize::from(tile.add(pixel, sample, value, weight));
                 } else {

@@ -410,7 +410,7 @@ fn accel_help() -> String {
 mod tests {
     use super::*;
     use clap::CommandFactory;
-    use steradian::desc::LayerDesc;
+    use steradian::desc::LayerKind;
 
     fn render(arguments: &[&str]) -> Result<RenderArgs, clap::Error> {
         let line = ["steradian", "render", "a.json"].iter().chain(arguments);
@@ -439,7 +439,7 @@ mod tests {
         assert_eq!((o.integrator, o.max_depth, o.clamp, o.time_limit), (Some(IntegratorDesc::default()), Some(3), Some(2.5), Some(1.5)));
         assert_eq!(
             (o.layers, o.float, o.exposure, o.view),
-            (vec![LayerDesc::Z, LayerDesc::Albedo], true, Some(-1.5), Some(ViewDesc::Filmic))
+            (vec![LayerKind::Z, LayerKind::Albedo], true, Some(-1.5), Some(ViewDesc::Filmic))
         );
         assert_eq!((o.outputs, o.default_outputs), (vec!["a.exr".to_owned(), "b.png".to_owned()], vec!["d.exr".to_owned()]));
         assert!(o.guiding == Some(true) && o.regularize == Some(0.2) && o.no_depth_of_field && o.transparent);
@@ -450,7 +450,7 @@ mod tests {
     fn all_layers_are_those_of_the_scene_format() {
         let layers = |line: &str| render(&line.split_whitespace().collect::<Vec<_>>()).unwrap().overrides(Vec::new()).layers;
         let all = layers("--layers all");
-        assert!(all.len() > 20 && all.contains(&LayerDesc::CryptoAsset) && layers("--layers Z,all").len() == all.len() + 1);
+        assert!(all.len() > 20 && all.contains(&LayerKind::CryptoAsset) && layers("--layers Z,all").len() == all.len() + 1);
     }
 
     #[test]
