@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::{CompileContext, camera};
+use crate::assets::SceneSource;
 use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, MAX_FILTER_RADIUS, OutputDesc, SceneDesc};
 use crate::error::Result;
-use crate::import::Imported;
 use crate::output::find_output_fault;
 
 /// The largest width and height of a picture.
@@ -24,8 +24,8 @@ pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
 ///
 /// # Errors
 /// As [`check_settings`].
-pub fn check_imported_settings(imported: &Imported, scene_file: &Path) -> Result<()> {
-    check(&imported.desc, &CompileContext::of(imported, scene_file))
+pub fn check_settings_from(desc: &SceneDesc, source: SceneSource) -> Result<()> {
+    check(desc, &source.into())
 }
 
 /// As [`check_settings`], for a film and an integrator alone that `file` holds.

@@ -10,7 +10,7 @@ use crate::desc::{
     RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
 };
 use crate::error::Result;
-use crate::import::closest_name;
+use crate::suggestion::closest_name;
 
 /// What a BSDF has become.
 #[derive(Clone, Debug)]

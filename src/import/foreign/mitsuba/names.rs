@@ -1,6 +1,6 @@
 //! Names that Mitsuba 3 knows: plugins and indices of refraction.
 
-use crate::import::closest_name;
+use crate::suggestion::closest_name;
 
 /// Plugins of Mitsuba 3.9 by class; names of Mitsuba 0.6 that it still reads included.
 const PLUGINS: &[(&str, &[&str])] = &[

@@ -4,8 +4,8 @@ use roxmltree::Node;
 
 use super::values::{self, Fault};
 use crate::error::{Error, Result};
-use crate::import::closest_name;
 use crate::math::{DAffine3, DMat3, DVec3};
+use crate::suggestion::closest_name;
 
 const STEPS: [&str; 5] = ["translate", "rotate", "scale", "lookat", "matrix"];
 

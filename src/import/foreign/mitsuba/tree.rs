@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use crate::error::Error;
-use crate::import::closest_name;
 use crate::math::DAffine3;
+use crate::suggestion::closest_name;
 
 /// Where something stands in a file.
 #[derive(Clone, Debug)]

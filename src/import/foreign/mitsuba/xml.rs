@@ -11,7 +11,7 @@ use super::transforms;
 use super::tree::{Document, Place, Plugin, PluginId, Property, Spectrum, Value};
 use super::values::{self, Fault};
 use crate::error::{Error, Result};
-use crate::import::closest_name;
+use crate::suggestion::closest_name;
 
 /// Plugins nested deeper than this are a mistake.
 const MAX_DEPTH: usize = 100;
