@@ -64,15 +64,13 @@ pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
 /// As [`compile`].
 pub fn compile_from(desc: &SceneDesc, source: SceneSource) -> Result<Scene> {
     let files = CompileContext::from(source);
-    settings::check(desc, &files)?;
-    let shutter = camera::shutter(&files, &desc.camera)?;
-    let camera = camera::compile(&files, &desc.camera)?;
+    let camera = settings::check(desc, &files)?;
     let used = desc.used_names();
     let materials = MaterialTable::new(&files, desc, &used)?;
     let mut builder = Builder {
         meshes: MeshStore::read(&files, desc, &used),
         files,
-        shutter,
+        shutter: Shutter::from(camera.shutter()),
         surroundings: camera.places(),
         materials,
         geometry: Geometry::default(),

@@ -26,7 +26,7 @@ pub use material::{
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerDesc, OutputDesc, PixelTypeDesc, ViewDesc};
 pub use principled::{PrincipledDesc, PrincipledModelDesc};
 pub use settings::{
-    FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS, SamplerDesc, SamplerKindDesc, StrategyDesc,
+    FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS, MAX_SIDE, SamplerDesc, SamplerKindDesc, StrategyDesc,
 };
 pub use shape::{
     AttributeDesc, ConeDesc, CubeDesc, CylinderDesc, DiskDesc, EmissionDesc, InstanceDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc,
