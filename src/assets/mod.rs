@@ -1,5 +1,5 @@
-//! Assets, what a scene names beside itself: files of meshes, images and light profiles, read to buffers that nobody has checked, and
-//! the like that a scene reader made itself.
+//! Assets, which a scene names: meshes, images and light profiles, read from files to buffers that nobody has checked,
+//! or made by the reader of a scene format.
 
 mod environment_image;
 mod fingerprint;

@@ -1,4 +1,4 @@
-//! Scene files of all formats to [`SceneDesc`], with the assets that are no files. Knows nothing of what compilation makes of them.
+//! Scene files of all formats to [`SceneDesc`], with the assets that are no files.
 
 mod comments;
 mod fault;
