@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let imported = import::read_scene(scene_file, &ImportOptions::default())?;
     let overrides = Overrides { spp: Some(4), default_outputs: vec!["counted.exr".into()], ..Overrides::default() };
     let settings = Settings::new(&imported.desc, &overrides)?;
-    let scene = compile::compile_imported(&imported, scene_file)?;
+    let scene = compile::compile_from(&imported.desc, imported.source(scene_file))?;
     let inner = accel::build(AccelKind::EMBREE, &scene.geometry, settings.threads)?;
     let counting = Counting { inner, closest: AtomicU64::new(0), any: AtomicU64::new(0) };
     render::render(&scene, &counting, &settings, &Silent, &AtomicBool::new(false))?;

@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Steradian's own JSON, Mitsuba 3 XML, pbrt-v4 or glTF, by the file's extension.
     let imported = import::read_scene(scene_file, &ImportOptions::default())?;
     let settings = Settings::new(&imported.desc, &Overrides { spp: Some(16), outputs: vec![picture], ..Overrides::default() })?;
-    let scene = compile::compile_imported(&imported, scene_file)?;
+    let scene = compile::compile_from(&imported.desc, imported.source(scene_file))?;
     let accel = accel::build(settings.accel, &scene.geometry, settings.threads)?;
     let rendered = render::render(&scene, &*accel, &settings, &Silent, &AtomicBool::new(false))?;
     for OutputDesc { file, .. } in &settings.outputs {

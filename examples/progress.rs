@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let imported = import::read_scene(scene_file, &ImportOptions::default())?;
     let overrides = Overrides { spp: Some(64), default_outputs: vec!["progress.exr".into()], ..Overrides::default() };
     let settings = Settings::new(&imported.desc, &overrides)?;
-    let scene = compile::compile_imported(&imported, scene_file)?;
+    let scene = compile::compile_from(&imported.desc, imported.source(scene_file))?;
     let accel = accel::build(settings.accel, &scene.geometry, settings.threads)?;
 
     let progress = Half::default();

@@ -5,8 +5,10 @@ use std::collections::HashSet;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
+use steradian::assets;
+use steradian::assets::MeshData;
 use steradian::config::{self, Trust};
-use steradian::import::{self, ImportOptions, MeshData};
+use steradian::import::{self, ImportOptions};
 use steradian::render::Recipe;
 
 /// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to. Malformed files are errors; anything else is a finding.
@@ -27,23 +29,23 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
             let cut = data.iter().position(|&byte| byte == 0).unwrap_or(data.len());
             let (obj, mtl) = data.split_at(cut);
             write("m.mtl", mtl.get(1..).unwrap_or_default());
-            if let Ok(meshes) = import::read_obj(&write("m.obj", obj), true) {
+            if let Ok(meshes) = assets::read_obj(&write("m.obj", obj), true) {
                 meshes.iter().for_each(|mesh| look_at(&mesh.mesh));
             }
         }
         "ply" => {
-            if let Ok(mesh) = import::read_ply(&write("m.ply", data)) {
+            if let Ok(mesh) = assets::read_ply(&write("m.ply", data)) {
                 look_at(&mesh);
             }
         }
         "image" => {
             for name in ["i.png", "i.tga"] {
-                if let Ok(image) = import::read_image(&write(name, data)) {
+                if let Ok(image) = assets::read_image(&write(name, data)) {
                     assert!(image.width > 0 && image.height > 0 && (1..=4).contains(&image.channels));
                 }
             }
             let extension = if data.starts_with(b"P") { "pfm" } else { "hdr" };
-            let _ = import::read_rgb_image(&write(&format!("i.{extension}"), data));
+            let _ = assets::read_rgb_image(&write(&format!("i.{extension}"), data));
         }
         "mitsuba_xml" => read_scene(&write("s.xml", data)),
         "pbrt" => read_scene(&write("s.pbrt", data)),

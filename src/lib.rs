@@ -3,10 +3,10 @@
 //! Data flows one way; a later stage never reads an earlier one:
 //!
 //! ```text
-//! scene.json -- import --> desc::SceneDesc -- compile --> scene::Scene --+--> accel::build(kind, &scene.geometry)
-//! .obj .ply .exr           (plain serde data)            (indices only)  +--> World { &scene, &accel }
-//!                                                                             --> integrator --> PixelSample
-//!                                                                             --> Film --> output::{exr, png}
+//! scene.json -- import --> desc::SceneDesc --+-- compile --> scene::Scene --+--> accel::build(kind, &scene.geometry)
+//! .xml .gltf        (plain serde data)       |   (indices only)             +--> World { &scene, &accel }
+//! .obj .ply .exr -- assets (plain buffers) --+                                   --> integrator --> PixelSample
+//!                                                                                --> Film --> output::{exr, png}
 //! ```
 //!
 //! A module imports only from lower layers (`tests/tidy.rs` enforces the table):
@@ -14,13 +14,13 @@
 //! | # | modules |
 //! |---|---|
 //! | 0 | `id`, `error`, `memory`, `metal`, `printable`, `suggestion`, `bytes` |
-//! | 1 | `math`, `desc`, `file`, `attribute` |
-//! | 2 | `color`, `sampling`, `import`, `config` |
-//! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
+//! | 1 | `math`, `desc`, `file`, `attribute`, `image_data` |
+//! | 2 | `color`, `sampling`, `config` |
+//! | 3 | `assets`, `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
 //! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
-//! | 5 | `scene`, `convert`, `denoise` |
-//! | 6 | `integrator`, `compile` |
-//! | 7 | `render` |
+//! | 5 | `scene`, `denoise` |
+//! | 6 | `import`, `integrator`, `compile` |
+//! | 7 | `render`, `convert` |
 //! | 8 | `bench`, `farm`, `live` |
 //! | 9 | `bin/steradian` |
 
@@ -28,6 +28,7 @@
 #![cfg_attr(not(feature = "bench"), allow(dead_code, unused_imports))]
 
 pub mod accel;
+pub mod assets;
 pub mod attribute;
 #[cfg(feature = "bench")]
 pub mod bench;
@@ -47,6 +48,7 @@ pub mod film;
 pub mod geometry;
 pub mod guiding;
 pub mod id;
+pub mod image_data;
 pub mod import;
 pub mod integrator;
 pub mod light;

@@ -15,7 +15,7 @@ fn picture(path: &Path) -> Vec<[u32; 3]> {
     let overrides = Overrides { spp: Some(2), size: Some([24, 16]), threads: Some(2), ..Overrides::default() };
     let imported = read_scene(path, &ImportOptions::default()).unwrap();
     let settings = Settings::new(&imported.desc, &overrides).unwrap();
-    let scene = compile::compile_imported(&imported, path).unwrap();
+    let scene = compile::compile_from(&imported.desc, imported.source(path)).unwrap();
     pixels(&render_with(&Prepared { scene, settings }, AccelKind::EMBREE).image).map(|pixel| pixel.map(f32::to_bits)).collect()
 }
 
@@ -106,7 +106,7 @@ fn errors_name_the_place_in_the_imported_file() {
         let scene = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/>\n{shape}\n<emitter type=\"constant\"/></scene>");
         std::fs::write(&path, scene).unwrap();
         let imported = read_scene(&path, &ImportOptions::default()).unwrap();
-        compile::compile_imported(&imported, &path).err().unwrap().to_string()
+        compile::compile_from(&imported.desc, imported.source(&path)).err().unwrap().to_string()
     };
     let ply = |name: &str| format!("<shape type=\"ply\"><string name=\"filename\" value=\"{name}\"/></shape>");
     let gone = message(&ply("gone.ply"));

@@ -126,7 +126,7 @@ fn imported_scenes_are_rendered_without_what_has_no_area() {
         let imported = read_scene(&path, &ImportOptions::default()).unwrap();
         let overrides = Overrides { spp: Some(1), threads: Some(1), ..Overrides::default() };
         let settings = Settings::new(&imported.desc, &overrides).unwrap();
-        let scene = compile::compile_imported(&imported, &path).unwrap();
+        let scene = compile::compile_from(&imported.desc, imported.source(&path)).unwrap();
         assert_eq!((scene.geometry.shapes.len(), scene.lights.lights().len()), (0, 0), "{}", path.display());
         // What is left is dark, in those renderers too.
         for (kind, name) in AccelKind::ALL {

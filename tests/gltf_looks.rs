@@ -58,7 +58,7 @@ fn render(gltf: &Value, map: [[u8; 4]; 4]) -> Image {
     (film.width, film.height, film.filter) = (4, 4, FilterDesc::Box { radius: 0.5, samples: None });
     imported.desc.sampler.spp = 16;
     let settings = Settings::new(&imported.desc, &Overrides { threads: Some(2), ..Overrides::default() }).unwrap();
-    let scene = compile::compile_imported(&imported, &path).unwrap();
+    let scene = compile::compile_from(&imported.desc, imported.source(&path)).unwrap();
     render_with(&Prepared { scene, settings }, AccelKind::EMBREE).image
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use image::ImageBuffer;
 use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
+use steradian::assets;
 use steradian::bsdf::Bsdf;
 use steradian::compile::Summary;
 use steradian::config::{self, Trust};
@@ -357,18 +358,18 @@ fn a_byte_order_mark_changes_nothing() {
         assert_eq!(plain, marked, "{name}");
     }
     for from in ["ply/ascii", "ply/big", "ply/little"] {
-        let [plain, marked] = marks.map(|mark| import::read_ply(&folder.write("a.ply", with(mark, &named(from)))).unwrap());
+        let [plain, marked] = marks.map(|mark| assets::read_ply(&folder.write("a.ply", with(mark, &named(from)))).unwrap());
         assert!(plain == marked && !plain.triangles.is_empty(), "{from}");
     }
     let [plain, marked] = marks.map(|mark| {
         folder.write("a.mtl", format!("{mark}newmtl red\nKd 0.5 0 0\n"));
         let obj = folder.write("a.obj", format!("{mark}mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
-        format!("{:?}", import::read_obj(&obj, true).unwrap())
+        format!("{:?}", assets::read_obj(&obj, true).unwrap())
     });
     assert!(plain == marked && plain.contains("red"), "{marked}");
     let [plain, marked] = marks.map(|mark| {
         let ies = format!("{mark}TILT=NONE\n1 1000 1 2 1 1 1 0 0 0\n1 1 100\n0 90\n0\n100 50\n");
-        import::read_ies(&folder.write("a.ies", ies)).unwrap()
+        assets::read_ies(&folder.write("a.ies", ies)).unwrap()
     });
     assert_eq!(plain, marked);
     let [plain, marked] = marks.map(|mark| {

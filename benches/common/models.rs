@@ -3,9 +3,9 @@
 use std::f32::consts::TAU;
 use std::path::PathBuf;
 
+use steradian::assets::read_ply;
 use steradian::geometry::{Geometry, Mesh, Shape};
 use steradian::id::ShapeId;
-use steradian::import::read_ply;
 use steradian::math::{Aabb, Vec3};
 
 /// A mesh with its floor, and what of it a camera should frame.

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::assets::MeshData;
 use crate::geometry::{Geometry, Mesh, Shape};
 use crate::id::ShapeId;
-use crate::import::MeshData;
 use crate::math::DVec3;
 
 /// A sphere of radius about 1 with bumps of several sizes, of `triangles` triangles if that number is even and has a factor near its square

@@ -50,12 +50,12 @@ pub fn place_in(files: &CompileContext, desc: &CameraDesc, camera: Camera, space
 }
 
 /// When the shutter is open.
-pub fn shutter(files: &CompileContext, desc: &CameraDesc) -> Result<Shutter> {
+fn shutter(files: &CompileContext, desc: &CameraDesc) -> Result<Shutter> {
     let [open, close] = desc.shutter;
     if !(open.is_finite() && close.is_finite() && open <= close && (close - open).is_finite()) {
         return Err(files.error("camera.shutter", format!("must be finite and not close before it opens, not {:?}", desc.shutter)));
     }
-    Ok(Shutter { open, close })
+    Ok(desc.shutter.into())
 }
 
 /// How the camera moves from where `map` puts it.

@@ -32,7 +32,7 @@ impl Builder {
         let Some(Coincident { count, shapes }) = find(&self.geometry, look_alike) else { return };
         let [first, second] = shapes.map(|shape| self.paths[shape.index()].as_str());
         let what = if count == 1 { "1 triangle coincides".to_owned() } else { format!("{count} triangles coincide") };
-        let whose = if shapes[0] == shapes[1] { "the same mesh".to_owned() } else { self.files.place(second) };
+        let whose = if shapes[0] == shapes[1] { "the same mesh".to_owned() } else { self.files.source.place(second) };
         self.files.warn(
             first,
             format_args!(

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::CompileContext;
 use super::textures::TextureTable;
+use crate::assets::{AssetError, read_ies, read_rgb_image};
 use crate::color::Rgb;
 use crate::desc::{EnvironmentLightDesc, IesLightDesc, LightDesc, ProjectorLightDesc};
 use crate::error::Result;
 use crate::id::{LightGroupId, LightId};
-use crate::import::{AssetError, read_ies, read_rgb_image};
 use crate::light::{
     DirectionalLight, Environment, EnvironmentMap, IesLight, IesProfile, Light, LightGroups, PointLight, Projector, SpotLight,
     TextureProjection,
@@ -179,7 +179,7 @@ fn ies(files: &CompileContext, path: &str, desc: &IesLightDesc, space: &RenderSp
     }
     let intensity = files.intensity(&format!("{path}.intensity"), desc.intensity, space)?;
     let place = format!("{path}.file");
-    let asset = files.asset(&desc.file);
+    let asset = files.source.asset(&desc.file);
     let data = read_ies(&asset).map_err(|e| files.asset_error(&place, &asset, e))?;
     let profile = IesProfile::new(data.vertical, data.horizontal, data.candela);
     let profile = profile.ok_or_else(|| files.asset_error(&place, &asset, AssetError::Malformed("no table of intensities".into())))?;
@@ -208,8 +208,8 @@ fn environment(files: &CompileContext, path: &str, desc: &EnvironmentLightDesc) 
         }
         (None, Some(file)) => {
             let place = format!("{path}.file");
-            let asset = files.asset(file);
-            let image = match files.assets.environments.get(file) {
+            let asset = files.source.asset(file);
+            let image = match files.source.assets.environments.get(file) {
                 Some(image) => image.clone(),
                 None => read_rgb_image(&asset).map_err(|e| files.asset_error(&place, &asset, e))?,
             };

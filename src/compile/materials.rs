@@ -5,6 +5,7 @@ use std::fmt::Debug;
 
 use super::CompileContext;
 use super::textures::{TextureTable, TextureUse};
+use crate::assets::ObjMaterial;
 use crate::bsdf::{Beckmann, Coat, Conductor, Dielectric, Ggx, Lambert, Mirror, Plastic, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
 use crate::color::Rgb;
 use crate::desc::{
@@ -13,7 +14,6 @@ use crate::desc::{
 };
 use crate::error::Result;
 use crate::id::{MaterialId, ReliefId, TextureId};
-use crate::import::ObjMaterial;
 use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial};
 use crate::medium::{Media, Medium};
 use crate::metal::{Metal, MetalNames};

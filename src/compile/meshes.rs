@@ -6,11 +6,11 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::normals::{self, Smoothing};
 use super::{CompileContext, attributes};
+use crate::assets::{self, AssetError, MeshData, ObjMaterial};
 use crate::attribute::{AttributeValues, VERTEX_COLOR, is_of_faces};
 use crate::desc::{AttributeDesc, MeshDesc, MeshShadingDesc, SceneDesc, ShapeDesc, UsedNames};
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, MeshError, MeshStep};
-use crate::import::{self, AssetError, MeshData, ObjMaterial};
 use crate::math::{DVec3, Transform, Vec3};
 
 /// A mesh as given, with the material that its file names.
@@ -129,15 +129,15 @@ fn load_file(
     attributes: &BTreeSet<String>,
 ) -> Result<Vec<LoadedMesh>> {
     let plain = |data, material| LoadedMesh { data, later: Vec::new(), material };
-    if let Some(data) = files.assets.meshes.get(file) {
+    if let Some(data) = files.source.assets.meshes.get(file) {
         return Ok(vec![plain(data.clone(), None)]);
     }
-    let asset = files.asset(file);
+    let asset = files.source.asset(file);
     let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
     let loaded = match extension.as_deref() {
-        Some("ply") => import::read_ply_attributes(&asset, Some(attributes)).map(|data| vec![plain(data, None)]),
+        Some("ply") => assets::read_ply_attributes(&asset, Some(attributes)).map(|data| vec![plain(data, None)]),
         Some("obj") => {
-            import::read_obj(&asset, with_materials).map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect())
+            assets::read_obj(&asset, with_materials).map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect())
         }
         _ => Err(AssetError::Malformed("meshes are .obj or .ply files".into())),
     };
@@ -162,7 +162,7 @@ pub struct Placement<'a> {
 /// The error about a mesh, in its file if it has one.
 pub fn refusal(files: &CompileContext, path: &str, file: Option<&str>, message: String) -> Error {
     match file {
-        Some(file) => files.asset_error(&format!("{path}.file"), &files.asset(file), AssetError::Malformed(message)),
+        Some(file) => files.asset_error(&format!("{path}.file"), &files.source.asset(file), AssetError::Malformed(message)),
         None => files.error(path, message),
     }
 }
@@ -312,7 +312,7 @@ impl Faces {
         });
         let dropped = before - self.triangles.len();
         if dropped > 0 {
-            let file = files.scene.display();
+            let file = files.source.file.display();
             tracing::warn!(
                 "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped (for both sides: \
                  emission.two_sided)"

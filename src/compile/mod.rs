@@ -27,19 +27,17 @@ mod summary;
 mod textures;
 mod transforms;
 
-pub use settings::{check_film_and_integrator, check_imported_settings, check_settings};
+pub use settings::{check_film_and_integrator, check_settings, check_settings_from};
 pub use summary::Summary;
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
+use crate::assets::{AssetError, SceneSource};
 use crate::desc::{IntegratorDesc, SceneDesc};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Shape};
 use crate::id::TextureId;
-use crate::import::{AssetError, Assets, Imported};
 use crate::light::LightSet;
 use crate::material::Material;
 use crate::math::{Bounds, RenderSpace};
@@ -58,27 +56,22 @@ use transforms::Shutter;
 /// # Errors
 /// [`Error::Scene`], [`Error::Asset`] or [`Error::Missing`], each with the place in the scene.
 pub fn compile(desc: &SceneDesc, scene_file: &Path) -> Result<Scene> {
-    compile_with(desc, CompileContext::new(scene_file))
+    compile_from(desc, SceneSource::new(scene_file))
 }
 
 /// Compiles a scene that was read from a file of any kind; errors name the places in that file.
 ///
 /// # Errors
 /// As [`compile`].
-pub fn compile_imported(imported: &Imported, scene_file: &Path) -> Result<Scene> {
-    compile_with(&imported.desc, CompileContext::of(imported, scene_file))
-}
-
-fn compile_with(desc: &SceneDesc, files: CompileContext) -> Result<Scene> {
-    settings::check(desc, &files)?;
-    let shutter = camera::shutter(&files, &desc.camera)?;
-    let camera = camera::compile(&files, &desc.camera)?;
+pub fn compile_from(desc: &SceneDesc, source: SceneSource) -> Result<Scene> {
+    let files = CompileContext::from(source);
+    let camera = settings::check(desc, &files)?;
     let used = desc.used_names();
     let materials = MaterialTable::new(&files, desc, &used)?;
     let mut builder = Builder {
         meshes: MeshStore::read(&files, desc, &used),
         files,
-        shutter,
+        shutter: Shutter::from(camera.shutter()),
         surroundings: camera.places(),
         materials,
         geometry: Geometry::default(),
@@ -105,40 +98,37 @@ fn compile_with(desc: &SceneDesc, files: CompileContext) -> Result<Scene> {
 /// Why a transform cannot place anything.
 const SINGULAR: &str = "the transform is singular: it flattens the shape, or is not finite";
 
-/// Where the scene lies; makes errors and finds assets.
+/// Where the scene comes from; makes errors and warnings.
 #[derive(Clone, Debug)]
 struct CompileContext {
-    scene: PathBuf,
-    /// What is named like a file and has none.
-    assets: Arc<Assets>,
-    /// Where the file of another renderer says what became `shapes[0]` and so on.
-    places: Arc<BTreeMap<String, String>>,
+    source: SceneSource,
+}
+
+impl From<SceneSource> for CompileContext {
+    fn from(source: SceneSource) -> Self {
+        Self { source }
+    }
 }
 
 impl CompileContext {
     /// A scene whose assets are all files.
     fn new(scene: impl Into<PathBuf>) -> Self {
-        Self { scene: scene.into(), assets: Arc::default(), places: Arc::default() }
-    }
-
-    /// The scene of a file of any kind.
-    fn of(imported: &Imported, scene: &Path) -> Self {
-        Self { scene: scene.into(), assets: Arc::clone(&imported.assets), places: Arc::clone(&imported.places) }
+        Self { source: SceneSource::new(scene) }
     }
 
     /// An error at a place of the scene.
     fn error(&self, path: &str, message: impl Into<String>) -> Error {
-        Error::Scene { file: self.scene.clone(), path: self.place(path), message: message.into() }
+        Error::Scene { file: self.source.file.clone(), path: self.source.place(path), message: message.into() }
     }
 
     /// A warning about a place of the scene.
     fn warn(&self, path: &str, message: fmt::Arguments) {
-        tracing::warn!("{}: {}: {message}", self.scene.display(), self.place(path));
+        tracing::warn!("{}: {}: {message}", self.source.file.display(), self.source.place(path));
     }
 
     /// Warns of a file that is not there and that nothing uses.
     fn warn_of_missing(&self, path: &str, name: &str) {
-        if !self.assets.contains(name) && !self.asset(name).is_file() {
+        if !self.source.assets.contains(name) && !self.source.asset(name).is_file() {
             self.warn(path, format_args!("there is no file {name}; nothing uses it"));
         }
     }
@@ -146,30 +136,16 @@ impl CompileContext {
     /// An error about a scene of this format that is surely a mistake; a warning where the renderer that a scene was
     /// written for renders it.
     fn refuse_own(&self, path: &str, message: &str) -> Result<()> {
-        if self.places.is_empty() {
+        if self.source.places.is_empty() {
             return Err(self.error(path, message));
         }
         self.warn(path, format_args!("{message}"));
         Ok(())
     }
 
-    /// A place of the scene, with that of the file it was read from.
-    fn place(&self, path: &str) -> String {
-        let parts = self.places.iter().filter(|(part, _)| path.strip_prefix(part.as_str()).is_some_and(ends_a_name));
-        match parts.max_by_key(|(part, _)| part.len()) {
-            Some((_, place)) => format!("{path} (from {place})"),
-            None => path.into(),
-        }
-    }
-
-    /// Where an asset lies.
-    fn asset(&self, name: &str) -> PathBuf {
-        self.scene.parent().unwrap_or(Path::new("")).join(name)
-    }
-
     /// An error about an asset that `path` names.
     fn asset_error(&self, path: &str, asset: &Path, error: AssetError) -> Error {
-        error.at(&self.scene, &self.place(path), asset)
+        error.at(&self.source.file, &self.source.place(path), asset)
     }
 
     /// The error for a name that does not exist, with a suggestion.
@@ -177,11 +153,6 @@ impl CompileContext {
         let hint = did_you_mean(name, known, ["\"", "\""]);
         self.error(path, format!("no {what} named \"{name}\"{hint}"))
     }
-}
-
-/// Whether what follows a name in a path does not belong to the name.
-fn ends_a_name(rest: &str) -> bool {
-    rest.is_empty() || rest.starts_with(['.', '['])
 }
 
 /// A scene under construction.

@@ -3,11 +3,11 @@
 use super::materials::{MaterialBinding, from_mtl};
 use super::textures::TextureUse;
 use super::{Builder, meshes};
+use crate::assets::{ObjMap, ObjMaterial};
 use crate::bsdf::{Bsdf, Plastic};
 use crate::color::Rgb;
 use crate::error::Result;
 use crate::id::TextureId;
-use crate::import::{ObjMap, ObjMaterial};
 use crate::light::Emission;
 use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, ScalarInput, TexturedMaterial};
 use crate::math::Vec2;
@@ -28,7 +28,7 @@ impl Builder {
         let every = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity, &maps.specular, &maps.emission];
         let has_maps = every.iter().any(|map| map.is_some());
         if has_maps && !has_uvs {
-            tracing::warn!("{}: {path}: material \"{}\": faces without uv have no maps", self.files.scene.display(), mtl.name);
+            tracing::warn!("{}: {path}: material \"{}\": faces without uv have no maps", self.files.source.file.display(), mtl.name);
         }
         let wanted = |map: &Option<ObjMap>| map.clone().filter(|_| has_uvs);
         let (diffuse, opacity) = (wanted(&maps.diffuse), wanted(&maps.opacity));
@@ -57,7 +57,7 @@ impl Builder {
             }
         }
         if !unused.is_empty() {
-            tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.scene.display(), mtl.name, unused.join(", "));
+            tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.source.file.display(), mtl.name, unused.join(", "));
         }
         let mut look = MaterialBinding::plain(self.materials.push(material));
         // Glass lets through what it does not reflect.

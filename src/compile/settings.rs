@@ -4,28 +4,27 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::{CompileContext, camera};
-use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, MAX_FILTER_RADIUS, OutputDesc, SceneDesc};
+use crate::assets::SceneSource;
+use crate::camera::Camera;
+use crate::desc::{FilmDesc, FilterDesc, IntegratorDesc, MAX_FILTER_RADIUS, MAX_SIDE, OutputDesc, SceneDesc};
 use crate::error::Result;
-use crate::import::Imported;
+use crate::film::Crop;
 use crate::output::find_output_fault;
-
-/// The largest width and height of a picture.
-const MAX_SIZE: u32 = 65_536;
 
 /// Checks the numbers that say how to render.
 ///
 /// # Errors
 /// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.
 pub fn check_settings(desc: &SceneDesc, scene_file: &Path) -> Result<()> {
-    check(desc, &CompileContext::new(scene_file))
+    check_settings_from(desc, SceneSource::new(scene_file))
 }
 
 /// As [`check_settings`], for a scene that was read from a file of any kind; errors name the places in that file.
 ///
 /// # Errors
 /// As [`check_settings`].
-pub fn check_imported_settings(imported: &Imported, scene_file: &Path) -> Result<()> {
-    check(&imported.desc, &CompileContext::of(imported, scene_file))
+pub fn check_settings_from(desc: &SceneDesc, source: SceneSource) -> Result<()> {
+    check(desc, &source.into()).map(drop)
 }
 
 /// As [`check_settings`], for a film and an integrator alone that `file` holds.
@@ -38,13 +37,13 @@ pub fn check_film_and_integrator(film: &FilmDesc, integrator: &IntegratorDesc, f
     check_integrator(&files, integrator)
 }
 
-/// As [`check_settings`], for the scene of `files`.
-pub(super) fn check(desc: &SceneDesc, files: &CompileContext) -> Result<()> {
+/// As [`check_settings`], for the scene of `files`; the result is the camera.
+pub(super) fn check(desc: &SceneDesc, files: &CompileContext) -> Result<Camera> {
     check_film(files, &desc.film)?;
     if desc.sampler.spp == 0 {
         return Err(files.error("sampler.spp", "must be at least 1"));
     }
-    camera::compile(files, &desc.camera)?;
+    let camera = camera::compile(files, &desc.camera)?;
     check_integrator(files, &desc.integrator)?;
     let mut written = HashMap::new();
     for (i, output) in desc.outputs.iter().enumerate() {
@@ -54,21 +53,20 @@ pub(super) fn check(desc: &SceneDesc, files: &CompileContext) -> Result<()> {
             return Err(files.error(&format!("{path}.file"), format!("\"{}\" is the file of outputs[{first}] too", output.file)));
         }
     }
-    Ok(())
+    Ok(camera)
 }
 
 fn check_film(files: &CompileContext, film: &FilmDesc) -> Result<()> {
     for (key, value) in [("film.width", film.width), ("film.height", film.height)] {
-        if value == 0 || value > MAX_SIZE {
-            return Err(files.error(key, format!("must be from 1 to {MAX_SIZE}, not {value}")));
+        if value == 0 || value > MAX_SIDE {
+            return Err(files.error(key, format!("must be from 1 to {MAX_SIDE}, not {value}")));
         }
     }
-    if let Some([x, y, width, height]) = film.crop {
-        let inside = |start: u32, length: u32, size: u32| length > 0 && start.checked_add(length).is_some_and(|end| end <= size);
-        if !inside(x, width, film.width) || !inside(y, height, film.height) {
-            let message = format!("[{x}, {y}, {width}, {height}] must have an area and lie within {} x {}", film.width, film.height);
-            return Err(files.error("film.crop", message));
-        }
+    if let Some([x, y, width, height]) = film.crop
+        && !(Crop { x, y, width, height }).fits([film.width, film.height])
+    {
+        let message = format!("[{x}, {y}, {width}, {height}] must have an area and lie within {} x {}", film.width, film.height);
+        return Err(files.error("film.crop", message));
     }
     let most = film.width.min(film.height);
     if film.overscan > most {

@@ -7,12 +7,13 @@ use std::sync::Arc;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::CompileContext;
+use crate::assets::{AssetError, read_image};
 use crate::attribute::{VERTEX_COLOR, is_of_faces};
 use crate::color::Rgb;
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, SceneDesc, TextureDesc, TextureFilterDesc, UsedNames, WrapDesc, WrapModeDesc};
 use crate::error::Result;
 use crate::id::{AttributeId, TextureId};
-use crate::import::{AssetError, ImageData, Samples, read_image};
+use crate::image_data::{ImageData, Samples};
 use crate::material::ColorInput;
 use crate::math::Vec2;
 use crate::texture::{Bitmap, Channel, Checker, Decoding, Texture, TextureFilter, TextureImage, UvTransform, Wrap};
@@ -279,10 +280,10 @@ impl Loader<'_> {
                     return Err(files.error(&format!("{path}.rotation_degrees"), "is not finite"));
                 }
                 let place = format!("{path}.file");
-                let image = match files.assets.images.get(file) {
+                let image = match files.source.assets.images.get(file) {
                     _ if !self.used.contains(name) => kept_image(&mut self.images, files, &place, "", &blank())?,
                     Some(data) => kept_image(&mut self.images, files, &place, file, data)?,
-                    None => load_image(&mut self.images, files, &place, &files.asset(file))?,
+                    None => load_image(&mut self.images, files, &place, &files.source.asset(file))?,
                 };
                 if *color_space == ColorSpaceDesc::Srgb && image.is_float() {
                     return Err(files.error(&format!("{path}.color_space"), "the image has floats, which are linear"));
@@ -333,7 +334,7 @@ fn blank() -> ImageData {
 /// The images of all used files that can be read, in parallel; what is wrong with the others is found when they are asked for.
 fn read_all(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> HashMap<PathBuf, Arc<TextureImage>> {
     let file = |texture: &TextureDesc| match texture {
-        TextureDesc::Image { file, .. } if !files.assets.images.contains_key(file) => files.asset(file).canonicalize().ok(),
+        TextureDesc::Image { file, .. } if !files.source.assets.images.contains_key(file) => files.source.asset(file).canonicalize().ok(),
         _ => None,
     };
     let names: BTreeSet<PathBuf> =

@@ -14,6 +14,12 @@ pub(super) struct Shutter {
     pub close: f64,
 }
 
+impl From<[f64; 2]> for Shutter {
+    fn from([open, close]: [f64; 2]) -> Self {
+        Self { open, close }
+    }
+}
+
 impl Shutter {
     /// A time of the scene as a share of the interval, or from its opening on if it has no length.
     pub fn share(&self, time: f64) -> f64 {

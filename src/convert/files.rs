@@ -6,9 +6,11 @@ use std::io::{BufWriter, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Originals, folder_of, write_ply};
+use crate::assets::{Assets, RgbImage};
 use crate::error::{Error, Result};
 use crate::file::{self, MARK, write_atomically};
-use crate::import::{Assets, ImageData, Imported, RgbImage, Samples};
+use crate::image_data::{ImageData, Samples};
+use crate::import::Imported;
 use crate::output::FileUses;
 
 /// Brings files to the folder beside a scene.
@@ -318,7 +320,7 @@ fn write_exr(width: usize, height: usize, planes: Vec<(&str, Vec<f32>)>, out: &m
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::{read_image, read_rgb_image};
+    use crate::assets::{read_image, read_rgb_image};
 
     fn file(name: &str, write: impl FnOnce(&mut BufWriter<&mut fs::File>) -> Result<(), String>) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();

@@ -2,8 +2,8 @@
 
 use std::io::{Result, Write};
 
+use crate::assets::MeshData;
 use crate::attribute::{AttributeValues, is_of_faces};
-use crate::import::MeshData;
 
 /// Writes a mesh as a binary little-endian PLY file: x y z (as doubles if they are far from the origin), nx ny nz and u
 /// v where the mesh has them, triangles, and attributes such that they are read with their names: colours called
@@ -67,7 +67,7 @@ fn write_attributes(attributes: &[(&str, &AttributeValues)], i: usize, out: &mut
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::read_ply;
+    use crate::assets::read_ply;
 
     #[test]
     fn meshes_come_back_as_they_were() {

@@ -98,6 +98,9 @@ pub enum FilterDesc {
     },
 }
 
+/// The largest width and height of a picture: beyond it, `f32` film coordinates would be coarser than 1/256 of a pixel.
+pub const MAX_SIDE: u32 = 65_536;
+
 /// The largest radius of a pixel filter.
 pub const MAX_FILTER_RADIUS: f32 = 64.0;
 

@@ -13,40 +13,7 @@ use crate::geometry::{Hit, SurfaceInteraction};
 use crate::math::{Ray, RayCone, Vec3};
 use crate::texture::Footprint;
 
-/// How a picture is divided into samples.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelFootprint {
-    /// Width and height in pixels.
-    size: [u32; 2],
-    /// One over the root of the samples per pixel.
-    share: f32,
-}
-
 impl World<'_> {
-    /// As part of a picture of `size` pixels with `spp` samples each: textures are looked up over what a sample stands for.
-    #[must_use]
-    pub fn of_picture(mut self, size: [u32; 2], spp: u32) -> Self {
-        self.picture = Some(size);
-        let pixel_footprint = PixelFootprint { size, share: 1.0 / (spp.max(1) as f32).sqrt() };
-        self.pixel_footprint = self.scene.features.filtered_textures.then_some(pixel_footprint);
-        self
-    }
-
-    /// The cone of a camera ray; `None` if no texture would make use of it.
-    #[inline]
-    pub(super) fn camera_cone(&self, ray: &Ray) -> Option<RayCone> {
-        let PixelFootprint { size, share } = self.pixel_footprint?;
-        let RayCone { width, spread } = self.scene.camera.pixel_cone(ray, size);
-        Some(RayCone { width: width * share, spread: spread * share })
-    }
-
-    /// The cone of a ray that leaves a surface at the distance `t` along the ray of `cone`, in a direction chosen with density `pdf`
-    /// (infinite for mirrors and glass).
-    #[inline]
-    pub(super) fn scattered_cone(&self, cone: RayCone, t: f32, pdf: f32) -> RayCone {
-        scattered(cone, t, pdf, self.pixel_footprint.map_or(0.0, |pixel_footprint| pixel_footprint.share))
-    }
-
     /// What `ray`, whose hit led to `at`, stands for in uv.
     #[inline(never)]
     pub(super) fn footprint(&self, cone: Option<&RayCone>, ray: &Ray, hit: Option<&Hit>, at: &SurfaceInteraction) -> Footprint<'_> {
@@ -63,8 +30,9 @@ impl World<'_> {
     }
 }
 
+/// The cone of a ray that leaves a surface, for a `share` of one over the root of the samples per pixel.
 #[inline]
-fn scattered(cone: RayCone, t: f32, pdf: f32, share: f32) -> RayCone {
+pub(super) fn scattered(cone: RayCone, t: f32, pdf: f32, share: f32) -> RayCone {
     RayCone { width: cone.width_at(t), spread: cone.spread.max(share / (PI * pdf).sqrt()) }
 }
 

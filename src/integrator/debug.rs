@@ -63,7 +63,7 @@ impl Integrator for DebugView {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
         let request = AovRequest { surface: self.needs, light: self.light_aovs };
         let shade = |_: &CameraSample, _: &Ray, at: &SurfaceInteraction| self.view.color(pass.world, at);
-        for_each_first_surface(pass.world, samples, request, workspace, shade);
+        for_each_first_surface(pass, samples, request, workspace, shade);
     }
 }
 
@@ -85,7 +85,7 @@ impl Integrator for AmbientOcclusion {
         let mut shadow_rays = 0;
         let distance = (f64::from(self.distance) * world.scene.camera.render_space().scale()) as f32;
         let request = AovRequest { surface: self.needs, light: self.light_aovs };
-        for_each_first_surface(world, samples, request, workspace, |sample, ray, at| {
+        for_each_first_surface(pass, samples, request, workspace, |sample, ray, at| {
             let u = self.sampler.sample_4d(sample.seed, sample.sample, dimensions::bsdf(0));
             let side = if at.n_g.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
             let direction = Frame::from_normal(at.n_s * side).to_world(warp::cosine_hemisphere([u[1], u[2]]));
@@ -108,12 +108,13 @@ struct AovRequest {
 
 /// Traces all camera rays of a batch and sets its values from `shade`, with nothing where a ray leaves the scene.
 fn for_each_first_surface(
-    world: &World,
+    pass: &PassContext,
     samples: &CameraBatch,
     AovRequest { surface: needs, light: light_aovs }: AovRequest,
     Workspace { out, counts, .. }: &mut Workspace,
     mut shade: impl FnMut(&CameraSample, &Ray, &SurfaceInteraction) -> Rgb,
 ) {
+    let world = pass.world;
     let rays: Vec<Ray> = samples.iter().map(|sample| sample.ray).collect();
     let mut hits = vec![None; rays.len()];
     world.accel.intersect_batch(&rays, &mut hits, Coherence::Coherent);
@@ -124,7 +125,7 @@ fn for_each_first_surface(
         let sample = &sample;
         let Some(at) = world.resolve(ray, hit) else {
             if needs.motion {
-                out.surfaces[i].motion = world.motion_at_infinity(ray.direction).to_array();
+                out.surfaces[i].motion = pass.render.motion_at_infinity(ray.direction).to_array();
             }
             continue;
         };
@@ -133,7 +134,7 @@ fn for_each_first_surface(
         add_emission(&mut out.light_aovs, i, radiance);
         if wants_surface {
             out.surfaces[i] =
-                surface_sample(world, needs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || world.scene.texture_point(&at));
+                surface_sample(pass, needs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || world.scene.texture_point(&at));
         }
     }
 }

@@ -11,6 +11,7 @@ mod light_events;
 mod media;
 mod path;
 mod regularization;
+mod render_context;
 mod shading;
 mod strategy;
 mod surface;
@@ -23,6 +24,7 @@ pub use debug::{AmbientOcclusion, DebugView, View};
 use path::PathBuffers;
 pub use path::PathIntegrator;
 pub use regularization::Regularization;
+pub use render_context::RenderContext;
 pub(crate) use shading::{facing_normal, terminator_factor};
 pub use strategy::Strategy;
 pub use surface::SurfaceAovs;
@@ -169,6 +171,8 @@ impl RayCounts {
 pub struct PassContext<'a> {
     /// The scene with its accelerator.
     pub world: &'a World<'a>,
+    /// The picture and the end of the render.
+    pub render: RenderContext<'a>,
     /// The learned incident radiance, if paths are guided.
     pub guide: Option<&'a Guide>,
 }

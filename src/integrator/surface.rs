@@ -1,6 +1,6 @@
 //! What layers need of the first surface of a sample, and denoisers of the first one that is no mirror and no clear glass.
 
-use super::World;
+use super::{PassContext, World};
 use crate::color::Rgb;
 use crate::film::{ShapeKey, SurfaceSample};
 use crate::geometry::{Detail, Hit, SurfaceInteraction};
@@ -23,8 +23,8 @@ pub struct SurfaceAovs {
 }
 
 /// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator found.
-pub(super) fn place_sample(world: &World, needs: SurfaceAovs, at: &SurfaceInteraction, hit: Option<&Hit>) -> SurfaceSample {
-    let mut sample = SurfaceSample::default();
+pub(super) fn place_sample(pass: &PassContext, needs: SurfaceAovs, at: &SurfaceInteraction, hit: Option<&Hit>) -> SurfaceSample {
+    let (world, mut sample) = (pass.world, SurfaceSample::default());
     if needs.geometry {
         sample.depth = world.scene.camera.depth(at.p, at.time);
         sample.normal = at.n_s;
@@ -36,7 +36,7 @@ pub(super) fn place_sample(world: &World, needs: SurfaceAovs, at: &SurfaceIntera
         sample.uv = world.uv(at, hit).to_array();
     }
     if needs.motion {
-        sample.motion = world.motion_of(at).to_array();
+        sample.motion = pass.render.motion_of(at).to_array();
     }
     sample
 }
@@ -51,14 +51,14 @@ pub(super) struct FirstSurface<'a> {
 
 /// The AOVs of the first surface, for integrators that do not follow specular paths for denoising features.
 pub(super) fn surface_sample<'f>(
-    world: &World,
+    pass: &PassContext,
     needs: SurfaceAovs,
     FirstSurface { ray, hit, at }: FirstSurface,
     footprint: impl FnOnce() -> Footprint<'f>,
 ) -> SurfaceSample {
-    let mut sample = place_sample(world, needs, at, hit);
+    let mut sample = place_sample(pass, needs, at, hit);
     if needs.albedo || needs.features {
-        sample.albedo = albedo_at(world, at, ray, footprint);
+        sample.albedo = albedo_at(pass.world, at, ray, footprint);
     }
     if needs.features {
         let albedo = sample.albedo;
@@ -83,18 +83,5 @@ impl World<'_> {
     /// Surface parameters at the point of a hit.
     fn uv(&self, at: &SurfaceInteraction, hit: Option<&Hit>) -> Vec2 {
         if self.detail(at.shape) == Detail::Place { self.scene.geometry.uv(at, hit) } else { at.uv }
-    }
-
-    /// How far a point of a surface moves in the picture while the shutter is open.
-    fn motion_of(&self, at: &SurfaceInteraction) -> Vec2 {
-        match self.picture {
-            Some(size) if self.scene.features.motion => self.scene.camera.film_motion(self.scene.geometry.ends_of_motion(at), size),
-            _ => Vec2::ZERO,
-        }
-    }
-
-    /// How far what lies infinitely far away in a direction moves in the picture while the shutter is open.
-    pub(super) fn motion_at_infinity(&self, direction: Vec3) -> Vec2 {
-        self.picture.map_or(Vec2::ZERO, |size| self.scene.camera.film_motion_at_infinity(direction.as_dvec3(), size))
     }
 }

@@ -52,27 +52,28 @@ impl Integrator for Whitted {
                 let hit = world.accel.intersect(&ray);
                 counts.camera += 1 + world.skip_emitters(&mut ray, hit).1;
             }
-            let segment = Segment::trace(world, ray, world.camera_cone(&ray), current, counts);
+            let segment = Segment::trace(world, ray, pass.render.camera_cone(&ray), current, counts);
             if wants_surface {
                 out.surfaces[i] = match &segment.end {
                     Some(at) => {
                         let first = FirstSurface { ray: &segment.ray, hit: segment.hit.as_ref(), at };
-                        surface_sample(world, self.needs, first, || segment.footprint(world, at))
+                        surface_sample(pass, self.needs, first, || segment.footprint(world, at))
                     }
-                    None if self.needs.motion => {
-                        SurfaceSample { motion: world.motion_at_infinity(segment.ray.direction).to_array(), ..SurfaceSample::default() }
-                    }
+                    None if self.needs.motion => SurfaceSample {
+                        motion: pass.render.motion_at_infinity(segment.ray.direction).to_array(),
+                        ..SurfaceSample::default()
+                    },
                     None => SurfaceSample::default(),
                 };
             }
             let mut tally = Tally { light_aovs: &mut out.light_aovs, index: i, rays: counts, sample, light_samples: 0 };
             let view = View { depth: 1, throughput: segment.transmittance, way: None };
             out.pixels[i] = match &segment.end {
-                Some(at) => PixelSample { radiance: self.shade(world, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
-                None if self.hide_emitters || !world.shows_background => PixelSample::default(),
+                Some(at) => PixelSample { radiance: self.shade(pass, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
+                None if self.hide_emitters || !pass.render.shows_background => PixelSample::default(),
                 None => PixelSample {
                     radiance: segment.escaped(world, View { throughput: Rgb::WHITE, ..view }, &mut tally),
-                    alpha: world.background_alpha(),
+                    alpha: pass.render.background_alpha(),
                 },
             };
         }
@@ -176,14 +177,14 @@ impl Segment {
 
 impl Whitted {
     /// Radiance leaving `at`, the end of the segment, against that.
-    fn shade(&self, world: &World, segment: &Segment, at: &SurfaceInteraction, view: View, tally: &mut Tally) -> Rgb {
-        let Segment { ray, cone, media, .. } = segment;
+    fn shade(&self, pass: &PassContext, segment: &Segment, at: &SurfaceInteraction, view: View, tally: &mut Tally) -> Rgb {
+        let (world, Segment { ray, cone, media, .. }) = (pass.world, segment);
         let mut radiance = world.emitted(at, -ray.direction);
         if tally.sorts() {
             let source = world.scene.surface(at.shape).light(at.prim);
             tally.add(world, view.throughput * radiance, view.course(0, LightEvent::Emission), source);
         }
-        if view.depth >= self.max_depth || world.gives_up() {
+        if view.depth >= self.max_depth || pass.render.gives_up() {
             return radiance;
         }
         let boundary = world.boundary_bsdf(at, ray.direction, media);
@@ -224,7 +225,7 @@ impl Whitted {
             let arriving = match &next.end {
                 Some(end) => {
                     let behind = View { throughput: behind.throughput * next.transmittance, ..behind };
-                    self.shade(world, &next, end, behind, tally) * next.transmittance
+                    self.shade(pass, &next, end, behind, tally) * next.transmittance
                 }
                 None => next.escaped(world, behind, tally),
             };

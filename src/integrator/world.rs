@@ -1,7 +1,5 @@
 //! A scene with its accelerator: rays in, surface interactions out.
 
-use super::cancel::Cancel;
-use super::cones::PixelFootprint;
 use crate::accel::Accelerator;
 use crate::color::Rgb;
 use crate::geometry::{Analytic, Detail, Hit, Mesh, Shape, SurfaceInteraction};
@@ -31,15 +29,8 @@ pub struct World<'a> {
     reach_squared: f32,
     /// By shape: what depends on its parametrisation.
     parametrization: Vec<Parametrization>,
-    /// Of pictures of scenes with [filtered textures](crate::scene::SceneFeatures::filtered_textures).
-    pub(super) pixel_footprint: Option<PixelFootprint>,
     /// Around all surfaces of media.
     pub(super) media_bounds: Aabb,
-    /// Width and height of the picture in pixels, if it is part of one.
-    pub(super) picture: Option<[u32; 2]>,
-    /// Whether the camera sees light from infinity.
-    pub(super) shows_background: bool,
-    cancel: Option<&'a Cancel<'a>>,
 }
 
 impl<'a> World<'a> {
@@ -52,40 +43,8 @@ impl<'a> World<'a> {
             bounds,
             reach_squared: bounds.size().max_element().powi(2),
             parametrization: parametrization(scene),
-            pixel_footprint: None,
             media_bounds: super::media::bounds(scene),
-            picture: None,
-            shows_background: true,
-            cancel: None,
         }
-    }
-
-    /// Where the camera does not see light from infinity: the picture is transparent there.
-    pub fn without_background(self) -> Self {
-        Self { shows_background: false, ..self }
-    }
-
-    /// The picture's alpha where the camera sees no surface.
-    #[inline]
-    pub(super) fn background_alpha(&self) -> f32 {
-        if self.shows_background && !self.scene.lights.at_infinity().is_empty() { 1.0 } else { 0.0 }
-    }
-
-    /// With what says that batches are to be given up.
-    pub fn with_cancel(self, cancel: &'a Cancel<'a>) -> Self {
-        Self { cancel: Some(cancel), ..self }
-    }
-
-    /// Whether the batch under way is to be given up.
-    #[inline]
-    pub(super) fn gives_up(&self) -> bool {
-        self.cancel.is_some_and(Cancel::is_due)
-    }
-
-    /// Whether a batch was given up.
-    #[inline]
-    pub fn has_given_up(&self) -> bool {
-        self.cancel.is_some_and(Cancel::given_up)
     }
 
     /// How much of interactions with a shape is computed.

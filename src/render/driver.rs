@@ -51,7 +51,7 @@ impl RenderSession<'_> {
         check_kept(self.settings, state.shard)?;
         let cancel = Cancel::new(self.stop, self.settings.time_limit);
         let mut renderer = TileRenderer::new(self.scene, self.accel, self.settings);
-        renderer.world = renderer.world.with_cancel(&cancel);
+        renderer.context = renderer.context.with_cancel(&cancel);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.settings.threads).build();
         let pool = pool.map_err(|e| Error::Threads { count: self.settings.threads, message: e.to_string() })?;
         let workspaces = (0..pool.current_num_threads()).map(|_| Mutex::default()).collect();

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::ExrOverrides;
 use crate::accel::AccelKind;
-use crate::desc::{FilterDesc, IntegratorDesc, LayerKind, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc, ViewDesc};
+use crate::desc::{
+    FilterDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc, StrategyDesc, ViewDesc,
+};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
 use crate::output::check_output;
@@ -15,9 +17,6 @@ use crate::sampling::SamplerKind;
 
 /// Extensions of the files written if neither the scene nor the command line names one.
 pub const DEFAULT_EXTENSIONS: [&str; 2] = ["exr", "png"];
-
-/// Largest width and height: beyond it, `f32` film coordinates would be coarser than 1/256 of a pixel.
-const MAX_SIDE: u32 = 1 << 16;
 
 /// The most samples of a pixel where a target error decides and nothing else is said.
 const MOST_SAMPLES: u32 = 1 << 16;

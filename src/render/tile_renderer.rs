@@ -8,7 +8,9 @@ use crate::accel::Accelerator;
 use crate::desc::IntegratorDesc;
 use crate::film::{FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, PlacedSample, Splats};
 use crate::guiding::Guide;
-use crate::integrator::{self, CameraBatch, CameraBlock, Integrator, PassContext, Setup, SurfaceAovs, Workspace, World, dimensions};
+use crate::integrator::{
+    self, CameraBatch, CameraBlock, Integrator, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World, dimensions,
+};
 use crate::math::Vec2;
 use crate::math::rows::{BATCH, Row, pair};
 use crate::sampling::{SampleIdRows, SampleRows, Sampler};
@@ -16,7 +18,8 @@ use crate::scene::Scene;
 
 /// What renders samples of tiles; it does not change during a render.
 pub(super) struct TileRenderer<'a> {
-    pub world: World<'a>,
+    world: World<'a>,
+    pub context: RenderContext<'a>,
     integrator: Box<dyn Integrator>,
     sampler: Sampler,
     filter: Filter,
@@ -84,12 +87,12 @@ impl<'a> TileRenderer<'a> {
             by_scattering: settings.layers.needs_light_aovs(),
             light_groups: if wanted(LayerKind::LightGroups) { shape.light_groups.len() as u32 } else { 0 },
         };
-        let world = World::new(scene, accel).of_picture(settings.size, settings.spp.min(FINEST_SPP));
-        let world = if settings.transparent { world.without_background() } else { world };
+        let (world, context) = (World::new(scene, accel), RenderContext::new(scene, settings.size, settings.spp.min(FINEST_SPP)));
         // Analytic shapes have their parameters only with the whole parametrisation.
         let in_full = settings.integrator == IntegratorDesc::Uv || (needs.uv && scene.features.analytic_shapes);
         Self {
             world: if in_full { world.in_full() } else { world },
+            context: if settings.transparent { context.without_background() } else { context },
             integrator: integrator::build(&settings.integrator, Setup { sampler, needs, light_aovs }),
             sampler,
             grid: FilmGrid::new(&shape, &filter, TILE_SIZE),
@@ -130,7 +133,7 @@ impl<'a> TileRenderer<'a> {
             self.camera_rays(count, film, numbers, block);
             camera_batch.extend(count);
         }
-        let pass = PassContext { world: &self.world, guide };
+        let pass = PassContext { world: &self.world, render: self.context, guide };
         self.integrator.render_batch(&pass, &workspace.samples, &mut workspace.integrator);
     }
 
@@ -183,7 +186,7 @@ impl<'a> TileRenderer<'a> {
         let count = samples.len() as u64 * active.area();
         for sample in samples {
             self.render_batch(origin, sample, guide, workspace);
-            if self.world.has_given_up() {
+            if self.context.has_given_up() {
                 break;
             }
             workspace.placed.clear();

@@ -6,7 +6,7 @@ use half::f16;
 
 use super::pyramid::Pyramid;
 use crate::color::{Rgb, linear_from_srgb};
-use crate::import::{ImageData, Samples};
+use crate::image_data::{ImageData, Samples};
 
 /// Why an image is refused.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -83,12 +83,7 @@ impl TextureImage {
     /// If a number is not finite, or there are more or fewer than the size says.
     pub fn new(data: ImageData) -> Result<Self, ImageError> {
         let ImageData { width, height, channels, ref samples } = data;
-        let count = match samples {
-            Samples::U8(s) => s.len(),
-            Samples::U16(s) => s.len(),
-            Samples::F16(s) => s.len(),
-            Samples::F32(s) => s.len(),
-        };
+        let count = samples.count();
         if count == 0 || count != width * height * channels || !(1..=4).contains(&channels) {
             return Err(ImageError::Count { width, height, channels, count });
         }
@@ -135,7 +130,7 @@ impl TextureImage {
 
     /// Whether the numbers are floats, which are linear.
     pub fn is_float(&self) -> bool {
-        matches!(self.data.samples, Samples::F16(_) | Samples::F32(_))
+        self.data.is_float()
     }
 
     /// Smallest and largest number of alpha or of all colour channels; 0 and 1 for whole numbers and where there is no alpha.
@@ -184,12 +179,7 @@ impl TextureImage {
 
     /// Bytes of the pixels.
     pub fn memory_bytes(&self) -> usize {
-        match &self.data.samples {
-            Samples::U8(s) => size_of_val(s.as_slice()),
-            Samples::U16(s) => size_of_val(s.as_slice()),
-            Samples::F16(s) => size_of_val(s.as_slice()),
-            Samples::F32(s) => size_of_val(s.as_slice()),
-        }
+        self.data.samples.memory_bytes()
     }
 
     /// The sum of `weights` times the colours of four pixels (column, row).

@@ -6,7 +6,7 @@
 use half::f16;
 
 use super::image::{Channel, Decoding, TextureImage};
-use crate::import::{ImageData, Samples};
+use crate::image_data::{ImageData, Samples};
 
 /// The smaller levels of an image, down to a single texel. Whole numbers are kept in 16 bits, floats as the image has them; all are linear.
 #[derive(Clone, Debug)]

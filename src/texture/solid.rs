@@ -118,7 +118,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::import::{ImageData, Samples};
+    use crate::image_data::{ImageData, Samples};
     use crate::math::Rng;
     use crate::texture::{Bitmap, Decoding, TextureFilter, TextureImage};
 

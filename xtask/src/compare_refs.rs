@@ -128,7 +128,7 @@ fn render_scene(name: &str, spp: u32, seed: u64) -> Result<(Image, bool)> {
     let path = if own.is_file() { own } else { known.iter().find(|path| path.exists()).unwrap_or(&known[0]) };
     let imported = import::read_scene(path, &ImportOptions::default())?;
     let settings = Settings::new(&imported.desc, &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() })?;
-    let scene = compile::compile_imported(&imported, path)?;
+    let scene = compile::compile_from(&imported.desc, imported.source(path))?;
     let accel = accel::build(AccelKind::EMBREE, &scene.geometry, settings.threads)?;
     let image = render::render(&scene, &*accel, &settings, &Silent, &AtomicBool::new(false))?.image;
     Ok((image, scene.features.environment))

@@ -16,7 +16,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use steradian::import::{ImageData, Samples};
+use steradian::image_data::{ImageData, Samples};
 use steradian::math::{Vec2, vec2};
 use steradian::sampling::{Sampler, SamplerKind};
 use steradian::texture::{Bitmap, Decoding, Footprint, TextureImage};

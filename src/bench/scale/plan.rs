@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::quantity::Quantity;
 use crate::accel::AccelKind;
-use crate::desc::LayerKind;
+use crate::desc::{LayerKind, MAX_SIDE};
 use crate::error::{Error, Result};
 
 /// What is asked of the benchmark.
@@ -109,9 +109,6 @@ pub const SWEEPS: [(&str, &str); 8] = [
 
 /// Triangles of the sphere that instances place.
 const INSTANCED: [usize; 2] = [2_000, 20_000];
-
-/// Width and height that the scene format allows.
-const LARGEST_SIDE: u32 = 1 << 16;
 
 /// Depth, where that is not what grows.
 const DEPTH: u32 = 8;
@@ -240,7 +237,7 @@ impl Planner<'_> {
         let (options, picture) = (self.options, self.picture());
         match self.name {
             "resolution" => {
-                let sizes = [1, 2, 4, 8, 16].map(|factor| options.size.map(|side| (side * factor).div_ceil(4).min(LARGEST_SIDE)));
+                let sizes = [1, 2, 4, 8, 16].map(|factor| options.size.map(|side| (side * factor).div_ceil(4).min(MAX_SIDE)));
                 self.sweep(
                     "The room, 1 spp".to_owned(),
                     &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],

@@ -101,7 +101,7 @@ pub fn run_case(case: &Case) -> Result<Measured> {
     let mut settings = Settings::new(&imported.desc, &overrides)?;
     settings.layers = case.layers.iter().collect();
     settings.accel = case.accel.parse().map_err(|e: accel::UnknownAccel| Error::Usage(e.to_string()))?;
-    let scene = compile::compile_imported(&imported, "generated".as_ref())?;
+    let scene = compile::compile_from(&imported.desc, imported.source("generated".as_ref()))?;
     drop(imported);
     let load_seconds = clock.elapsed().as_secs_f64();
     let loaded = memory();

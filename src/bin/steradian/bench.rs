@@ -50,7 +50,7 @@ fn accel(arguments: &BenchAccelArgs) -> Result<u8> {
         watch.step(&format!("{}: loading", path.display()));
         let imported = scene::load(path, &arguments.import, Verbosity { quiet: arguments.quiet, verbose: 0 })?;
         let settings = Settings::new(&imported.desc, &Overrides { default_outputs: vec!["unused.exr".into()], ..Overrides::default() })?;
-        let scene = compile::compile_imported(&imported, path)?;
+        let scene = compile::compile_from(&imported.desc, imported.source(path))?;
         watch.step(&format!("{}: recording rays", path.display()));
         let recorder = accel::build(AccelKind::EMBREE, &scene.geometry, 0)?;
         let rays = record(&scene, &*recorder, &settings, arguments.rays as usize)?;
@@ -169,8 +169,8 @@ fn options(arguments: &BenchAccelArgs) -> Options {
 fn replay(arguments: &BenchAccelArgs, ray: &str) -> Result<()> {
     let ray = parse_ray(ray).map_err(|message| Error::Usage(format!("--ray: {message}")))?;
     for path in &arguments.scenes {
-        let scene =
-            compile::compile_imported(&scene::load(path, &arguments.import, Verbosity { quiet: arguments.quiet, verbose: 0 })?, path)?;
+        let imported = scene::load(path, &arguments.import, Verbosity { quiet: arguments.quiet, verbose: 0 })?;
+        let scene = compile::compile_from(&imported.desc, imported.source(path))?;
         for kind in options(arguments).accels {
             let accel = accel::build(kind, &scene.geometry, 0)?;
             let any = if accel.occluded(&ray) { "occluded" } else { "free" };

@@ -33,7 +33,7 @@ pub fn run(arguments: &BenchErrorArgs) -> Result<u8> {
     watch.step(&format!("{}: loading", arguments.scene.display()));
     let imported = scene::load(&arguments.scene, &arguments.import, Verbosity { quiet: arguments.quiet, verbose: 0 })?;
     let options = options(arguments, &imported.desc, reference)?;
-    let scene = compile::compile_imported(&imported, &arguments.scene)?;
+    let scene = compile::compile_from(&imported.desc, imported.source(&arguments.scene))?;
     drop(imported);
     let report = bench_error(&scene, &options, &watch, &interrupt.stop, |report| match &arguments.out {
         Some(folder) => report.write_figures_to(folder),

@@ -29,7 +29,7 @@ pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Ins
         session.reporter.complete_frame();
         return Ok(0);
     };
-    let mut scene = compile::compile_imported(&shot.imported, &shot.scene)?;
+    let mut scene = compile::compile_from(&shot.imported.desc, shot.imported.source(&shot.scene))?;
     if !plan.settings.depth_of_field {
         scene.camera.remove_lens();
     }
@@ -92,7 +92,7 @@ impl<'a> Plan<'a> {
     /// Checks all that can be checked before the scene is made; `None` if the frame is there already.
     fn new(arguments: &'a RenderArgs, shot: &Shot, session: &Session) -> Result<Option<Self>> {
         let json = arguments.json.as_deref().map(|path| shot.file(path));
-        compile::check_imported_settings(&shot.imported, &shot.scene)?;
+        compile::check_settings_from(&shot.imported.desc, shot.imported.source(&shot.scene))?;
         let mut overrides = arguments.overrides(default_outputs(&arguments.scene));
         let shard_name = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?;
         let shard_file = shard_name.as_deref().map(|name| shot.file_of(name));

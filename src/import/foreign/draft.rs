@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::{ImportReport, Imported, Outcome, ReportEntry};
+use crate::assets::{Assets, MeshData, RgbImage};
 use crate::desc::{
     CameraDesc, InstanceDesc, KeyframeDesc, LightDesc, MaterialDesc, ObjectDesc, SceneDesc, ShapeDesc, TextureDesc, TransformDesc,
     TransformStepDesc,
 };
-use crate::import::{Assets, ImageData, MeshData, RgbImage};
+use crate::image_data::ImageData;
 use crate::math::{DAffine3, DMat3, DVec3, Transform};
 
 /// What becomes of samplers of independent numbers: another set of points changes no mean, so they count as mapped.

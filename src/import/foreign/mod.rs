@@ -9,7 +9,6 @@ mod recolor;
 mod report;
 
 pub use draft::Draft;
-pub(super) use recolor::linear;
 pub use report::{ImportReport, Outcome, ReportEntry};
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,7 +17,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Assets, load_scene};
+use super::load_scene;
+use crate::assets::{Assets, SceneSource};
 use crate::desc::SceneDesc;
 use crate::error::Result;
 
@@ -45,6 +45,13 @@ pub struct Imported {
     pub files: Arc<BTreeSet<PathBuf>>,
     /// Where the file says what became `shapes[0]`, `materials.floor` and so on; empty for our own format.
     pub places: Arc<BTreeMap<String, String>>,
+}
+
+impl Imported {
+    /// Where the scene comes from, which was read from `file`.
+    pub fn source(&self, file: &Path) -> SceneSource {
+        SceneSource { file: file.into(), assets: Arc::clone(&self.assets), places: Arc::clone(&self.places) }
+    }
 }
 
 /// Reads a scene file of any kind that its extension names: `.json` (ours, and any other name), `.xml` (Mitsuba 3), `.pbrt` (pbrt-v4),

@@ -5,8 +5,10 @@ use std::path::Path;
 use half::f16;
 
 use super::Draft;
+use crate::assets::read_image;
+use crate::color::linear_from_srgb;
 use crate::desc::{ChannelDesc, ColorSpaceDesc, TextureDesc};
-use crate::import::{ImageData, Samples, read_image};
+use crate::image_data::{ImageData, Samples};
 
 /// A texture like the one of this name, whose colours times `factor` are changed; its name. `None` if it is of a kind
 /// that cannot be changed, or has no readable image, which is found out when the scene is compiled.
@@ -40,7 +42,7 @@ pub fn recolored(draft: &mut Draft, folder: &Path, name: &str, factor: [f32; 3],
 
 /// An image as floats with its colours changed; alpha is left out.
 fn recolored_image(image: &ImageData, is_srgb: bool, change: &dyn Fn([f32; 3]) -> [f32; 3]) -> ImageData {
-    let decode = |x: f32| if is_srgb { linear(x) } else { x };
+    let decode = |x: f32| if is_srgb { linear_from_srgb(x) } else { x };
     let value = |i: usize| match &image.samples {
         Samples::U8(v) => v.get(i).map_or(0.0, |&x| decode(f32::from(x) / 255.0)),
         Samples::U16(v) => v.get(i).map_or(0.0, |&x| decode(f32::from(x) / 65535.0)),
@@ -51,11 +53,6 @@ fn recolored_image(image: &ImageData, is_srgb: bool, change: &dyn Fn([f32; 3]) -
     let pixel = |i: usize| change(std::array::from_fn(|k| value(i * image.channels + if is_grey { 0 } else { k })));
     let samples = (0..image.width * image.height).flat_map(|i| pixel(i).map(f16::from_f32)).collect();
     ImageData { width: image.width, height: image.height, channels: 3, samples: Samples::F16(samples) }
-}
-
-/// A value of the sRGB curve as a linear one.
-pub fn linear(x: f32) -> f32 {
-    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]

@@ -26,7 +26,6 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
     if misses.is_empty() {
         return;
     }
-    let world = context.world;
     let MissScratch { directions, evals, environment } = miss;
     let image = context.scene.lights.single_environment_map();
     for (k, &path) in misses.iter().enumerate() {
@@ -37,7 +36,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         let compensation = (context.bounce > 0).then_some(context.compensation);
         environment.eval(image, directions, misses.len(), compensation, evals);
     }
-    let is_visible = context.bounce > 0 || (!context.config.hide_emitters && world.shows_background);
+    let is_visible = context.bounce > 0 || (!context.config.hide_emitters && context.pass.render.shows_background);
     for (k, &path) in misses.iter().enumerate() {
         let i = usize::from(path);
         let direction = directions.get(k);
@@ -46,7 +45,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         let slot = paths.slot[i];
         if is_visible {
             if context.bounce == 0 {
-                out.batch.pixels[slot as usize].alpha = world.background_alpha();
+                out.batch.pixels[slot as usize].alpha = context.pass.render.background_alpha();
             }
             let light = context.config.clamped(paths.throughput.get(i) * miss.radiance(context), context.bounce);
             out.add(slot, light);

@@ -60,6 +60,7 @@ pub struct PathIntegrator {
 #[derive(Clone, Copy)]
 struct Context<'a> {
     config: &'a PathIntegrator,
+    pass: &'a PassContext<'a>,
     world: &'a World<'a>,
     scene: &'a Scene,
     /// Scatterings between the camera and the rays that are traced.
@@ -111,13 +112,13 @@ impl PathIntegrator {
 
     /// The main loop.
     fn render_wave(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
-        let PassContext { world, guide } = *pass;
+        let PassContext { world, render, guide } = *pass;
         let Workspace { out, counts, paths: PathBuffers(wave) } = workspace;
         let (compensation, out) = (self.strategy.compensation(), &mut Output { batch: out });
-        let mut context = Context { config: self, world, scene: world.scene, bounce: 0, is_last: false, compensation };
+        let mut context = Context { config: self, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
         wave.start(&context, samples);
         for bounce in 0..self.max_depth {
-            if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && world.gives_up()) {
+            if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && render.gives_up()) {
                 break;
             }
             (context.bounce, context.is_last) = (bounce, bounce + 1 >= self.max_depth);

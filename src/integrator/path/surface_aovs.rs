@@ -37,7 +37,7 @@ fn write_surfaces(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         let at = vertices.interaction(lane);
         let surface = &mut out.batch.surfaces[paths[block].slot[i] as usize];
         if context.bounce == 0 {
-            *surface = place_sample(context.world, needs, &at, hits[block].get(i).as_ref());
+            *surface = place_sample(context.pass, needs, &at, hits[block].get(i).as_ref());
         }
         if features.is_some() || needs.albedo {
             let albedo = albedo(context, vertices, lane, &at);
@@ -69,7 +69,7 @@ pub(super) fn write_miss(
     surface: &mut SurfaceSample,
 ) {
     if context.bounce == 0 && context.config.needs.motion {
-        surface.motion = context.world.motion_at_infinity(direction).to_array();
+        surface.motion = context.pass.render.motion_at_infinity(direction).to_array();
     }
     if let Some(throughput) = features {
         set_features(surface, throughput, radiance().map(|value| value.min(1.0)), Vec3::ZERO);

@@ -152,7 +152,7 @@ impl Wave {
             self.media.extend(samples.iter().map(|sample| state(&sample.ray)));
         }
         self.cones.clear();
-        self.cones.extend(samples.iter().map_while(|sample| context.world.camera_cone(&sample.ray)));
+        self.cones.extend(samples.iter().map_while(|sample| context.pass.render.camera_cone(&sample.ray)));
         self.light_aovs.start(context.config, samples.len());
         self.guided.clear();
         self.shadows.count = 0;
@@ -265,7 +265,7 @@ impl Wave {
             if let Some(&cone) = cones.get(path) {
                 let is_specular = scatter.path_flags[lane] & path_flags::SPECULAR != 0;
                 let pdf = if is_specular { f32::INFINITY } else { scatter.pdf[lane] };
-                cones[to] = context.world.scattered_cone(cone, vertices.rows.t[lane], pdf);
+                cones[to] = context.pass.render.scattered_cone(cone, vertices.rows.t[lane], pdf);
             }
             if context.wants_aovs() {
                 let lobes = || vertices.sampled_lobes(context.scene, lane);

@@ -1,6 +1,6 @@
 use super::*;
 use crate::color::{linear_from_srgb, srgb_from_linear};
-use crate::import::{ImageData, Samples};
+use crate::image_data::{ImageData, Samples};
 use crate::texture::ImageError;
 use half::f16;
 

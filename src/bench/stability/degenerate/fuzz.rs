@@ -6,8 +6,8 @@ use std::time::Instant;
 use super::{Effort, Outcome};
 use crate::bench::stability::geometry::Rng;
 use crate::compile;
-use crate::import;
 use crate::render::{Overrides, Settings};
+use crate::{assets, import};
 
 /// What is mutated: scenes of the gallery, which between them use most of what there is.
 const SCENES: [&str; 6] = [
@@ -147,15 +147,15 @@ fn read_scene(bytes: &[u8], path: &Path) -> Result<(), String> {
 pub(super) fn e10_mutated_files(effort: Effort) -> Outcome {
     let Ok(folder) = tempfile::tempdir() else { return Outcome::new() };
     let file = folder.path().join("mutated");
-    let through_file = |bytes: &[u8], read: &dyn Fn(&Path) -> Result<(), import::AssetError>| {
+    let through_file = |bytes: &[u8], read: &dyn Fn(&Path) -> Result<(), assets::AssetError>| {
         std::fs::write(&file, bytes).map_err(|e| e.to_string())?;
         read(&file).map_err(|e| e.to_string())
     };
     let mut rng = Rng::new(101);
     let scene = |bytes: &[u8]| read_scene(bytes, &folder.path().join("scene.json"));
-    let obj = |bytes: &[u8]| through_file(bytes, &|path| import::read_obj(path, false).map(drop));
-    let ply = |bytes: &[u8]| through_file(bytes, &|path| import::read_ply(path).map(drop));
-    let ies = |bytes: &[u8]| through_file(bytes, &|path| import::read_ies(path).map(drop));
+    let obj = |bytes: &[u8]| through_file(bytes, &|path| assets::read_obj(path, false).map(drop));
+    let ply = |bytes: &[u8]| through_file(bytes, &|path| assets::read_ply(path).map(drop));
+    let ies = |bytes: &[u8]| through_file(bytes, &|path| assets::read_ies(path).map(drop));
     let parts: [(&str, usize, &[&str], &Reader<'_>); 4] = [
         ("scenes", effort.pick(300, 8_000), &SCENES, &scene),
         ("OBJ files", effort.pick(200, 8_000), &[OBJ], &obj),

@@ -5,7 +5,7 @@ use super::{Effort, Outcome, Tests, prepare};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::Plot;
 use crate::film::{Crop, Film, FilmShape, LayerSet, LightAovRequest};
-use crate::integrator::{self, CameraBatch, CameraSample, PassContext, Setup, SurfaceAovs, Workspace, World, dimensions};
+use crate::integrator::{self, CameraBatch, CameraSample, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World, dimensions};
 use crate::math::Vec2;
 use crate::render::{Overrides, Settings};
 use crate::sampling::Sampler;
@@ -84,7 +84,8 @@ fn run(settings: &Settings, world: &World, to: u32) -> Option<Vec<Checkpoint>> {
     let integrator = integrator::build(&settings.integrator, setup);
     let mut film = Film::new(FilmShape::new([WIDTH; 2], Crop::full([WIDTH; 2]), LayerSet::COLOR), WIDTH).ok()?;
     let (mut sums, mut squares) = (vec![Sum::default(); COUNT], 0.0);
-    let (pass, mut workspace) = (PassContext { world, guide: None }, Workspace::default());
+    let (pass, mut workspace) =
+        (PassContext { world, render: RenderContext::new(world.scene, [WIDTH; 2], to), guide: None }, Workspace::default());
     let (mut checkpoints, mut next) = (Vec::new(), 1);
     for first in (0..to).step_by(AT_ONCE as usize) {
         let samples = batch(world, &sampler, first);

@@ -1,8 +1,9 @@
 //! A camera and a light for files that have none.
 
 use super::meshes::Placed;
+use crate::assets::RgbImage;
 use crate::desc::{CameraDesc, DirectionalLightDesc, EnvironmentLightDesc, LightDesc};
-use crate::import::{Draft, RgbImage};
+use crate::import::Draft;
 use crate::math::DVec3;
 
 /// Full vertical angle of view in degrees.

@@ -8,8 +8,8 @@ use gltf::json::{Index, accessor};
 use super::Source;
 use super::accessors::{Column, Wanted};
 use super::skins;
+use crate::assets::MeshData;
 use crate::error::Result;
-use crate::import::MeshData;
 use crate::math::{DAffine3, DVec3};
 
 /// What moves the vertices of a mesh.

@@ -9,9 +9,11 @@ use serde_json::{Map, Value};
 use super::Source;
 use super::buffers::Uri;
 use super::extensions::{TextureInfo, TextureTransform};
+use crate::assets::read_image_bytes;
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
-use crate::import::{Draft, ImageData, read_image_bytes};
+use crate::image_data::ImageData;
+use crate::import::Draft;
 
 /// A texture as a material names it.
 #[derive(Clone, Debug)]

@@ -8,13 +8,14 @@ use super::sensor::fov;
 use super::textures::{Role, TextureValue, UvOrigin};
 use super::tree::{PluginId, Value};
 use super::values;
+use crate::assets::{RgbImage, read_image};
+use crate::color::linear_from_srgb;
 use crate::desc::{
     DirectionalLightDesc, EmissionDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, ProjectorLightDesc, SpotLightDesc, TextureDesc,
     TransformDesc, TransformStepDesc,
 };
 use crate::error::Result;
-use crate::import::foreign::recolor::linear;
-use crate::import::{ImageData, RgbImage, Samples, read_image};
+use crate::image_data::{ImageData, Samples};
 use crate::math::{DAffine3, DMat3, DVec3};
 
 impl<'a> Reader<'a> {
@@ -236,8 +237,8 @@ fn rotation(element: &mut Element, map: &DAffine3) -> Option<TransformDesc> {
 /// The linear colours of an image.
 fn as_environment(image: &ImageData) -> RgbImage {
     let at = |i: usize| match &image.samples {
-        Samples::U8(v) => linear(f32::from(v[i]) / 255.0),
-        Samples::U16(v) => linear(f32::from(v[i]) / 65535.0),
+        Samples::U8(v) => linear_from_srgb(f32::from(v[i]) / 255.0),
+        Samples::U16(v) => linear_from_srgb(f32::from(v[i]) / 65535.0),
         Samples::F16(v) => v[i].to_f32(),
         Samples::F32(v) => v[i],
     };

@@ -3,8 +3,8 @@
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
+use crate::assets::{MeshData, read_obj, read_ply};
 use crate::desc::{MeshDesc, MeshShadingDesc};
-use crate::import::{MeshData, read_obj, read_ply};
 
 /// Mitsuba's cube `[-1, 1]³`, with its uv.
 pub fn cube() -> MeshDesc {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use flate2::read::ZlibDecoder;
 
-use crate::import::{AssetError, MeshData};
+use crate::assets::{AssetError, MeshData};
 
 const MAGIC: u16 = 0x041c;
 

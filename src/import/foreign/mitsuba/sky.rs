@@ -9,9 +9,9 @@ use std::f64::consts::{PI, TAU};
 use super::Reader;
 use super::element::Element;
 use super::values;
+use crate::assets::RgbImage;
 use crate::desc::{DirectionalLightDesc, EnvironmentLightDesc, LightDesc, TransformDesc, TransformStepDesc};
 use crate::error::Result;
-use crate::import::RgbImage;
 use crate::math::{DAffine3, DMat3, DVec3, dvec3};
 
 const WIDTH: usize = 512;

@@ -9,7 +9,7 @@ use super::tree::{PluginId, Property, Value};
 use crate::attribute::is_of_faces;
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, RangedDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc};
 use crate::error::Result;
-use crate::import::{ImageData, Samples};
+use crate::image_data::{ImageData, Samples};
 use crate::math::{DAffine3, DMat3, DVec3, dvec3};
 
 /// How the uv of our shape differs from that of Mitsuba's, whose images have their origin at the top left.

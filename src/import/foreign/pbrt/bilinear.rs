@@ -1,6 +1,6 @@
 //! Bilinear patches: two triangles where they are flat, a grid of them where they are not.
 
-use crate::import::MeshData;
+use crate::assets::MeshData;
 use crate::math::Vec3;
 
 /// Quads along a side of a curved patch, where there are few.

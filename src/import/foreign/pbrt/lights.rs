@@ -4,10 +4,10 @@ use super::colors::{Colors, Meaning};
 use super::octahedral;
 use super::params::Params;
 use super::state::{Ctm, World, matrix, rotation_and_scale};
+use crate::assets::{RgbImage, read_rgb_image};
 use crate::desc::{DirectionalLightDesc, EnvironmentLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
-use crate::import::{RgbImage, read_rgb_image};
 use crate::math::{DMat3, DVec3};
 
 /// Reads a `LightSource`. pbrt divides each light by what its spectrum measures in nits, and the film takes a nit as 1.

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-use crate::import::MeshData;
+use crate::assets::MeshData;
 use crate::math::DVec3;
 
 /// More triangles than this are not made.

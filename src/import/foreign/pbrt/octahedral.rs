@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
-use crate::import::RgbImage;
+use crate::assets::RgbImage;
 use crate::math::DVec3;
 
 /// Rows of the lat-long image at most.

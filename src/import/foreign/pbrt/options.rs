@@ -1,7 +1,7 @@
 //! What comes before the world: film, filter, sampler, integrator.
 
 use super::params::Params;
-use crate::desc::{FilterDesc, IntegratorDesc, OutputDesc, PixelTypeDesc};
+use crate::desc::{FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc};
 use crate::error::Result;
 use crate::import::foreign::draft::SOBOL_FOR_INDEPENDENT;
 use crate::import::foreign::{Draft, Outcome};
@@ -15,15 +15,12 @@ pub struct Typed {
     pub params: Params,
 }
 
-/// More pixels along a side than any film has.
-const MAX_SIDE: i64 = 1 << 16;
-
 /// Sets the film's size and output.
 pub fn set_film(draft: &mut Draft, film: Option<&Typed>) -> Result<()> {
     let (mut width, mut height) = (1280, 720);
     if let Some(Typed { kind, params }) = film {
         let side = |name: &str, default: i64| match params.integer_or(name, default)? {
-            side if (1..=MAX_SIDE).contains(&side) => Ok(side as u32),
+            side if (1..=i64::from(MAX_SIDE)).contains(&side) => Ok(side as u32),
             side => Err(params.error(format!("{name} must be from 1 to {MAX_SIDE}, not {side}"))),
         };
         (width, height) = (side("xresolution", 1280)?, side("yresolution", 720)?);

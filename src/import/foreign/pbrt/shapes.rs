@@ -11,10 +11,10 @@ use super::params::Params;
 use super::state::{Graphics, Look, World};
 use super::textures::Textures;
 use super::triangles;
+use crate::assets::{MeshData, read_ply_attributes};
 use crate::desc::{CylinderDesc, DiskDesc, MaterialDesc, MeshDesc, MeshShadingDesc, NormalWeightDesc, ShapeDesc, SmoothByDesc, SphereDesc};
 use crate::error::Result;
 use crate::import::foreign::Draft;
-use crate::import::{MeshData, read_ply_attributes};
 use crate::math::{DAffine3, DVec3};
 
 /// Meshes of more triangles are kept apart from the scene's text.

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use super::colors::{Colors, Meaning};
 use super::params::Params;
+use crate::assets::read_image;
 use crate::desc::{
     ChannelDesc, ColorDesc, ColorSpaceDesc, OpacityDesc, ScalarDesc, TextureDesc, TextureFilterDesc, WrapDesc, WrapModeDesc,
 };
 use crate::error::Result;
+use crate::image_data::{ImageData, Samples};
 use crate::import::foreign::Draft;
-use crate::import::{ImageData, Samples, read_image};
 
 /// A texture, or a colour or number in its place.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Meshes of triangles as pbrt understands them.
 
-use crate::import::MeshData;
+use crate::assets::MeshData;
 use crate::math::{DAffine3, Vec3};
 
 /// Turns triangles so that their fronts are where their normals point, as pbrt has it. Whether any had to be turned.

@@ -10,9 +10,10 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
+use crate::assets::MeshData;
 use crate::desc::{InstanceDesc, MaterialDesc, PrincipledDesc, ShapeDesc, TransformDesc, TransformStepDesc};
 use crate::error::Result;
-use crate::import::{ImportOptions, Imported, MeshData, Outcome, read_scene};
+use crate::import::{ImportOptions, Imported, Outcome, read_scene};
 use crate::math::{DAffine3, DMat3, DVec3};
 
 /// A file in the making, with one buffer.

@@ -160,7 +160,7 @@ fn colours_are_linear_as_floats_and_encoded_as_whole_numbers() {
     };
     assert_eq!(colors("float", ["red", "green", "blue"], "0.25 2 -1"), Some(vec![[0.25, 2.0, -1.0]; 3]));
     assert_eq!(colors("double", ["r", "g", "b"], "0.25 0.5 1"), Some(vec![[0.25, 0.5, 1.0]; 3]));
-    assert_eq!(colors("uchar", ["b", "g", "r"], "255 51 0"), Some(vec![[0.0, linear(0.2), 1.0]; 3]));
-    assert_eq!(colors("ushort", ["red", "green", "blue"], "0 13107 65535"), Some(vec![[0.0, linear(0.2), 1.0]; 3]));
+    assert_eq!(colors("uchar", ["b", "g", "r"], "255 51 0"), Some(vec![[0.0, linear_from_srgb(0.2), 1.0]; 3]));
+    assert_eq!(colors("ushort", ["red", "green", "blue"], "0 13107 65535"), Some(vec![[0.0, linear_from_srgb(0.2), 1.0]; 3]));
     assert_eq!(colors("uchar", ["red", "green", "alpha"], "255 51 0"), None);
 }

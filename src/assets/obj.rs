@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use std::fmt::Display;
 use std::path::Path;
 
-use super::foreign::linear;
 use super::mtl_maps::{ObjMaps, take_maps};
 use super::obj_check::{check_obj, expand_colors};
 use super::{AssetError, MeshData};
+use crate::color::linear_from_srgb;
 use crate::file;
 
 /// What an MTL says of a material that is used here.
@@ -183,7 +183,7 @@ fn from_tobj(mesh: &tobj::Mesh) -> MeshData {
     let positions = triples(&mesh.positions);
     let normals = triples(&mesh.normals);
     let uvs = mesh.texcoords.as_chunks::<2>().0.to_vec();
-    let colors: Vec<[f32; 3]> = mesh.vertex_color.as_chunks::<3>().0.iter().map(|color| color.map(linear)).collect();
+    let colors: Vec<[f32; 3]> = mesh.vertex_color.as_chunks::<3>().0.iter().map(|color| color.map(linear_from_srgb)).collect();
     let colors = (colors.len() == positions.len()).then_some(colors);
     MeshData {
         normals: (normals.len() == positions.len()).then_some(normals),
@@ -247,7 +247,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let colored = "v 0 0 0 1 0 0.2\nv 1 0 0 0 1 0.2\nv 1 1 0 0 0 1\n";
         let mesh = |text: &str| read_obj(&write(&folder, "q.obj", text), true).unwrap().remove(0).mesh;
-        let blue = linear(0.2);
+        let blue = linear_from_srgb(0.2);
         let mixed = mesh(&format!("{colored}f 3 1 2\n"));
         assert_eq!(mixed.colors(), Some(&[[0.0, 0.0, 1.0], [1.0, 0.0, blue], [0.0, 1.0, blue]][..]));
         for some in [format!("{colored}v 0 1 0\n"), format!("v 0 1 0\n{colored}")] {

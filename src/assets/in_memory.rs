@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{ImageData, MeshData, RgbImage};
+use super::{MeshData, RgbImage};
+use crate::image_data::ImageData;
 
 /// What a scene names as if it were a file: looked up here before the folder of the scene is.
 #[derive(Clone, Debug, Default)]

@@ -12,39 +12,7 @@ use super::AssetError;
 use super::jpeg_check::is_whole_jpeg;
 use crate::file::exr_blocks::{Place, Row, read_rows};
 use crate::file::exr_headers::check_claims;
-
-/// An image as a file has it, row by row from the top.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImageData {
-    /// Width in pixels, at least 1.
-    pub width: usize,
-    /// Height in pixels, at least 1.
-    pub height: usize,
-    /// Numbers per pixel: 1 is grey, 2 grey and alpha, 3 red, green and blue, 4 those and alpha.
-    pub channels: usize,
-    /// `width * height * channels` numbers.
-    pub samples: Samples,
-}
-
-/// The numbers of an image.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Samples {
-    /// From 0 to 255.
-    U8(Vec<u8>),
-    /// From 0 to 65,535.
-    U16(Vec<u16>),
-    /// Floats that 16 bits hold without loss.
-    F16(Vec<f16>),
-    /// Floats.
-    F32(Vec<f32>),
-}
-
-impl ImageData {
-    /// Whether its numbers are floats.
-    pub fn is_float(&self) -> bool {
-        matches!(self.samples, Samples::F16(_) | Samples::F32(_))
-    }
-}
+use crate::image_data::{ImageData, Samples};
 
 /// More pixels than any texture has; a header that claims more is damaged, or means harm.
 pub(super) const MAX_PIXELS: u64 = 1 << 28;

@@ -12,10 +12,10 @@ use ply_rs_bw::ply::{
     DefaultElement, ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
-use super::foreign::linear;
 use super::ply_attributes::{self, Column};
 use super::{AssetError, MeshData};
 use crate::attribute::{AttributeValues, VERTEX_COLOR};
+use crate::color::linear_from_srgb;
 
 /// Reads a PLY file with all of its attributes. One with no faces, such as a cloud of points, is a mesh without triangles.
 ///
@@ -209,7 +209,7 @@ fn channel(name: &str, property: &Property) -> Option<(usize, f32)> {
         _ => return None,
     };
     let value = number(property)? as f32;
-    Some((channel, largest(property).map_or(value, |largest| linear(value / largest))))
+    Some((channel, largest(property).map_or(value, |largest| linear_from_srgb(value / largest))))
 }
 
 #[derive(Default)]
