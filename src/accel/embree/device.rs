@@ -27,6 +27,13 @@ impl EmbreeInfo {
     pub fn query() -> Result<Self> {
         Ok(Device::new(1)?.info())
     }
+
+    /// A bound for the relative error of the reciprocals that distances of triangles are found with, so that hits that near
+    /// the end of a ray's interval may be missed or found beyond it; 0 if those of powers of two are exact. Without AVX-512 an
+    /// estimate of 11 bits is refined once, which leaves the last bit.
+    pub fn reciprocal_error(&self) -> f32 {
+        if self.isa == "AVX-512" { 0.0 } else { 2.0 * f32::EPSILON }
+    }
 }
 
 /// What the callbacks of a device write to.

@@ -4,7 +4,7 @@ use super::geometry::{
     Rng, cube, grid, instances, meshes, placed_analytic_shapes, ray, ray_through, reach, soup, sphere_mesh, transform, world,
 };
 use crate::accel::inspect::Inspect;
-use crate::accel::{self, AccelKind, Accelerator, Coherence};
+use crate::accel::{self, AccelKind, Accelerator, Coherence, EmbreeInfo};
 use crate::bench::bumpy_sphere;
 use crate::geometry::{Geometry, Hit, Instance, Mesh, MeshStep, Object, Shape};
 use crate::id::{ObjectId, ShapeId};
@@ -30,6 +30,15 @@ pub fn all(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)
     accels.push(("embree", build(AccelKind::EMBREE, geometry)));
     accels.push(("packets", packets(geometry)));
     accels
+}
+
+/// Why bounds on Embree's distances are weaker on some processors.
+pub const INEXACT_RECIPROCALS: &str =
+    "on a processor without AVX-512, Embree divides by refined estimates of reciprocals: distances to triangles may be 2^-22 off";
+
+/// The relative error of an accelerator's distances to triangles, from [`all`].
+pub fn distance_error(name: &str) -> f32 {
+    if name == "embree" { EmbreeInfo::query().map_or(0.0, |info| info.reciprocal_error()) } else { 0.0 }
 }
 
 /// An accelerator whose answers to single rays are those to batches of one.
