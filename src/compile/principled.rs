@@ -1,57 +1,58 @@
 //! The principled material: its parameters checked.
 
 use super::materials::Compiler;
-use crate::bsdf::{PrincipledModel, PrincipledParameters};
-use crate::desc::{PrincipledDesc, PrincipledModelDesc, ScalarDesc};
+use crate::bsdf::PrincipledModel;
+use crate::desc::{PrincipledDesc, PrincipledModelDesc, principled_parameters};
 use crate::error::Result;
 use crate::material::{PrincipledInputs, RangedInput, ScalarInput};
 
 impl Compiler<'_> {
     pub(super) fn principled(&self, path: &str, desc: &PrincipledDesc) -> Result<PrincipledInputs> {
-        let scalar = |key: &str, desc: &ScalarDesc| self.scalar(&format!("{path}.{key}"), desc);
-        let (specular, ior) = match (&desc.specular, &desc.ior) {
-            (Some(_), Some(_)) => return Err(self.files.error(path, "give either `specular` or `ior`")),
-            (Some(specular), None) => (Some(scalar("specular", specular)?), RangedInput::Constant(1.5)),
-            (None, Some(ior)) => (None, self.ior(path, ior, 1.0)?),
-            (None, None) => (None, RangedInput::Constant(1.5)),
-        };
-        let diffuse_transmission = scalar("diffuse_transmission", &desc.diffuse_transmission)?;
-        if !desc.thin && diffuse_transmission != ScalarInput::Constant(0.0) {
+        if desc.specular.is_some() && desc.ior.is_some() {
+            return Err(self.files.error(path, "give either `specular` or `ior`"));
+        }
+        macro_rules! input {
+            (color $desc:expr, $path:expr, $default:tt) => {
+                self.color($path, &$desc)?
+            };
+            (scalar $desc:expr, $path:expr, $default:tt) => {
+                self.scalar($path, &$desc)?
+            };
+            (specular $desc:expr, $path:expr, $default:tt) => {
+                $desc.as_ref().map(|desc| self.scalar($path, desc)).transpose()?
+            };
+            (ior $desc:expr, $path:expr, $default:tt) => {
+                $desc.as_ref().map_or(Ok(RangedInput::Constant($default)), |desc| self.ior(path, desc, 1.0))?
+            };
+            (flag $desc:expr, $path:expr, $default:tt) => {
+                $desc
+            };
+            (model $desc:expr, $path:expr, $default:tt) => {
+                match $desc {
+                    PrincipledModelDesc::Burley => PrincipledModel::Burley,
+                    PrincipledModelDesc::Mitsuba => PrincipledModel::Mitsuba,
+                }
+            };
+        }
+        macro_rules! inputs {
+            ($($(#[doc = $doc:literal])* $(#[serde $serde:tt])? $name:ident: $kind:ident = $default:tt,)*) => {
+                PrincipledInputs { $($name: input!($kind desc.$name, &format!("{path}.{}", stringify!($name)), $default),)* }
+            };
+        }
+        let inputs = principled_parameters!(inputs);
+        if !desc.thin && inputs.diffuse_transmission != ScalarInput::Constant(0.0) {
             return Err(self.files.error(&format!("{path}.diffuse_transmission"), "needs `thin`: a solid has no other side here"));
         }
-        let transmission = scalar("transmission", &desc.transmission)?;
-        if !desc.thin && !transmission.is_zero() {
-            let textured =
-                [("specular", matches!(specular, Some(ScalarInput::Texture(_)))), ("ior", matches!(ior, RangedInput::Texture { .. }))];
+        if !desc.thin && !inputs.transmission.is_zero() {
+            let textured = [
+                ("specular", matches!(inputs.specular, Some(ScalarInput::Texture(_)))),
+                ("ior", matches!(inputs.ior, RangedInput::Texture { .. })),
+            ];
             if let Some((key, _)) = textured.into_iter().find(|(_, is_textured)| *is_textured) {
                 let message = "cannot come from a texture with `transmission`, unless `thin`: what is inside has one index of refraction";
                 return Err(self.files.error(&format!("{path}.{key}"), message));
             }
         }
-        Ok(PrincipledInputs {
-            rest: PrincipledParameters {
-                thin: desc.thin,
-                multiscatter: desc.multiscatter,
-                model: match desc.model {
-                    PrincipledModelDesc::Burley => PrincipledModel::Burley,
-                    PrincipledModelDesc::Mitsuba => PrincipledModel::Mitsuba,
-                },
-                ..PrincipledParameters::default()
-            },
-            base_color: self.color(&format!("{path}.base_color"), &desc.base_color)?,
-            metallic: scalar("metallic", &desc.metallic)?,
-            roughness: scalar("roughness", &desc.roughness)?,
-            anisotropic: scalar("anisotropic", &desc.anisotropic)?,
-            ior,
-            specular,
-            specular_tint: scalar("specular_tint", &desc.specular_tint)?,
-            sheen: scalar("sheen", &desc.sheen)?,
-            sheen_tint: scalar("sheen_tint", &desc.sheen_tint)?,
-            clearcoat: scalar("clearcoat", &desc.clearcoat)?,
-            clearcoat_gloss: scalar("clearcoat_gloss", &desc.clearcoat_gloss)?,
-            subsurface: scalar("subsurface", &desc.subsurface)?,
-            transmission,
-            diffuse_transmission,
-        })
+        Ok(inputs)
     }
 }

@@ -24,6 +24,7 @@ pub use material::{
     RangedDesc, RoughnessDesc, ScalarDesc,
 };
 pub use output::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, LayerDesc, OutputDesc, PixelTypeDesc, ViewDesc};
+pub(crate) use principled::principled_parameters;
 pub use principled::{PrincipledDesc, PrincipledModelDesc};
 pub use settings::{
     FilmDesc, FilterDesc, FilterSamplesDesc, IntegratorDesc, MAX_FILTER_RADIUS, SamplerDesc, SamplerKindDesc, StrategyDesc,

@@ -47,27 +47,15 @@ const MIN_GLASS_IOR: f32 = 1.05;
 /// The principled model at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Principled {
-    base: Rgb,
+    /// The parameters; `ior` is the index that glass has, also where `specular` is given, and `multiscatter` is false for Mitsuba's lobes.
+    p: PrincipledParameters,
     /// Reflectance of the dielectric layer ahead.
     specular: Rgb,
     /// Colour of light scattered by microfacets more than once, over `pi (1 - E_avg)`.
     multiple: Rgb,
-    /// Weights of metal and of glass; the rest is the diffuse base with its layer.
-    metallic: f32,
+    /// Weight of glass; the rest of what is not metal is the diffuse base with its layer.
     glass: f32,
-    ior: f32,
     ggx: Ggx,
-    sheen: f32,
-    sheen_tint: f32,
-    clearcoat: f32,
-    gloss: f32,
-    roughness: f32,
-    subsurface: f32,
-    diffuse_transmission: f32,
-    specular_tint: f32,
-    thin: bool,
-    multiscatter: bool,
-    model: PrincipledModel,
 }
 
 /// What the layers reflect of the light from one direction, each if it alone were there.
@@ -98,11 +86,12 @@ impl Principled {
         let squared = p.roughness * p.roughness;
         let glass = (1.0 - p.metallic) * p.transmission;
         let refracts = glass > 0.0 && !p.thin;
-        let ior = if refracts { p.ior.max(MIN_GLASS_IOR) } else { p.ior };
+        let layer_ior = p.specular.map_or(p.ior, PrincipledParameters::ior_of_specular);
+        let ior = if refracts { layer_ior.max(MIN_GLASS_IOR) } else { layer_ior };
         let least = if refracts { MIN_ALPHA.max(2e-4 / (ior - 1.0)) } else { MIN_ALPHA };
         let ggx = Ggx::new([squared / aspect, squared * aspect].map(|a| a.clamp(least, 1.0)));
 
-        let f0 = (p.ior - 1.0) / (p.ior + 1.0);
+        let f0 = (layer_ior - 1.0) / (layer_ior + 1.0);
         let specular = mix(Rgb::WHITE, tint(p.base_color, p.model), p.specular_tint) * (f0 * f0);
         let dielectric = 1.0 - p.metallic - glass;
         let mut multiple = Rgb::BLACK;
@@ -113,49 +102,30 @@ impl Principled {
                 + specular.map(|f| schlick_multiple(f, 1.0 - missing)) * dielectric.max(0.0);
             multiple = color / (PI * missing);
         }
-        Self {
-            base: p.base_color,
-            specular,
-            multiple,
-            metallic: p.metallic,
-            glass,
-            ior,
-            ggx,
-            sheen: p.sheen,
-            sheen_tint: p.sheen_tint,
-            clearcoat: p.clearcoat,
-            gloss: p.clearcoat_gloss,
-            roughness: p.roughness,
-            subsurface: p.subsurface,
-            diffuse_transmission: p.diffuse_transmission,
-            specular_tint: p.specular_tint,
-            thin: p.thin,
-            multiscatter,
-            model: p.model,
-        }
+        Self { p: PrincipledParameters { ior, multiscatter, ..*p }, specular, multiple, glass, ggx }
     }
 
     /// Whether the lobes are Mitsuba's.
     #[inline]
     fn is_mitsuba(&self) -> bool {
-        self.model == PrincipledModel::Mitsuba
+        self.p.model == PrincipledModel::Mitsuba
     }
 
     /// Weight of the diffuse base with its layer.
     #[inline]
     fn dielectric(&self) -> f32 {
-        (1.0 - self.metallic - self.glass).max(0.0)
+        (1.0 - self.p.metallic - self.glass).max(0.0)
     }
 
     /// Reflectance of metal and layer together, at Schlick's weight 0.
     #[inline]
     fn f0(&self) -> Rgb {
-        self.base * self.metallic + self.specular * self.dielectric()
+        self.p.base_color * self.p.metallic + self.specular * self.dielectric()
     }
 
     #[inline]
     fn sheen_color(&self) -> Rgb {
-        mix(Rgb::WHITE, tint(self.base, self.model), self.sheen_tint) * self.sheen
+        mix(Rgb::WHITE, tint(self.p.base_color, self.p.model), self.p.sheen_tint) * self.p.sheen
     }
 
     /// Reflection by the microfacets of metal and layer, all but the Fresnel factor.
@@ -170,9 +140,9 @@ impl Principled {
         let weight = schlick_weight(cos);
         let schlick = |f0: Rgb, f90: f32| f0 * (1.0 - weight) + Rgb::splat(f90 * weight);
         if !self.is_mitsuba() {
-            return schlick(self.f0(), self.metallic + self.dielectric());
+            return schlick(self.f0(), self.p.metallic + self.dielectric());
         }
-        schlick(self.base, 1.0) * self.metallic + self.mitsuba_specular(cos) * self.dielectric()
+        schlick(self.p.base_color, 1.0) * self.p.metallic + self.mitsuba_specular(cos) * self.dielectric()
     }
 
     #[inline]
@@ -184,9 +154,9 @@ impl Principled {
         LobeAlbedos {
             facets,
             schlick: energy.schlick(w).clamp(0.0, facets),
-            clearcoat: if self.clearcoat > 0.0 { self.clearcoat * principled_clear_coat(self.gloss, cos) } else { 0.0 },
-            sheen: if dielectric && self.sheen > 0.0 { principled_sheen(cos) } else { 0.0 },
-            diffuse: if dielectric { principled_diffuse(self.roughness, self.subsurface, cos) } else { 0.0 },
+            clearcoat: if self.p.clearcoat > 0.0 { self.p.clearcoat * principled_clear_coat(self.p.clearcoat_gloss, cos) } else { 0.0 },
+            sheen: if dielectric && self.p.sheen > 0.0 { principled_sheen(cos) } else { 0.0 },
+            diffuse: if dielectric { principled_diffuse(self.p.roughness, self.p.subsurface, cos) } else { 0.0 },
         }
     }
 
@@ -199,9 +169,9 @@ impl Principled {
     /// What diffuse base and sheen would scatter without a layer.
     #[inline]
     fn base_albedo(&self, at: &LobeAlbedos) -> Rgb {
-        let diffuse = at.diffuse + (1.0 - at.diffuse) * self.diffuse_transmission;
-        let base = self.base * diffuse;
-        if self.sheen > 0.0 { base + self.sheen_color() * at.sheen } else { base }
+        let diffuse = at.diffuse + (1.0 - at.diffuse) * self.p.diffuse_transmission;
+        let base = self.p.base_color * diffuse;
+        if self.p.sheen > 0.0 { base + self.sheen_color() * at.sheen } else { base }
     }
 
     /// What would be scattered without a clear coat, at most.
@@ -209,7 +179,7 @@ impl Principled {
     fn uncoated_albedo(&self, at: &LobeAlbedos) -> Rgb {
         let layer = self.layer_albedo(at);
         let base = rgb_min(self.base_albedo(at), Rgb::WHITE - layer);
-        self.base.map(|f| facets_albedo(f, at)) * self.metallic + (layer + base) * self.dielectric() + Rgb::splat(self.glass)
+        self.p.base_color.map(|f| facets_albedo(f, at)) * self.p.metallic + (layer + base) * self.dielectric() + Rgb::splat(self.glass)
     }
 
     /// What the layer of a black base reflects, for a direction of the upper side: the closed form for tests.
@@ -223,12 +193,12 @@ impl Principled {
     fn lobe_pmf(&self, at: &LobeAlbedos) -> LobePmf {
         let below = 1.0 - at.clearcoat;
         let f0 = self.f0().mean();
-        let specular = below * (f0 * (at.facets - at.schlick) + (self.metallic + self.dielectric()) * at.schlick);
+        let specular = below * (f0 * (at.facets - at.schlick) + (self.p.metallic + self.dielectric()) * at.schlick);
         let left = (1.0 - self.layer_albedo(at).mean()).min(1.0);
-        let base = self.dielectric() * left.min(self.base.mean());
-        let around = self.dielectric() * left * self.sheen * at.sheen + (1.0 - at.facets) * self.multiple.mean().min(1.0);
-        let diffuse = below * (base * (1.0 - self.diffuse_transmission) + around);
-        let diffuse_transmission = below * base * self.diffuse_transmission;
+        let base = self.dielectric() * left.min(self.p.base_color.mean());
+        let around = self.dielectric() * left * self.p.sheen * at.sheen + (1.0 - at.facets) * self.multiple.mean().min(1.0);
+        let diffuse = below * (base * (1.0 - self.p.diffuse_transmission) + around);
+        let diffuse_transmission = below * base * self.p.diffuse_transmission;
         let glass = below * self.glass;
         let sum = at.clearcoat + specular + diffuse + diffuse_transmission + glass;
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
@@ -259,16 +229,16 @@ impl Principled {
         let mut coat = 0.0;
         let mut pdf = 0.0;
         // Seen from inside of a solid, Mitsuba's has nothing but glass.
-        let is_within = self.is_mitsuba() && self.glass > 0.0 && !self.thin && wo.z < 0.0;
+        let is_within = self.is_mitsuba() && self.glass > 0.0 && !self.p.thin && wo.z < 0.0;
 
         // Clear coat, metal and dielectric layer.
         if reflects {
-            if self.clearcoat > 0.0 {
-                let (unscaled, density) = ClearCoat::new(self.gloss).eval(o, i);
-                coat = self.clearcoat * unscaled * if self.is_mitsuba() { 4.0 * o.z * i.z } else { 1.0 };
+            if self.p.clearcoat > 0.0 {
+                let (unscaled, density) = ClearCoat::new(self.p.clearcoat_gloss).eval(o, i);
+                coat = self.p.clearcoat * unscaled * if self.is_mitsuba() { 4.0 * o.z * i.z } else { 1.0 };
                 pdf += pmf.clearcoat * density;
             }
-            if self.metallic + self.dielectric() > 0.0 {
+            if self.p.metallic + self.dielectric() > 0.0 {
                 let facet = self.facet(o, i);
                 value += self.reflectance(facet.cos) * facet.value;
                 value += self.multiple * ((1.0 - at_o.facets) * (1.0 - at_i.facets) * i.z);
@@ -289,11 +259,11 @@ impl Principled {
 
         // Glass.
         if self.glass > 0.0 {
-            let glass = if self.thin { self.eval_thin(o, i, reflects) } else { self.eval_glass(wo, wi) };
+            let glass = if self.p.thin { self.eval_thin(o, i, reflects) } else { self.eval_glass(wo, wi) };
             value += glass.value * self.glass;
             pdf += pmf.glass * glass.pdf;
         }
-        if self.clearcoat > 0.0 {
+        if self.p.clearcoat > 0.0 {
             let clear = |at: &LobeAlbedos| Rgb::splat(at.clearcoat);
             let below = self.base_attenuation([clear(at_o), clear(&at_i)], [self.uncoated_albedo(at_o), self.uncoated_albedo(&at_i)]);
             value = value * below + Rgb::splat(coat);
@@ -307,14 +277,14 @@ impl Principled {
         let layer = [self.layer_albedo(at_o), self.layer_albedo(at_i)];
         let below_layer = self.base_attenuation(layer, [self.base_albedo(at_o), self.base_albedo(at_i)]);
         if !reflects {
-            return self.base * below_layer * (self.diffuse_transmission * FRAC_1_PI * i.z);
+            return self.p.base_color * below_layer * (self.p.diffuse_transmission * FRAC_1_PI * i.z);
         }
-        let mut shape = shapes::diffuse(o, i, self.roughness);
-        if self.subsurface > 0.0 {
-            shape += (shapes::subsurface(o, i, self.roughness) - shape) * self.subsurface;
+        let mut shape = shapes::diffuse(o, i, self.p.roughness);
+        if self.p.subsurface > 0.0 {
+            shape += (shapes::subsurface(o, i, self.p.roughness) - shape) * self.p.subsurface;
         }
-        let mut value = self.base * ((1.0 - self.diffuse_transmission) * shape);
-        if self.sheen > 0.0 {
+        let mut value = self.p.base_color * ((1.0 - self.p.diffuse_transmission) * shape);
+        if self.p.sheen > 0.0 {
             value += self.sheen_color() * shapes::sheen(o, i);
         }
         value * below_layer
@@ -338,10 +308,10 @@ impl Principled {
             return None;
         }
         let is_transmission = wo.z * wi.z < 0.0;
-        let eta = match (is_transmission && !self.thin, wo.z > 0.0) {
+        let eta = match (is_transmission && !self.p.thin, wo.z > 0.0) {
             (false, _) => 1.0,
-            (true, true) => self.ior,
-            (true, false) => 1.0 / self.ior,
+            (true, true) => self.p.ior,
+            (true, false) => 1.0 / self.p.ior,
         };
         Some(BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission, eta })
     }
@@ -357,7 +327,7 @@ impl Principled {
             u_lobe < 0.0
         };
         if is_chosen(pmf.clearcoat) {
-            return above(ClearCoat::new(self.gloss).sample(o, u));
+            return above(ClearCoat::new(self.p.clearcoat_gloss).sample(o, u));
         }
         if is_chosen(pmf.specular) {
             let m = self.ggx.sample_visible_normal(o, u);
@@ -373,7 +343,7 @@ impl Principled {
             return None;
         }
         let u_glass = (u_lobe / pmf.glass).min(crate::math::float::ONE_MINUS_EPSILON);
-        if !self.thin {
+        if !self.p.thin {
             return self.glass().sample(wo, u_glass, u).map(|sample| sample.wi);
         }
         let (i, reflects) = self.sample_thin(o, u_glass, u);
@@ -407,7 +377,7 @@ impl Principled {
     /// The lobes.
     #[inline]
     pub fn flags(&self) -> BsdfFlags {
-        let crosses = self.glass > 0.0 || self.diffuse_transmission > 0.0;
+        let crosses = self.glass > 0.0 || self.p.diffuse_transmission > 0.0;
         let transmission = if crosses { BsdfFlags::TRANSMISSION } else { BsdfFlags::empty() };
         BsdfFlags::DIFFUSE | BsdfFlags::REFLECTION | self.ggx.flags() | BsdfFlags::GLOSSY | transmission
     }
@@ -415,7 +385,7 @@ impl Principled {
     /// What all lobes scatter together, about.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         let at = self.albedos(vec3(wo.x, wo.y, wo.z.abs()));
-        let glass = if self.thin { self.base } else { self.base.map(f32::sqrt) };
+        let glass = if self.p.thin { self.p.base_color } else { self.p.base_color.map(f32::sqrt) };
         let below = self.uncoated_albedo(&at) - (Rgb::WHITE - glass) * self.glass;
         rgb_min(below + Rgb::splat(at.clearcoat), Rgb::WHITE)
     }

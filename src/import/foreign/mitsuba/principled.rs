@@ -33,22 +33,18 @@ impl<'a> Reader<'a> {
         let (subsurface, transmission) = (scalar("flatness", 0.0)?, scalar("spec_trans", 0.0)?);
         Ok(PrincipledDesc {
             base_color: self.color(element, "base_color", 0.5, uv)?,
-            metallic: ZERO,
             roughness,
             anisotropic,
-            specular: None,
             ior: self.ranged(element, "eta", uv)?,
             specular_tint,
             sheen,
             sheen_tint,
-            clearcoat: ZERO,
             clearcoat_gloss: ZERO,
             subsurface,
             transmission,
-            thin: false,
-            diffuse_transmission: ZERO,
             multiscatter: false,
             model: PrincipledModelDesc::Mitsuba,
+            ..PrincipledDesc::default()
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::super::Source;
 use super::super::textures::{TextureRef, TextureSet};
-use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, PrincipledDesc, PrincipledModelDesc, ScalarDesc, TextureDesc};
+use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, PrincipledDesc, ScalarDesc, TextureDesc};
 use crate::error::Result;
 use crate::import::Draft;
 
@@ -113,19 +113,7 @@ pub fn default_principled() -> PrincipledDesc {
         base_color: ColorDesc::Grey(1.0),
         metallic: ScalarDesc::Constant(1.0),
         roughness: ScalarDesc::Constant(1.0),
-        anisotropic: ScalarDesc::Constant(0.0),
-        specular: None,
-        ior: None,
-        specular_tint: ScalarDesc::Constant(0.0),
-        sheen: ScalarDesc::Constant(0.0),
         sheen_tint: ScalarDesc::Constant(0.0),
-        clearcoat: ScalarDesc::Constant(0.0),
-        clearcoat_gloss: ScalarDesc::Constant(1.0),
-        subsurface: ScalarDesc::Constant(0.0),
-        transmission: ScalarDesc::Constant(0.0),
-        thin: false,
-        diffuse_transmission: ScalarDesc::Constant(0.0),
-        multiscatter: true,
-        model: PrincipledModelDesc::Burley,
+        ..PrincipledDesc::default()
     }
 }
