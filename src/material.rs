@@ -220,7 +220,7 @@ impl TexturedMaterial {
             }
             Self::Coated { coat, tint, base } => {
                 let base = base.bsdf(textures, || *footprint);
-                Bsdf::Coated(Box::new(Coated::new(coat.at(textures, footprint), tint.at(textures, footprint), base)))
+                Bsdf::Coated(Coated::new(coat.at(textures, footprint), tint.at(textures, footprint), base).into())
             }
             Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, footprint))),
         }

@@ -131,11 +131,11 @@ impl Scene {
     /// The scattering at a point for a ray that arrives in `direction` and stands for `footprint`.
     #[inline(always)]
     pub fn bsdf<'a, 'f>(&'a self, at: &SurfaceInteraction, direction: Vec3, footprint: impl FnOnce() -> Footprint<'f>) -> Cow<'a, Bsdf> {
-        if let Material::Constant(bsdf) = self.material(at.shape) {
-            Cow::Borrowed(bsdf)
-        } else {
-            Cow::Owned(self.met_material(at, direction).bsdf(&self.textures, footprint))
+        let mut material = self.material(at.shape);
+        if material.parts().is_some() {
+            material = self.met_material(at, direction);
         }
+        if let Material::Constant(bsdf) = material { Cow::Borrowed(bsdf) } else { Cow::Owned(material.bsdf(&self.textures, footprint)) }
     }
 
     /// The material that a ray meets at a point, of those that the shape's material consists of.

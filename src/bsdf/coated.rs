@@ -15,6 +15,10 @@
 //! spreads light widely. The base sees directions as they are outside: what the coat bends on the way in it bends back
 //! on the way out.
 
+use std::cell::RefCell;
+use std::ops::Deref;
+use std::sync::Arc;
+
 use super::fresnel;
 use super::microfacet::MIN_COSINE;
 use super::regularize::widened;
@@ -33,6 +37,45 @@ pub struct Coated {
     /// For a diffuse base the factor on `(1 - E(wo)) (1 - E(wi))`.
     diffuse: Option<f32>,
     base: Bsdf,
+}
+
+/// A [`Coated`] in memory that the thread uses again: textures and path space regularization make one for each hit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PooledCoated(Arc<Coated>);
+
+thread_local! {
+    /// Memory of coated BSDFs that are no more.
+    static FREE: RefCell<Vec<Arc<Coated>>> = const { RefCell::new(Vec::new()) };
+}
+
+impl From<Coated> for PooledCoated {
+    fn from(coated: Coated) -> Self {
+        if let Some(mut free) = FREE.with_borrow_mut(Vec::pop)
+            && let Some(place) = Arc::get_mut(&mut free)
+        {
+            *place = coated;
+            return Self(free);
+        }
+        Self(Arc::new(coated))
+    }
+}
+
+impl Drop for PooledCoated {
+    fn drop(&mut self) {
+        if Arc::strong_count(&self.0) == 1 {
+            // When the thread ends, the pool may be gone before.
+            let _ = FREE.try_with(|free| free.borrow_mut().push(Arc::clone(&self.0)));
+        }
+    }
+}
+
+impl Deref for PooledCoated {
+    type Target = Coated;
+
+    #[inline]
+    fn deref(&self) -> &Coated {
+        &self.0
+    }
 }
 
 /// The least share of the light below the coat that sampling assumes the base to reflect.

@@ -29,7 +29,7 @@ mod thin;
 
 pub use beckmann::Beckmann;
 pub use coat::{Coat, diffuse_mean, mitsuba_diffuse_mean};
-pub use coated::Coated;
+pub use coated::{Coated, PooledCoated};
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use energy::bake as bake_energy_tables;
@@ -112,7 +112,7 @@ pub enum Bsdf {
     /// Disney's model.
     Principled(Principled),
     /// A clear coat over another opaque one.
-    Coated(Box<Coated>),
+    Coated(PooledCoated),
     /// One of the above with Beckmann's microfacets.
     Beckmann(SingleScatteringBsdf<Beckmann>),
     /// One of the above with GGX microfacets masked on each side independently.

@@ -1,7 +1,7 @@
 //! Rough surfaces made rougher, for paths whose light would come through too narrow a lobe (Kaplanyan and Dachsbacher,
 //! "Path Space Regularization for Holistic and Robust Light Transport").
 
-use super::{Bsdf, Microfacets, SingleScatteringBsdf};
+use super::{Bsdf, Coated, Microfacets, SingleScatteringBsdf};
 
 impl Bsdf {
     /// The same scattering with an alpha of at least `alpha`, within `[0, 1]`, along both tangents; what lies below a coat and how much the
@@ -15,7 +15,7 @@ impl Bsdf {
             }
             Self::Principled(bsdf) => Self::Principled(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
             Self::Glossy(bsdf) => Self::Glossy(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),
-            Self::Coated(bsdf) => Self::Coated(Box::new(bsdf.with_min_alpha(alpha)?)),
+            Self::Coated(bsdf) => Self::Coated(Coated::with_min_alpha(bsdf, alpha)?.into()),
             Self::Beckmann(bsdf) => Self::Beckmann(bsdf.with_min_alpha(alpha)?),
             Self::SeparableGgx(bsdf) => Self::SeparableGgx(bsdf.with_min_alpha(alpha)?),
             Self::Lambert(_) | Self::Eon(_) | Self::DiffuseTransmission(_) | Self::Mirror(_) | Self::ThinDielectric(_) | Self::Phong(_) => {

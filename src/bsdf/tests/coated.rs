@@ -5,7 +5,7 @@ use super::*;
 use crate::sampling::statistics::random_points;
 
 fn coated(ior: f32, alpha: [f32; 2], tint: Rgb, base: Bsdf) -> Bsdf {
-    Bsdf::Coated(Box::new(Coated::new(Coat::new(ior, alpha), tint, base)))
+    Bsdf::Coated(Coated::new(Coat::new(ior, alpha), tint, base).into())
 }
 
 fn principled(parameters: PrincipledParameters) -> Bsdf {

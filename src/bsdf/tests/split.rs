@@ -37,10 +37,10 @@ fn shares_are_what_the_diffuse_part_adds() {
         assert_split("plastic", &plastic(COLOR), &plastic(Rgb::BLACK));
         let coated = |albedo: Rgb, tint: Rgb| {
             let base = Bsdf::Eon(Eon { albedo, roughness: 0.5 });
-            Bsdf::Coated(Box::new(Coated::new(Coat::new(1.4, [alpha; 2]), tint, base)))
+            Bsdf::Coated(Coated::new(Coat::new(1.4, [alpha; 2]), tint, base).into())
         };
         assert_split("coated", &coated(COLOR, COLOR), &coated(Rgb::BLACK, COLOR));
-        let twice = |diffuse: Rgb| Bsdf::Coated(Box::new(Coated::new(Coat::new(1.4, [0.3; 2]), Rgb::WHITE, plastic(diffuse))));
+        let twice = |diffuse: Rgb| Bsdf::Coated(Coated::new(Coat::new(1.4, [0.3; 2]), Rgb::WHITE, plastic(diffuse)).into());
         assert_split("coated plastic", &twice(COLOR), &twice(Rgb::BLACK));
     }
     for roughness in [0.2, 0.7] {
@@ -63,7 +63,7 @@ fn lobes_of_one_kind_are_all_or_nothing() {
         let p = PrincipledParameters { base_color: COLOR, clearcoat: 0.5, metallic, transmission, ..PrincipledParameters::default() };
         Bsdf::Principled(Principled::new(&p))
     };
-    let over = |base: Bsdf, alpha: f32| Bsdf::Coated(Box::new(Coated::new(Coat::new(1.5, [alpha; 2]), Rgb::WHITE, base)));
+    let over = |base: Bsdf, alpha: f32| Bsdf::Coated(Coated::new(Coat::new(1.5, [alpha; 2]), Rgb::WHITE, base).into());
     let lambert = || Bsdf::Lambert(Lambert { albedo: COLOR });
     let specular = [gold([0.2; 2]), glass([0.3; 2]), beckmann_gold([0.2; 2]), beckmann_glass([0.2; 2]), principled(1.0, 0.0)];
     let more = [principled(0.0, 1.0), over(gold([0.4; 2]), 0.2), over(gold([0.4; 2]), 0.0)];

@@ -52,7 +52,7 @@ pub fn glass(ior: f32, alpha: [f32; 2]) -> Material {
 }
 
 fn coated(ior: f32, alpha: [f32; 2], tint: Rgb, base: Bsdf) -> Bsdf {
-    Bsdf::Coated(Box::new(Coated::new(Coat::new(ior, alpha), tint, base)))
+    Bsdf::Coated(Coated::new(Coat::new(ior, alpha), tint, base).into())
 }
 
 fn principled(parameters: &PrincipledParameters) -> Bsdf {
