@@ -13,7 +13,7 @@
 //!
 //! | # | modules |
 //! |---|---|
-//! | 0 | `id`, `error`, `memory`, `printable`, `bytes` |
+//! | 0 | `id`, `error`, `memory`, `printable`, `suggestion`, `bytes` |
 //! | 1 | `math`, `desc`, `file`, `attribute` |
 //! | 2 | `color`, `sampling`, `import`, `config` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
@@ -62,6 +62,7 @@ pub mod relief;
 pub mod render;
 pub mod sampling;
 pub mod scene;
+pub mod suggestion;
 pub mod texture;
 
 pub use error::{Error, ErrorKind, Result};

@@ -44,6 +44,7 @@ use crate::light::LightSet;
 use crate::material::Material;
 use crate::math::{Bounds, RenderSpace};
 use crate::scene::{Scene, SceneFeatures, Surface};
+use crate::suggestion::did_you_mean;
 use crate::texture::Texture;
 
 use identities::IdentityTable;
@@ -173,7 +174,7 @@ impl CompileContext {
 
     /// The error for a name that does not exist, with a suggestion.
     fn unknown<'a>(&self, path: &str, what: &str, name: &str, known: impl IntoIterator<Item = &'a str>) -> Error {
-        let hint = crate::import::closest_name(name, known).map_or(String::new(), |near| format!(" (did you mean \"{near}\"?)"));
+        let hint = did_you_mean(name, known, ["\"", "\""]);
         self.error(path, format!("no {what} named \"{name}\"{hint}"))
     }
 }

@@ -28,7 +28,7 @@ pub use mesh_data::MeshData;
 pub use mtl_maps::{ObjMap, ObjMaps};
 pub use obj::{ObjMaterial, ObjMesh, read_obj};
 pub use ply::{read_ply, read_ply_attributes};
-pub use scene_file::{closest_name, load_scene, parse_scene, scene_as_written};
+pub use scene_file::{load_scene, parse_scene, scene_as_written};
 pub use spectrum::{Named, Spectrum, named};
 
 use std::path::{Path, PathBuf};

@@ -9,6 +9,7 @@ use super::comments::blank_comments;
 use super::fault::{self, Step};
 use crate::desc::SceneDesc;
 use crate::error::{Error, Result};
+use crate::suggestion::did_you_mean;
 
 /// Reads a scene file.
 ///
@@ -102,43 +103,16 @@ fn offset(text: &str, error: &serde_json::Error) -> usize {
 fn describe(text: &str, place: &str) -> String {
     let text = text.rsplit_once(" at line ").map_or(text, |(message, _)| message);
     let place = if place.is_empty() { String::new() } else { format!("{place}: ") };
-    let suggestion = suggestion(text).map_or(String::new(), |name| format!(" (did you mean `{name}`?)"));
-    format!("{place}{text}{suggestion}")
+    format!("{place}{text}{}", hint(text))
 }
 
 /// For "unknown field `x`, expected one of `a`, `b`": the expected word nearest to `x`.
-fn suggestion(message: &str) -> Option<&str> {
+fn hint(message: &str) -> String {
     if !(message.starts_with("unknown field") || message.starts_with("unknown variant")) {
-        return None;
+        return String::new();
     }
     let mut words = message.split('`').skip(1).step_by(2);
-    let given = words.next()?;
-    closest_name(given, words)
-}
-
-/// Longer names, in characters, are compared with none: that would take the square of their length.
-const MAX_NAME: usize = 128;
-
-/// Names that one is compared with, of those of about its length.
-const MAX_CANDIDATES: usize = 10_000;
-
-/// The candidate that `name` is most likely a slip of, if any is near.
-pub fn closest_name<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let length = |text: &str| text.chars().take(MAX_NAME + 1).count();
-    let own = length(name);
-    if own > MAX_NAME {
-        return None;
-    }
-    let lower = name.to_lowercase();
-    let most = 1 + own / 4;
-    candidates
-        .into_iter()
-        .filter(|candidate| length(candidate).abs_diff(own) <= most)
-        .take(MAX_CANDIDATES)
-        .map(|candidate| (strsim::damerau_levenshtein(&lower, &candidate.to_lowercase()), candidate))
-        .filter(|(distance, _)| *distance <= most)
-        .min()
-        .map(|(_, candidate)| candidate)
+    words.next().map_or(String::new(), |given| did_you_mean(given, words, ["`", "`"]))
 }
 
 #[cfg(test)]
@@ -229,11 +203,5 @@ mod tests {
         for deep in ["[".repeat(100_000), "{\"camera\":".repeat(100_000), format!("{{ \"camera\": {} }}", "[".repeat(100_000))] {
             assert_message(&deep, "s.json:1:", &[]);
         }
-    }
-
-    #[test]
-    fn names_are_matched_regardless_of_case() {
-        assert_eq!(closest_name("gold", ["Silver", "Gold"]), Some("Gold"));
-        assert_eq!(closest_name("gold", ["Silver", "Chrome"]), None);
     }
 }

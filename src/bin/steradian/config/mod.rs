@@ -10,7 +10,8 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use steradian::config::{PREFIX, Trust, Words, trust};
 use steradian::farm::message_lines;
-use steradian::{Error, Result, import};
+use steradian::suggestion::did_you_mean;
+use steradian::{Error, Result};
 
 use crate::args::Cli;
 use crate::log;
@@ -155,7 +156,7 @@ impl Options {
 
     /// A hint for a name that is not known.
     fn unknown(&self, key: &str) -> String {
-        let hint = import::closest_name(key, self.names()).map_or(String::new(), |name| format!(" (did you mean \"{name}\"?)"));
+        let hint = did_you_mean(key, self.names(), ["\"", "\""]);
         let why = if trust(key) == Some(Trust::CommandLine) { "belongs to the command line" } else { "is no option of render" };
         format!("\"{key}\" {why}{hint}")
     }

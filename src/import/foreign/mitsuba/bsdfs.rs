@@ -10,7 +10,7 @@ use crate::desc::{
     RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
 };
 use crate::error::Result;
-use crate::import::closest_name;
+use crate::suggestion::did_you_mean;
 
 /// What a BSDF has become.
 #[derive(Clone, Debug)]
@@ -178,8 +178,8 @@ impl<'a> Reader<'a> {
             (Some("none"), None, None) => ([0.0; 3], [1.0; 3]),
             (Some(name), None, None) => {
                 let unknown = || {
-                    let hint = closest_name(name, metals::names()).map(|near| format!(" (did you mean \"{near}\"?)"));
-                    element.place_of("material").error(format!("no material named \"{name}\"{}", hint.unwrap_or_default()))
+                    let hint = did_you_mean(name, metals::names(), ["\"", "\""]);
+                    element.place_of("material").error(format!("no material named \"{name}\"{hint}"))
                 };
                 metals::find(name).ok_or_else(unknown)?
             }

@@ -1,6 +1,6 @@
 //! Names that Mitsuba 3 knows: plugins and indices of refraction.
 
-use crate::import::closest_name;
+use crate::suggestion::did_you_mean;
 
 /// Plugins of Mitsuba 3.9 by class; names of Mitsuba 0.6 that it still reads included.
 const PLUGINS: &[(&str, &[&str])] = &[
@@ -109,7 +109,7 @@ pub fn check(class: &str, kind: &str) -> Result<(), String> {
     if known.contains(&kind) {
         return Ok(());
     }
-    let hint = closest_name(kind, known.iter().copied()).map_or(String::new(), |near| format!(" (did you mean \"{near}\"?)"));
+    let hint = did_you_mean(kind, known.iter().copied(), ["\"", "\""]);
     Err(format!("Mitsuba has no {class} of the type \"{kind}\"{hint}"))
 }
 
@@ -144,6 +144,6 @@ pub const INDICES: &[(&str, f64)] = &[
 pub fn index(name: &str) -> Result<f64, String> {
     let lower = name.to_lowercase();
     let found = INDICES.iter().find(|(known, _)| *known == lower).map(|(_, index)| *index);
-    let hint = || closest_name(name, INDICES.iter().map(|(known, _)| *known)).map(|near| format!(" (did you mean \"{near}\"?)"));
-    found.ok_or_else(|| format!("no index of refraction is known for \"{name}\"{}", hint().unwrap_or_default()))
+    let hint = || did_you_mean(name, INDICES.iter().map(|(known, _)| *known), ["\"", "\""]);
+    found.ok_or_else(|| format!("no index of refraction is known for \"{name}\"{}", hint()))
 }

@@ -4,8 +4,8 @@ use roxmltree::Node;
 
 use super::values::{self, Fault};
 use crate::error::{Error, Result};
-use crate::import::closest_name;
 use crate::math::{DAffine3, DMat3, DVec3};
+use crate::suggestion::did_you_mean;
 
 const STEPS: [&str; 5] = ["translate", "rotate", "scale", "lookat", "matrix"];
 
@@ -48,7 +48,7 @@ fn step(node: Node, read: Read, fail: Fail) -> Result<DAffine3> {
             values::matrix(&text).map_err(at)?
         }
         other => {
-            let hint = closest_name(other, STEPS).map_or(String::new(), |near| format!(" (did you mean <{near}>?)"));
+            let hint = did_you_mean(other, STEPS, ["<", ">"]);
             return Err(at(format!("unknown step <{other}> of a transform{hint}")));
         }
     })

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use crate::error::Error;
-use crate::import::closest_name;
 use crate::math::DAffine3;
+use crate::suggestion::did_you_mean;
 
 /// Where something stands in a file.
 #[derive(Clone, Debug)]
@@ -132,8 +132,8 @@ impl Document {
             Value::Reference(name) => {
                 let target = self.aliases.get(name).unwrap_or(name);
                 let found = self.ids.get(target).copied();
-                let hint = || closest_name(name, self.ids.keys().map(String::as_str)).map(|near| format!(" (did you mean \"{near}\"?)"));
-                let unknown = || property.place.error(format!("nothing has the id \"{name}\"{}", hint().unwrap_or_default()));
+                let hint = || did_you_mean(name, self.ids.keys().map(String::as_str), ["\"", "\""]);
+                let unknown = || property.place.error(format!("nothing has the id \"{name}\"{}", hint()));
                 found.ok_or_else(unknown).map(Some)
             }
             _ => Ok(None),

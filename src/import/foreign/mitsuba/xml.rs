@@ -11,7 +11,7 @@ use super::transforms;
 use super::tree::{Document, Place, Plugin, PluginId, Property, Spectrum, Value};
 use super::values::{self, Fault};
 use crate::error::{Error, Result};
-use crate::import::closest_name;
+use crate::suggestion::did_you_mean;
 
 /// Plugins nested deeper than this are a mistake.
 const MAX_DEPTH: usize = 100;
@@ -69,7 +69,7 @@ pub fn read(path: &Path, defines: &[(String, String)]) -> Result<Document> {
     parser.document.plugins.push(root);
     if let Some((name, _)) = parser.used.iter().find(|(_, used)| !**used) {
         let known = parser.parameters.keys().map(String::as_str).filter(|known| known != name);
-        let hint = closest_name(name, known).map_or(String::new(), |near| format!(" (did you mean \"{near}\"?)"));
+        let hint = did_you_mean(name, known, ["\"", "\""]);
         return Err(Error::Usage(format!("{}: nothing uses ${name}{hint}", path.display())));
     }
     Ok(parser.document)
@@ -218,8 +218,7 @@ impl Parser {
             let ends = name.char_indices().map(|(i, c)| i + c.len_utf8()).rev();
             let found = ends.into_iter().find_map(|end| self.parameters.get_key_value(&name[..end]));
             let Some((known, value)) = found else {
-                let hint = closest_name(name, self.parameters.keys().map(String::as_str));
-                let hint = hint.map_or(String::new(), |near| format!(" (did you mean ${near}?)"));
+                let hint = did_you_mean(name, self.parameters.keys().map(String::as_str), ["$", ""]);
                 return Err(source.place(node).error(format!("${name} has no value{hint}")));
             };
             result.push_str(value);
@@ -293,8 +292,7 @@ impl Parser {
             if tag == "spectrum" || CLASSES.contains(&tag) && tag != "scene" {
                 return self.nested(source, node, name, properties, depth);
             }
-            let hint = closest_name(tag, CLASSES.into_iter().chain(OTHERS));
-            let hint = hint.map_or(String::new(), |near| format!(" (did you mean <{near}>?)"));
+            let hint = did_you_mean(tag, CLASSES.into_iter().chain(OTHERS), ["<", ">"]);
             return Err(place.error(format!("unknown element <{tag}>{hint}")));
         };
         if name.is_empty() && !matches!(value, Value::Reference(_)) {

@@ -382,8 +382,7 @@ impl Reader {
         if directive == "NamedMaterial" {
             let known = self.materials.get(&first).cloned();
             self.graphics.look = Some(known.ok_or_else(|| {
-                let near = crate::import::closest_name(&first, self.materials.keys().map(String::as_str));
-                let hint = near.map_or(String::new(), |near| format!(" (did you mean \"{near}\"?)"));
+                let hint = crate::suggestion::did_you_mean(&first, self.materials.keys().map(String::as_str), ["\"", "\""]);
                 lexer.error(at, format!("no material named \"{first}\"{hint}"))
             })?);
             return Ok(());
