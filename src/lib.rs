@@ -13,7 +13,7 @@
 //!
 //! | # | modules |
 //! |---|---|
-//! | 0 | `id`, `error`, `memory`, `printable`, `suggestion`, `bytes` |
+//! | 0 | `id`, `error`, `memory`, `metal`, `printable`, `suggestion`, `bytes` |
 //! | 1 | `math`, `desc`, `file`, `attribute` |
 //! | 2 | `color`, `sampling`, `import`, `config` |
 //! | 3 | `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
@@ -55,6 +55,7 @@ pub mod material;
 pub mod math;
 pub mod medium;
 pub mod memory;
+pub mod metal;
 pub mod opacity;
 pub mod output;
 pub mod printable;

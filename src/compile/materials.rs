@@ -16,23 +16,9 @@ use crate::id::{MaterialId, ReliefId, TextureId};
 use crate::import::ObjMaterial;
 use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial};
 use crate::medium::{Media, Medium};
+use crate::metal::{Metal, MetalNames};
 use crate::relief::Relief;
 use crate::texture::Texture;
-
-/// Real and imaginary part of the index of refraction for red, green and blue (650, 550 and 450 nm;
-/// refractiveindex.info: Johnson and Christy for noble metals, iron, chromium and titanium; Rakic for aluminium and
-/// tungsten; Querry for brass).
-const METALS: &[(&str, [f32; 3], [f32; 3])] = &[
-    ("aluminium", [1.657, 0.880, 0.521], [9.224, 6.270, 4.837]),
-    ("brass", [0.444, 0.527, 1.094], [3.695, 2.765, 1.829]),
-    ("chromium", [3.107, 3.181, 2.323], [3.331, 3.329, 3.135]),
-    ("copper", [0.200, 0.924, 1.102], [3.912, 2.452, 2.142]),
-    ("gold", [0.143, 0.375, 1.442], [3.983, 2.386, 1.603]),
-    ("iron", [2.911, 2.950, 2.585], [3.089, 2.932, 2.767]),
-    ("silver", [0.155, 0.116, 0.138], [4.828, 3.122, 2.147]),
-    ("titanium", [2.741, 2.542, 2.267], [3.814, 3.435, 3.039]),
-    ("tungsten", [4.370, 3.300, 2.999], [3.500, 2.605, 2.731]),
-];
 
 /// All materials and textures, with their names.
 pub struct MaterialTable {
@@ -301,8 +287,8 @@ impl Compiler<'_> {
     fn metal(&self, path: &str, metal: Option<&str>, eta: Option<[f32; 3]>, k: Option<[f32; 3]>) -> Result<([f32; 3], [f32; 3])> {
         match (metal, eta, k) {
             (Some(name), None, None) => {
-                let found = METALS.iter().find(|(metal, ..)| *metal == name).map(|&(_, eta, k)| (eta, k));
-                found.ok_or_else(|| self.files.unknown(&format!("{path}.metal"), "metal", name, METALS.iter().map(|m| m.0)))
+                let unknown = || self.files.unknown(&format!("{path}.metal"), "metal", name, Metal::names(MetalNames::Steradian));
+                Metal::find(MetalNames::Steradian, name).map(|metal| (metal.eta, metal.k)).ok_or_else(unknown)
             }
             (None, Some(eta), Some(k)) => {
                 if !eta.iter().all(|&e| e > 0.0 && e.is_finite()) {
@@ -458,6 +444,16 @@ mod tests {
         assert_eq!(bsdf(shiny), Bsdf::Plastic(Plastic::new(Rgb::new(0.1, 0.2, 0.3), 1.5, [0.2; 2])));
         let glowing = from_mtl(&ObjMaterial { emissive: Some([1.0, 2.0, 3.0]), ..plain }).unwrap();
         assert_eq!(glowing.radiance, Some(Rgb::new(1.0, 2.0, 3.0)));
+    }
+
+    #[test]
+    fn the_schema_has_the_names_of_all_metals() {
+        let schema = crate::import::schema();
+        let (_, list) = schema.split_once("A metal by name: ").unwrap();
+        let (list, _) = list.split_once(".\"").unwrap();
+        let mut listed: Vec<_> = list.split(", ").map(|name| name.trim_matches('`')).collect();
+        listed.sort_unstable();
+        assert_eq!(listed, Metal::names(MetalNames::Steradian).collect::<Vec<_>>());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Spectra that pbrt knows by name, as constants.
 
 use super::Spectrum;
+use crate::metal::{Metal, MetalNames};
 
 /// What a name stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,18 +18,6 @@ pub enum Named {
     /// A light's colour at luminance 1, linear RGB.
     Illuminant([f32; 3]),
 }
-
-/// Metals: eta and k under D65, with eta such that the reflectance ahead is that of the spectrum (optical constants of
-/// luxpop.com, of which k is 0 within the accuracy for both oxides; brass as in refractiveindex.info: Querry).
-const METALS: &[(&str, [f32; 3], [f32; 3])] = &[
-    ("Ag", [0.1267, 0.1207, 0.1491], [4.0649, 3.2863, 2.3918]),
-    ("Al", [1.4286, 0.9285, 0.5905], [7.7405, 6.6026, 5.3604]),
-    ("Au", [0.0800, 0.4563, 1.5612], [3.3905, 2.5038, 1.7709]),
-    ("Cu", [0.1337, 0.9552, 1.2142], [3.2734, 2.5923, 2.3693]),
-    ("CuZn", [0.444, 0.527, 1.094], [3.695, 2.765, 1.829]),
-    ("MgO", [1.7337, 1.7409, 1.7535], [0.0; 3]),
-    ("TiO2", [2.8601, 2.9571, 3.1855], [0.0; 3]),
-];
 
 /// Glasses of Schott's catalogue; pbrt's names F5, F10 and F11 are SF5, SF10 and SF11.
 const GLASSES: &[(&str, f32, f32)] = &[
@@ -64,10 +53,10 @@ const ILLUMINANTS: &[(&str, [f32; 3])] = &[
 /// What pbrt means by the name of a spectrum, if it knows it.
 pub fn named(name: &str) -> Option<Named> {
     if let Some((metal, part)) = name.strip_prefix("metal-").and_then(|rest| rest.split_once('-')) {
-        let (_, eta, k) = METALS.iter().find(|(symbol, ..)| *symbol == metal)?;
+        let metal = Metal::find(MetalNames::Pbrt, metal)?;
         return match part {
-            "eta" => Some(Named::Metal(*eta)),
-            "k" => Some(Named::Metal(*k)),
+            "eta" => Some(Named::Metal(metal.eta)),
+            "k" => Some(Named::Metal(metal.k)),
             _ => None,
         };
     }

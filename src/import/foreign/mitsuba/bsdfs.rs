@@ -1,7 +1,6 @@
 //! BSDFs to materials.
 
 use super::element::Element;
-use super::metals;
 use super::textures::{Role, TextureValue, UvOrigin};
 use super::tree::PluginId;
 use super::{Reader, names};
@@ -10,6 +9,7 @@ use crate::desc::{
     RangedDesc, RoughnessDesc, ScalarDesc, TextureDesc,
 };
 use crate::error::Result;
+use crate::metal::{Metal, MetalNames};
 use crate::suggestion::did_you_mean;
 
 /// What a BSDF has become.
@@ -178,10 +178,12 @@ impl<'a> Reader<'a> {
             (Some("none"), None, None) => ([0.0; 3], [1.0; 3]),
             (Some(name), None, None) => {
                 let unknown = || {
-                    let hint = did_you_mean(name, metals::names(), ["\"", "\""]);
+                    let hint = did_you_mean(name, Metal::names(MetalNames::Mitsuba).chain(["none"]), ["\"", "\""]);
                     element.place_of("material").error(format!("no material named \"{name}\"{hint}"))
                 };
-                metals::find(name).ok_or_else(unknown)?
+                let find = |name: &str| Metal::find(MetalNames::Mitsuba, name);
+                let found = find(name).or_else(|| find(name.strip_suffix("_palik")?));
+                found.map(|metal| (metal.eta, metal.k)).ok_or_else(unknown)?
             }
             (None, None, None) | (Some(_), ..) => {
                 return Err(element.place_of("material").error("give either \"material\" or \"eta\" and \"k\""));

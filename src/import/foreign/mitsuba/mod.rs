@@ -9,7 +9,6 @@ mod element;
 mod emitters;
 mod integrators;
 mod meshes;
-mod metals;
 mod names;
 mod principled;
 mod sensor;
