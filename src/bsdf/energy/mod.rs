@@ -12,9 +12,11 @@
 //!
 //! Directions are unit, local, on the upper side.
 
+#[cfg(feature = "bench")]
 mod bake;
 pub(super) mod table;
 
+#[cfg(feature = "bench")]
 pub use bake::bake;
 
 use super::{Ggx, Microfacets};
