@@ -44,7 +44,7 @@ impl Blades {
         let scaled = f64::from(u[0]) * count;
         let side = scaled.floor().min(count - 1.0);
         // A triangle from the centre to each side.
-        let [b, c] = warp::uniform_triangle([(scaled - side) as f32, u[1]]);
+        let [b, c] = warp::uniform_triangle([(scaled - side) as f32, u[1]]).map(|b| b as f32);
         let corner = |k: f64| DVec2::from_angle(self.rotation + TAU * k / count);
         corner(side) * f64::from(b) + corner(side + 1.0) * f64::from(c)
     }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::{Detail, Hit, Shape};
 use crate::id::ShapeId;
 use crate::math::Ray;
+use crate::math::random::mix_32;
 
 /// Opacity of surfaces, decided stochastically hit by hit during traversal.
 ///
@@ -74,7 +75,7 @@ fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
 #[inline(never)]
 fn ray_key(ray: &Ray) -> u32 {
     let words = [ray.origin.x, ray.origin.y, ray.origin.z, ray.direction.x, ray.direction.y, ray.direction.z, ray.time];
-    words.iter().fold(0x9e37_79b9, |hash, word| mix(hash ^ word.to_bits()))
+    words.iter().fold(0x9e37_79b9, |hash, word| mix_32(hash ^ word.to_bits()))
 }
 
 #[inline(never)]
@@ -82,17 +83,9 @@ fn is_covered(coverage: f32, key: u32, hit: &Hit) -> bool {
     if coverage <= 0.0 || coverage >= 1.0 {
         return coverage > 0.0;
     }
-    let hash = [hit.instance.0, hit.shape.0, hit.prim.0].iter().fold(key, |hash, word| mix(hash ^ word));
+    let hash = [hit.instance.0, hit.shape.0, hit.prim.0].iter().fold(key, |hash, word| mix_32(hash ^ word));
     // 24 bits fill the mantissa.
     (hash >> 8) as f32 * (1.0 / 16_777_216.0) < coverage
-}
-
-/// A bijective hash of 32 bits (Ellis, "Prospecting for Hash Functions": `lowbias32`), moved off the fixed point 0.
-fn mix(n: u32) -> u32 {
-    let n = n.wrapping_add(0x9e37_79b9);
-    let n = (n ^ (n >> 16)).wrapping_mul(0x7feb_352d);
-    let n = (n ^ (n >> 15)).wrapping_mul(0x846c_a68b);
-    n ^ (n >> 16)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{Aabb, DVec3, Ray, RayF64, Vec3};
+use crate::sampling::warp;
 
 /// The corners of one triangle. The front is where they appear counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,14 +127,7 @@ impl TrianglePoints {
         if !(double_area > 0.0) {
             return None;
         }
-        // Low-distortion map (Heitz, "A Low-Distortion Map Between Triangle and Square").
-        let (mut b0, mut b1) = (0.5 * f64::from(u[0]), 0.5 * f64::from(u[1]));
-        let offset = b1 - b0;
-        if offset > 0.0 {
-            b1 += offset;
-        } else {
-            b0 -= offset;
-        }
+        let [b0, b1] = warp::uniform_triangle(u);
         let b2 = (1.0 - b0 - b1).max(0.0);
         let p = self.a.as_dvec3() * b2 + self.b.as_dvec3() * b0 + self.c.as_dvec3() * b1;
         let n = (cross / double_area).as_vec3();

@@ -7,6 +7,7 @@ use crate::accel::Coherence;
 use crate::color::Rgb;
 use crate::film::{LightAovRequest, PixelSample};
 use crate::geometry::SurfaceInteraction;
+use crate::math::random::mix_32;
 use crate::math::{Frame, Ray, Vec3};
 use crate::sampling::{Sampler, warp};
 
@@ -43,10 +44,7 @@ impl View {
 
 /// A bright colour that differs between neighbouring ids.
 fn color_of(id: u32) -> Rgb {
-    let mut h = id.wrapping_add(0x9e37_79b9);
-    h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d);
-    h = (h ^ (h >> 15)).wrapping_mul(0x846c_a68b);
-    h ^= h >> 16;
+    let h = mix_32(id);
     let channel = |shift: u32| 0.1 + 0.9 * ((h >> shift) & 0xff) as f32 / 255.0;
     Rgb::new(channel(0), channel(8), channel(16))
 }

@@ -13,6 +13,15 @@ pub fn mix(n: u64) -> u64 {
     n ^ (n >> 31)
 }
 
+/// A bijective hash of 32 bits (Ellis, "Prospecting for Hash Functions": `lowbias32`), moved off the fixed point 0.
+#[inline]
+pub fn mix_32(n: u32) -> u32 {
+    let n = n.wrapping_add((STEP >> 32) as u32);
+    let n = (n ^ (n >> 16)).wrapping_mul(0x7feb_352d);
+    let n = (n ^ (n >> 15)).wrapping_mul(0x846c_a68b);
+    n ^ (n >> 16)
+}
+
 /// What consecutive states of the generator differ by.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 

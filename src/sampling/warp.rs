@@ -2,7 +2,7 @@
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
-use crate::math::{Vec2, Vec3, sin_cos_eighth, sin_cos_turns, vec2, vec3};
+use crate::math::{Vec2, Vec3, sin_cos_eighth, sin_cos_turns, unit_circle, vec2, vec3};
 
 /// Uniform on the unit disk (Shirley and Chiu, "A Low Distortion Map Between Disk and Square"); density `1 / pi`.
 #[inline]
@@ -63,11 +63,13 @@ pub const UNIFORM_HEMISPHERE_PDF: f32 = 1.0 / TAU;
 /// A direction with density [`UNIFORM_SPHERE_PDF`].
 #[inline]
 pub fn uniform_sphere(u: [f32; 2]) -> Vec3 {
-    uniform_cone(u, 2.0)
+    let z = 1.0 - 2.0 * u[0];
+    let sin = (4.0 * u[0] * (1.0 - u[0])).max(0.0).sqrt();
+    (unit_circle(u[1]).as_vec2() * sin).extend(z).normalize()
 }
 
 /// Density per solid angle of [`uniform_sphere`].
-pub const UNIFORM_SPHERE_PDF: f32 = 0.5 / TAU;
+pub const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
 
 /// A direction within a cone, with density [`uniform_cone_pdf`]. The cone is given by `1 - cos` of its half-angle, within `(0, 2]`, since
 /// the cosine of a narrow cone has no digits left.
@@ -87,14 +89,10 @@ pub fn uniform_cone_pdf(one_minus_cos_max: f32) -> f32 {
 
 /// Barycentric weights of the second and third corner, uniform by area (Heitz, "A Low-Distortion Map Between Triangle and Square").
 #[inline]
-pub fn uniform_triangle(u: [f32; 2]) -> [f32; 2] {
-    if u[1] > u[0] {
-        let half = 0.5 * u[0];
-        [half, u[1] - half]
-    } else {
-        let half = 0.5 * u[1];
-        [u[0] - half, half]
-    }
+pub fn uniform_triangle(u: [f32; 2]) -> [f64; 2] {
+    let [b, c] = u.map(|u| 0.5 * f64::from(u));
+    let offset = c - b;
+    if offset > 0.0 { [b, c + offset] } else { [b - offset, c] }
 }
 
 #[cfg(test)]
@@ -131,7 +129,7 @@ mod tests {
     #[test]
     fn the_triangle_is_uniform_in_area() {
         check_plane("triangle", 3, |u| {
-            let [b1, b2] = uniform_triangle(u);
+            let [b1, b2] = uniform_triangle(u).map(|b| b as f32);
             assert!(b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0);
             // Area fraction on one side of a line parallel to an edge, and the position along that line.
             [(b1 + b2) * (b1 + b2), if b1 + b2 > 0.0 { b1 / (b1 + b2) } else { 0.0 }]

@@ -20,7 +20,7 @@ pub(super) const LEAST_MEAN: f32 = 1e-3;
 pub(super) fn point(shape: &Shape, prim: PrimId, p: DVec3, u: [f32; 2]) -> Footprint<'_> {
     match shape {
         Shape::Mesh(mesh) => {
-            let [b, c] = warp::uniform_triangle(u);
+            let [b, c] = warp::uniform_triangle(u).map(|b| b as f32);
             Footprint { attributes: mesh.attributes_at(prim, b, c), ..Footprint::point(mesh.uv(prim, b, c)) }
         }
         Shape::Analytic(placed) => Footprint::point(placed.uv(p, u)),

@@ -4,6 +4,7 @@ use super::SurfaceSample;
 use crate::geometry::TrianglePoints;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Vec3};
+use crate::sampling::warp;
 
 /// A triangle of a mesh.
 pub(super) struct TriangleEmitter {
@@ -56,13 +57,7 @@ impl TriangleEmitter {
     /// A point as seen from `p`; `None` in the plane.
     #[inline]
     pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
-        // Low-distortion map (Heitz, "A Low-Distortion Map Between Triangle and Square").
-        let (mut b, mut c) = (0.5 * f64::from(u[0]), 0.5 * f64::from(u[1]));
-        if c > b {
-            c += c - b;
-        } else {
-            b += b - c;
-        }
+        let [b, c] = warp::uniform_triangle(u);
         SurfaceSample::from_area(p, self.corner + self.edge_u * b + self.edge_v * c, self.normal, 1.0 / self.area)
     }
 }

@@ -19,9 +19,8 @@ use std::sync::OnceLock;
 use super::{InfiniteLightEval, LightSample, MisCompensation};
 use crate::color::Rgb;
 use crate::math::{DMat3, Vec3, angle_of, unit_circle};
+use crate::sampling::warp::{UNIFORM_SPHERE_PDF, uniform_sphere};
 use crate::sampling::{Piecewise2d, PiecewiseCell};
-
-const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
 
 /// By this share of the mean a cell is at least brighter than the mean, or counts as even.
 const EVEN: f64 = 1e-6;
@@ -41,12 +40,7 @@ impl Environment {
     pub fn sample(&self, u: [f32; 2], compensation: MisCompensation) -> Option<LightSample> {
         let (wi, radiance, pdf) = match self {
             Self::Constant(_) if compensation == MisCompensation::On => return None,
-            Self::Constant(radiance) => {
-                let z = 1.0 - 2.0 * u[0];
-                let sin = (4.0 * u[0] * (1.0 - u[0])).max(0.0).sqrt();
-                let around = unit_circle(u[1]).as_vec2() * sin;
-                (Vec3::new(around.x, around.y, z).normalize(), *radiance, UNIFORM_SPHERE_PDF)
-            }
+            Self::Constant(radiance) => (uniform_sphere(u), *radiance, UNIFORM_SPHERE_PDF),
             Self::Map(map) => {
                 let chosen = map.choose(map.density(compensation)?, u);
                 (chosen.wi, map.lookup(chosen.at), chosen.pdf)
