@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use steradian::accel::{self, AccelKind, Accelerator};
-use steradian::geometry::{Analytic, Disk, Frustum, Geometry, Hit, Placed, Profile, Quad, Revolution, Shape, Sphere};
+use steradian::geometry::{Analytic, Disk, Frustum, Geometry, Hit, Profile, Quad, Revolution, Shape, Sphere, TransformedShape};
 use steradian::id::{PrimId, ShapeId};
 use steradian::math::{DVec3, Ray, Rng, Transform, Vec3};
 use steradian_benches::models::tessellated_sphere;
@@ -30,7 +30,7 @@ fn shapes() -> Vec<(&'static str, Analytic)> {
 }
 
 fn world(shape: Analytic) -> Geometry {
-    let shapes = vec![Shape::Analytic(Placed::new(shape, Transform::IDENTITY))];
+    let shapes = vec![Shape::Analytic(TransformedShape::new(shape, Transform::IDENTITY))];
     Geometry { shapes, world: vec![ShapeId(0)], ..Geometry::default() }
 }
 
@@ -91,7 +91,7 @@ fn column(segments: usize) -> Analytic {
 }
 
 /// The best of many passes over `rays`, in nanoseconds per ray.
-fn nanoseconds(shape: &Placed, rays: &[Ray]) -> f64 {
+fn nanoseconds(shape: &TransformedShape, rays: &[Ray]) -> f64 {
     let end = Instant::now() + Duration::from_millis(300);
     let mut best = f64::INFINITY;
     while Instant::now() < end {
@@ -103,7 +103,7 @@ fn nanoseconds(shape: &Placed, rays: &[Ray]) -> f64 {
 }
 
 /// Rays from afar that hit and that pass through the bounds without, level rays, rays along the axis.
-fn kinds_of_rays(geometry: &Geometry, shape: &Placed) -> Vec<(&'static str, Vec<Ray>)> {
+fn kinds_of_rays(geometry: &Geometry, shape: &TransformedShape) -> Vec<(&'static str, Vec<Ray>)> {
     let (hits, misses): (Vec<Ray>, Vec<Ray>) = rays(geometry).into_iter().partition(|ray| shape.intersect(ray).is_some());
     let mut random = Rng::new(4);
     let mut through = |direction: fn(DVec3) -> DVec3| -> Vec<Ray> {
@@ -121,7 +121,7 @@ fn revolution_table(_: &mut Criterion) {
     println!("ns per ray           hit   miss  level  axial");
     let sphere = ("sphere".to_owned(), Analytic::Sphere(Sphere::full(1.0).expect("valid")));
     for (name, shape) in std::iter::once(sphere).chain([1, 2, 4, 8, 16].map(|n| (format!("{n} segments"), column(n)))) {
-        let placed = Placed::new(shape.clone(), Transform::IDENTITY);
+        let placed = TransformedShape::new(shape.clone(), Transform::IDENTITY);
         let cells = kinds_of_rays(&world(shape), &placed);
         let cells: String = cells.iter().map(|(_, rays)| format!("{:7.0}", nanoseconds(&placed, rays))).collect();
         println!("{name:<17}{cells}");

@@ -9,7 +9,7 @@ use steradian::assets;
 use steradian::assets::MeshData;
 use steradian::config::{self, Trust};
 use steradian::import::{self, ImportOptions};
-use steradian::render::Recipe;
+use steradian::render::RenderProvenance;
 
 /// Reads `data` as a file of `kind`, which is the name of a target, in `folder`, which only this caller writes to. Malformed files are errors; anything else is a finding.
 pub fn read(kind: &str, data: &[u8], folder: &Path) {
@@ -55,9 +55,9 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
         }
         "recipe" => {
             let file = Path::new("a.exr");
-            if let Some(recipe) = serde_json::from_slice(data).ok().and_then(|value| Recipe::from_value(value, file).ok()) {
+            if let Some(recipe) = serde_json::from_slice(data).ok().and_then(|value| RenderProvenance::from_value(value, file).ok()) {
                 let value = recipe.to_value();
-                let again = Recipe::from_value(value.clone(), file).expect("what was taken is taken again");
+                let again = RenderProvenance::from_value(value.clone(), file).expect("what was taken is taken again");
                 assert_eq!(again.to_value(), value);
                 let settings = recipe.settings(1);
                 assert!(settings.crop.fits(settings.film_size()) && settings.spp > 0 && settings.threads == 1);

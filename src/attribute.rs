@@ -55,7 +55,7 @@ impl AttributeValues {
     /// One of them; a number as a grey.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// If there are fewer values.
     #[inline]
     pub fn get(&self, i: usize) -> [f32; 3] {
         match self {
@@ -64,7 +64,7 @@ impl AttributeValues {
         }
     }
 
-    /// Those with these indices; zero where there are not so many.
+    /// Those with these indices; zero for indices beyond the last one.
     #[must_use]
     pub fn gathered(&self, indices: impl Iterator<Item = u32>) -> Self {
         match self {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 /// What kind of fault ended the work; the binary maps each to an exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// The command line asks for something impossible.
+    /// The command line is impossible.
     Usage,
     /// The scene (or a file it names) is malformed or makes no sense.
     Scene,
@@ -24,7 +24,7 @@ pub enum ErrorKind {
 /// An error with its place.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The command line asks for something impossible.
+    /// The command line is impossible.
     #[error("{0}")]
     Usage(String),
     /// A fault in a scene's text: `scene.json:3:14: shapes[2].radius: ...`.

@@ -40,8 +40,8 @@ ids! {
     TextureId,
     /// The name of an attribute of meshes.
     AttributeId,
-    /// A relief.
-    ReliefId,
+    /// A normal or bump map.
+    NormalPerturbationId,
     /// A light.
     LightId,
     /// A group of lights.

@@ -17,7 +17,7 @@
 //! | 1 | `math`, `desc`, `file`, `attribute`, `image_data` |
 //! | 2 | `color`, `sampling`, `config` |
 //! | 3 | `assets`, `geometry`, `texture`, `bsdf`, `camera`, `film`, `guiding` |
-//! | 4 | `accel`, `material`, `medium`, `opacity`, `relief`, `light`, `output` |
+//! | 4 | `accel`, `material`, `medium`, `opacity`, `normal_perturbation`, `light`, `output` |
 //! | 5 | `scene`, `denoise` |
 //! | 6 | `import`, `integrator`, `compile` |
 //! | 7 | `render`, `convert` |
@@ -58,10 +58,10 @@ pub mod math;
 pub mod medium;
 pub mod memory;
 pub mod metal;
+pub mod normal_perturbation;
 pub mod opacity;
 pub mod output;
 pub mod printable;
-pub mod relief;
 pub mod render;
 pub mod sampling;
 pub mod scene;

@@ -312,7 +312,7 @@ impl Material {
         }
     }
 
-    /// The material that this one stands for on one side at a point, if it consists of others; `u` within `[0, 1)` chooses.
+    /// The leaf material on one side at a point, if this one consists of others; `u` within `[0, 1)` chooses.
     #[inline]
     pub fn part<'f>(
         &self,

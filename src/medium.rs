@@ -9,10 +9,10 @@ use std::cmp::Ordering;
 use crate::color::Rgb;
 use crate::id::MediumId;
 
-/// Wavelengths in nanometres that stand for red, green and blue, as for the indices of metals.
+/// Wavelengths in nanometres of red, green and blue, as for the indices of metals.
 const WAVELENGTHS: [f32; 3] = [650.0, 550.0, 450.0];
 
-/// The green channel, which stands for all where none is chosen.
+/// The green channel, which is used where none is chosen.
 const GREEN: usize = 1;
 
 /// What fills closed surfaces.

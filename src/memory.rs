@@ -15,7 +15,7 @@ pub fn fallible<T>(request: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Whether so many bytes can be had in one piece. Many small requests would be granted long past what the machine has.
+/// Whether `bytes` can be allocated in one piece. Many small requests would be granted long past what the machine has.
 pub fn is_available(bytes: usize) -> bool {
     fallible(|| std::hint::black_box(Vec::<u8>::new()).try_reserve_exact(bytes).is_ok())
 }

@@ -6,13 +6,13 @@ use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::film::Identities;
 use crate::geometry::{Geometry, SurfaceInteraction};
-use crate::id::{LightId, MaterialId, MediumId, PrimId, ReliefId, ShapeId};
+use crate::id::{LightId, MaterialId, MediumId, NormalPerturbationId, PrimId, ShapeId};
 use crate::light::{LightGroups, LightSet};
 use crate::material::Material;
 use crate::math::Vec3;
-use crate::math::random::mix;
+use crate::math::random::hash64;
 use crate::medium::Media;
-use crate::relief::Relief;
+use crate::normal_perturbation::NormalPerturbation;
 use crate::texture::{Footprint, Texture};
 
 /// How a shape looks.
@@ -21,7 +21,7 @@ pub struct Surface {
     /// Its material.
     pub material: MaterialId,
     /// Where its shading normals come from, if not from the shape alone or from a part of its material.
-    pub relief: Option<ReliefId>,
+    pub normal_perturbation: Option<NormalPerturbationId>,
     /// The medium within it.
     pub medium: Option<MediumId>,
     /// The light of its first primitive if it emits; the others follow.
@@ -54,10 +54,10 @@ pub struct SceneFeatures {
     pub textures: bool,
     /// Some mesh has attributes, which a texture takes.
     pub attributes: bool,
-    /// Some material has an image that is looked up over what a ray stands for.
+    /// Some material has an image that is filtered over the footprint of a ray.
     pub filtered_textures: bool,
     /// Some surface has a normal map or a bump map.
-    pub reliefs: bool,
+    pub normal_perturbations: bool,
     /// Some surface's shading normal differs from its geometric one.
     pub shading_normals: bool,
     /// Something depends on uv or on tangents.
@@ -83,12 +83,12 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Materials, by [`MaterialId`].
     pub materials: Vec<Material>,
-    /// Reliefs, by [`ReliefId`].
-    pub reliefs: Vec<Relief>,
+    /// Reliefs, by [`NormalPerturbationId`].
+    pub normal_perturbations: Vec<NormalPerturbation>,
     /// What surfaces have within them, by [`MediumId`].
     pub media: Media,
     /// Reliefs of materials that are parts of others, by [`MaterialId`]; empty if there are none.
-    pub part_reliefs: Vec<Option<ReliefId>>,
+    pub part_normal_perturbations: Vec<Option<NormalPerturbationId>>,
     /// Textures, by [`TextureId`](crate::id::TextureId).
     pub textures: Vec<Texture>,
     /// Lights and their choice.
@@ -128,7 +128,7 @@ impl Scene {
         if self.features.attributes { Footprint { attributes: self.geometry.attributes(at), ..footprint } } else { footprint }
     }
 
-    /// The scattering at a point for a ray that arrives in `direction` and stands for `footprint`.
+    /// The BSDF at a point for a ray that arrives in `direction` with `footprint`.
     #[inline(always)]
     pub fn bsdf<'a, 'f>(&'a self, at: &SurfaceInteraction, direction: Vec3, footprint: impl FnOnce() -> Footprint<'f>) -> Cow<'a, Bsdf> {
         let mut material = self.material(at.shape);
@@ -148,14 +148,14 @@ impl Scene {
         self.descend(self.surface(at.shape).material, at, direction, |_| ())
     }
 
-    /// The relief at a point for a ray that arrives in `direction`.
-    pub fn relief(&self, at: &SurfaceInteraction, direction: Vec3) -> Option<ReliefId> {
+    /// The normal or bump map at a point for a ray that arrives in `direction`.
+    pub fn normal_perturbation(&self, at: &SurfaceInteraction, direction: Vec3) -> Option<NormalPerturbationId> {
         let surface = self.surface(at.shape);
-        if surface.relief.is_some() || self.part_reliefs.is_empty() {
-            return surface.relief;
+        if surface.normal_perturbation.is_some() || self.part_normal_perturbations.is_empty() {
+            return surface.normal_perturbation;
         }
         let mut found = None;
-        self.descend(surface.material, at, direction, |id| found = self.part_reliefs[id.index()].or(found));
+        self.descend(surface.material, at, direction, |id| found = self.part_normal_perturbations[id.index()].or(found));
         found
     }
 
@@ -177,6 +177,6 @@ impl Scene {
 /// same for any number of threads, and another for every sample of a pixel.
 fn choice(at: &SurfaceInteraction, direction: Vec3, id: MaterialId) -> f32 {
     let words = at.p.to_array().map(f64::to_bits).into_iter().chain(direction.to_array().map(|x| u64::from(x.to_bits())));
-    let hash = words.fold(mix(u64::from(id.0)), |hash, word| mix(hash ^ word));
+    let hash = words.fold(hash64(u64::from(id.0)), |hash, word| hash64(hash ^ word));
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use steradian::accel::{AccelKind, Coherence, build};
-use steradian::geometry::{AlphaMask, AlphaMasks, Geometry, Hit, Placed, Shape, Sphere};
+use steradian::geometry::{AlphaMask, AlphaMasks, Geometry, Hit, Shape, Sphere, TransformedShape};
 use steradian::id::ShapeId;
 use steradian::math::{DMat3, DVec3, Ray};
 
@@ -119,7 +119,7 @@ fn light_passes_a_veil_as_its_layers_say() {
 
 #[test]
 fn the_far_side_shows_through_a_hole_of_a_sphere() {
-    let sphere = Shape::Analytic(Placed::new(
+    let sphere = Shape::Analytic(TransformedShape::new(
         steradian::geometry::Analytic::Sphere(Sphere::full(1.0).unwrap()),
         transform(DMat3::IDENTITY, DVec3::new(0.0, 0.0, 5.0)),
     ));

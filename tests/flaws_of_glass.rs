@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde_json::{Value, json};
 use steradian::film::Image;
-use steradian::geometry::{Analytic, Disk, Frustum, Placed, Profile, Revolution, Sphere};
+use steradian::geometry::{Analytic, Disk, Frustum, Profile, Revolution, Sphere, TransformedShape};
 use steradian::math::{DMat3, DVec3, Ray, RayF64, Vec3};
 
 use crate::util::geometry::{Rng, all_analytic_shapes, transform};
@@ -22,8 +22,8 @@ fn endless(origin: DVec3, direction: DVec3) -> RayF64 {
     RayF64 { origin, direction, t_min: 0.0, t_max: f64::INFINITY }
 }
 
-fn placed(shape: Analytic) -> Placed {
-    Placed::new(shape, transform(DMat3::IDENTITY, DVec3::ZERO))
+fn placed(shape: Analytic) -> TransformedShape {
+    TransformedShape::new(shape, transform(DMat3::IDENTITY, DVec3::ZERO))
 }
 
 /// A picture of light given off alone, 16 x 16, along -z.
@@ -251,8 +251,10 @@ fn a_scale_acts_on_every_shape_as_its_measures_do() {
 #[test]
 fn normals_under_an_uneven_scale_stay_perpendicular() {
     // By the matrix itself instead of its inverse transpose, the normal of an ellipsoid leans the wrong way.
-    let ellipsoid =
-        Placed::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), transform(DMat3::from_diagonal(DVec3::new(3.0, 1.0, 0.5)), DVec3::ZERO));
+    let ellipsoid = TransformedShape::new(
+        Analytic::Sphere(Sphere::full(1.0).unwrap()),
+        transform(DMat3::from_diagonal(DVec3::new(3.0, 1.0, 0.5)), DVec3::ZERO),
+    );
     let mut rng = Rng::new(63);
     for _ in 0..2_000 {
         let direction = rng.direction();

@@ -5,7 +5,7 @@ use std::path::Path;
 use steradian::accel::inspect::{StructureStats, TraversalCounts};
 use steradian::accel::{AccelKind, Accelerator, LinearAccel, build};
 use steradian::bench::{bumpy_sphere, record};
-use steradian::geometry::{Analytic, Disk, Geometry, Hit, Mesh, Placed, Shape, Sphere};
+use steradian::geometry::{Analytic, Disk, Geometry, Hit, Mesh, Shape, Sphere, TransformedShape};
 use steradian::math::{DMat3, DVec3, Ray};
 use steradian::render::{Overrides, Settings};
 use steradian::{compile, import};
@@ -117,7 +117,7 @@ fn bounds_of_analytic_shapes_hold_their_extreme_points() {
                 0 => Analytic::Sphere(Sphere::full(rng.range(0.1, 2.0)).unwrap()),
                 _ => Analytic::Disk(Disk::new(rng.range(0.1, 2.0), 0.0, std::f64::consts::TAU).unwrap()),
             };
-            Placed::new(shape, transform(rng.rotation(), center))
+            TransformedShape::new(shape, transform(rng.rotation(), center))
         });
         let placed: Vec<_> = shapes.collect();
         let mut hits = 0;

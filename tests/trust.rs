@@ -31,8 +31,8 @@ fn pixels(path: &Path) -> Vec<u32> {
 }
 
 /// Writes an EXR file with this recipe.
-fn with_recipe(path: &Path, recipe: Value) {
-    let info = RenderInfo { settings: Some(recipe), ..RenderInfo::default() };
+fn with_recipe(path: &Path, provenance: Value) {
+    let info = RenderInfo { settings: Some(provenance), ..RenderInfo::default() };
     output::write_exr(path, &Image::of_color([1, 1], vec![1.0; 4]), &OutputDesc::new("forged.exr"), &info).unwrap();
 }
 
@@ -46,12 +46,12 @@ fn rerender_runs_no_option_of_the_file() {
     listener.set_nonblocking(true).unwrap();
     let address = listener.local_addr().unwrap();
     let victims = ["report", "json", "log-file", "checkpoint", "shard"];
-    let mut recipe = output::read_settings(&dir.join("a.exr")).unwrap();
+    let mut provenance = output::read_settings(&dir.join("a.exr")).unwrap();
     let line = "render scene.json --report report --json json --log-file log-file --checkpoint checkpoint -o shard --preview 0 --denoise";
     let mut arguments: Vec<String> = line.split(' ').map(str::to_owned).collect();
     arguments.extend(["--tev".to_owned(), address.to_string(), "--oidn-library".to_owned(), dir.join("evil.so").display().to_string()]);
-    recipe["arguments"] = json!(arguments);
-    with_recipe(&dir.join("forged.exr"), recipe);
+    provenance["arguments"] = json!(arguments);
+    with_recipe(&dir.join("forged.exr"), provenance);
     victims.iter().for_each(|name| std::fs::write(dir.join(name), "kept").unwrap());
     let before = names(dir);
     assert_code(dir, "rerender forged.exr -o again.exr", 0, &["wrote again.exr"]);
@@ -67,20 +67,20 @@ fn forged_and_old_recipes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     assert_code(dir, "render scene.json -q -o a.exr --threads 1", 0, &[]);
-    let recipe = output::read_settings(&dir.join("a.exr")).unwrap();
+    let provenance = output::read_settings(&dir.join("a.exr")).unwrap();
     for key in ["json", "report", "log_file", "checkpoint", "oidn_library", "tev", "preview", "outputs", "threads"] {
         for place in ["", "/settings", "/import"] {
-            let mut forged = recipe.clone();
+            let mut forged = provenance.clone();
             forged.pointer_mut(place).unwrap()[key] = json!("victim");
             with_recipe(&dir.join("forged.exr"), forged);
             assert_code(dir, "rerender forged.exr -o again.exr", 3, &["forged.exr", &format!("unknown field `{key}`")]);
         }
     }
-    let mut old = recipe.clone();
+    let mut old = provenance.clone();
     old.as_object_mut().unwrap().remove("version");
     with_recipe(&dir.join("old.exr"), old);
     assert_code(dir, "rerender old.exr -o again.exr", 3, &["old.exr", "no version"]);
-    let mut wild = recipe;
+    let mut wild = provenance;
     wild["settings"]["size"] = json!([4_000_000_000u32, 1]);
     with_recipe(&dir.join("wild.exr"), wild);
     assert_code(dir, "rerender wild.exr -o again.exr", 3, &["wild.exr", "film.width"]);
@@ -97,9 +97,9 @@ fn rerender_writes_only_where_the_command_line_says() {
     assert_eq!(std::fs::read(dir.join("a.exr")).unwrap(), bytes);
     assert_code(dir, "rerender a.exr -o b.exr --spp 0", 2, &["--spp 0"]);
     // Even a denoiser comes from here.
-    let mut recipe = output::read_settings(&dir.join("a.exr")).unwrap();
-    recipe["denoise"] = json!(true);
-    with_recipe(&dir.join("denoised.exr"), recipe);
+    let mut provenance = output::read_settings(&dir.join("a.exr")).unwrap();
+    provenance["denoise"] = json!(true);
+    with_recipe(&dir.join("denoised.exr"), provenance);
     assert_code(dir, "rerender denoised.exr -o b.exr --oidn-library none.so", 4, &["none.so", "--oidn-library"]);
 }
 

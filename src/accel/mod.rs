@@ -29,7 +29,7 @@ use inspect::Inspect;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
     /// Every run of 16 rays starts at nearly one point and points nearly one way: camera rays of a pixel block, or shadow rays from there
-    /// to a small light. A promise not kept costs more than it brings.
+    /// to a small light. A wrong promise costs more than it saves.
     Coherent,
     /// Nothing is known.
     Incoherent,

@@ -57,7 +57,7 @@ pub(super) fn check_size(width: usize, height: usize) -> Result<(), String> {
     }
 }
 
-/// The most pixels that a byte of a file can stand for, where the format has a bound: memory is not asked for on a header's word alone.
+/// The most pixels that a byte of a file can encode, where the format has a bound: a header alone never leads to a large allocation.
 fn pixels_per_byte(format: ImageFormat) -> u64 {
     match format {
         // Deflate makes at most 1,032 bytes of one, and a byte may hold eight pixels.
@@ -74,7 +74,7 @@ fn read_with(bytes: &[u8], format: ImageFormat) -> Result<ImageData, AssetError>
     let name = format.extensions_str().first().unwrap_or(&"").to_uppercase();
     let malformed = |e: &dyn std::fmt::Display| AssetError::Malformed(format!("not a readable {name} image: {e}"));
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    // The size is checked below; four floats a pixel are the most that a decoder asks for.
+    // The size is checked below; four floats a pixel are the most that a decoder needs.
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(16 * MAX_PIXELS);
     reader.limits(limits);

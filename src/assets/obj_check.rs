@@ -102,7 +102,7 @@ fn check_corner(corner: &str, counts: &[i64; 3], largest: &mut [(i64, usize); 3]
     Ok(())
 }
 
-/// An MTL with every colour written as three numbers: one number stands for grey.
+/// An MTL with every colour written as three numbers: one number means grey.
 pub fn expand_colors(text: &str) -> Result<String, String> {
     let mut out = String::with_capacity(text.len() + 64);
     for (i, line) in text.lines().enumerate() {

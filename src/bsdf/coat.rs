@@ -98,7 +98,7 @@ impl<D: Microfacets> Coat<D> {
         (sum / (STEPS * AZIMUTHS) as f64) as f32
     }
 
-    /// Axes that the table tells apart.
+    /// Axes of the table.
     #[inline]
     fn axes(&self) -> usize {
         if self.is_anisotropic() { 2 } else { 1 }

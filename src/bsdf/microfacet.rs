@@ -152,7 +152,7 @@ impl Microfacets for Ggx {
         let [ax, ay] = self.alpha;
         // The hemisphere's configuration: there a reflected direction is uniform on the cap z > -w.z.
         let w = vec3(ax * o.x, ay * o.y, o.z).normalize();
-        // z + w.z and 1 - z², without the cancellation that z itself would bring at grazing angles.
+        // z + w.z and 1 - z², without the cancellation of z itself at grazing angles.
         let above = (1.0 - u[1]) * (1.0 + w.z);
         let radius = (u[1] * (1.0 + w.z) * (above + (1.0 - w.z))).sqrt();
         let (sin, cos) = sin_cos_turns(u[0]);

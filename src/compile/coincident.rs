@@ -5,7 +5,7 @@ use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelExte
 use super::Builder;
 use crate::geometry::{Geometry, Mesh, Shape};
 use crate::id::{PrimId, ShapeId};
-use crate::math::random::mix;
+use crate::math::random::hash64;
 
 /// Meshes of fewer triangles are not worth more than one thread.
 const MANY: usize = 1 << 13;
@@ -27,7 +27,9 @@ impl Builder {
             let [x, y] = [a, b].map(|id| &self.surfaces[id.index()]);
             let same_material = x.material == y.material || materials[x.material.index()] == materials[y.material.index()];
             let same_opacity = self.opacities[a.index()] == self.opacities[b.index()];
-            same_material && same_opacity && (x.relief, x.medium, x.first_light) == (y.relief, y.medium, y.first_light)
+            same_material
+                && same_opacity
+                && (x.normal_perturbation, x.medium, x.first_light) == (y.normal_perturbation, y.medium, y.first_light)
         };
         let Some(Coincident { count, shapes }) = find(&self.geometry, look_alike) else { return };
         let [first, second] = shapes.map(|shape| self.paths[shape.index()].as_str());
@@ -50,7 +52,7 @@ fn find(geometry: &Geometry, look_alike: impl Fn(ShapeId, ShapeId) -> bool) -> O
     let meshes = groups.enumerate().flat_map(|(group, shapes)| shapes.iter().map(move |&id| (group, id)));
     let meshes: Vec<(u64, ShapeId, &Mesh)> = meshes
         .filter_map(|(group, id)| match geometry.shape(id) {
-            Shape::Mesh(mesh) => Some((mix(group as u64), id, mesh)),
+            Shape::Mesh(mesh) => Some((hash64(group as u64), id, mesh)),
             Shape::Analytic(_) => None,
         })
         .collect();
@@ -107,7 +109,7 @@ fn keys(meshes: &[(u64, ShapeId, &Mesh)]) -> Vec<u32> {
 }
 
 fn hash_of(seed: u64, [x, y, z]: [u32; 3]) -> u64 {
-    mix(seed ^ (u64::from(x) | u64::from(y) << 32) ^ u64::from(z).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+    hash64(seed ^ (u64::from(x) | u64::from(y) << 32) ^ u64::from(z).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
 /// Equal for equal positions: adding zero makes a negative zero positive.

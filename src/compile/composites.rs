@@ -62,7 +62,7 @@ impl MaterialTable {
                 };
                 self.coated(base_id, &coating, &mut HashMap::new())
             }
-            MaterialDesc::Relief { material, .. } => {
+            MaterialDesc::NormalPerturbation { material, .. } => {
                 outer.push(name);
                 let place = format!("{path}.material");
                 let base = self.part(compiler, desc, &place, material, outer)?;

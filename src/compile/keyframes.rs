@@ -64,7 +64,7 @@ impl CompileContext {
         Ok(Motion::keyframed(&times.iter().copied().zip(maps).collect::<Vec<_>>()))
     }
 
-    /// The point that the steps before the first turn bring to the origin: what turns, turns about it. The origin if keyframes disagree.
+    /// The point that the steps before the first rotation move to the origin: the centre of rotation. The origin if keyframes disagree.
     fn pivot(&self, path: &str, lists: &[&TransformDesc]) -> Result<DVec3> {
         let mut pivot: Option<DVec3> = None;
         for list in lists {

@@ -13,22 +13,22 @@ use crate::desc::{
     SceneDesc, UsedNames,
 };
 use crate::error::Result;
-use crate::id::{MaterialId, ReliefId, TextureId};
+use crate::id::{MaterialId, NormalPerturbationId, TextureId};
 use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial};
 use crate::medium::{Media, Medium};
 use crate::metal::{Metal, MetalNames};
-use crate::relief::Relief;
+use crate::normal_perturbation::NormalPerturbation;
 use crate::texture::Texture;
 
 /// All materials and textures, with their names.
 pub struct MaterialTable {
     pub materials: Vec<Material>,
     pub textures: TextureTable,
-    pub reliefs: Vec<Relief>,
+    pub normal_perturbations: Vec<NormalPerturbation>,
     /// What is within surfaces of these materials.
     pub media: Media,
     /// Reliefs of materials of the scene file that have one.
-    pub(super) by_material: HashMap<MaterialId, ReliefId>,
+    pub(super) by_material: HashMap<MaterialId, NormalPerturbationId>,
     names: HashMap<String, MaterialBinding>,
     /// The medium of each material that has one.
     pub(super) medium_of: HashMap<MaterialId, Medium>,
@@ -38,7 +38,7 @@ pub struct MaterialTable {
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialBinding {
     pub material: MaterialId,
-    pub relief: Option<ReliefId>,
+    pub normal_perturbation: Option<NormalPerturbationId>,
     /// How much of the surface is there, if not all of it.
     pub opacity: Option<TextureId>,
 }
@@ -46,7 +46,7 @@ pub struct MaterialBinding {
 impl MaterialBinding {
     /// A material alone.
     pub fn plain(material: MaterialId) -> Self {
-        Self { material, relief: None, opacity: None }
+        Self { material, normal_perturbation: None, opacity: None }
     }
 }
 
@@ -60,7 +60,7 @@ impl MaterialTable {
         let mut table = Self {
             materials: vec![default],
             textures: TextureTable::default(),
-            reliefs: Vec::new(),
+            normal_perturbations: Vec::new(),
             media: Media::default(),
             by_material: HashMap::new(),
             names: HashMap::new(),
@@ -92,14 +92,18 @@ impl MaterialTable {
             None => compiler.material(&path, &desc.materials[name])?,
         };
         let medium = match &desc.materials[name] {
-            MaterialDesc::Relief { material, .. } => self.names.get(material).and_then(|look| self.medium_of.get(&look.material)).copied(),
+            MaterialDesc::NormalPerturbation { material, .. } => {
+                self.names.get(material).and_then(|look| self.medium_of.get(&look.material)).copied()
+            }
             plain => self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, plain)?),
         };
         let id = self.push(material);
         self.medium_of.extend(medium.map(|medium| (id, medium)));
-        let relief = compiler.relief(desc, &path, &desc.materials[name])?.map(|relief| self.push_relief(relief));
-        self.by_material.extend(relief.map(|relief| (id, relief)));
-        self.names.insert(name.to_owned(), MaterialBinding { relief, ..MaterialBinding::plain(id) });
+        let normal_perturbation = compiler
+            .normal_perturbation(desc, &path, &desc.materials[name])?
+            .map(|normal_perturbation| self.push_relief(normal_perturbation));
+        self.by_material.extend(normal_perturbation.map(|normal_perturbation| (id, normal_perturbation)));
+        self.names.insert(name.to_owned(), MaterialBinding { normal_perturbation, ..MaterialBinding::plain(id) });
         Ok(id)
     }
 
@@ -113,7 +117,7 @@ impl MaterialTable {
     pub fn needs_uv(&self, look: &MaterialBinding) -> bool {
         let cut_out = look.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
         let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.relief_of(id).is_some();
-        cut_out || look.relief.is_some() || self.any_part(look.material, &needs)
+        cut_out || look.normal_perturbation.is_some() || self.any_part(look.material, &needs)
     }
 
     fn has_texture(&self, id: MaterialId, is: impl Fn(&Texture) -> bool) -> bool {
@@ -122,11 +126,13 @@ impl MaterialTable {
 
     /// Whether a surface's normals come from a normal map.
     pub fn has_normal_map(&self, look: &MaterialBinding) -> bool {
-        let is_map = |relief: Option<ReliefId>| relief.is_some_and(|id| matches!(self.reliefs[id.index()], Relief::NormalMap { .. }));
-        is_map(look.relief) || self.any_part(look.material, &|id| is_map(self.relief_of(id)))
+        let is_map = |normal_perturbation: Option<NormalPerturbationId>| {
+            normal_perturbation.is_some_and(|id| matches!(self.normal_perturbations[id.index()], NormalPerturbation::NormalMap { .. }))
+        };
+        is_map(look.normal_perturbation) || self.any_part(look.material, &|id| is_map(self.relief_of(id)))
     }
 
-    /// What a name stands for, or the default.
+    /// The material of a name, or the default.
     pub fn find(&self, files: &CompileContext, path: &str, name: Option<&str>) -> Result<MaterialBinding> {
         let Some(name) = name else {
             return Ok(MaterialBinding::plain(Self::DEFAULT));
@@ -189,7 +195,10 @@ impl Compiler<'_> {
                 }
                 TexturedMaterial::CookTorrance { albedo, d, s, m, f0 }.into()
             }
-            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } | MaterialDesc::Relief { .. } => {
+            MaterialDesc::Mix { .. }
+            | MaterialDesc::TwoSided { .. }
+            | MaterialDesc::Coated { .. }
+            | MaterialDesc::NormalPerturbation { .. } => {
                 return Err(files.error(path, "cannot be part of a material"));
             }
             MaterialDesc::Plastic(desc) => self.plastic(path, desc)?.into(),

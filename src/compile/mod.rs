@@ -14,13 +14,13 @@ mod media;
 mod meshes;
 mod mtl;
 mod nesting;
+mod normal_perturbations;
 mod normals;
 mod objects;
 mod opacity;
 mod planes;
 mod prepared;
 mod principled;
-mod reliefs;
 mod settings;
 mod shapes;
 mod summary;
@@ -184,7 +184,7 @@ impl Builder {
         let files = &self.files;
         if !self.space.is_world() {
             self.materials.media.rescale(1.0 / self.space.scale());
-            self.materials.reliefs.iter_mut().for_each(|relief| relief.rescale(self.space.scale()));
+            self.materials.normal_perturbations.iter_mut().for_each(|normal_perturbation| normal_perturbation.rescale(self.space.scale()));
         }
         self.geometry.cutouts = opacity::cutouts(&self.geometry.shapes, &self.opacities, &self.materials.textures);
         let light_groups = self.lights.groups();
@@ -197,9 +197,10 @@ impl Builder {
             let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
             files.refuse_own("lights", message)?;
         }
-        let part_reliefs = self.materials.part_reliefs();
+        let part_normal_perturbations = self.materials.part_normal_perturbations();
         let materials = self.materials.materials;
-        let reliefs = !part_reliefs.is_empty() || self.surfaces.iter().any(|surface| surface.relief.is_some());
+        let normal_perturbations =
+            !part_normal_perturbations.is_empty() || self.surfaces.iter().any(|surface| surface.normal_perturbation.is_some());
         let anisotropic = materials.iter().any(|material| material.flags().is_anisotropic());
         let smooth = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.has_normals());
         let features = SceneFeatures {
@@ -211,8 +212,8 @@ impl Builder {
             attributes: self.geometry.shapes.iter().any(|s| matches!(s, Shape::Mesh(mesh) if mesh.has_attributes())),
             filtered_textures: materials.iter().any(Material::is_textured)
                 && self.materials.textures.textures.iter().any(Texture::is_filtered),
-            reliefs,
-            shading_normals: reliefs || self.geometry.shapes.iter().any(smooth),
+            normal_perturbations,
+            shading_normals: normal_perturbations || self.geometry.shapes.iter().any(smooth),
             parameters: anisotropic || !self.materials.textures.textures.is_empty(),
             delta_materials: materials.iter().any(|material| material.flags().is_delta()),
             media: self.surfaces.iter().any(|surface| surface.medium.is_some()),
@@ -224,9 +225,9 @@ impl Builder {
             geometry: self.geometry,
             surfaces: self.surfaces,
             materials,
-            reliefs: self.materials.reliefs,
+            normal_perturbations: self.materials.normal_perturbations,
             media: self.materials.media,
-            part_reliefs,
+            part_normal_perturbations,
             textures: self.materials.textures.textures,
             lights,
             light_groups,

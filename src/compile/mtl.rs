@@ -11,7 +11,7 @@ use crate::id::TextureId;
 use crate::light::Emission;
 use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, ScalarInput, TexturedMaterial};
 use crate::math::Vec2;
-use crate::relief::Relief;
+use crate::normal_perturbation::NormalPerturbation;
 use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
 
 /// What a material of an MTL comes to.
@@ -64,12 +64,12 @@ impl Builder {
         if !is_glass {
             look.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
         }
-        let relief = match (wanted(&maps.normal), wanted(&maps.bump)) {
+        let normal_perturbation = match (wanted(&maps.normal), wanted(&maps.bump)) {
             (Some(map), _) => Some(self.relief_map(path, &map, true)?),
             (None, Some(map)) => Some(self.relief_map(path, &map, false)?),
             (None, None) => None,
         };
-        look.relief = relief.map(|relief| self.materials.push_relief(relief));
+        look.normal_perturbation = normal_perturbation.map(|normal_perturbation| self.materials.push_relief(normal_perturbation));
         let texture = emission.map(|map| self.emission_map(path, &map)).transpose()?;
         let emission = surface.radiance.map(|radiance| Emission { texture, ..Emission::constant(radiance) });
         Ok(MtlBinding { look, emission })
@@ -131,13 +131,17 @@ impl Builder {
     }
 
     /// A normal map, which `bump` may name too: then it is one with colours.
-    fn relief_map(&mut self, path: &str, map: &ObjMap, is_normal_map: bool) -> Result<Relief> {
+    fn relief_map(&mut self, path: &str, map: &ObjMap, is_normal_map: bool) -> Result<NormalPerturbation> {
         let bitmap = self.map_texture(path, map, TextureUse::Data)?;
         let holds_normals = is_normal_map || (map.channel.is_none() && !bitmap.image.is_grey());
         let bitmap = if holds_normals { Bitmap { channel: None, ..bitmap } } else { bitmap };
         let id = self.materials.textures.push(Texture::Bitmap(bitmap));
         let textures = &self.materials.textures.textures;
-        Ok(if holds_normals { Relief::normal_map(id, 1.0, false, textures) } else { Relief::bump_map(id, map.height, textures) })
+        Ok(if holds_normals {
+            NormalPerturbation::normal_map(id, 1.0, false, textures)
+        } else {
+            NormalPerturbation::bump_map(id, map.height, textures)
+        })
     }
 }
 

@@ -9,7 +9,7 @@ use crate::color::Rgb;
 use crate::desc::{MeshDesc, MeshShadingDesc, ShapeCommon, ShapeDesc};
 use crate::error::Result;
 use crate::film::ShapeIdentity;
-use crate::geometry::{Analytic, Placed, Shape};
+use crate::geometry::{Analytic, Shape, TransformedShape};
 use crate::id::{LightGroupId, ShapeId};
 use crate::light::{AreaLight, Emission, Light};
 use crate::material::ColorInput;
@@ -101,7 +101,7 @@ impl PreparedShape {
 }
 
 impl Builder {
-    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may bring several.
+    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may contain several.
     /// Where it is not used, its files are not read.
     pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc, is_used: bool) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
@@ -254,7 +254,7 @@ impl Builder {
         let transform =
             Transform::new(space.place(&(*outer * map))).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
         let analytic = |surface: Analytic| {
-            let mut placed = Placed::new(surface, transform);
+            let mut placed = TransformedShape::new(surface, transform);
             placed.reverse_normal = reverse_normal;
             Shape::Analytic(placed)
         };
@@ -287,7 +287,13 @@ impl Builder {
         if medium.is_some() && emission.is_some() {
             return Err(self.files.error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
         }
-        let mut surface = Surface { material: look.material, relief: look.relief, medium, first_light: None, single_light: false };
+        let mut surface = Surface {
+            material: look.material,
+            normal_perturbation: look.normal_perturbation,
+            medium,
+            first_light: None,
+            single_light: false,
+        };
         if let Some(PreparedEmission { emission, group }) = emission {
             let emission = Emission { opacity: look.opacity, ..emission };
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);

@@ -125,7 +125,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         (f.analytic_shapes, "analytic shapes"),
         (f.instances, "instances"),
         (f.textures, "textures"),
-        (f.reliefs, "normal or bump maps"),
+        (f.normal_perturbations, "normal or bump maps"),
         (!scene.geometry.cutouts.is_empty(), "holes"),
         (f.delta_materials, "mirror or glass"),
         (f.media, "media"),

@@ -21,7 +21,7 @@ pub struct Files<'a> {
     /// Name of the folder beside the scene.
     folder: String,
     originals: Originals,
-    /// What stands for a name of the source in the target.
+    /// The name in the target for a name of the source.
     brought: BTreeMap<String, String>,
     /// Files in the folder beside the scene.
     count: usize,
@@ -54,7 +54,7 @@ impl<'a> Files<'a> {
         self.count
     }
 
-    /// Whether a file, or what stands for one, is there.
+    /// Whether a file, or data in place of one, exists.
     pub fn is_there(&self, name: &str) -> bool {
         self.assets.contains(name) || folder_of(self.source).join(name).is_file()
     }
@@ -212,7 +212,7 @@ impl<'a> Files<'a> {
     }
 }
 
-/// As much of a file as tells its kind, in bytes.
+/// Bytes at the start of a file that its type is detected from.
 const START: u64 = 1 << 16;
 
 /// Refuses to copy what is not what its name says: a scene of a stranger could name any file, and who gets the copy would have it.

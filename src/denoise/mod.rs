@@ -29,7 +29,7 @@ pub struct Denoiser {
 
 impl Denoiser {
     /// Opens the library: the file or folder `named`, else the one that the environment variable [`VARIABLE`] names,
-    /// else the system's, else that of Python's package `pyoidn`. Works with `threads` threads; 0 stands for all.
+    /// else the system's, else that of Python's package `pyoidn`. Works with `threads` threads; 0 means all.
     ///
     /// # Errors
     /// [`Error::Missing`](crate::Error::Missing) if there is no library that can be used: where was looked, and how to get it.

@@ -168,7 +168,7 @@ pub fn file_of_frame(name: &str, frame: i64) -> String {
     out + rest
 }
 
-/// Whether a scene's path stands for a file of each frame: it has a pattern, and no file of that very name exists.
+/// Whether a scene's path is a pattern for a file of each frame: it has a pattern, and no file of that very name exists.
 pub fn is_scene_per_frame(scene: &Path) -> bool {
     scene.to_str().is_some_and(has_frame_pattern) && !scene.exists()
 }

@@ -21,7 +21,7 @@ pub struct Status {
     pub text: String,
 }
 
-/// What a farm is told.
+/// Progress for a farm.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
     /// A frame is begun: its number in a sequence.

@@ -64,7 +64,7 @@ pub fn pixel_count(header: &Header) -> Result<usize, String> {
     }
 }
 
-/// Memory for so many channels of a part of the file `path`: copies of `value`, one for each pixel and channel.
+/// Memory for `count` channels of a part of the file `path`: copies of `value`, one for each pixel and channel.
 ///
 /// # Errors
 /// [`Error::Malformed`] if there are more than [`MAX_PIXELS`] pixels, [`Error::OutOfMemory`].

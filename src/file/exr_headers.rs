@@ -25,7 +25,7 @@ fn most_per_byte(compression: Compression) -> u64 {
     }
 }
 
-/// Checks the claims of a file of so many bytes.
+/// Checks the headers of a file against its length in bytes.
 ///
 /// # Errors
 /// If the file is too short for the pixels that a header claims.

@@ -20,7 +20,7 @@ pub struct Lock {
 
 /// Why a lock cannot be had.
 #[derive(Debug)]
-pub enum Refusal {
+pub enum LockError {
     /// Another process holds it; its number as text, if it left one.
     Held(String),
     /// The system refuses.
@@ -31,30 +31,30 @@ impl Lock {
     /// Makes a lock file and locks it. A symbolic link in its place is not followed, and what is no lock file is not touched.
     ///
     /// # Errors
-    /// [`Refusal`].
-    pub fn take(path: &Path) -> Result<Self, Refusal> {
+    /// [`LockError`].
+    pub fn take(path: &Path) -> Result<Self, LockError> {
         loop {
             let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32;
             let mut options = File::options();
             options.read(true).write(true).create(true).truncate(false).custom_flags(flags);
-            let mut file = options.open(path).map_err(Refusal::System)?;
-            let metadata = file.metadata().map_err(Refusal::System)?;
+            let mut file = options.open(path).map_err(LockError::System)?;
+            let metadata = file.metadata().map_err(LockError::System)?;
             let mut text = String::new();
             if !metadata.is_file() || metadata.nlink() > 1 || metadata.len() > 64 {
-                return Err(Refusal::System(foreign(path)));
+                return Err(LockError::System(foreign(path)));
             }
             let _ = Read::by_ref(&mut file).take(64).read_to_string(&mut text);
             if !text.is_empty() && !text.starts_with(MARK) {
-                return Err(Refusal::System(foreign(path)));
+                return Err(LockError::System(foreign(path)));
             }
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Err(Refusal::Held(text.trim().to_owned())),
+                Err(TryLockError::WouldBlock) => return Err(LockError::Held(text.trim().to_owned())),
                 // A file system without locks: better no lock than no render. NOLCK is what network file systems
                 // without a lock service report.
                 Err(TryLockError::Error(e))
                     if e.kind() == io::ErrorKind::Unsupported || e.raw_os_error() == Some(Errno::NOLCK.raw_os_error()) => {}
-                Err(TryLockError::Error(e)) => return Err(Refusal::System(e)),
+                Err(TryLockError::Error(e)) => return Err(LockError::System(e)),
             }
             // Between opening and locking, the owner may have removed the file; then it is another that has to be locked.
             let own = (metadata.dev(), metadata.ino());
@@ -93,7 +93,7 @@ mod tests {
         let path = folder.path().join(".a.lock");
         let lock = Lock::take(&path).unwrap();
         let held = Lock::take(&path).unwrap_err();
-        assert!(matches!(&held, Refusal::Held(owner) if *owner == format!("process {}", std::process::id())), "{held:?}");
+        assert!(matches!(&held, LockError::Held(owner) if *owner == format!("process {}", std::process::id())), "{held:?}");
         drop(lock);
         assert!(!path.exists());
         // Of a killed process.
@@ -103,17 +103,17 @@ mod tests {
         let precious = folder.path().join("precious");
         fs::write(&precious, "text").unwrap();
         std::os::unix::fs::symlink(&precious, &path).unwrap();
-        assert!(matches!(Lock::take(&path), Err(Refusal::System(_))));
+        assert!(matches!(Lock::take(&path), Err(LockError::System(_))));
         fs::remove_file(&path).unwrap();
         fs::hard_link(&precious, &path).unwrap();
-        assert!(matches!(Lock::take(&path), Err(Refusal::System(_))));
+        assert!(matches!(Lock::take(&path), Err(LockError::System(_))));
         fs::remove_file(&path).unwrap();
         fs::write(&path, "notes").unwrap();
         let refused = Lock::take(&path).unwrap_err();
-        assert!(matches!(&refused, Refusal::System(e) if e.to_string().contains("is no lock")), "{refused:?}");
+        assert!(matches!(&refused, LockError::System(e) if e.to_string().contains("is no lock")), "{refused:?}");
         fs::remove_file(&path).unwrap();
         rustix::fs::mkfifoat(rustix::fs::CWD, &path, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
-        assert!(matches!(Lock::take(&path), Err(Refusal::System(_))));
+        assert!(matches!(Lock::take(&path), Err(LockError::System(_))));
         assert_eq!(fs::read(&precious).unwrap(), b"text");
     }
 }

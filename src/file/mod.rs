@@ -10,7 +10,7 @@ mod lock;
 mod output;
 
 pub use input::{MARK, open, read, read_stream, read_to_string, skip_mark, without_mark};
-pub use lock::{Lock, Refusal};
+pub use lock::{Lock, LockError};
 pub use output::{append, check_creatable, resolve, write_atomically, write_synchronized};
 
 use std::fs::FileType;

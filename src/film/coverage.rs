@@ -24,7 +24,7 @@ impl CoverageCounts {
     /// Bytes of a pixel that shows one shape.
     pub(super) const PIXEL_BYTES: usize = size_of::<CoverageEntry>();
 
-    /// No samples of so many pixels.
+    /// Empty, for this number of pixels.
     pub fn new(pixels: usize) -> Self {
         Self { entries: vec![CoverageEntry::default(); pixels], pixels }
     }

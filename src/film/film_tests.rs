@@ -78,7 +78,7 @@ fn data_is_that_of_the_nearest_sample_and_albedo_is_a_mean() {
         position: Vec3::new(x, 0.0, 1.0),
         normal: n,
         albedo: Rgb::splat(albedo),
-        shown: crate::film::ShapeKey { instance: 0, shape: 0 },
+        visible_shape: crate::film::ShapeKey { instance: 0, shape: 0 },
         ..Default::default()
     };
     let mut film = Film::new(FilmShape::new([2, 1], Crop::full([2, 1]), LayerSet::FULL), 8).unwrap();
@@ -262,7 +262,7 @@ fn batches_have_the_bits_of_single_samples() {
                 batch.pixels[i] = PixelSample { radiance: color(), alpha: 1.0 };
                 batch.surfaces[i] =
                     SurfaceSample { albedo: color(), feature_albedo: color(), depth: color().r, ..SurfaceSample::default() };
-                batch.surfaces[i].shown.shape = (color().r * 3.0) as u32;
+                batch.surfaces[i].visible_shape.shape = (color().r * 3.0) as u32;
                 // The others stay black.
                 batch.light_aovs.add(i, 2 * (i % 3), color());
                 batch.light_aovs.add(i, 9, color());

@@ -180,7 +180,7 @@ impl Identities {
     }
 }
 
-/// The number of the last of so many things, counted from 1.
+/// The largest id of `count` things, counted from 1.
 fn last_of(count: usize) -> NonZeroU32 {
     NonZeroU32::new(count as u32).unwrap_or(NonZeroU32::MIN)
 }

@@ -28,7 +28,7 @@ impl Nearest {
         if self.channels == 0 {
             return;
         }
-        let depth = if surface.shown != ShapeKey::NONE { surface.depth } else { f32::INFINITY };
+        let depth = if surface.visible_shape != ShapeKey::NONE { surface.depth } else { f32::INFINITY };
         if let Some(values) = self.nearer(pixel, depth, sample) {
             layers.read(surface, values);
         }

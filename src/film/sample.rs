@@ -3,7 +3,7 @@
 use crate::color::Rgb;
 use crate::math::Vec3;
 
-/// What one sample of a pixel brings to the picture.
+/// Radiance and alpha of one sample of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelSample {
     /// Radiance, without the filter's weight.
@@ -57,7 +57,7 @@ pub struct SurfaceSample {
     /// Shading normal of that surface, world.
     pub feature_normal: Vec3,
     /// The shape; [`ShapeKey::NONE`] where there is none.
-    pub shown: ShapeKey,
+    pub visible_shape: ShapeKey,
 }
 
 impl SurfaceSample {
@@ -131,7 +131,7 @@ pub struct LightAovRows {
 }
 
 impl LightAovRows {
-    /// Black AOVs of so many samples.
+    /// Clears the AOVs of `samples` samples.
     pub fn reset(&mut self, samples: usize, request: LightAovRequest) {
         (self.samples, self.request) = (samples, request);
         self.rows.iter_mut().for_each(Vec::clear);

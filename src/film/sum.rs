@@ -80,7 +80,7 @@ impl<const N: usize> SumPlane<N> {
         Self::load(data).filter(|plane| plane.has_entries(self.high.len()))
     }
 
-    /// Whether there are so many entries.
+    /// Whether this is the number of entries.
     pub fn has_entries(&self, entries: usize) -> bool {
         self.high.len() == entries
     }

@@ -44,7 +44,7 @@ pub(super) struct InverseVarianceSums {
 }
 
 /// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own; what shared samples
-/// bring to pixels of other tiles is in the borders of the tile's cells until the picture is made.
+/// add to pixels of other tiles is in the borders of the tile's cells until the picture is made.
 ///
 /// [`Sums`] do not depend on the order of samples: whoever adds the same samples gets the same picture, in one tile or merged from several.
 #[derive(Clone, Debug)]
@@ -182,7 +182,7 @@ impl FilmTile {
             self.weights.add(entry, [f64::from(weight)]);
         }
         if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
-            coverage.add(entry, surface.shown, 1);
+            coverage.add(entry, surface.visible_shape, 1);
         }
     }
 
@@ -212,7 +212,7 @@ impl FilmTile {
         splats.add(&self.cells, first, taps, &values);
         if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
             self.cells.for_each_tap(first, taps, |entry, weight| {
-                coverage.add(entry, surface.shown, (f64::from(weight.abs()) * COVERAGE_UNITS).round() as u64);
+                coverage.add(entry, surface.visible_shape, (f64::from(weight.abs()) * COVERAGE_UNITS).round() as u64);
             });
         }
         true

@@ -113,7 +113,7 @@ impl Layout {
         self.light_aovs.count() + self.means.channels() / 3
     }
 
-    /// Whether samples bring more than colour.
+    /// Whether samples have AOVs.
     #[inline]
     pub fn beside_color(&self) -> bool {
         self.set.needs_surface() || self.light_aovs.count() > 0

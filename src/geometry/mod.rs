@@ -31,8 +31,8 @@ pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
 pub(crate) use mesh::interpolated_normal;
 pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
 pub use placed::{
-    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, Placed, PlacedNormalRows, PlacedPoint, PlacedPointRows, PlacedSampleRows,
-    RayPacket, ShapeSample,
+    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, PlacedNormalRows, PlacedPointRows, PlacedSampleRows, RayPacket, ShapeSample,
+    SurfacePoint, TransformedShape,
 };
 pub use profile::Profile;
 pub use quad::Quad;
@@ -57,7 +57,7 @@ pub enum Shape {
     /// Triangles, with positions in the space the shape is placed in.
     Mesh(Mesh),
     /// A surface given by a formula, with its transform.
-    Analytic(Placed),
+    Analytic(TransformedShape),
 }
 
 impl Shape {

@@ -61,7 +61,7 @@ impl Geometry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Analytic, Instance, MeshStep, Object, Placed, Sphere};
+    use crate::geometry::{Analytic, Instance, MeshStep, Object, Sphere, TransformedShape};
     use crate::id::{InstanceId, ObjectId, ShapeId};
     use crate::math::{DAffine3, Motion, Ray, Transform, Vec3};
 
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn points_turn_and_shift_with_their_instance() {
-        let sphere = Shape::Analytic(Placed::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), Transform::IDENTITY));
+        let sphere = Shape::Analytic(TransformedShape::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), Transform::IDENTITY));
         let later = DAffine3::from_translation(DVec3::new(2.0, 0.0, 0.0)) * DAffine3::from_rotation_z(1.0);
         let geometry = instanced(sphere, Motion::keyframed(&[(0.0, DAffine3::IDENTITY), (1.0, later)]).unwrap());
         // Halfway, the sphere stands at x = 1 and has turned by 0.5.

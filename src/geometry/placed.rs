@@ -4,7 +4,7 @@
 //! passes the clips; `surface` gives the reprojected point, unit normal, derivatives and uv there; `bounds` and `area` are those of the
 //! clipped part; `sample` covers exactly that part and `pdf_area` is its density.
 //!
-//! Errors of an intersection are those of `f64` relative to the coordinates of the ray's origin in the shape's space. [`Placed`] therefore
+//! Errors of an intersection are those of `f64` relative to the coordinates of the ray's origin in the shape's space. [`TransformedShape`] therefore
 //! moves the origin along the ray to the shape before it asks, so that they are relative to the shape's size.
 
 mod points;
@@ -146,7 +146,7 @@ impl Analytic {
 
 /// An analytic surface with its transform.
 #[derive(Clone, Debug)]
-pub struct Placed {
+pub struct TransformedShape {
     /// The surface in its own space.
     pub shape: Analytic,
     /// Where it stands.
@@ -169,7 +169,7 @@ struct CenteredRay {
     shift: f64,
 }
 
-impl Placed {
+impl TransformedShape {
     /// A surface with its transform.
     pub fn new(shape: Analytic, transform: Transform) -> Self {
         let bounds = shape.bounds();
@@ -330,7 +330,7 @@ impl Placed {
 
     /// A point chosen on the surface, placed; `u` in the unit square.
     #[inline]
-    pub fn sample_area(&self, u: [f32; 2]) -> PlacedPoint {
+    pub fn sample_area(&self, u: [f32; 2]) -> SurfacePoint {
         let sample = self.shape.sample([f64::from(u[0]), f64::from(u[1])]);
         self.place(sample.p, sample.n, sample.pdf_area)
     }
@@ -351,7 +351,7 @@ impl Placed {
         Vec2::new(s as f32, t as f32)
     }
 
-    /// The density (with respect to placed area) with which [`Placed::sample_area`] finds the point where `ray` hits; `None` on a miss.
+    /// The density (with respect to placed area) with which [`TransformedShape::sample_area`] finds the point where `ray` hits; `None` on a miss.
     pub fn pdf_area(&self, ray: &Ray) -> Option<f64> {
         let centered = self.centered_ray(ray);
         let hit = self.shape.intersect(&centered.ray)?;
@@ -359,7 +359,7 @@ impl Placed {
         Some(self.place(surface.p, surface.n, surface.pdf_area).pdf_area)
     }
 
-    /// [`Placed::pdf_area`] at a point known to be on the surface, from its unit normal (of either side) alone; `None` for surfaces whose
+    /// [`TransformedShape::pdf_area`] at a point known to be on the surface, from its unit normal (of either side) alone; `None` for surfaces whose
     /// sampling is not uniform by area in their own space.
     #[inline]
     pub fn pdf_area_from_normal(&self, n: Vec3) -> Option<f64> {
@@ -372,12 +372,12 @@ impl Placed {
     }
 
     #[inline(always)]
-    fn place(&self, p: DVec3, n: DVec3, pdf_area: f64) -> PlacedPoint {
+    fn place(&self, p: DVec3, n: DVec3, pdf_area: f64) -> SurfacePoint {
         let normal = self.transform.normal(n);
         let length = normal.length();
         // The inverse transpose keeps the side even where the transform reflects.
         let sign = if self.reverse_normal { -1.0 } else { 1.0 };
-        PlacedPoint {
+        SurfacePoint {
             p: self.transform.point(p),
             n: (normal * (sign / length)).as_vec3(),
             pdf_area: pdf_area / (self.transform.determinant().abs() * length),
@@ -415,12 +415,12 @@ impl RayPacket {
 pub struct PacketHits {
     /// Distances; negative on a miss.
     pub t: [f32; PACKET_SIZE],
-    /// 1 where [`Placed::intersect`] has to be called, else 0.
+    /// 1 where [`TransformedShape::intersect`] has to be called, else 0.
     pub is_undecided: [u32; PACKET_SIZE],
 }
 
 #[inline(always)]
-fn intersect_packet(placed: &Placed, rays: &RayPacket) -> PacketHits {
+fn intersect_packet(placed: &TransformedShape, rays: &RayPacket) -> PacketHits {
     let mut hits = PacketHits { t: [-1.0; PACKET_SIZE], is_undecided: [1; PACKET_SIZE] };
     // A macro: closures are not always inlined.
     macro_rules! intersect {
@@ -463,7 +463,7 @@ fn circle_bounds(map: &DAffine3, center: DVec3, radii: [DVec3; 2]) -> Bounds {
 
 /// A point of a placed shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlacedPoint {
+pub struct SurfacePoint {
     /// The point.
     pub p: DVec3,
     /// Unit normal, towards the front.

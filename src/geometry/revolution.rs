@@ -6,7 +6,7 @@
 //! `uv = (phi / phi_max, v)` with `v = (segment + s) / segments` of the parameter `s` within the profile's segment, or
 //! by height or arc length.
 //!
-//! Inside this module everything turns about z: `(x, y, z)` stands for the object's `(z, x, y)`, and heights are measured from the middle
+//! Inside this module everything turns about z: `(x, y, z)` is the object's `(z, x, y)`, and heights are measured from the middle
 //! of the profile.
 
 mod along;

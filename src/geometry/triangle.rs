@@ -95,7 +95,7 @@ impl TrianglePoints {
     }
 
     /// The inverse sine of the angle between the two shortest edges, at least 1: a normal computed from them in `f32`
-    /// is off by so many units of roundoff.
+    /// is off by this many units of roundoff.
     pub fn flatness(&self) -> f64 {
         let [a, b, c] = [self.a, self.b, self.c].map(Vec3::as_dvec3);
         let [ab, bc, ca] = [b - a, c - b, a - c].map(DVec3::length);

@@ -11,13 +11,13 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-pub use quadtree::{Directions, GuideSample, Records};
+pub use quadtree::{DTree, DTreeBuilder, GuideSample};
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
 use crate::math::float::ONE_MINUS_EPSILON;
-use crate::math::random::mix;
+use crate::math::random::hash64;
 use crate::math::{Aabb, Vec3};
 
 /// Records of a leaf beyond which it is divided, after one sample per pixel; after `n` it is `sqrt(n)` times as many.
@@ -67,15 +67,15 @@ impl Node {
 /// What has been learned of a part of space. Apart from what is being learned: a thread that writes one would slow down
 /// those that read the other.
 #[derive(Clone, Debug)]
-struct Learned {
-    directions: Option<Arc<Directions>>,
+struct Region {
+    directions: Option<Arc<DTree>>,
     surface_share: f32,
 }
 
 /// What is being learned of a part of space.
 #[derive(Debug, Default)]
 struct Leaf {
-    records: Records,
+    records: DTreeBuilder,
     count: AtomicU64,
     /// How much better each of [`OTHER_SHARES`] is than half, as the mean logarithm of the density weighted by light.
     gains: [AtomicI64; 4],
@@ -93,7 +93,7 @@ impl Leaf {
 #[derive(Clone, Copy, Debug)]
 pub struct GuideRegion<'a> {
     /// Where it comes from.
-    pub directions: &'a Directions,
+    pub directions: &'a DTree,
     /// How many directions the surface had better choose.
     pub surface_share: f32,
 }
@@ -121,7 +121,7 @@ pub struct Guide {
     inverse_size: f32,
     /// The first six are roots.
     nodes: Vec<Node>,
-    learned: Vec<Learned>,
+    learned: Vec<Region>,
     leaves: Vec<Leaf>,
     /// From light to whole numbers.
     scale: f32,
@@ -136,7 +136,7 @@ impl Guide {
             corner: Vec3::ZERO,
             inverse_size: 0.0,
             nodes: (0..6).map(|leaf| Node(leaf | IS_LEAF)).collect(),
-            learned: vec![Learned { directions: None, surface_share: SURFACE_SHARE }; 6],
+            learned: vec![Region { directions: None, surface_share: SURFACE_SHARE }; 6],
             leaves: (0..6).map(|_| Leaf::default()).collect(),
             scale: scale_of(typical),
             learns: true,
@@ -201,8 +201,8 @@ impl Guide {
 
         // Random numbers of the record itself.
         let bits = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
-        let first = mix(bits(at.x, direction.x) ^ mix(bits(at.y, direction.y) ^ mix(bits(at.z, light))));
-        let second = mix(first);
+        let first = hash64(bits(at.x, direction.x) ^ hash64(bits(at.y, direction.y) ^ hash64(bits(at.z, light))));
+        let second = hash64(first);
         let unit = |bits: u64| (bits & 0xf_ffff) as f32 * (1.0 / 1_048_576.0);
         // Moved by up to half a leaf: what leaves learn does not jump at their borders then.
         let jitter = |k: u32| 0.5f32.powi(((depth + 2 - k) / 3) as i32) * (unit(first >> (20 * k)) - 0.5);
@@ -212,7 +212,7 @@ impl Guide {
         self.leaves[leaf].records.add(direction, [unit(second), unit(second >> 32)], amount as u64);
     }
 
-    /// What is known after so many samples per pixel, with all that was recorded.
+    /// The guide after training with this many samples per pixel.
     #[must_use]
     pub fn refined(&self, samples: u32) -> Self {
         let most_records = (RECORDS_TO_DIVIDE * f64::from(samples).sqrt()) as u64;
@@ -232,7 +232,7 @@ impl Guide {
             let (count, surface_share) = (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
             for &part in &parts {
                 next.nodes[part] = Node(next.leaves.len() as u32 | IS_LEAF);
-                next.learned.push(Learned { directions: directions.clone(), surface_share });
+                next.learned.push(Region { directions: directions.clone(), surface_share });
                 next.leaves.push(Leaf {
                     records: records.copied(),
                     count: AtomicU64::new(count),
@@ -244,7 +244,7 @@ impl Guide {
         next
     }
 
-    /// Divides a leaf with so many records until its parts have few enough; gives the nodes of the parts.
+    /// Divides a leaf with `count` records until its parts have few enough; returns the nodes of the parts.
     fn divide(&mut self, index: usize, depth: u32, count: u64, most: u64, free: &mut usize) -> Vec<usize> {
         if count <= most || depth >= MAX_DEPTH || *free == 0 {
             return vec![index];

@@ -16,7 +16,7 @@ const RECORDS_TO_DIVIDE: f64 = 16.0;
 /// Divisions in a row at most: a cell is then about 0.0005 radians wide.
 const MAX_DEPTH: u32 = 12;
 
-/// What stands for "not divided": no node has the root as child.
+/// Marks a leaf: no node has the root as child.
 const LEAF: u32 = 0;
 
 /// A direction with the density per solid angle with which it was chosen.
@@ -95,11 +95,11 @@ fn is_forest(children: impl ExactSizeIterator<Item = [u32; 4]>) -> bool {
 
 /// A distribution of directions, constant on each cell of a quadtree over the square.
 #[derive(Clone, Debug)]
-pub struct Directions {
+pub struct DTree {
     nodes: Vec<Node>,
 }
 
-impl Directions {
+impl DTree {
     /// A direction; `u` in `[0, 1)²`.
     #[inline]
     pub fn sample(&self, [mut u, mut v]: [f32; 2]) -> GuideSample {
@@ -204,18 +204,18 @@ struct Held {
 /// Light by direction as it is recorded. Sums are whole numbers, so they do not depend on the order in which threads
 /// add.
 #[derive(Debug)]
-pub struct Records {
+pub struct DTreeBuilder {
     nodes: Vec<RecordNode>,
 }
 
-impl Default for Records {
+impl Default for DTreeBuilder {
     /// The whole sphere in quarters.
     fn default() -> Self {
         Self { nodes: vec![RecordNode::default()] }
     }
 }
 
-impl Records {
+impl DTreeBuilder {
     /// Adds light from a direction, moved at random (`jitter` in `[0, 1)²`) by up to half a cell, for a cell tells of
     /// its neighbours too.
     #[inline]
@@ -265,7 +265,7 @@ impl Records {
     }
 
     /// The distribution of what was recorded; `None` of nothing.
-    pub fn directions(&self) -> Option<Directions> {
+    pub fn directions(&self) -> Option<DTree> {
         let held = self.held();
         let light = |held: &[Held; 4]| held.map(|h| h.light);
         if light(&held[0]).iter().sum::<f64>() == 0.0 {
@@ -273,7 +273,7 @@ impl Records {
         }
         // What holds no light is never entered, so its shares do not matter.
         let nodes = self.nodes.iter().zip(&held).map(|(node, held)| Node::new(light(held), node.children)).collect();
-        Some(Directions { nodes })
+        Some(DTree { nodes })
     }
 
     /// The same records, for each of so many parts of space, in a tree of at most so many nodes that is divided where

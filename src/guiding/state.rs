@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
-use super::{Directions, Guide, Leaf, Learned, MAX_LEAVES, MAX_NODES_OF_LEAF, Node, Records};
+use super::{DTree, DTreeBuilder, Guide, Leaf, MAX_LEAVES, MAX_NODES_OF_LEAF, Node, Region};
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::math::Aabb;
 
@@ -34,7 +34,7 @@ impl Guide {
     pub fn write(&self, out: &mut ByteWriter) {
         out.integers(&self.nodes.iter().map(|node| node.0).collect::<Vec<_>>());
         out.integers(&[self.scale.to_bits()]);
-        let mut last: Option<&Arc<Directions>> = None;
+        let mut last: Option<&Arc<DTree>> = None;
         for (learned, leaf) in self.learned.iter().zip(&self.leaves) {
             let own = learned.directions.as_ref();
             let is_shared = own.zip(last).is_some_and(|(own, last)| Arc::ptr_eq(own, last));
@@ -61,7 +61,7 @@ impl Guide {
         for _ in 0..leaves {
             let learned = read_learned(data, guide.learned.last())?;
             guide.learned.push(learned);
-            let records = Records::read(data, MAX_NODES_OF_LEAF)?;
+            let records = DTreeBuilder::read(data, MAX_NODES_OF_LEAF)?;
             let count = AtomicU64::new(data.long()?);
             let gains = [data.long()?, data.long()?, data.long()?, data.long()?].map(|gain| AtomicI64::new(gain as i64));
             guide.leaves.push(Leaf { records, count, gains });
@@ -70,16 +70,16 @@ impl Guide {
     }
 }
 
-fn read_learned(data: &mut ByteReader, last: Option<&Learned>) -> Option<Learned> {
+fn read_learned(data: &mut ByteReader, last: Option<&Region>) -> Option<Region> {
     let [place, share] = data.integers()?.try_into().ok()?;
     let directions = match place {
         directions::NONE => None,
         directions::SHARED => Some(last?.directions.clone()?),
-        directions::OWN => Some(Arc::new(Directions::read(data, MAX_NODES_OF_LEAF)?)),
+        directions::OWN => Some(Arc::new(DTree::read(data, MAX_NODES_OF_LEAF)?)),
         _ => return None,
     };
     let surface_share = Some(f32::from_bits(share)).filter(|share| *share > 0.0 && *share < 1.0)?;
-    Some(Learned { directions, surface_share })
+    Some(Region { directions, surface_share })
 }
 
 /// The leaves of the trees over space; `None` if these are not six binary trees with each leaf once.

@@ -2,7 +2,7 @@ use super::*;
 
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::math::Rng;
-use crate::math::random::mix;
+use crate::math::random::hash64;
 use crate::sampling::statistics::compare_directions;
 
 fn unit_box() -> Aabb {
@@ -33,7 +33,7 @@ fn taught(rounds: u32, count: usize, order: u64) -> Guide {
                 record(random_place(&mut rng), direction, lobes(direction))
             })
             .collect();
-        records.sort_by_key(|r| mix(u64::from(r.p.x.to_bits()) ^ order));
+        records.sort_by_key(|r| hash64(u64::from(r.p.x.to_bits()) ^ order));
         for record in &records {
             guide.record(record);
         }
@@ -65,7 +65,7 @@ fn samples_follow_the_density_which_integrates_to_one() {
 }
 
 /// Whether the density changes within rounding of a direction.
-fn is_at_border(directions: &Directions, w: Vec3) -> bool {
+fn is_at_border(directions: &DTree, w: Vec3) -> bool {
     let pdf = directions.pdf(w);
     let mut rng = Rng::new(1);
     (0..64).any(|_| (directions.pdf((w + 1e-6 * rng.direction().as_vec3()).normalize()) / pdf - 1.0).abs() > 1e-3)

@@ -1,4 +1,4 @@
-//! Ray cones: what a path's samples stand for where they look up a texture (Akenine-Möller et al., "Improved Shader and
+//! Ray cones: footprints of paths for texture filtering (Akenine-Möller et al., "Improved Shader and
 //! Texture Level of Detail Using Ray Cones").
 //!
 //! A camera ray's cone is as wide as its pixel divided by the root of the samples per pixel: the samples share the
@@ -14,7 +14,7 @@ use crate::math::{Ray, RayCone, Vec3};
 use crate::texture::Footprint;
 
 impl World<'_> {
-    /// What `ray`, whose hit led to `at`, stands for in uv.
+    /// The footprint in uv of `ray`, whose hit led to `at`.
     #[inline(never)]
     pub(super) fn footprint(&self, cone: Option<&RayCone>, ray: &Ray, hit: Option<&Hit>, at: &SurfaceInteraction) -> Footprint<'_> {
         // Behind a rounding artefact another surface is met than the hit says.
@@ -23,7 +23,7 @@ impl World<'_> {
         self.covered(cone, ray.direction, at, self.scene.geometry.uv_density(ray, hit))
     }
 
-    /// What a ray in `direction` stands for in uv at a point of this [density of uv](crate::geometry::Geometry::uv_density).
+    /// The footprint in uv of a ray in `direction` at a point of this [density of uv](crate::geometry::Geometry::uv_density).
     #[inline]
     pub(super) fn covered(&self, cone: &RayCone, direction: Vec3, at: &SurfaceInteraction, uv_density: f32) -> Footprint<'_> {
         self.scene.with_attributes(at, Footprint::of_cone(at.uv, cone.width_at(at.t), direction.dot(at.n_g), uv_density))

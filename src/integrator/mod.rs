@@ -1,4 +1,4 @@
-//! Light transport: from camera rays to what each sample of a pixel brings.
+//! Light transport: from camera rays to the radiance and AOVs of samples.
 //!
 //! Integrators take a batch of camera samples (one sample of every pixel of a tile) and work through it stage by stage: trace all rays,
 //! shade all hits, trace all shadow rays. Accelerators can then trace rays side by side that belong together, and each stage's code and

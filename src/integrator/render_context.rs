@@ -21,7 +21,7 @@ pub struct RenderContext<'a> {
 }
 
 impl<'a> RenderContext<'a> {
-    /// A picture of `size` pixels with `spp` samples each: textures are looked up over what a sample stands for.
+    /// A picture of `size` pixels with `spp` samples each: texture lookups are filtered over the footprint of a sample.
     pub fn new(scene: &'a Scene, size: [u32; 2], spp: u32) -> Self {
         let cone_share = scene.features.filtered_textures.then(|| 1.0 / (spp.max(1) as f32).sqrt());
         Self { scene, size, cone_share, shows_background: true, cancel: None }

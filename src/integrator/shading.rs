@@ -61,7 +61,7 @@ pub fn terminator_factor(cos_geometric: f32, cos_shading: f32, cos_normals: f32)
 const MIN_TERMINATOR_OFFSET: f64 = 256.0;
 
 /// Where rays start that see more than the facet `at` does: above it on the side of the shading normal `n`, on the
-/// smooth surface that the facet stands for, so that the shadow of a coarse mesh has no edges but its own. The second
+/// smooth surface that the facet approximates, so that the shadow of a coarse mesh has no edges but its own. The second
 /// is a ray from the facet to there: if anything occludes it, the start is not to be used, so that rays get nowhere
 /// that rays from the facet cannot get in one step or two. `None` if that surface is not above the facet, and in scenes
 /// with media, for the side of the facet determines the medium.

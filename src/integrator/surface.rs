@@ -30,7 +30,7 @@ pub(super) fn place_sample(pass: &PassContext, needs: SurfaceAovs, at: &SurfaceI
         sample.normal = at.n_s;
         sample.geometric_normal = at.n_g;
         sample.position = world.scene.camera.render_space().world_point(at.p).as_vec3();
-        sample.shown = ShapeKey { instance: at.instance.0, shape: at.shape.0 };
+        sample.visible_shape = ShapeKey { instance: at.instance.0, shape: at.shape.0 };
     }
     if needs.uv {
         sample.uv = world.uv(at, hit).to_array();

@@ -51,7 +51,7 @@ pub(super) struct Vertex<'a> {
 }
 
 impl<'a> Vertex<'a> {
-    /// The vertex at `at`, where `ray` arrives, which stands for `footprint`.
+    /// The vertex at `at`, where `ray` arrives with `footprint`.
     #[inline(always)]
     pub fn new(world: &'a World, at: &'a SurfaceInteraction, ray: &Ray, footprint: impl FnOnce() -> Footprint<'a>) -> Self {
         let back = -ray.direction;
@@ -60,8 +60,8 @@ impl<'a> Vertex<'a> {
         let frame = if world.scene.features.anisotropic { Frame::from_normal_and_tangent(n_s, at.dp_du) } else { Frame::from_normal(n_s) };
         let bsdf = world.scene.bsdf(at, ray.direction, footprint);
         // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
-        let has_relief = world.scene.features.reliefs && world.scene.relief(at, ray.direction).is_some();
-        let cos_normals = (has_relief && n_s != at.n_g).then(|| n_s.dot(at.n_g));
+        let is_perturbed = world.scene.features.normal_perturbations && world.scene.normal_perturbation(at, ray.direction).is_some();
+        let cos_normals = (is_perturbed && n_s != at.n_g).then(|| n_s.dot(at.n_g));
         Self { at, bsdf, frame, wo: frame.to_local(back), cos_geometric, cos_normals }
     }
 
@@ -121,7 +121,7 @@ impl<'a> Vertex<'a> {
     #[inline]
     fn terminator_point(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
         let sides = HemisphereTest::new([self.wo.z, direction.dot(self.frame.z)], [self.cos_geometric, direction.dot(self.at.n_g)]);
-        // Under a relief, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
+        // Under a normal map, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
         if !sides.is_below_facet() || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.flags().transmits() {
             return None;
         }

@@ -157,7 +157,7 @@ impl Segment {
         Self { ray, cone, hit, end: world.resolve(&ray, hit), media, transmittance: arrival.transmittance }
     }
 
-    /// What the ray stands for on the surface at its end.
+    /// The footprint of the ray on the surface at its end.
     fn footprint<'a>(&self, world: &'a World, at: &SurfaceInteraction) -> Footprint<'a> {
         world.footprint(self.cone.as_ref(), &self.ray, self.hit.as_ref(), at)
     }

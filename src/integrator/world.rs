@@ -12,7 +12,7 @@ use crate::math::vectorize::vectorize;
 use crate::math::{Aabb, Ray, RayRows, Vec3};
 use crate::scene::{Scene, Surface};
 
-/// How often a ray looks again behind hits that turn out to be rounding artefacts. Stacks of so many coplanar surfaces do not occur.
+/// Most hits of a ray that are skipped as rounding artefacts. Stacks of as many coplanar surfaces do not occur.
 const MAX_RETRACES: u32 = 64;
 
 /// Emitters in a row that a ray passes at most: it must not go on for ever.
@@ -68,7 +68,7 @@ impl<'a> World<'a> {
         self.parametrization[shape.index()] != Parametrization::Unused
     }
 
-    /// Whether a shape is analytic and [`Placed::resolve_rows`](crate::geometry::Placed::resolve_rows) finds all that
+    /// Whether a shape is analytic and [`TransformedShape::resolve_rows`](crate::geometry::TransformedShape::resolve_rows) finds all that
     /// is needed of its hits.
     #[inline]
     pub(super) fn resolves_in_rows(&self, shape: ShapeId) -> bool {
@@ -96,8 +96,8 @@ impl<'a> World<'a> {
         let mut at = self.scene.geometry.interaction_with(self.detail(hit.shape), ray, &hit);
         if at.is_none() {
             at = self.retrace(ray, hit);
-        } else if self.scene.features.reliefs {
-            at = at.map(|at| self.with_relief(ray, &hit, at));
+        } else if self.scene.features.normal_perturbations {
+            at = at.map(|at| self.with_normal_perturbation(ray, &hit, at));
         }
         at
     }
@@ -116,13 +116,13 @@ impl<'a> World<'a> {
         (hit, MAX_EMITTERS)
     }
 
-    /// With the shading normal that the surface's relief gives, if it has one.
+    /// With the shading normal of the surface's normal or bump map, if it has one.
     #[inline(never)]
-    fn with_relief(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
+    fn with_normal_perturbation(&self, ray: &Ray, hit: &Hit, at: SurfaceInteraction) -> SurfaceInteraction {
         let scene = self.scene;
-        let Some(id) = scene.relief(&at, ray.direction) else { return at };
+        let Some(id) = scene.normal_perturbation(&at, ray.direction) else { return at };
         let dp_dv = scene.geometry.dp_dv(ray, hit);
-        SurfaceInteraction { n_s: scene.reliefs[id.index()].normal(&scene.geometry, &scene.textures, &at, dp_dv), ..at }
+        SurfaceInteraction { n_s: scene.normal_perturbations[id.index()].normal(&scene.geometry, &scene.textures, &at, dp_dv), ..at }
     }
 
     #[cold]
@@ -132,7 +132,7 @@ impl<'a> World<'a> {
             ray.t_min = step_past(hit.t);
             hit = self.accel.intersect(&ray)?;
             if let Some(at) = self.scene.geometry.interaction_with(self.detail(hit.shape), &ray, &hit) {
-                return Some(self.with_relief(&ray, &hit, at));
+                return Some(self.with_normal_perturbation(&ray, &hit, at));
             }
         }
         None
@@ -198,8 +198,8 @@ fn parametrization(scene: &Scene) -> Vec<Parametrization> {
             Light::Area(light) => light.emission.texture.is_none() && light.emission.opacity.is_none(),
             _ => false,
         });
-        let has_relief = surface.relief.is_some() || !scene.part_reliefs.is_empty();
-        if has_relief || has_part(scene, surface.material, |material| material.flags().is_anisotropic()) {
+        let is_perturbed = surface.normal_perturbation.is_some() || !scene.part_normal_perturbations.is_empty();
+        if is_perturbed || has_part(scene, surface.material, |material| material.flags().is_anisotropic()) {
             Parametrization::Full
         } else if emits_evenly && !has_part(scene, surface.material, Material::is_textured) {
             Parametrization::Unused

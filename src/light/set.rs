@@ -54,7 +54,7 @@ struct LightDistribution {
     tree_share: f32,
 }
 
-/// From so many lights on that are not at infinity, a tree chooses. Where time is equal, it halves the error of 16
+/// At least this many lights that are not at infinity are sampled by a tree. Where time is equal, it halves the error of 16
 /// lights, and gains nothing on 3 or 4.
 const TREE_FROM: usize = 6;
 

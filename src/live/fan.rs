@@ -3,7 +3,7 @@
 use crate::film::Image;
 use crate::render::Progress;
 
-/// Tells every listener what it is told.
+/// Forwards every event to all listeners.
 pub struct Fan<'a> {
     listeners: Vec<&'a dyn Progress>,
 }

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Pictures take no more than one part in so many of the render's time.
+/// Pictures take at most one part in this many of the render's time.
 const SHARE: u32 = 20;
 
 /// Measures what pictures cost, from the question to the copy.

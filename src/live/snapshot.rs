@@ -14,7 +14,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// A copy of a picture of so many samples per pixel.
+    /// A copy of a picture with its samples per pixel.
     pub fn new(image: &Image, spp: u32) -> Self {
         // Layers that only files have are here without values.
         let layers: Vec<Layer> = image.layers.iter().filter(|layer| !layer.data.is_empty()).cloned().collect();

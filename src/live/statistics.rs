@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-/// Counts what a render tells of its progress.
+/// Statistics of a render's progress.
 #[derive(Debug)]
 pub struct Statistics {
     time_limit: Option<Duration>,
@@ -58,14 +58,14 @@ impl Statistics {
         self.plan.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The render starts: so many samples per pixel at most, of so many pixels.
+    /// The render starts: samples per pixel at most, and number of pixels.
     pub fn start(&self, samples_per_pixel: u32, pixels: u64) {
         let mut plan = self.plan_mut();
         (plan.start, plan.end, plan.pixels) = (Instant::now(), None, pixels);
         plan.total = u64::from(samples_per_pixel) * pixels;
     }
 
-    /// The plan is another: so many samples in all, since the picture's error is `error` and is to be `target`.
+    /// The number of samples in all changed: the picture's error is `error`, and its target `target`.
     pub fn plan(&self, samples: u64, error: f64, target: f64) {
         let mut plan = self.plan_mut();
         (plan.total, plan.errors) = (samples, Some([error, target]));

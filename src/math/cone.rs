@@ -1,6 +1,6 @@
 //! Ray cones.
 
-/// A cone around a ray: the width of what the ray stands for.
+/// A cone around a ray: the width of the beam that the ray represents.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RayCone {
     /// Width at the ray's origin, in world units.

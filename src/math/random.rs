@@ -6,7 +6,7 @@ use super::{DMat3, DVec3};
 
 /// A bijective hash of 64 bits: what [SplitMix64](Rng) gives first for this seed.
 #[inline(always)]
-pub fn mix(n: u64) -> u64 {
+pub fn hash64(n: u64) -> u64 {
     let n = n.wrapping_add(STEP);
     let n = (n ^ (n >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let n = (n ^ (n >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -37,7 +37,7 @@ impl Rng {
 
     /// 64 random bits.
     pub fn bits(&mut self) -> u64 {
-        let bits = mix(self.0);
+        let bits = hash64(self.0);
         self.0 = self.0.wrapping_add(STEP);
         bits
     }

@@ -63,7 +63,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check_creatable(path)
 }
 
-/// What a file tells of the rendering.
+/// Metadata of the render in a file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RenderInfo {
     /// Samples per pixel.

@@ -8,7 +8,7 @@ mod exr_overrides;
 mod pixel_order;
 mod planner;
 mod progress;
-mod recipe;
+mod provenance;
 mod settings;
 mod state;
 mod tile_renderer;
@@ -16,7 +16,7 @@ mod tile_renderer;
 pub use driver::RenderSession;
 pub use exr_overrides::ExrOverrides;
 pub use progress::{Progress, Silent};
-pub use recipe::{Frame, Recipe};
+pub use provenance::{Frame, RenderProvenance};
 pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings, threads};
 pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 
@@ -39,7 +39,7 @@ pub const TILE_SIZE: u32 = 32;
 /// Camera rays of a block of this many pixels each way are traced side by side.
 const BLOCK_SIZE: u32 = 4;
 
-/// Textures are as sharp as so many samples per pixel can show.
+/// Textures are filtered for at most this many samples per pixel.
 const FINEST_SPP: u32 = 1024;
 
 /// What a render did.
@@ -127,7 +127,7 @@ pub fn render(
     Ok(RenderResult { image: state.picture(settings), stats })
 }
 
-/// What a replayed sample brings.
+/// The values of a replayed sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Replayed {
     /// For the picture.
@@ -136,7 +136,7 @@ pub struct Replayed {
     pub surface: SurfaceSample,
 }
 
-/// What one sample of one pixel brings, before the filter's weight: exactly what it brought to the picture.
+/// The values of one sample of one pixel, before the filter's weight: exactly those that the picture has.
 ///
 /// # Errors
 /// If the pixel lies outside the film.

@@ -1,15 +1,15 @@
-//! How a render tells what it is doing.
+//! Progress of a render.
 
 use crate::film::Image;
 
 /// Listens to a render. Every method may be called from any thread; all do nothing by default.
 pub trait Progress: Sync {
-    /// The render starts: so many samples per pixel at most, of so many pixels.
+    /// The render starts: samples per pixel at most, and number of pixels.
     fn start(&self, samples_per_pixel: u32, pixels: u64) {
         let _ = (samples_per_pixel, pixels);
     }
 
-    /// The plan is another: so many samples in all, since the picture's error is `error` and is to be `target`.
+    /// The number of samples in all changed: the picture's error is `error`, and its target `target`.
     fn plan(&self, samples: u64, error: f64, target: f64) {
         let _ = (samples, error, target);
     }
@@ -29,7 +29,7 @@ pub trait Progress: Sync {
         false
     }
 
-    /// The picture so far, of so many samples per pixel (their mean, rounded down).
+    /// The picture so far, with its samples per pixel (their mean, rounded down).
     fn picture(&self, image: &Image, samples_per_pixel: u32) {
         let _ = (image, samples_per_pixel);
     }

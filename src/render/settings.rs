@@ -26,7 +26,7 @@ const MAX_THREADS: usize = 4096;
 
 /// How a scene is rendered.
 ///
-/// Serialized, these are the settings that the picture depends on: EXR files keep them for [`Recipe`](super::Recipe),
+/// Serialized, these are the settings that the picture depends on: EXR files keep them for [`RenderProvenance`](super::Recipe),
 /// and a checkpoint or shard belongs to another picture if any differs. Only what can never change a pixel is skipped.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -65,7 +65,7 @@ pub struct Settings {
     /// The files to write.
     #[serde(skip)]
     pub outputs: Vec<OutputDesc>,
-    /// Every layer that an output asks for.
+    /// Every layer of an output.
     pub layers: LayerSet,
 }
 
@@ -82,7 +82,7 @@ pub struct Overrides {
     pub crop: Option<[u32; 4]>,
     /// `--overscan`, in pixels.
     pub overscan: Option<u32>,
-    /// `--threads`; 0 stands for all.
+    /// `--threads`; 0 means all.
     pub threads: Option<usize>,
     /// `--seed`.
     pub seed: Option<u64>,
@@ -100,7 +100,7 @@ pub struct Overrides {
     pub max_depth: Option<u32>,
     /// `--strategy`.
     pub strategy: Option<StrategyDesc>,
-    /// `--clamp`; infinity stands for no limit.
+    /// `--clamp`; infinity means no limit.
     pub clamp: Option<f32>,
     /// `--regularize`; 0 means none.
     pub regularize: Option<f32>,

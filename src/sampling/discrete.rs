@@ -82,7 +82,7 @@ impl AliasTable {
         if self.bins.len() == 1 {
             return DiscreteSample { index: 0, u };
         }
-        // `u` stands for the 2^-24 wide interval that begins with it; the middle keeps the rounding of the bins' limits free of bias.
+        // `u` represents the 2^-24 wide interval that begins with it; the middle keeps the rounding of the bins' limits free of bias.
         let x = (f64::from(u) + 0.5 / f64::from(1 << 24)) * self.bins.len() as f64;
         let i = (x as usize).min(self.bins.len() - 1);
         let bin = self.bins[i];

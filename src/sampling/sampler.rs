@@ -11,7 +11,7 @@ mod batch;
 use serde::{Deserialize, Serialize};
 
 use crate::desc::SamplerKindDesc;
-use crate::math::random::mix;
+use crate::math::random::hash64;
 
 pub use batch::{SampleIdRows, SampleRows};
 
@@ -50,14 +50,14 @@ impl Sampler {
     /// A sampler of the given kind.
     pub fn new(kind: SamplerKind, seed: u64) -> Self {
         // Mixed once, so that neighbouring seeds do not meet in neighbouring pixels.
-        Self { kind, seed: mix(seed) }
+        Self { kind, seed: hash64(seed) }
     }
 
     /// The seed of a pixel.
     #[inline]
     pub fn pixel(&self, x: u32, y: u32) -> PixelSeed {
         let pixel = u64::from(y) << 32 | u64::from(x);
-        PixelSeed((mix(self.seed ^ pixel) >> 32) as u32)
+        PixelSeed((hash64(self.seed ^ pixel) >> 32) as u32)
     }
 
     /// Four numbers in `[0, 1)`, multiples of `2^-24`: dimensions `4 set .. 4 set + 4` of one sample of a pixel.
@@ -81,7 +81,7 @@ impl SobolSeeds {
     /// The first seed is mixed well; one more round for each of the others will do.
     #[inline(always)]
     fn new(pixel: PixelSeed, set: u32) -> Self {
-        let first = mix(u64::from(pixel.0) << 32 | u64::from(set));
+        let first = hash64(u64::from(pixel.0) << 32 | u64::from(set));
         let folded = first ^ (first >> 32);
         let (second, third) = (folded.wrapping_mul(0xbf58_476d_1ce4_e5b9), folded.wrapping_mul(0x94d0_49bb_1331_11eb));
         let second = second ^ (second >> 29);
@@ -118,7 +118,7 @@ fn owen_scramble(reversed: u32, seed: u32) -> u32 {
     n
 }
 
-/// The number in `[0, 1)` that 32 bits stand for, a multiple of `2^-24`.
+/// The number in `[0, 1)` of 32 random bits, a multiple of `2^-24`.
 #[inline(always)]
 fn unit(bits: u32) -> f32 {
     // The conversion of a signed number is one instruction everywhere.

@@ -110,7 +110,7 @@ impl Bitmap {
         if self.filter == TextureFilter::Trilinear && texels > 1.0 { Some(self.levels_of_area(texels)) } else { None }
     }
 
-    /// The levels where a texel covers about so many of the image's.
+    /// The levels where a texel covers about this many of the image's.
     #[inline(never)]
     fn levels_of_area(&self, texels: f32) -> Levels<'_> {
         let pyramid = self.image.pyramid(self.decoding);

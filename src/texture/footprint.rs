@@ -1,4 +1,4 @@
-//! What part of a texture a lookup stands for.
+//! Footprints of texture lookups.
 
 use crate::attribute::AttributePoint;
 use crate::math::Vec2;
@@ -6,7 +6,7 @@ use crate::math::Vec2;
 /// The least cosine between a ray and a surface: what is seen edge-on has no end.
 const LEAST_COSINE: f32 = 1e-3;
 
-/// A place on a surface: in uv, with how much of uv around it a sample stands for, and the attributes of the mesh there.
+/// A place on a surface: in uv, with the footprint in uv, and the attributes of the mesh there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint<'a> {
     /// The middle.

@@ -1,6 +1,6 @@
 //! Textures: colours and numbers as functions of uv, or attributes of meshes.
 //!
-//! A lookup is a point, or stands for what a sample of a pixel covers: then it takes a smaller version of the image
+//! A lookup is a point, or has the footprint of a sample: then it takes a smaller version of the image
 //! where the samples of the pixel together would miss texels.
 
 mod bitmap;

@@ -34,7 +34,7 @@ pub struct SolidTable {
 struct Axis {
     wrap: Wrap,
     count: i32,
-    /// After so many the image repeats.
+    /// Period of the image in texels.
     period: i32,
 }
 

@@ -32,7 +32,7 @@ pub fn run() -> Outcome {
 }
 
 /// A surface with colour and relief.
-struct Relief {
+struct NormalPerturbation {
     /// Linear colour.
     color: V,
     /// From 0 to 1.
@@ -123,7 +123,7 @@ fn globe(uv: V2) -> V {
 }
 
 /// A brick wall, four courses high and two bricks wide.
-fn bricks(uv: V2) -> Relief {
+fn bricks(uv: V2) -> NormalPerturbation {
     let row = (uv.y * 4.0).floor();
     let column = uv.x * 2.0 + 0.5 * row.rem_euclid(2.0);
     let (x, y) = (column.rem_euclid(1.0), (uv.y * 4.0).rem_euclid(1.0));
@@ -135,7 +135,7 @@ fn bricks(uv: V2) -> Relief {
     let mortar = vec3(0.45, 0.43, 0.40) * (0.8 + 0.3 * rough);
     let rise = (edge / 0.08).clamp(0.0, 1.0);
     let rise = rise * rise * (3.0 - 2.0 * rise);
-    Relief { color: if edge > 0.0 { brick } else { mortar }, height: rise * (0.8 + 0.2 * rough) + 0.1 * (1.0 - rise) * rough }
+    NormalPerturbation { color: if edge > 0.0 { brick } else { mortar }, height: rise * (0.8 + 0.2 * rough) + 0.1 * (1.0 - rise) * rough }
 }
 
 /// Square tiles in two tones with joints.
@@ -187,7 +187,7 @@ fn hammered(uv: V2) -> f32 {
 }
 
 /// A leaf on its stalk; its height is 1 inside and falls to 0 over a few pixels outside.
-fn leaf(uv: V2) -> Relief {
+fn leaf(uv: V2) -> NormalPerturbation {
     let (x, y) = ((uv.x - 0.5).abs(), (uv.y - 0.14) / 0.82);
     let teeth = 1.0 + 0.06 * (TAU * 9.0 * y).sin();
     let width = if (0.0..1.0).contains(&y) { 0.34 * (PI * y.powf(0.75)).sin() * teeth } else { 0.0 };
@@ -196,12 +196,12 @@ fn leaf(uv: V2) -> Relief {
     let is_vein = x < 0.011 || veins.min(1.0 - veins) < 0.07;
     let tone = 0.8 + 0.4 * layers(uv, [8, 8], 3);
     let color = if is_vein { vec3(0.30, 0.40, 0.10) } else { vec3(0.10, 0.28, 0.04) } * tone;
-    Relief { color, height: ((width.max(stalk) - x) * 64.0).clamp(0.0, 1.0) }
+    NormalPerturbation { color, height: ((width.max(stalk) - x) * 64.0).clamp(0.0, 1.0) }
 }
 
 /// Five blossoms of five petals; their height is 1 inside and falls to 0 over a few pixels outside.
-fn blossom(uv: V2) -> Relief {
-    let mut out = Relief { color: vec3(0.75, 0.50, 0.55), height: 0.0 };
+fn blossom(uv: V2) -> NormalPerturbation {
+    let mut out = NormalPerturbation { color: vec3(0.75, 0.50, 0.55), height: 0.0 };
     for (i, middle) in [vec2(0.27, 0.30), vec2(0.72, 0.26), vec2(0.50, 0.52), vec2(0.26, 0.74), vec2(0.74, 0.73)].into_iter().enumerate() {
         let p = uv - middle;
         let angle = p.y.atan2(p.x) + i as f32;
@@ -231,12 +231,12 @@ fn waves(uv: V2) -> f32 {
 }
 
 /// Three twisted strands.
-fn rope(uv: V2) -> Relief {
+fn rope(uv: V2) -> NormalPerturbation {
     let across = (uv.y * 3.0 + uv.x * 12.0).fract() - 0.5;
     let height = (1.0 - (2.0 * across).powi(2)).max(0.0).sqrt();
     let fibres = 0.5 + 0.5 * (TAU * (uv.x * 36.0 - uv.y * 12.0)).sin();
     let tone = vec3(0.55, 0.40, 0.20) * (0.45 + 0.55 * height) * (0.85 + 0.15 * fibres);
-    Relief { color: tone, height: 0.92 * height + 0.08 * fibres * height }
+    NormalPerturbation { color: tone, height: 0.92 * height + 0.08 * fibres * height }
 }
 
 /// A ring about +y with uv and normals: u once around, v once around the tube.

@@ -48,7 +48,7 @@ pub(in crate::accel) struct Binary {
 }
 
 impl Binary {
-    /// Builds the hierarchy; `references` must not be empty. `is_alone` tells items that may not share a leaf with others.
+    /// Builds the hierarchy; `references` must not be empty. `is_alone` is true for items that may not share a leaf with others.
     pub fn new(references: Vec<Reference>, is_alone: impl Fn(u32) -> bool + Sync) -> Self {
         Self::from_depth(references, is_alone, 0)
     }

@@ -7,7 +7,7 @@ use super::device::Monitor;
 use super::gate::{RayLimits, RayWords};
 use super::packet::INVALID;
 use super::sys;
-use crate::geometry::{Geometry, Hit, Instance, PACKET_SIZE, Placed, RayPacket, Shape};
+use crate::geometry::{Geometry, Hit, Instance, PACKET_SIZE, RayPacket, Shape, TransformedShape};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::math::Ray;
 
@@ -42,11 +42,11 @@ pub(super) unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post
     true
 }
 
-/// The distance at which `ray` hits the [`Placed`] behind `shape`; negative on a miss.
+/// The distance at which `ray` hits the [`TransformedShape`] behind `shape`; negative on a miss.
 pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *const sys::StRay, _key: u32, _instance: u32) -> f32 {
-    // SAFETY: `shape` was made from a `&Placed` inside the geometry that the accelerator borrows, and `Placed` is not changed by anyone;
+    // SAFETY: `shape` was made from a `&Placed` inside the geometry that the accelerator borrows, and `TransformedShape` is not changed by anyone;
     // `ray` points to a ray on the shim's stack, and `StRay` has the layout of `Ray`.
-    let (placed, ray) = unsafe { (&*shape.cast::<Placed>(), &*ray.cast::<Ray>()) };
+    let (placed, ray) = unsafe { (&*shape.cast::<TransformedShape>(), &*ray.cast::<Ray>()) };
     // Rounding to f32 keeps the order, so the result stays within the ray's interval.
     placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32)
 }
@@ -58,7 +58,7 @@ pub(super) unsafe extern "C" fn intersect_placed_packet(shape: *const c_void, ra
     // and more, and of `valid`, and room for the distances of a packet. Every bit pattern is a number.
     let (placed, words, valid, t) = unsafe {
         let words = std::slice::from_raw_parts(rays, ROWS * n);
-        (&*shape.cast::<Placed>(), words, std::slice::from_raw_parts(valid, n), &mut *t.cast::<[f32; PACKET_SIZE]>())
+        (&*shape.cast::<TransformedShape>(), words, std::slice::from_raw_parts(valid, n), &mut *t.cast::<[f32; PACKET_SIZE]>())
     };
     let row = |k: usize| {
         let mut row = [0.0; PACKET_SIZE];

@@ -74,7 +74,7 @@ impl Device {
         // SAFETY: the configuration is a C string, which Embree copies.
         let handle = unsafe { sys::rtcNewDevice(config.as_ptr()) };
         let Some(handle) = NonNull::new(handle) else {
-            // SAFETY: a null device asks for the error of the failed creation on this thread.
+            // SAFETY: with a null device, the call returns the error of the failed creation on this thread.
             let code = unsafe { sys::rtcGetDeviceError(std::ptr::null_mut()) };
             return Err(device_error(code, "no device could be created"));
         };

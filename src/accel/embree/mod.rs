@@ -130,7 +130,7 @@ impl<'g> EmbreeAccel<'g> {
         Registered { filters, user_geometries, entered_instances: self.entered.count(), time_steps }
     }
 
-    /// Gives everything back and tells how many bytes Embree holds after that: none, if it works.
+    /// Releases everything and returns how many bytes Embree still holds: none, if it works.
     pub fn release(self) -> isize {
         let memory = self.device.memory();
         drop(self);

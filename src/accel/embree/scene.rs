@@ -41,7 +41,7 @@ impl UserShapes {
             match (shape, filter) {
                 (Shape::Mesh(_), None) => UserData::Triangles,
                 (Shape::Mesh(_), Some(filter)) => {
-                    // Whoever asks for closest hits confirms them.
+                    // Closest hits are confirmed by the caller.
                     let user = std::ptr::from_ref(&*filter).cast::<c_void>();
                     let raw = sys::StFilter { user, counts: Some(counts), any_hit_only: !has_holes };
                     UserData::FilteredTriangles(raw, filter)

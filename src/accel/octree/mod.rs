@@ -198,7 +198,7 @@ fn split(items: &Items<'_>, cell: &Cell) -> Option<Vec<(u32, Cell)>> {
             children.push((octant, Cell { node: 0, bounds, parts, depth: cell.depth + 1, budget: 0.0 }));
         }
     }
-    // Octants that all hold nearly everything bring nothing.
+    // A split is useless if all octants hold nearly everything.
     let pays = total as f64 <= cell.budget && (children.len() == 1 || total < 6 * cell.parts.len());
     pays.then_some(children)
 }

@@ -5,7 +5,7 @@ use super::primitives::{Polygon, PrimRecord};
 use crate::accel::bvh::{Binary, Reference};
 use crate::accel::inspect::ItemKind;
 use crate::accel::tree::Items;
-use crate::geometry::{Geometry, Placed, Shape, TrianglePoints};
+use crate::geometry::{Geometry, Shape, TransformedShape, TrianglePoints};
 use crate::id::{PrimId, ShapeId};
 use crate::math::{Aabb, DVec3, Vec3};
 
@@ -13,7 +13,7 @@ use crate::math::{Aabb, DVec3, Vec3};
 pub(super) enum Primitive<'g> {
     Triangle(Polygon<3>),
     Quadrilateral(Polygon<4>),
-    Shape(&'g Placed, u32),
+    Shape(&'g TransformedShape, u32),
 }
 
 /// A box with what is inside.

@@ -17,7 +17,7 @@ use crate::math::rows::BATCH;
 use crate::math::{Aabb, Ray, RayRows};
 use hierarchy::Hierarchy;
 
-/// Up to so many polygons and analytic shapes packets are faster than Embree (`docs/performance.md`).
+/// Up to this number of polygons and analytic shapes, packets are faster than Embree (`docs/performance.md`).
 const FEW: usize = 40;
 
 /// Traces batches in packets, and single rays as the BVH does.

@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 use super::lanes::{BoundingSphere, LaneSet, Packet, any, dot, splat, subtract};
-use crate::geometry::{PACKET_SIZE, Placed, RayPacket, TrianglePoints};
+use crate::geometry::{PACKET_SIZE, RayPacket, TransformedShape, TrianglePoints};
 use crate::id::{PrimId, ShapeId};
 use crate::math::{DVec3, Vec3};
 
@@ -138,7 +138,13 @@ const MIN_PACKET_RAYS: u32 = 3;
 
 /// Intersects some rays of a packet with an analytic shape.
 #[inline(always)]
-pub(super) fn intersect_shape<S: Simd, const ANY: bool>(simd: S, placed: &Placed, prim: u32, lanes: LaneSet, packet: &mut Packet<S>) {
+pub(super) fn intersect_shape<S: Simd, const ANY: bool>(
+    simd: S,
+    placed: &TransformedShape,
+    prim: u32,
+    lanes: LaneSet,
+    packet: &mut Packet<S>,
+) {
     let distances = distances(placed, lanes, &packet.rays(simd));
     let t = simd.partial_load_f32s(&distances[..S::F32_LANES]);
     packet.offer::<ANY>(simd, simd.greater_than_or_equal_f32s(t, simd.splat_f32s(0.0)), t, prim);
@@ -146,7 +152,7 @@ pub(super) fn intersect_shape<S: Simd, const ANY: bool>(simd: S, placed: &Placed
 
 /// The distances at which some rays hit a shape; negative on a miss, and for the others.
 #[inline(never)]
-fn distances(placed: &Placed, lanes: LaneSet, rays: &RayPacket) -> [f32; PACKET_SIZE] {
+fn distances(placed: &TransformedShape, lanes: LaneSet, rays: &RayPacket) -> [f32; PACKET_SIZE] {
     let mut distances = [-1.0; PACKET_SIZE];
     let alone = |lane: usize| placed.intersect(&rays.get(lane)).map_or(-1.0, |hit| hit.t as f32);
     if lanes.count() < MIN_PACKET_RAYS {

@@ -7,7 +7,7 @@ use super::traverse::{Closest, Occluded};
 use super::*;
 use crate::accel::LinearAccel;
 use crate::accel::tree::testing::mesh_geometry;
-use crate::geometry::{Analytic, Disk, Mesh, Placed, Sphere, TrianglePoints};
+use crate::geometry::{Analytic, Disk, Mesh, Sphere, TransformedShape, TrianglePoints};
 use crate::id::ShapeId;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DAffine3, DVec3, Transform, Vec3};
@@ -69,7 +69,7 @@ fn geometries(random: &mut Sequence) -> Vec<Geometry> {
     for (i, shape) in shapes.into_iter().enumerate() {
         let place = DAffine3::from_translation(DVec3::new(0.3 * i as f64 - 0.5, 0.2, 0.4 - 0.3 * i as f64));
         mixed.world.push(ShapeId::new(mixed.shapes.len()));
-        mixed.shapes.push(Shape::Analytic(Placed::new(shape, Transform::new(place).unwrap())));
+        mixed.shapes.push(Shape::Analytic(TransformedShape::new(shape, Transform::new(place).unwrap())));
     }
     all.push(mixed);
     all

@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use crate::accel::Accelerator;
 use crate::geometry::{
-    Analytic, Disk, Frustum, Geometry, Hit, Instance, Mesh, Object, Placed, Profile, Quad, Revolution, Shape, Sphere, SurfaceInteraction,
+    Analytic, Disk, Frustum, Geometry, Hit, Instance, Mesh, Object, Profile, Quad, Revolution, Shape, Sphere, SurfaceInteraction,
+    TransformedShape,
 };
 use crate::id::{ObjectId, ShapeId};
 pub use crate::math::Rng;
@@ -142,7 +143,7 @@ pub fn all_analytic_shapes() -> Vec<(&'static str, Analytic)> {
 
 /// One of each analytic shape, turned and moved, in a cube of half size 4 around `center`.
 pub fn placed_analytic_shapes(rng: &mut Rng, center: DVec3) -> Vec<Shape> {
-    let place = |shape| Shape::Analytic(Placed::new(shape, transform(rng.rotation(), center + 2.0 * rng.cube())));
+    let place = |shape| Shape::Analytic(TransformedShape::new(shape, transform(rng.rotation(), center + 2.0 * rng.cube())));
     all_analytic_shapes().into_iter().map(|(_, shape)| shape).map(place).collect()
 }
 

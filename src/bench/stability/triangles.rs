@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::geometry::{Rng, closest, cube, grid, instances, mesh, meshes, ray, ray_through, sphere_mesh, transform, triangle, world};
 use super::{Effort, Outcome};
 use crate::accel::{self, AccelKind, Accelerator, LinearAccel};
-use crate::geometry::{Analytic, Geometry, Mesh, MeshStep, Placed, Quad, Shape, SurfaceInteraction};
+use crate::geometry::{Analytic, Geometry, Mesh, MeshStep, Quad, Shape, SurfaceInteraction, TransformedShape};
 use crate::id::PrimId;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DMat3, DVec3, Ray, Transform, Vec3};
@@ -136,7 +136,7 @@ fn a1_triangle_hits(effort: Effort) -> Outcome {
 
 fn a2_quad_hits(effort: Effort) -> Outcome {
     let quad = Quad::new(DVec3::ZERO, DVec3::X, DVec3::Y).expect("the unit square has an area");
-    let geometry = world(vec![Shape::Analytic(Placed::new(Analytic::Quad(quad), Transform::IDENTITY))]);
+    let geometry = world(vec![Shape::Analytic(TransformedShape::new(Analytic::Quad(quad), Transform::IDENTITY))]);
     let mut rng = Rng::new(2);
     let target = || DVec3::new(rng.range(1e-3, 0.999), rng.range(1e-3, 0.999), 0.0);
     hit_errors(&geometry, target, effort.pick(10_000, 1_000_000)).report()

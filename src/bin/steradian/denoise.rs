@@ -88,7 +88,7 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
 
 /// Whether a file's recipe has a pixel filter that shares samples.
 fn shares_samples(file: &Path) -> bool {
-    let filter = output::read_settings(file).ok().and_then(|recipe| recipe.pointer("/settings/filter").cloned());
+    let filter = output::read_settings(file).ok().and_then(|provenance| provenance.pointer("/settings/filter").cloned());
     filter.and_then(|filter| serde_json::from_value(filter).ok()).is_some_and(|desc| Filter::new(&desc).is_shared())
 }
 

@@ -20,7 +20,7 @@ use crate::progress::Reporter;
 const EXTENSION: &str = "shard";
 
 /// What the command line says of the state.
-pub struct Kept<'a> {
+pub struct Resumable<'a> {
     arguments: &'a StateArgs,
     shard: Shard,
     /// Where the shard goes, if the render is of one.
@@ -43,7 +43,7 @@ pub fn take_shard_name(arguments: &StateArgs, scene: &Path, overrides: &mut Over
     }
 }
 
-impl<'a> Kept<'a> {
+impl<'a> Resumable<'a> {
     /// Takes the files, so that nobody else writes them; `None` if nothing is kept.
     pub fn new(
         arguments: &'a StateArgs,

@@ -9,14 +9,16 @@ use steradian::farm::check_single_name;
 use steradian::film::LayerSet;
 use steradian::live::{Fan, Live};
 use steradian::output::{self, RenderInfo, RenderStatistics};
-use steradian::render::{self, DEFAULT_EXTENSIONS, Header, Progress, Recipe, RenderResult, RenderSession, Replayed, Settings, Stats};
+use steradian::render::{
+    self, DEFAULT_EXTENSIONS, Header, Progress, RenderProvenance, RenderResult, RenderSession, Replayed, Settings, Stats,
+};
 use steradian::scene::Scene;
 use steradian::{Result, compile};
 
 use crate::args::RenderArgs;
 use crate::denoise;
 use crate::frames::{Session, Shot};
-use crate::kept::{self, Kept};
+use crate::kept::{self, Resumable};
 use crate::progress::Reporter;
 use crate::rerender;
 use crate::skipped::Skipped;
@@ -83,9 +85,9 @@ struct Plan<'a> {
     json: Option<PathBuf>,
     /// Where the shard goes, if the render is of one.
     shard_file: Option<PathBuf>,
-    recipe: Option<Recipe>,
+    provenance: Option<RenderProvenance>,
     denoiser: Option<Denoiser>,
-    kept: Option<Kept<'a>>,
+    kept: Option<Resumable<'a>>,
 }
 
 impl<'a> Plan<'a> {
@@ -97,7 +99,7 @@ impl<'a> Plan<'a> {
         let shard_name = kept::take_shard_name(&arguments.state, &arguments.scene, &mut overrides)?;
         let shard_file = shard_name.as_deref().map(|name| shot.file_of(name));
         let mut settings = match &arguments.repeat {
-            Some(repeat) => repeat.recipe.settings(render::threads(arguments.threads)?),
+            Some(repeat) => repeat.provenance.settings(render::threads(arguments.threads)?),
             None => Settings::new(&shot.imported.desc, &overrides)?,
         };
         if arguments.pixel.is_none() {
@@ -106,7 +108,7 @@ impl<'a> Plan<'a> {
         if arguments.repeat.is_none() {
             shot.adapt(&mut settings);
         }
-        let recipe = rerender::recipe(arguments, shot, &settings)?;
+        let provenance = rerender::provenance(arguments, shot, &settings)?;
         let is_there = match &shard_file {
             Some(file) => shot.frame.is_some() && !arguments.sequence.overwrite && file.exists(),
             None => shot.is_there(&settings, arguments.sequence.overwrite),
@@ -114,7 +116,7 @@ impl<'a> Plan<'a> {
         if is_there {
             if let Some(frame) = shot.frame.filter(|_| shard_file.is_none()) {
                 let mut skipped = Skipped::default();
-                skipped.compare(frame, recipe.as_ref(), &settings.outputs);
+                skipped.compare(frame, provenance.as_ref(), &settings.outputs);
                 skipped.report(session);
             }
             return Ok(None);
@@ -128,11 +130,11 @@ impl<'a> Plan<'a> {
         let denoiser = denoise::prepare(&arguments.denoise, &mut settings)?;
         let checkpoint = arguments.state.checkpoint.as_deref().map(|path| shot.file_of(path));
         let kept = match arguments.pixel {
-            None => Kept::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?,
+            None => Resumable::new(&arguments.state, &settings, shard_file.as_deref(), checkpoint.as_deref())?,
             Some(_) => None,
         };
         let (scene_file, frame) = (shot.scene.clone(), shot.frame);
-        Ok(Some(Self { arguments, settings, scene_file, frame, json, shard_file, recipe, denoiser, kept }))
+        Ok(Some(Self { arguments, settings, scene_file, frame, json, shard_file, provenance, denoiser, kept }))
     }
 
     /// What files tell of the rendering before it is done.
@@ -142,7 +144,7 @@ impl<'a> Plan<'a> {
             world_to_ndc: scene.camera.world_to_ndc(self.settings.size),
             pixel_aspect: Some(scene.camera.framing().pixel_aspect as f32),
             identities: self.settings.layers.needs_coverage().then(|| scene.identities.clone()),
-            settings: self.recipe.as_ref().map(Recipe::to_value),
+            settings: self.provenance.as_ref().map(RenderProvenance::to_value),
             statistics: Some(RenderStatistics { threads: self.settings.threads, ..RenderStatistics::default() }),
             ..RenderInfo::default()
         }
@@ -150,7 +152,7 @@ impl<'a> Plan<'a> {
 
     /// What the state of the render says of itself, if it is kept.
     fn header(&self, shot: &Shot, scene: &Scene) -> Result<Option<Header>> {
-        let header = |kept: &Kept| kept.header(&shot.imported, &shot.scene, scene, &self.settings, self.info(scene));
+        let header = |kept: &Resumable| kept.header(&shot.imported, &shot.scene, scene, &self.settings, self.info(scene));
         self.kept.as_ref().map(header).transpose()
     }
 
@@ -198,7 +200,7 @@ impl<'a> Plan<'a> {
             samples_per_pixel: stats.spp_done,
             render_seconds: stats.render_seconds,
             statistics: Some(RenderStatistics { threads: self.settings.threads, rays: stats.rays.total(), nan_samples: stats.nan_samples }),
-            settings: self.recipe.clone().map(|recipe| recipe.with_samples(stats.spp_done).to_value()),
+            settings: self.provenance.clone().map(|provenance| provenance.with_samples(stats.spp_done).to_value()),
             texts: denoised.texts,
             ..self.info(scene)
         };

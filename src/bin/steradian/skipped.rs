@@ -6,7 +6,7 @@ use std::path::Path;
 use steradian::desc::OutputDesc;
 use steradian::farm::FrameList;
 use steradian::output::{self, Format};
-use steradian::render::{Progress, Recipe, Settings};
+use steradian::render::{Progress, RenderProvenance, Settings};
 
 use crate::args::RenderArgs;
 use crate::frames::{Session, Shot};
@@ -23,11 +23,11 @@ pub struct Skipped {
 
 impl Skipped {
     /// Compares the settings in the file of a frame with those that it would be rendered with.
-    pub fn compare(&mut self, frame: i64, expected: Option<&Recipe>, outputs: &[OutputDesc]) {
+    pub fn compare(&mut self, frame: i64, expected: Option<&RenderProvenance>, outputs: &[OutputDesc]) {
         let found = expected.and_then(|expected| {
             let output = outputs.iter().find(|output| Format::from_path(Path::new(&output.file)).is_ok_and(|f| f == Format::Exr))?;
             let file = Path::new(&output.file);
-            let found = Recipe::from_value(output::read_settings(file).ok()?, file).ok()?;
+            let found = RenderProvenance::from_value(output::read_settings(file).ok()?, file).ok()?;
             Some(found.of_frame(frame).differences(&expected.of_frame(frame), output))
         });
         match found {
@@ -61,23 +61,23 @@ pub fn warn(arguments: &RenderArgs, frames: &[i64], session: &Session, shares_fi
         return;
     }
     let mut skipped = Skipped::default();
-    let mut first: Option<Recipe> = None;
+    let mut first: Option<RenderProvenance> = None;
     for &frame in frames {
         let expected = shot(frame).and_then(|shot| {
             let mut settings = settings(arguments, &shot)?;
             shot.adapt(&mut settings);
-            let recipe = match &first {
+            let provenance = match &first {
                 Some(first) if shares_files => {
                     let scene = first.scene.with_description(&shot.imported.desc).ok()?;
-                    Recipe { scene, settings: settings.clone(), ..first.clone() }
+                    RenderProvenance { scene, settings: settings.clone(), ..first.clone() }
                 }
-                _ => rerender::recipe(arguments, &shot, &settings).ok()??,
+                _ => rerender::provenance(arguments, &shot, &settings).ok()??,
             };
-            first.get_or_insert_with(|| recipe.clone());
-            Some((recipe, settings.outputs))
+            first.get_or_insert_with(|| provenance.clone());
+            Some((provenance, settings.outputs))
         });
-        let (recipe, outputs) = expected.unzip();
-        skipped.compare(frame, recipe.as_ref(), &outputs.unwrap_or_default());
+        let (provenance, outputs) = expected.unzip();
+        skipped.compare(frame, provenance.as_ref(), &outputs.unwrap_or_default());
     }
     skipped.report(session);
 }

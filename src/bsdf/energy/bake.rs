@@ -130,7 +130,7 @@ fn coat_average(entry: usize, coat: &[f32]) -> f32 {
     mean.sum::<f64>() as f32
 }
 
-/// Alpha at a node; the first stands for the limit, where only the ratio of cosine and alpha counts.
+/// Alpha at a node; the first is the limit, where only the ratio of cosine and alpha counts.
 fn node_alpha(node: usize) -> f32 {
     let root = node as f32 / (ALPHAS - 1) as f32;
     (root * root).max(1e-3)

@@ -27,7 +27,7 @@ use table::{
     SCHLICK, SHAPES, SHEEN, TableCoordinate, across, smoothed,
 };
 
-/// The least loss under diffuse light that is told from none.
+/// A smaller loss under diffuse light counts as none.
 const MIN_LOST: f32 = 1e-7;
 
 /// Directional albedo of rough microfacets with single scattering.

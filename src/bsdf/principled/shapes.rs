@@ -19,7 +19,7 @@ pub fn diffuse(o: Vec3, i: Vec3, roughness: f32) -> f32 {
     FRAC_1_PI * i.z * (1.0 + fd90 * schlick_weight(o.z)) * (1.0 + fd90 * schlick_weight(i.z))
 }
 
-/// The flat lobe that stands for subsurface scattering (ibid., after Hanrahan and Krueger).
+/// The flat lobe that approximates subsurface scattering (ibid., after Hanrahan and Krueger).
 #[inline]
 pub fn subsurface(o: Vec3, i: Vec3, roughness: f32) -> f32 {
     let fd90 = roughness * half_cos_squared(o, i) - 1.0;

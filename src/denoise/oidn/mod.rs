@@ -49,7 +49,7 @@ pub struct Device {
 pub struct Unusable(pub String);
 
 impl Device {
-    /// Opens a library by its path, or by its bare name where the system looks for libraries, with so many threads (0: all).
+    /// Opens a library by its path, or by its bare name where the system looks for libraries, with `threads` threads (0: all).
     pub fn open(file: &Path, threads: usize) -> Result<Self, Unusable> {
         // SAFETY: opening runs the library's initialisers. The file is named by the user, or has the name of a library known to be fit.
         let library = unsafe { Library::new(file) }.map_err(|e| Unusable(loader_message(&e)))?;

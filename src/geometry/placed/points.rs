@@ -1,6 +1,6 @@
 //! Points of many hits on one analytic surface, the same as of each of them alone.
 
-use super::{Analytic, CenteredRay, LocalHit, Placed};
+use super::{Analytic, CenteredRay, LocalHit, TransformedShape};
 use crate::geometry::{Detail, Disk, Frustum, LocalSurface, Quad, ShapeSample, Sphere};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::rows::{BATCH, Element, Row, pair, soa};
@@ -26,13 +26,13 @@ soa! {
         dp_du: Vec3,
         /// Surface parameters.
         uv: Vec2,
-        /// 0 where [`Placed::interaction`] has to be called, else 1.
+        /// 0 where [`TransformedShape::interaction`] has to be called, else 1.
         is_resolved: u32,
     }
 }
 
 soa! {
-    /// Points as [`PlacedPoint`](super::PlacedPoint) has them.
+    /// Points as [`SurfacePoint`](super::PlacedPoint) has them.
     pub struct PlacedSampleRows {
         /// The point, in the space the shape is placed in.
         p: DVec3,
@@ -44,12 +44,12 @@ soa! {
 }
 
 /// Samples the first `count` points, at most [`BATCH`]. Surfaces of revolution are sampled alone.
-pub(super) fn sample(placed: &Placed, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+pub(super) fn sample(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
     vectorize!(sample_rows(placed, u, count, out));
 }
 
 #[inline(always)]
-fn sample_rows(placed: &Placed, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+fn sample_rows(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
     match &placed.shape {
         Analytic::Sphere(sphere) => sample_on(placed, sphere, u, count, out),
         Analytic::Quad(quad) => sample_on(placed, quad, u, count, out),
@@ -60,7 +60,7 @@ fn sample_rows(placed: &Placed, u: &[Row; 2], count: usize, out: &mut PlacedSamp
 }
 
 #[inline(always)]
-fn sample_on<S: LaneShape>(placed: &Placed, shape: &S, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+fn sample_on<S: LaneShape>(placed: &TransformedShape, shape: &S, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         let sample = shape.sample(pair(u, i).map(f64::from));
         let point = placed.place(sample.p, sample.n, sample.pdf_area);
@@ -73,7 +73,7 @@ fn sample_on<S: LaneShape>(placed: &Placed, shape: &S, u: &[Row; 2], count: usiz
 /// Finds the points of the hits of the first `count` rays at the distances `t`, at most [`BATCH`], with parameters on
 /// quads alone. Nothing is resolved on surfaces of revolution.
 pub(super) fn resolve(
-    placed: &Placed,
+    placed: &TransformedShape,
     rays: &RayRows,
     t: &[f32; BATCH],
     count: usize,
@@ -115,7 +115,7 @@ lane_shapes!(Sphere: Detail::Place, Quad: Detail::Full, Disk: Detail::Place, Fru
 
 #[inline(always)]
 fn resolve_rows(
-    placed: &Placed,
+    placed: &TransformedShape,
     rays: &RayRows,
     t: &[f32; BATCH],
     count: usize,
@@ -133,7 +133,7 @@ fn resolve_rows(
 
 #[inline(always)]
 fn resolve_on<S: LaneShape>(
-    placed: &Placed,
+    placed: &TransformedShape,
     shape: &S,
     rays: &RayRows,
     t: &[f32; BATCH],

@@ -10,7 +10,7 @@ use crate::math::{DMat3, Rng, dvec3};
 
 const NO_HIT: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(0), instance: InstanceId(u32::MAX) };
 
-fn interaction(placed: &Placed, ray: &Ray) -> Option<SurfaceInteraction> {
+fn interaction(placed: &TransformedShape, ray: &Ray) -> Option<SurfaceInteraction> {
     let local = placed.intersect(ray)?;
     placed.interaction(ray, &Hit { t: local.t as f32, ..NO_HIT })
 }

@@ -109,21 +109,21 @@ impl Draft {
         self.desc.camera = camera;
     }
 
-    /// Keeps a mesh that has no file; the result is what stands for its file's name.
+    /// Keeps a mesh that has no file; the result is used in place of its file's name.
     pub fn keep_mesh(&mut self, name: &str, mesh: MeshData) -> String {
         let file = self.numbers.unique_file(name, "ply", &self.assets);
         self.assets.meshes.insert(file.clone(), mesh);
         file
     }
 
-    /// Keeps an image of a texture that has no file; the result is what stands for its file's name.
+    /// Keeps an image of a texture that has no file; the result is used in place of its file's name.
     pub fn keep_image(&mut self, name: &str, image: ImageData) -> String {
         let file = self.numbers.unique_file(name, if image.is_float() { "exr" } else { "png" }, &self.assets);
         self.assets.images.insert(file.clone(), image);
         file
     }
 
-    /// Keeps an image of an environment that has no file; the result is what stands for its file's name.
+    /// Keeps an image of an environment that has no file; the result is used in place of its file's name.
     pub fn keep_environment(&mut self, name: &str, image: RgbImage) -> String {
         let file = self.numbers.unique_file(name, "exr", &self.assets);
         self.assets.environments.insert(file.clone(), image);

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::{Imported, Outcome, ReportEntry};
 use crate::desc::{LightDesc, MeshDesc, ShapeDesc, TextureDesc};
 
-/// What stands for an image that is not there.
+/// The replacement of an image that does not exist.
 const GREY: [f32; 3] = [0.5; 3];
 
 impl Imported {

@@ -3,7 +3,7 @@
 use super::Spectrum;
 use crate::metal::{Metal, MetalNames};
 
-/// What a name stands for.
+/// The spectrum of a name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Named {
     /// A part of a metal's index of refraction, for red, green and blue.

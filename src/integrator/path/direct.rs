@@ -32,7 +32,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     }
     let Vertices { rows, points, light_samples: lights, direct, .. } = &mut *vertices;
     let is_mis = context.config.strategy == Strategy::Mis;
-    if context.scene.features.reliefs {
+    if context.scene.features.normal_perturbations {
         vectorize!(illuminate::<true>(rows, points, lights, direct, is_mis, count));
     } else {
         vectorize!(illuminate::<false>(rows, points, lights, direct, is_mis, count));

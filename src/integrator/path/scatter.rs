@@ -30,7 +30,7 @@ pub(super) fn sample(context: &Context, regions: Option<&Regions>, wave: &mut Wa
     let Vertices { rows, points, scatter, u_bsdf, .. } = &mut *vertices;
     let roulette = context.bounce + 1 >= context.config.rr_depth;
     let no_lights = context.scene.lights.is_empty();
-    if context.scene.features.reliefs {
+    if context.scene.features.normal_perturbations {
         vectorize!(spawn_rays::<true>(rows, points, scatter, u_bsdf, [roulette, no_lights], count));
     } else {
         vectorize!(spawn_rays::<false>(rows, points, scatter, u_bsdf, [roulette, no_lights], count));

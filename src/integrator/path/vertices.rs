@@ -215,16 +215,16 @@ pub(super) fn build_frames(context: &Context, wave: &mut Wave) {
         (false, true) => vectorize!(set_frames::<false, true>(&mut vertices.rows, count)),
         (true, true) => vectorize!(set_frames::<true, true>(&mut vertices.rows, count)),
     }
-    if features.reliefs {
+    if features.normal_perturbations {
         for lane in 0..count {
             if vertices.is_miss(lane) {
                 continue;
             }
             let at = vertices.interaction(lane);
-            let has_relief = context.scene.relief(&at, vertices.rows.direction.get(lane)).is_some();
+            let is_perturbed = context.scene.normal_perturbation(&at, vertices.rows.direction.get(lane)).is_some();
             let n = vertices.rows.n.get(lane);
             // On a smooth mesh the factor would show the facets, for it jumps with the geometric normal.
-            vertices.rows.cos_normals[lane] = if has_relief && n != at.n_g { n.dot(at.n_g) } else { 0.0 };
+            vertices.rows.cos_normals[lane] = if is_perturbed && n != at.n_g { n.dot(at.n_g) } else { 0.0 };
         }
     }
 }

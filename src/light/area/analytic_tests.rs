@@ -13,7 +13,7 @@ const WHITE: Emission = Emission::constant(Rgb::WHITE);
 const TWO_SIDED: Emission = Emission { two_sided: true, ..WHITE };
 
 fn place(shape: Analytic, map: DAffine3) -> Geometry {
-    let placed = Placed::new(shape, Transform::new(map).unwrap());
+    let placed = TransformedShape::new(shape, Transform::new(map).unwrap());
     Geometry { shapes: vec![Shape::Analytic(placed)], world: vec![ShapeId(0)], ..Geometry::default() }
 }
 
@@ -121,12 +121,13 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
     let mut shapes = partial();
     shapes.push(("sphere", sphere()));
     let maps = [skew([1.0, 2.0, 0.5]), skew([0.7; 3])];
-    let placed =
-        shapes.iter().flat_map(|(_, shape)| maps.map(|map| Shape::Analytic(Placed::new(shape.clone(), Transform::new(map).unwrap()))));
+    let placed = shapes
+        .iter()
+        .flat_map(|(_, shape)| maps.map(|map| Shape::Analytic(TransformedShape::new(shape.clone(), Transform::new(map).unwrap()))));
     let geometry = Geometry { shapes: placed.collect(), ..Geometry::default() };
     let lights: Vec<_> = (0..geometry.shapes.len())
         .flat_map(|i| [WHITE, TWO_SIDED].map(|emission| AreaLight::new(ShapeId::new(i), PrimId(0), emission, &geometry, &[])))
-        .filter(|light| matches!(light.form, Form::Sphere(_) | Form::Placed { .. }))
+        .filter(|light| matches!(light.form, Form::Sphere(_) | Form::TransformedShape { .. }))
         .collect();
     let mut random = Rng::new(31);
     let mut queue = EmitterQueue::default();

@@ -53,7 +53,7 @@ impl EmitterQueue {
     /// Queues the sample of a light for the vertex `lane`; `false` if the light is not sampled here.
     #[inline(always)]
     pub fn push(&mut self, light: &AreaLight, id: LightId, lane: usize) -> bool {
-        if !(light.emission.is_even() && matches!(light.form, Form::Sphere(_) | Form::Placed { .. })) {
+        if !(light.emission.is_even() && matches!(light.form, Form::Sphere(_) | Form::TransformedShape { .. })) {
             return false;
         }
         self.entries.push((id, lane));
@@ -95,7 +95,7 @@ impl EmitterRows {
                 vectorize!(sample_sphere(sphere, u, views, count));
                 true
             }
-            (Form::Placed { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
+            (Form::TransformedShape { .. }, Shape::Analytic(placed)) if placed.samples_in_rows() => {
                 placed.sample_area_rows(u, count, samples);
                 vectorize!(see_samples(samples, views, count));
                 true

@@ -18,7 +18,7 @@ use triangle::{TriangleEmitter, triangle_error};
 use super::bounds::{EmissionCone, LightBounds, to_positive};
 use super::{LightSample, ShadowTarget};
 use crate::color::Rgb;
-use crate::geometry::{Analytic, Geometry, Mesh, Placed, Shape, SpawnPoint, SurfaceInteraction};
+use crate::geometry::{Analytic, Geometry, Mesh, Shape, SpawnPoint, SurfaceInteraction, TransformedShape};
 use crate::id::{PrimId, ShapeId, TextureId};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Ray, Vec3};
@@ -64,7 +64,7 @@ impl Emission {
         self.texture.is_none() && self.opacity.is_none()
     }
 
-    /// What a point chosen on the surface brings: rays meet it as often as its opacity says, so this is the mean over rays.
+    /// The expected radiance of a point sampled on the surface: rays meet it as often as its opacity says, so this is the mean over rays.
     fn expected(&self, textures: &[Texture], point: &Footprint) -> Rgb {
         let coverage = self.opacity.map_or(1.0, |id| textures[id.index()].scalar_over(point));
         self.at(textures, || *point) * coverage
@@ -98,7 +98,7 @@ enum Form {
         area: f64,
     },
     /// Any analytic shape, by its own sampling; of this world area.
-    Placed {
+    TransformedShape {
         area: f64,
     },
 }
@@ -222,7 +222,7 @@ impl AreaLight {
             Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
             Form::Parallelogram(quad) => (quad.sample(p, u, both)?, quad.error),
             Form::Triangle { .. } => self.sample_triangle(geometry, p, u)?,
-            Form::Placed { .. } => {
+            Form::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
                 let point = placed.sample_area(u);
                 let sample = SurfaceSample::from_area(p, point.p, point.n.as_dvec3(), point.pdf_area)?;
@@ -272,7 +272,7 @@ impl AreaLight {
             Form::Sphere(sphere) => sphere.pdf(p, at.p),
             Form::Parallelogram(quad) => quad.pdf(p, at.p),
             Form::Triangle { area } => SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
-            Form::Placed { .. } => {
+            Form::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return 0.0 };
                 // Where the normal does not tell how densely the shape is sampled, the hit itself must.
                 let pdf_area = placed.pdf_area_from_normal(at.n_g).or_else(|| placed.pdf_area(ray));
@@ -286,7 +286,7 @@ impl AreaLight {
         match &self.form {
             Form::Sphere(sphere) => sphere.area(),
             Form::Parallelogram(quad) => quad.area(),
-            Form::Triangle { area } | Form::Placed { area } => *area,
+            Form::Triangle { area } | Form::TransformedShape { area } => *area,
         }
     }
 
@@ -297,7 +297,7 @@ impl AreaLight {
             Form::Sphere(_) => (shape.bounds(), None),
             Form::Parallelogram(quad) => (shape.bounds(), Some(quad.normal())),
             Form::Triangle { .. } => (shape.prim_bounds(self.prim), self.triangle(geometry).map(|triangle| triangle.normal())),
-            Form::Placed { .. } => (shape.bounds(), flat_normal(shape)),
+            Form::TransformedShape { .. } => (shape.bounds(), flat_normal(shape)),
         };
         let cone = normal.map_or(EmissionCone::SPHERE, EmissionCone::flat);
         // Of a closed convex surface, a quarter of the area is seen from far away.
@@ -315,7 +315,7 @@ impl AreaLight {
 }
 
 impl Form {
-    fn analytic(placed: &Placed) -> Self {
+    fn analytic(placed: &TransformedShape) -> Self {
         match (&placed.shape, placed.transform.uniform_scale()) {
             (Analytic::Sphere(sphere), Some(scale)) if sphere.is_full() => Self::Sphere(Box::new(SphereEmitter {
                 center: placed.transform.point(DVec3::ZERO),
@@ -327,13 +327,13 @@ impl Form {
     }
 
     /// What does not depend on a part of the surface being hidden by another.
-    fn by_area(placed: &Placed) -> Self {
-        let Analytic::Quad(quad) = &placed.shape else { return Self::Placed { area: placed_area(placed) } };
+    fn by_area(placed: &TransformedShape) -> Self {
+        let Analytic::Quad(quad) = &placed.shape else { return Self::TransformedShape { area: placed_area(placed) } };
         let map = &placed.transform;
         let front = placed.sample_area([0.5; 2]).n.as_dvec3();
         let edges = [quad.edge_u(), quad.edge_v()].map(|edge| map.vector(edge));
         ParallelogramEmitter::new(map.point(quad.origin()), edges, front, 0.0)
-            .map_or(Self::Placed { area: 0.0 }, |quad| Self::Parallelogram(Box::new(quad)))
+            .map_or(Self::TransformedShape { area: 0.0 }, |quad| Self::Parallelogram(Box::new(quad)))
     }
 
     /// Two triangles that share an edge, look to the same side and make up a parallelogram.
@@ -372,7 +372,7 @@ fn flat_normal(shape: &Shape) -> Option<Vec3> {
 }
 
 /// World area of any analytic shape: where the transform keeps angles that of the shape, else the mean of its inverse density.
-fn placed_area(placed: &Placed) -> f64 {
+fn placed_area(placed: &TransformedShape) -> f64 {
     if let Some(scale) = placed.transform.uniform_scale() {
         return placed.shape.area() * scale * scale;
     }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::color::Rgb;
-use crate::geometry::{Analytic, Disk, Geometry, Mesh, Placed, Quad, Shape, Sphere};
+use crate::geometry::{Analytic, Disk, Geometry, Mesh, Quad, Shape, Sphere, TransformedShape};
 use crate::id::{LightId, ShapeId};
 use crate::light::{
     AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSelection, LightSet, MisCompensation, PointLight, SpotLight,
@@ -32,7 +32,7 @@ fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
                 continue;
             }
         };
-        geometry.shapes.push(Shape::Analytic(Placed::new(analytic, transform)));
+        geometry.shapes.push(Shape::Analytic(TransformedShape::new(analytic, transform)));
         let shape = ShapeId::new(geometry.shapes.len() - 1);
         geometry.world.push(shape);
         lights.extend(AreaLight::for_shape(shape, emission, &geometry, &[]).into_iter().map(Light::Area));

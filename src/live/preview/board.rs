@@ -9,10 +9,10 @@ use crate::live::PICTURE_PERIOD;
 /// A page that has not asked for so long is closed.
 const PAGE_LIFE: Duration = Duration::from_secs(3);
 
-/// Pages beyond so many are not waited for.
+/// Most pages that are waited for.
 const MAX_PAGES: usize = 64;
 
-/// Answers hold no more pictures than so many at a time.
+/// Most pictures in answers at a time.
 const MOST_SENT: usize = 4;
 
 /// A page open somewhere.
@@ -29,7 +29,7 @@ struct Page {
 #[derive(Default)]
 struct State {
     snapshot: Option<Arc<Snapshot>>,
-    /// Counts pictures; 0 stands for none.
+    /// Number of the picture; 0 means none.
     version: u64,
     shown: Option<Instant>,
     finished: bool,

@@ -35,7 +35,7 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 
 
 /// Why a request is not answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Refusal {
+pub(crate) enum HttpError {
     /// Not HTTP, or without a host.
     Malformed,
     /// The head is too long.
@@ -48,7 +48,7 @@ pub(crate) enum Refusal {
     Busy,
 }
 
-impl Refusal {
+impl HttpError {
     const fn status(self) -> &'static str {
         match self {
             Self::Malformed => "400 Bad Request",
@@ -99,7 +99,7 @@ impl Connection {
     }
 
     /// The next request; `None` if there is none. Its head must be there in time, and it must ask for this machine or for `host`.
-    pub fn request(&mut self, host: &str) -> io::Result<Option<Result<Request, Refusal>>> {
+    pub fn request(&mut self, host: &str) -> io::Result<Option<Result<Request, HttpError>>> {
         let deadline = Instant::now() + self.patience.stall;
         loop {
             match parse(&self.buffer, host) {
@@ -108,7 +108,7 @@ impl Connection {
                     return Ok(Some(Ok(request)));
                 }
                 Some(Err(refusal)) => return Ok(Some(Err(refusal))),
-                None if self.buffer.len() > MAX_HEAD => return Ok(Some(Err(Refusal::TooLong))),
+                None if self.buffer.len() > MAX_HEAD => return Ok(Some(Err(HttpError::TooLong))),
                 None => {}
             }
             let mut piece = [0; 2048];
@@ -124,8 +124,8 @@ impl Connection {
     }
 
     /// Answers with a refusal, the last answer of the connection.
-    pub fn refuse(&mut self, refusal: Refusal) -> io::Result<()> {
-        let allow = if refusal == Refusal::Method { "Allow: GET\r\n" } else { "" };
+    pub fn refuse(&mut self, refusal: HttpError) -> io::Result<()> {
+        let allow = if refusal == HttpError::Method { "Allow: GET\r\n" } else { "" };
         let (status, length) = (refusal.status(), refusal.status().len());
         let head = format!("HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n");
         self.stream.write_all(format!("{head}{status}").as_bytes())?;
@@ -179,34 +179,34 @@ impl Connection {
 }
 
 /// The request at the start of `bytes` and its length; `None` if it is not all there yet.
-fn parse(bytes: &[u8], host: &str) -> Option<Result<(Request, usize), Refusal>> {
+fn parse(bytes: &[u8], host: &str) -> Option<Result<(Request, usize), HttpError>> {
     let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut request = httparse::Request::new(&mut headers);
     let length = match request.parse(bytes) {
         Ok(httparse::Status::Partial) => return None,
         Ok(httparse::Status::Complete(length)) => length,
-        Err(httparse::Error::TooManyHeaders) => return Some(Err(Refusal::TooLong)),
-        Err(_) => return Some(Err(Refusal::Malformed)),
+        Err(httparse::Error::TooManyHeaders) => return Some(Err(HttpError::TooLong)),
+        Err(_) => return Some(Err(HttpError::Malformed)),
     };
     Some(check(&request, host).map(|request| (request, length)))
 }
 
-fn check(request: &httparse::Request, host: &str) -> Result<Request, Refusal> {
+fn check(request: &httparse::Request, host: &str) -> Result<Request, HttpError> {
     let values = |name: &'static str| request.headers.iter().filter(move |h| h.name.eq_ignore_ascii_case(name)).map(|h| h.value);
     if request.method != Some("GET") {
-        return Err(Refusal::Method);
+        return Err(HttpError::Method);
     }
     // A request with a body would leave it where the next request is looked for.
     let has_body = values("Transfer-Encoding").next().is_some() || values("Content-Length").any(|value| value != b"0");
     let mut hosts = values("Host");
-    let (Some(asked), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(Refusal::Malformed) };
-    let asked = std::str::from_utf8(asked).map_err(|_| Refusal::Malformed)?;
+    let (Some(asked), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(HttpError::Malformed) };
+    let asked = std::str::from_utf8(asked).map_err(|_| HttpError::Malformed)?;
     // Browsers say which kind of page a request comes from; pages of other origins have no business here.
     let from_elsewhere = values("Sec-Fetch-Site").any(|site| site != b"same-origin" && site != b"none");
     if !is_own_host(asked, host) || from_elsewhere {
-        return Err(Refusal::Foreign);
+        return Err(HttpError::Foreign);
     }
-    let target = request.path.filter(|path| path.starts_with('/')).ok_or(Refusal::Malformed)?;
+    let target = request.path.filter(|path| path.starts_with('/')).ok_or(HttpError::Malformed)?;
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
     Ok(Request { path: path.to_owned(), query: query.to_owned() })
 }
@@ -228,7 +228,7 @@ fn is_own_host(asked: &str, host: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn result(text: &str) -> Option<Result<Request, Refusal>> {
+    fn result(text: &str) -> Option<Result<Request, HttpError>> {
         parse(text.as_bytes(), "node7").map(|result| result.map(|(request, _)| request))
     }
 
@@ -267,15 +267,15 @@ mod tests {
     #[test]
     fn anything_else_is_refused() {
         let of = |head: &str| result(&format!("{head}\r\n\r\n")).unwrap().unwrap_err();
-        assert_eq!(of("POST / HTTP/1.1\r\nHost: localhost"), Refusal::Method);
-        assert_eq!(of("HEAD / HTTP/1.1\r\nHost: localhost"), Refusal::Method);
-        assert_eq!(of("GET / HTTP/1.1"), Refusal::Malformed);
-        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost"), Refusal::Malformed);
-        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5"), Refusal::Malformed);
-        assert_eq!(of("GET http://localhost/ HTTP/1.1\r\nHost: localhost"), Refusal::Malformed);
-        assert_eq!(of("nonsense\u{1}"), Refusal::Malformed);
-        assert_eq!(of("GET / HTTP/1.1\r\nHost: evil.example"), Refusal::Foreign);
-        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nSec-Fetch-Site: cross-site"), Refusal::Foreign);
-        assert_eq!(of(&format!("GET / HTTP/1.1{}", "\r\nA: b".repeat(MAX_HEADERS + 1))), Refusal::TooLong);
+        assert_eq!(of("POST / HTTP/1.1\r\nHost: localhost"), HttpError::Method);
+        assert_eq!(of("HEAD / HTTP/1.1\r\nHost: localhost"), HttpError::Method);
+        assert_eq!(of("GET / HTTP/1.1"), HttpError::Malformed);
+        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost"), HttpError::Malformed);
+        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5"), HttpError::Malformed);
+        assert_eq!(of("GET http://localhost/ HTTP/1.1\r\nHost: localhost"), HttpError::Malformed);
+        assert_eq!(of("nonsense\u{1}"), HttpError::Malformed);
+        assert_eq!(of("GET / HTTP/1.1\r\nHost: evil.example"), HttpError::Foreign);
+        assert_eq!(of("GET / HTTP/1.1\r\nHost: localhost\r\nSec-Fetch-Site: cross-site"), HttpError::Foreign);
+        assert_eq!(of(&format!("GET / HTTP/1.1{}", "\r\nA: b".repeat(MAX_HEADERS + 1))), HttpError::TooLong);
     }
 }

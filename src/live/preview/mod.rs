@@ -18,7 +18,7 @@ use crate::desc::ViewDesc;
 use crate::error::{Error, Result};
 use board::Board;
 pub use http::Patience;
-use http::{Connection, Refusal};
+use http::{Connection, HttpError};
 
 /// More connections than this are turned away.
 const MAX_CONNECTIONS: usize = 64;
@@ -31,7 +31,7 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 pub struct PreviewOptions {
     /// Host name or address to listen at; only those who reach it can look.
     pub host: String,
-    /// The port; 0 stands for any that is free.
+    /// The port; 0 means any that is free.
     pub port: u16,
     /// How light is shown until the page's user chooses.
     pub view: ViewDesc,
@@ -157,7 +157,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
 fn serve(stream: TcpStream, shared: &Shared, has_room: bool) -> std::io::Result<()> {
     let mut connection = Connection::new(stream, shared.patience)?;
     if !has_room {
-        return connection.refuse(Refusal::Busy);
+        return connection.refuse(HttpError::Busy);
     }
     while !shared.closing.load(Ordering::Relaxed) {
         match connection.request(&shared.host)? {

@@ -1,12 +1,12 @@
 //! Names to ids: MurmurHash3 of 32 bits (Austin Appleby, public domain) with the seed 0, bent so that its bits are an ordinary `f32`.
 
-/// The id of a name, as bits of a float. Exponents of all zeros or all ones, which stand for zero, denormals,
+/// The id of a name, as bits of a float. Exponents of all zeros or all ones, which encode zero, denormals,
 /// infinities and NaN, have their lowest bit flipped.
 pub fn id_bits(name: &str) -> u32 {
     ordinary(murmur3_32(name.as_bytes()))
 }
 
-/// The id of a name as pixels hold it; 0 stands for no object and belongs to no name.
+/// The id of a name as pixels hold it; 0 means no object and belongs to no name.
 pub fn id(name: &str) -> f32 {
     f32::from_bits(id_bits(name))
 }

@@ -23,7 +23,7 @@ pub struct Matte {
     pub manifest: String,
 }
 
-/// The matte that a layer stands for, with so many ranks; `None` for other layers.
+/// The Cryptomatte of a layer with `depth` ranks; `None` for other layers.
 pub fn matte(kind: LayerKind, coverage: &Coverage, identities: &Identities, depth: usize) -> Option<Matte> {
     let name = type_name(kind)?;
     let names = names_of(coverage, |key| name_of(kind, identities, key));

@@ -15,7 +15,7 @@ use crate::film::{Crop, Image, Layer, LayerKind};
 
 /// Reads the colour of any EXR file: bare channels R, G, B (in upper or lower case), else a layer with such channels (the one with the
 /// shortest name, a "Combined" first), else Y as gray. Alpha is that of the same layer, or 1. The picture is the data window; where that
-/// reaches beyond the display window, the data window stands for the full picture.
+/// reaches beyond the display window, the data window is taken as the full picture.
 ///
 /// Only the channels of the colour are kept in memory.
 ///

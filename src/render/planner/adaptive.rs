@@ -185,7 +185,7 @@ impl AdaptivePlanner {
             let sum: f64 = variances.iter().enumerate().map(|(i, v)| v / f64::from(groups(i, scale))).sum();
             sum / variances.len() as f64
         };
-        // By halving, between a scale that asks for nothing and one that asks for everything.
+        // By bisection, between a scale that adds no sample and one that adds all.
         let most_share = shares.iter().copied().fold(0.0, f64::max).max(f64::MIN_POSITIVE);
         let least_share = shares.iter().copied().filter(|s| *s > 0.0).fold(most_share, f64::min);
         let (mut low, mut high) = ((1.0 / most_share).ln(), (f64::from(most) / least_share).ln());

@@ -11,7 +11,7 @@ use crate::guiding::Guide;
 use crate::math::Aabb;
 use crate::render::TILE_SIZE;
 
-/// Iterations of so many samples or more decide whether guiding goes on: their variance times rays must be so much less
+/// Iterations of at least this many samples decide whether guiding goes on: their variance times rays must be so much less
 /// than without.
 const MIN_GAINS: [(u32, f64); 2] = [(8, 1.2), (16, GUIDED_COST)];
 

@@ -107,7 +107,7 @@ impl IterationWeights {
         Self { factors: vec![1.0; film.tiles().len()], first: None, last: None }
     }
 
-    /// Adds an iteration of so many samples per pixel to the film of those before; the result is the variance times
+    /// Adds an iteration of `spp` samples per pixel to the film of those before; the result is the variance times
     /// rays of the first iteration over that of this one.
     pub fn add(&mut self, film: &mut Film, iteration: &Film, samples: u32, rays: u64) -> f64 {
         let variances: Vec<_> = iteration.tiles().iter().map(|tile| block_variances(tile, samples)).collect();

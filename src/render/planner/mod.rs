@@ -42,7 +42,7 @@ impl Pass {
     }
 }
 
-/// How large a pass may be: so many samples of all tiles, or one sample of some.
+/// How large a pass may be: a number of samples of all tiles, or one sample of some.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PassSize {
     pub samples: u32,
@@ -53,7 +53,7 @@ pub(super) struct PassSize {
 pub(super) enum PassSamples<'a> {
     /// The same of every pixel.
     Uniform { samples: Range<u32>, guide: Option<&'a Guide> },
-    /// Groups of samples, of the blocks of pixels that lack some; at most so many of each.
+    /// Groups of samples, of the blocks of pixels that need more; at most this number of each.
     Groups { planner: &'a AdaptivePlanner, most: u32 },
 }
 

@@ -47,7 +47,7 @@ impl Checkpoints {
         self.save(state, elapsed, progress);
     }
 
-    /// Writes the state. A failure is told, and is no reason to end the render: the earlier checkpoint is as it was.
+    /// Writes the state. A failure is a warning and does not end the render: the earlier checkpoint is unchanged.
     fn save(&mut self, state: &RenderState, elapsed: Duration, progress: &dyn Progress) {
         let start = Instant::now();
         let seconds = state.seconds + elapsed.as_secs_f64();

@@ -5,7 +5,7 @@
 //! u32       version of the format, 3
 //! u32       bytes of the header
 //!           the header, JSON
-//!           blocks, each a u64 with its bytes and then so many bytes
+//!           blocks, each a u64 with its length in bytes and then the bytes
 //! 8 bytes   "STEREND\n"
 //! 32 bytes  BLAKE3 of everything before
 //! ```

@@ -5,7 +5,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::file::{self, Lock, Refusal};
+use crate::file::{self, Lock, LockError};
 
 /// A file that only this process writes, as long as this lives.
 #[derive(Debug)]
@@ -31,9 +31,9 @@ impl StateFile {
         name.push(target.file_name().unwrap_or_default());
         name.push(".lock");
         let lock = Lock::take(&target.with_file_name(name)).map_err(|e| match e {
-            Refusal::Held(owner) if owner.is_empty() => fail("another process is writing it".to_owned()),
-            Refusal::Held(owner) => fail(format!("another process ({owner}) is writing it")),
-            Refusal::System(e) => fail(format!("it cannot be locked: {e}")),
+            LockError::Held(owner) if owner.is_empty() => fail("another process is writing it".to_owned()),
+            LockError::Held(owner) => fail(format!("another process ({owner}) is writing it")),
+            LockError::System(e) => fail(format!("it cannot be locked: {e}")),
         })?;
         Ok(Self { path: path.to_owned(), target, _lock: lock })
     }

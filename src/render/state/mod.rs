@@ -1,4 +1,4 @@
-//! The state of a render: what a checkpoint keeps, a shard brings, and a merge puts together.
+//! The state of a render: the content of checkpoints and shards, which merging sums.
 //!
 //! Films hold sums that do not depend on the order of their terms, and a sample depends on nothing but its pixel and
 //! its index. So a render that goes on from a state, and films of any parts of the samples put together, give the
@@ -121,7 +121,7 @@ impl RenderState {
         self.write_with(header, self.seconds, out)
     }
 
-    /// As [`write`](Self::write), after so many seconds of rendering.
+    /// As [`write`](Self::write), after `seconds` of rendering.
     fn write_with(&self, header: &Header, render_seconds: f64, out: impl Write) -> io::Result<()> {
         let RayCounts { camera, indirect, shadow } = self.rays;
         let header = Header {

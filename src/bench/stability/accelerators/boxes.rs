@@ -7,7 +7,7 @@ use crate::accel::LinearAccel;
 use crate::bench::stability::geometry::{Rng, cube, meshes, ray, ray_through, soup, transform, world};
 use crate::bench::stability::scenes::{all, own};
 use crate::bench::stability::{Effort, Outcome, Plot};
-use crate::geometry::{Analytic, Disk, Geometry, Mesh, Placed, Shape, Sphere};
+use crate::geometry::{Analytic, Disk, Geometry, Mesh, Shape, Sphere, TransformedShape};
 use crate::math::{DMat3, DVec3, Ray, Transform, Vec3};
 
 fn corner(mesh: &Mesh, i: usize) -> DVec3 {
@@ -42,14 +42,14 @@ struct Round {
     radius: f64,
     /// Of a disk.
     normal: Option<DVec3>,
-    placed: Placed,
+    placed: TransformedShape,
 }
 
 impl Round {
     fn new(rng: &mut Rng, center: DVec3, is_disk: bool) -> Self {
         let (radius, turn) = (rng.range(0.1, 2.0), rng.rotation());
         let shape = if is_disk { Disk::new(radius, 0.0, TAU).map(Analytic::Disk) } else { Sphere::full(radius).map(Analytic::Sphere) };
-        let placed = Placed::new(shape.expect("radii are above zero"), transform(turn, center));
+        let placed = TransformedShape::new(shape.expect("radii are above zero"), transform(turn, center));
         Self { center, radius, normal: is_disk.then_some(turn.z_axis), placed }
     }
 
@@ -89,7 +89,7 @@ pub(super) fn f5_extreme_points(effort: Effort) -> Outcome {
 
 pub(super) fn f6_far_cameras(effort: Effort) -> Outcome {
     let sphere = Analytic::Sphere(Sphere::full(1.0).expect("the radius is 1"));
-    let geometry = world(vec![Shape::Analytic(Placed::new(sphere, Transform::IDENTITY))]);
+    let geometry = world(vec![Shape::Analytic(TransformedShape::new(sphere, Transform::IDENTITY))]);
     let accels = all(&geometry);
     let mut rng = Rng::new(36);
     let (mut differ, mut missed, mut sure) = (0, 0, 0);

@@ -7,7 +7,7 @@ use crate::accel::{AccelKind, Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQua
 use crate::bench::bumpy_sphere;
 use crate::bench::stability::geometry::{Rng, all_analytic_shapes, cube, instances, meshes, ray, soup, transform, triangle, world};
 use crate::bench::stability::scenes::{all, all_answers, build, moving_scene, same, scenes, test_rays};
-use crate::geometry::{Geometry, Placed, Shape};
+use crate::geometry::{Geometry, Shape, TransformedShape};
 use crate::math::{DMat3, DVec3, Ray, Transform};
 
 /// How many answers of any accelerator are not the oracle's.
@@ -40,7 +40,7 @@ fn hits_of_nothing(rays: &[Ray]) -> usize {
 }
 
 fn single_shapes() -> Vec<Geometry> {
-    let analytic = all_analytic_shapes().into_iter().map(|(_, shape)| Shape::Analytic(Placed::new(shape, Transform::IDENTITY)));
+    let analytic = all_analytic_shapes().into_iter().map(|(_, shape)| Shape::Analytic(TransformedShape::new(shape, Transform::IDENTITY)));
     let triangle = Shape::Mesh(triangle(-DVec3::X, DVec3::new(1.0, 0.3, 0.2), DVec3::Y));
     analytic.chain([triangle]).map(|shape| world(vec![shape])).collect()
 }

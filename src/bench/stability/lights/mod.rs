@@ -12,7 +12,7 @@ use super::geometry::transform;
 use super::verdict::Tests;
 use super::{Effort, Outcome};
 use crate::color::Rgb;
-use crate::geometry::{Analytic, Geometry, Placed, Shape};
+use crate::geometry::{Analytic, Geometry, Shape, TransformedShape};
 use crate::id::{PrimId, ShapeId};
 use crate::light::{AreaLight, Emission, LightSample, ShadowTarget};
 use crate::math::{DMat3, DVec3, Transform};
@@ -62,7 +62,7 @@ const TWO_SIDED: Emission = Emission { two_sided: true, ..WHITE };
 
 /// One shape in the world.
 fn place(shape: Analytic, transform: Transform) -> Geometry {
-    super::geometry::world(vec![Shape::Analytic(Placed::new(shape, transform))])
+    super::geometry::world(vec![Shape::Analytic(TransformedShape::new(shape, transform))])
 }
 
 /// The light of the world's first primitive.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{Effort, Outcome, Tests, transform};
 use crate::bench::stability::geometry::mesh;
 use crate::color::Rgb;
-use crate::geometry::{Analytic, Disk, Geometry, Placed, Quad, Shape, Sphere};
+use crate::geometry::{Analytic, Disk, Geometry, Quad, Shape, Sphere, TransformedShape};
 use crate::id::{LightId, ShapeId};
 use crate::light::{
     AreaLight, Emission, Environment, IesLight, IesProfile, Light, LightSampleContext, LightSelection, LightSet, MisCompensation,
@@ -32,7 +32,7 @@ fn cloud(seed: u64, sky: bool, selection: LightSelection) -> LightSet {
             }
         };
         let turn = DMat3::from_axis_angle(q.normalize(), 3.0 * p.y) * (0.02 + 0.2 * q.z.abs());
-        geometry.shapes.push(Shape::Analytic(Placed::new(analytic, transform(turn, p))));
+        geometry.shapes.push(Shape::Analytic(TransformedShape::new(analytic, transform(turn, p))));
         let shape = ShapeId::new(geometry.shapes.len() - 1);
         geometry.world.push(shape);
         lights.extend(AreaLight::for_shape(shape, emission, &geometry, &[]).into_iter().map(Light::Area));

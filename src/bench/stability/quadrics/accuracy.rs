@@ -5,7 +5,7 @@ use crate::bench::stability::geometry::{Rng, closest, transform as moved, world}
 use crate::bench::stability::oracle::{Answer, Case, ExactTransform, partial_cases, whole_cases};
 use crate::bench::stability::vectors::{SHAPES, ShapeVector, excluded as excluded_of, shape_vectors};
 use crate::bench::stability::{Effort, Outcome, Plot};
-use crate::geometry::{Analytic, Geometry, Placed, Shape, Sphere};
+use crate::geometry::{Analytic, Geometry, Shape, Sphere, TransformedShape};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
 use crate::math::{Bounds, DMat3, DVec3, Ray, Transform, Vec3};
 
@@ -129,7 +129,7 @@ fn bystanders(ray: &Ray, unit: f64) -> impl Iterator<Item = Shape> + '_ {
     (1..=3).map(move |i| {
         let center = ray.origin.as_dvec3() + back * unit * 4.0 * f64::from(i);
         let shape = Analytic::Sphere(Sphere::full(unit).expect("the radius is positive"));
-        Shape::Analytic(Placed::new(shape, Transform::from_translation(center)))
+        Shape::Analytic(TransformedShape::new(shape, Transform::from_translation(center)))
     })
 }
 
@@ -150,7 +150,7 @@ fn compare(rng: &mut Rng, case: &Case, setting: Setting, rays: usize, aim: impl 
         let Shot { ray, transform } = shot(rng, case, setting, aim);
         let answer = case.answer(&ExactTransform::new(&transform), &ray, margin);
         let m = transform.world_from_object;
-        let placed = Placed::new(case.shape.clone(), moved(m.matrix3 * case.axes, m.translation));
+        let placed = TransformedShape::new(case.shape.clone(), moved(m.matrix3 * case.axes, m.translation));
         let reach = placed.bounds().min.abs().max(placed.bounds().max.abs()).max_element();
         let is_inside = passes_inside(placed.bounds(), &ray);
         let mut geometry = world(vec![Shape::Analytic(placed)]);
@@ -342,7 +342,7 @@ pub(super) fn c13_stored_vectors(_: Effort) -> Outcome {
             let ShapeVector { ray, center, hit, condition } = vector;
             let at = Transform::from_translation(center);
             let answer = hit.map_or(Answer::Miss, |(t, p)| Answer::Hit { t, p });
-            let geometry = world(vec![Shape::Analytic(Placed::new(case.shape.clone(), at))]);
+            let geometry = world(vec![Shape::Analytic(TransformedShape::new(case.shape.clone(), at))]);
             let found = closest(&LinearAccel::new(&geometry), &geometry, &ray).found;
             let reach = center.abs().max_element() + case.size;
             shapes.judge(found.map(|at| (at.p, at.n_g)), answer, reach);

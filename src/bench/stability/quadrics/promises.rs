@@ -6,7 +6,7 @@ use crate::accel::{self, AccelKind, Accelerator, Coherence, LinearAccel};
 use crate::bench::stability::geometry::{Rng, closest, ray_through, transform, world};
 use crate::bench::stability::oracle::{Answer, Case, ExactTransform, partial_cases, whole_cases};
 use crate::bench::stability::{Effort, Outcome};
-use crate::geometry::{Analytic, Disk, Frustum, Geometry, LocalSurface, Placed, Profile, Revolution, Shape, Sphere};
+use crate::geometry::{Analytic, Disk, Frustum, Geometry, LocalSurface, Profile, Revolution, Shape, Sphere, TransformedShape};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
 use crate::math::{Bounds, DMat3, DVec3, Frame, Ray, RayF64, Transform, dvec3};
 
@@ -28,7 +28,7 @@ fn shapes() -> Vec<(&'static str, Analytic)> {
 }
 
 fn placed(shape: &Analytic, linear: DMat3, translation: DVec3) -> Geometry {
-    world(vec![Shape::Analytic(Placed::new(shape.clone(), transform(linear, translation)))])
+    world(vec![Shape::Analytic(TransformedShape::new(shape.clone(), transform(linear, translation)))])
 }
 
 /// What a ray finds through the oracle of all accelerators.
@@ -286,7 +286,7 @@ pub(super) fn c8_bounds(effort: Effort) -> Outcome {
     for (_, shape) in shapes() {
         for (linear, translation) in [(DMat3::IDENTITY, DVec3::ZERO), (rng.rotation(), 1e4 * rng.cube()), (shear, dvec3(10.0, -3.0, 100.0))]
         {
-            let placed = Placed::new(shape.clone(), transform(linear, translation));
+            let placed = TransformedShape::new(shape.clone(), transform(linear, translation));
             let padded = placed.bounds().padded();
             for i in 0..effort.pick(400, 100_000) {
                 // Corners and edges as well.
@@ -357,11 +357,11 @@ pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
             let (turn, offset) = if turned { (rng.rotation(), 100.0 * rng.cube()) } else { (DMat3::IDENTITY, DVec3::ZERO) };
             let at = |linear: DMat3, z: f64| transform(turn * linear, offset + turn * (z * DVec3::Z));
             let side = Analytic::Frustum(Frustum::new(bottom, top, height, TAU).expect(VALID));
-            let mut shapes = vec![Shape::Analytic(Placed::new(side, at(DMat3::IDENTITY, 0.0)))];
+            let mut shapes = vec![Shape::Analytic(TransformedShape::new(side, at(DMat3::IDENTITY, 0.0)))];
             for (radius, linear, z) in [(bottom, flip, 0.0), (top, DMat3::IDENTITY, height)] {
                 if radius > 0.0 {
                     let cap = Analytic::Disk(Disk::new(radius, 0.0, TAU).expect(VALID));
-                    shapes.push(Shape::Analytic(Placed::new(cap, at(linear, z))));
+                    shapes.push(Shape::Analytic(TransformedShape::new(cap, at(linear, z))));
                 }
             }
             let geometry = world(shapes);

@@ -5,7 +5,7 @@ use crate::accel::{Accelerator, LinearAccel};
 use crate::bench::stability::geometry::{closest, transform, world};
 use crate::bench::stability::oracle::line_cases;
 use crate::bench::stability::quadrics::compare_with_oracle;
-use crate::geometry::{Analytic, Frustum, Placed, Shape};
+use crate::geometry::{Analytic, Frustum, Shape, TransformedShape};
 use crate::math::{DMat3, DVec2};
 
 /// A line as a cubic with its parameter proportional to length.
@@ -111,7 +111,7 @@ pub(super) fn d5_spheroids_are_not_hit_again(effort: Effort) -> Outcome {
                 let linear = rng.rotation() * DMat3::from_diagonal(radius * dvec3(1.0, rng.range(0.5, 2.0), 1.0));
                 let center = rng.direction() * offset * radius;
                 let shape = Analytic::Revolution(turned(CIRCLE));
-                let geometry = world(vec![Shape::Analytic(Placed::new(shape, transform(linear, center)))]);
+                let geometry = world(vec![Shape::Analytic(TransformedShape::new(shape, transform(linear, center)))]);
                 let accel = LinearAccel::new(&geometry);
                 let from = center + rng.direction() * radius * rng.range(3.0, 30.0);
                 let ray = crate::bench::stability::geometry::ray_through(from, center + rng.direction() * 0.5 * radius);

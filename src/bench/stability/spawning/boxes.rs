@@ -3,7 +3,7 @@
 use super::{Effort, Leavings, NAMES, Outcome, accelerators};
 use crate::accel::{self, AccelKind};
 use crate::bench::stability::geometry::{Rng, closest, cube, instances, meshes, ray, ray_through, transform, world};
-use crate::geometry::{Analytic, Geometry, Instance, Mesh, MeshStep, Object, Placed, Shape, Sphere};
+use crate::geometry::{Analytic, Geometry, Instance, Mesh, MeshStep, Object, Shape, Sphere, TransformedShape};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::{DAffine3, DMat3, DVec3, Motion, Ray, Transform};
 
@@ -108,7 +108,7 @@ fn chains(rng: &mut Rng, time: f64) -> Vec<Chain> {
     let unit_cube = || Shape::Mesh(cube(DMat3::IDENTITY, DVec3::ZERO));
     let sphere = |map: DAffine3| {
         let shape = Analytic::Sphere(Sphere::full(1.0).expect("1 is a radius"));
-        Shape::Analytic(Placed::new(shape, Transform::new(map).expect("the map is regular")))
+        Shape::Analytic(TransformedShape::new(shape, Transform::new(map).expect("the map is regular")))
     };
     let mut all = Vec::new();
     // In the world: as it is, mapped, deforming.

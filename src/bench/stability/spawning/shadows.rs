@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{Effort, NAMES, Named, Outcome, accelerators, aimed, point_on, seen};
 use crate::bench::stability::geometry::{Rng, grid, mesh, triangle, world};
 use crate::color::Rgb;
-use crate::geometry::{Analytic, Disk, Frustum, Geometry, Mesh, Placed, Profile, Quad, Revolution, Shape, Sphere};
+use crate::geometry::{Analytic, Disk, Frustum, Geometry, Mesh, Profile, Quad, Revolution, Shape, Sphere, TransformedShape};
 use crate::id::{PrimId, ShapeId};
 use crate::light::{AreaLight, Emission};
 use crate::math::{DAffine3, DVec3, Transform};
@@ -14,7 +14,7 @@ const VALID: &str = "the emitters' parameters are valid";
 
 /// Convex emitters within about 1 of the origin.
 fn emitters() -> Vec<(&'static str, Shape)> {
-    let placed = |shape| Shape::Analytic(Placed::new(shape, Transform::IDENTITY));
+    let placed = |shape| Shape::Analytic(TransformedShape::new(shape, Transform::IDENTITY));
     let spindle = Profile::bezier(&[[0.0, -0.9], [0.5, -0.9], [0.8, -0.4], [0.8, 0.0], [0.8, 0.4], [0.5, 0.9], [0.0, 0.9]]).expect(VALID);
     let corner = DVec3::new(-0.7, -0.5, 0.0);
     let (x, y) = (DVec3::X * 1.4, DVec3::Y);
@@ -45,7 +45,7 @@ fn mapped(shape: &Shape, map: DAffine3) -> Shape {
         }
         Shape::Analytic(placed) => {
             let map = Transform::new(map * placed.transform.world_from_object).expect("the map is regular");
-            Shape::Analytic(Placed::new(placed.shape.clone(), map))
+            Shape::Analytic(TransformedShape::new(placed.shape.clone(), map))
         }
     }
 }

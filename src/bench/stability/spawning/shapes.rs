@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{Effort, Leavings, NAMES, Outcome, accelerators, leaving};
 use crate::accel::{self, AccelKind, Accelerator};
 use crate::bench::stability::geometry::{Rng, closest, grid, ray, ray_through, transform, world};
-use crate::geometry::{Analytic, Disk, Frustum, Geometry, Placed, Profile, Quad, Revolution, Shape, Sphere};
+use crate::geometry::{Analytic, Disk, Frustum, Geometry, Profile, Quad, Revolution, Shape, Sphere, TransformedShape};
 use crate::math::float::step_past;
 use crate::math::{DVec3, Ray, Transform};
 
@@ -71,7 +71,7 @@ pub(super) fn b2_convex_shapes(effort: Effort) -> Outcome {
             let translation = DVec3::new(translation(), translation(), translation());
             let placement = transform(rng.rotation() * scale, translation);
             let inside = inside.map(|p| placement.point(p));
-            let geometry = world(vec![Shape::Analytic(Placed::new(shape.clone(), placement))]);
+            let geometry = world(vec![Shape::Analytic(TransformedShape::new(shape.clone(), placement))]);
             let reach = size * scale;
             for ((_, accel), tally) in accelerators(&geometry).iter().zip(&mut tally) {
                 // Several rays leave each point.
@@ -101,7 +101,7 @@ fn squares(half: f64, z: f64) -> [Shape; 2] {
     let corner = DVec3::new(-half, -half, z);
     let quad = Quad::new(corner, 2.0 * half * DVec3::X, 2.0 * half * DVec3::Y).expect(VALID);
     let grid = grid(corner, 2.0 * half * DVec3::X, 2.0 * half * DVec3::Y, 1, |_, _| 0.0);
-    [Shape::Analytic(Placed::new(Analytic::Quad(quad), Transform::IDENTITY)), Shape::Mesh(grid)]
+    [Shape::Analytic(TransformedShape::new(Analytic::Quad(quad), Transform::IDENTITY)), Shape::Mesh(grid)]
 }
 
 pub(super) fn b9_quads(effort: Effort) -> Outcome {

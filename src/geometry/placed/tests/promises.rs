@@ -137,7 +137,7 @@ fn samples_are_uniform_by_area() {
 #[test]
 fn rays_that_are_none_are_not_hit() {
     for shape in shapes() {
-        let placed = Placed::new(shape.clone(), Transform::IDENTITY);
+        let placed = TransformedShape::new(shape.clone(), Transform::IDENTITY);
         for bad in [f32::NAN, f32::INFINITY] {
             for ray in [
                 Ray::new(Vec3::new(bad, 0.0, 5.0), -Vec3::Z),
@@ -168,7 +168,7 @@ fn placed_normals_stay_perpendicular_and_outside() {
     let mut random = Rng::new(15);
     for shape in shapes() {
         for transform in transforms() {
-            let mut placed = Placed::new(shape.clone(), transform);
+            let mut placed = TransformedShape::new(shape.clone(), transform);
             for reverse_normal in [false, true] {
                 placed.reverse_normal = reverse_normal;
                 for _ in 0..50 {
@@ -208,7 +208,7 @@ fn placed_densities_integrate_to_one() {
     const SIDE: usize = 200;
     for shape in shapes() {
         for transform in transforms() {
-            let placed = Placed::new(shape.clone(), transform);
+            let placed = TransformedShape::new(shape.clone(), transform);
             let mid = |i: usize| (i as f32 + 0.5) / SIDE as f32;
             let (mut from_pdf, mut from_patches) = (0.0, 0.0);
             let corner = |i: usize, k: usize| transform.point(shape.sample([i as f64 / SIDE as f64, k as f64 / SIDE as f64]).p);
@@ -226,7 +226,7 @@ fn placed_densities_integrate_to_one() {
 
 #[test]
 fn hits_whose_distance_was_rounded_otherwise_are_found_again() {
-    let placed = Placed::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), Transform::IDENTITY);
+    let placed = TransformedShape::new(Analytic::Sphere(Sphere::full(1.0).unwrap()), Transform::IDENTITY);
     let ray = Ray::new(Vec3::new(0.0, 0.0, -3.0), Vec3::Z);
     let hit = Hit { t: 1.999_99, ..NO_HIT };
     assert_eq!(placed.interaction(&ray, &hit).map(|at| at.t), Some(2.0));
@@ -244,7 +244,7 @@ fn points_resolved_in_rows_are_those_of_single_hits() {
     for shape in shapes() {
         let matrix = DMat3::from_cols(dvec3(0.6, 0.8, 0.1), dvec3(-0.8, 0.5, 0.0), dvec3(0.1, 0.2, 1.3));
         let transform = Transform::new(DAffine3 { matrix3: matrix, translation: dvec3(0.3, -2.0, 1.0) }).unwrap();
-        let placed = Placed::new(shape, transform);
+        let placed = TransformedShape::new(shape, transform);
         for count in [1, 16, 60, BATCH] {
             let (mut rays, mut t) = (RayRows::default(), [0.0; BATCH]);
             let mut found = Vec::new();
@@ -283,7 +283,7 @@ fn packets_hit_what_single_rays_hit() {
         for scale in [1.0, 1e-3] {
             let matrix = DMat3::from_cols(dvec3(0.6, 0.8, 0.1), dvec3(-0.8, 0.5, 0.0), dvec3(0.1, 0.2, 1.3)) * scale;
             let transform = Transform::new(DAffine3 { matrix3: matrix, translation: dvec3(0.3, -2.0, 1.0) * scale }).unwrap();
-            let placed = Placed::new(shape.clone(), transform);
+            let placed = TransformedShape::new(shape.clone(), transform);
             for round in 0..40 {
                 let mut vector =
                     |size: f64| dvec3(random.range(-size, size), random.range(-size, size), random.range(-size, size)).as_vec3();

@@ -126,7 +126,7 @@ impl Uri {
     }
 }
 
-/// The bytes of a text in which some stand as `%` and two digits. A `%` that no digits follow stands for itself.
+/// The bytes of a text in which some stand as `%` and two digits. A `%` that no digits follow is itself.
 fn percent_decoded(text: &str) -> Result<Vec<u8>, String> {
     let bytes = text.as_bytes();
     let digit = |at: usize| bytes.get(at).and_then(|&b| char::from(b).to_digit(16));

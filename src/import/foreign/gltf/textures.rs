@@ -65,7 +65,7 @@ impl TextureSet {
         let json = source.root.textures.get(texture.index);
         let json = json.ok_or_else(|| source.fault(&texture.place, format!("there is no textures[{}]", texture.index)))?;
         let path = format!("textures[{}]", texture.index);
-        // An index of all ones stands for none.
+        // An index of all ones means none.
         let Some(image) = source.root.images.get(json.source.value()).map(|_| json.source.value()) else {
             draft.ignored(&path, "texture", "source", "the image is in a format of an extension that is not read");
             return Ok(None);

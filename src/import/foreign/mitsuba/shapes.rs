@@ -43,7 +43,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The shapes that a plugin stands for, with their places.
+    /// The shapes of a plugin, with their places.
     fn shapes(&mut self, id: PluginId) -> Result<Vec<(String, ShapeDesc)>> {
         self.guard(id)?;
         let kind = self.document.plugins[id.0].kind.as_str();

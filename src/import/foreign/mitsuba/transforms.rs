@@ -54,7 +54,7 @@ fn step(node: Node, read: Read, fail: Fail) -> Result<DAffine3> {
     })
 }
 
-/// `value`, or `x`, `y` and `z`, where `other` stands for those that are not given.
+/// `value`, or `x`, `y` and `z`, where `other` replaces those that are not given.
 pub fn vector(node: Node, other: f64, read: Read, fail: Fail) -> Result<[f64; 3]> {
     let at = |message: Fault| fail(node, message);
     if let Some(text) = read(node, "value")? {

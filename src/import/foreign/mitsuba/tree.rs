@@ -140,7 +140,7 @@ impl Document {
         }
     }
 
-    /// What a file name of the scene stands for, relative to the scene's folder.
+    /// The path of a file name of the scene, relative to the scene's folder.
     pub fn find_file(&self, scene: &Path, name: &str) -> String {
         let home = scene.parent().unwrap_or(Path::new(""));
         let candidates = self.folders.iter().rev().map(|folder| folder.join(name));

@@ -251,7 +251,7 @@ impl Parser {
                 self.child(source, child, class, &mut properties, depth + 1)?;
             }
         }
-        // The scene's names are those of plugins, which nothing asks for.
+        // The scene's names are those of plugins, which nothing uses.
         let mut names = BTreeSet::new();
         let mut named = properties.iter().filter(|property| class != "scene" && !property.name.is_empty());
         if let Some(property) = named.find(|property| !names.insert(property.name.as_str())) {

@@ -25,7 +25,7 @@ pub fn square_from_direction(d: DVec3) -> [f64; 2] {
     [u.copysign(d.x), v.copysign(d.y)].map(|x| 0.5 * (x + 1.0))
 }
 
-/// The direction (z up) that a point of the unit square stands for.
+/// The direction (z up) of a point of the unit square.
 pub fn direction_from_square([s, t]: [f64; 2]) -> DVec3 {
     let (u, v) = (2.0 * s - 1.0, 2.0 * t - 1.0);
     let (up, vp) = (u.abs(), v.abs());

@@ -153,12 +153,12 @@ impl Params {
         }
     }
 
-    /// One finite number, or what stands for it.
+    /// One finite number, or the default.
     pub fn number_or(&self, name: &str, default: f64) -> Result<f64> {
         Ok(self.number(name)?.unwrap_or(default))
     }
 
-    /// One number above 0, or what stands for it.
+    /// One number above 0, or the default.
     pub fn positive_or(&self, name: &str, default: f64) -> Result<f64> {
         match (self.number(name)?, self.get(name)) {
             (Some(x), Some(param)) if x <= 0.0 => Err(param.error(format!("must be above 0, not {x}"))),
@@ -166,7 +166,7 @@ impl Params {
         }
     }
 
-    /// One whole number, or what stands for it.
+    /// One whole number, or the default.
     pub fn integer_or(&self, name: &str, default: i64) -> Result<i64> {
         Ok(self.number(name)?.map_or(default, |x| x as i64))
     }
@@ -211,7 +211,7 @@ impl Params {
         Ok(Some(groups.iter().map(|group| group.map(|x| x as u32)).collect()))
     }
 
-    /// `true` or `false`, or what stands for it.
+    /// `true` or `false`, or the default.
     pub fn bool_or(&self, name: &str, default: bool) -> Result<bool> {
         let Some(param) = self.get(name) else { return Ok(default) };
         match &param.values {
@@ -268,7 +268,7 @@ fn read_values(lexer: &mut Lexer, declaration: &Token, kind: &str) -> Result<Val
     let mut values = match kind {
         "string" | "texture" => Values::Strings(Vec::new()),
         "bool" => Values::Bools(Vec::new()),
-        // Of a spectrum: numbers, or the name of one, which the first value tells.
+        // Of a spectrum: numbers, or the name of one, depending on the first value.
         "spectrum" | "integer" | "float" | "point2" | "point3" | "point" | "vector2" | "vector3" | "vector" | "normal" | "normal3"
         | "rgb" | "blackbody" => Values::Numbers(Vec::new()),
         _ => return Err(lexer.error(declaration.at, format!("there is no type of parameters \"{kind}\""))),

@@ -50,7 +50,7 @@ pub(crate) enum Look {
     Interface,
 }
 
-/// A material of the scene and what it asks of shapes.
+/// A material of the scene and what it requires of shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Material {
     /// Its name in the scene.

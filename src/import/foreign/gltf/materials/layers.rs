@@ -28,7 +28,7 @@ impl Builder<'_, '_> {
     pub(super) fn specular(&mut self, desc: &mut PrincipledDesc) -> Result<()> {
         let given = self.extension::<ext::Ior>(IOR)?;
         let ior = given.as_ref().map_or(1.5, |ior| ior.ior);
-        // Zero stands for a layer that reflects all.
+        // Zero means a layer that reflects all.
         let kept = if ior == 0.0 {
             10.0
         } else if ior >= 1.0 {

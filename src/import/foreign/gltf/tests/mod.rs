@@ -137,7 +137,7 @@ fn mesh_of<'a>(imported: &'a Imported, shape: &ShapeDesc) -> &'a MeshData {
     &imported.assets.meshes[mesh.file.as_ref().unwrap()]
 }
 
-/// The map that a transform's one matrix stands for.
+/// The affine map of a transform with one matrix.
 fn map(transform: &TransformDesc) -> DAffine3 {
     let [TransformStepDesc::Matrix(m)] = transform.0.as_slice() else { panic!("not one matrix") };
     let column = |k: usize| DVec3::new(m[0][k], m[1][k], m[2][k]);

@@ -11,7 +11,7 @@ fn seen(imported: &Imported, p: DVec3) -> [f64; 2] {
     [local.x / -local.z, local.y / -local.z]
 }
 
-/// Whether the reader mirrored the world: a sphere without transform tells.
+/// Whether the reader mirrored the world: shown by a sphere without transform.
 fn is_mirrored(imported: &Imported) -> bool {
     map(shape(imported).common().transform).matrix3.determinant() < 0.0
 }

@@ -4,24 +4,24 @@ use super::materials::{Compiler, MaterialTable};
 use super::textures::TextureUse;
 use crate::desc::{BumpMapDesc, ColorSpaceDesc, MaterialDesc, NormalMapDesc, SceneDesc, TextureDesc};
 use crate::error::Result;
-use crate::id::{MaterialId, ReliefId};
+use crate::id::{MaterialId, NormalPerturbationId};
 use crate::material::Material;
-use crate::relief::Relief;
+use crate::normal_perturbation::NormalPerturbation;
 
 impl MaterialTable {
     /// Adds a relief.
-    pub(super) fn push_relief(&mut self, relief: Relief) -> ReliefId {
-        self.reliefs.push(relief);
-        ReliefId::new(self.reliefs.len() - 1)
+    pub(super) fn push_relief(&mut self, normal_perturbation: NormalPerturbation) -> NormalPerturbationId {
+        self.normal_perturbations.push(normal_perturbation);
+        NormalPerturbationId::new(self.normal_perturbations.len() - 1)
     }
 
     /// The relief of a material by itself.
-    pub(super) fn relief_of(&self, id: MaterialId) -> Option<ReliefId> {
+    pub(super) fn relief_of(&self, id: MaterialId) -> Option<NormalPerturbationId> {
         self.by_material.get(&id).copied()
     }
 
     /// Reliefs by material if some material consists of one with relief; none otherwise.
-    pub(super) fn part_reliefs(&self) -> Vec<Option<ReliefId>> {
+    pub(super) fn part_normal_perturbations(&self) -> Vec<Option<NormalPerturbationId>> {
         let mut parts = self.materials.iter().filter_map(Material::parts).flatten();
         if !parts.any(|part| self.relief_of(part).is_some()) {
             return Vec::new();
@@ -32,8 +32,8 @@ impl MaterialTable {
 
 impl Compiler<'_> {
     /// The relief that a material says, if it is one with relief.
-    pub(super) fn relief(&self, desc: &SceneDesc, path: &str, material: &MaterialDesc) -> Result<Option<Relief>> {
-        let MaterialDesc::Relief { normal_map, bump_map, .. } = material else { return Ok(None) };
+    pub(super) fn normal_perturbation(&self, desc: &SceneDesc, path: &str, material: &MaterialDesc) -> Result<Option<NormalPerturbation>> {
+        let MaterialDesc::NormalPerturbation { normal_map, bump_map, .. } = material else { return Ok(None) };
         Ok(Some(match (normal_map, bump_map) {
             (Some(map), None) => self.normal_map(desc, &format!("{path}.normal_map"), map)?,
             (None, Some(map)) => self.bump_map(&format!("{path}.bump_map"), map)?,
@@ -41,21 +41,21 @@ impl Compiler<'_> {
         }))
     }
 
-    fn normal_map(&self, desc: &SceneDesc, path: &str, map: &NormalMapDesc) -> Result<Relief> {
+    fn normal_map(&self, desc: &SceneDesc, path: &str, map: &NormalMapDesc) -> Result<NormalPerturbation> {
         let place = format!("{path}.texture");
         let texture = self.textures.find_by_uv(self.files, &place, &map.texture, TextureUse::Data)?;
         if let Some(TextureDesc::Image { color_space: ColorSpaceDesc::Srgb, .. }) = desc.textures.get(&map.texture) {
             return Err(self.files.error(&place, format!("the `color_space` of \"{}\" is `srgb`, but normals are data", map.texture)));
         }
         self.files.within(&format!("{path}.strength"), f64::from(map.strength), 0.0, 16.0)?;
-        Ok(Relief::normal_map(texture, map.strength, map.flip_y, &self.textures.textures))
+        Ok(NormalPerturbation::normal_map(texture, map.strength, map.flip_y, &self.textures.textures))
     }
 
-    fn bump_map(&self, path: &str, map: &BumpMapDesc) -> Result<Relief> {
+    fn bump_map(&self, path: &str, map: &BumpMapDesc) -> Result<NormalPerturbation> {
         let texture = self.textures.find_by_uv(self.files, &format!("{path}.texture"), &map.texture, TextureUse::Data)?;
         if !map.height.is_finite() {
             return Err(self.files.error(&format!("{path}.height"), "is not finite"));
         }
-        Ok(Relief::bump_map(texture, map.height, &self.textures.textures))
+        Ok(NormalPerturbation::bump_map(texture, map.height, &self.textures.textures))
     }
 }

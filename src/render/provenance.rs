@@ -23,7 +23,7 @@ const VERSION: u64 = 1;
 /// It is data: it names the scene and what the picture depends on, never a file to write, a library to load or an address to connect to.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Recipe {
+pub struct RenderProvenance {
     /// The version of this format.
     pub version: u64,
     /// Name and version of the program.
@@ -66,7 +66,7 @@ pub struct Frame {
     pub per_second: f64,
 }
 
-impl Recipe {
+impl RenderProvenance {
     /// That of a render which is about to begin in the working folder.
     pub fn new(scene_file: &Path, scene: SceneFingerprint, settings: &Settings, arguments: Vec<String>) -> Self {
         Self {
@@ -105,10 +105,10 @@ impl Recipe {
     /// What of this is not as in `expected`, of which a file is to be written as `output` says: settings by name, each
     /// with both values. The command line, the folder and the version of the program do not count.
     pub fn differences(&self, expected: &Self, output: &OutputDesc) -> Vec<String> {
-        let flat = |recipe: &Self, output: Option<&OutputDesc>| {
+        let flat = |provenance: &Self, output: Option<&OutputDesc>| {
             let mut values = BTreeMap::new();
-            put(&mut values, "", &serde_json::to_value(&recipe.settings).unwrap_or_default());
-            put(&mut values, "denoise", &Value::Bool(recipe.denoise));
+            put(&mut values, "", &serde_json::to_value(&provenance.settings).unwrap_or_default());
+            put(&mut values, "denoise", &Value::Bool(provenance.denoise));
             put(&mut values, "output", &serde_json::to_value(output).unwrap_or_default());
             values.remove("output.file");
             values
@@ -141,17 +141,17 @@ impl Recipe {
             Some(Some(VERSION)) => {}
             Some(version) => {
                 let found = version.map_or_else(|| "no number".to_owned(), |version| version.to_string());
-                return Err(malformed(format!("its recipe has version {found}, supported is {VERSION}: render the scene itself")));
+                return Err(malformed(format!("its provenance has version {found}, supported is {VERSION}: render the scene itself")));
             }
             None => {
                 let message =
-                    "its recipe has no version: it was written by an earlier steradian, as a command line; render the scene itself";
+                    "its provenance has no version: it was written by an earlier steradian, as a command line; render the scene itself";
                 return Err(malformed(message.to_owned()));
             }
         }
-        let recipe: Self = serde_path_to_error::deserialize(value).map_err(|e| malformed(format!("its recipe: {e}")))?;
-        recipe.check(file)?;
-        Ok(recipe)
+        let provenance: Self = serde_path_to_error::deserialize(value).map_err(|e| malformed(format!("its provenance: {e}")))?;
+        provenance.check(file)?;
+        Ok(provenance)
     }
 
     /// Whether numbers are such as scenes and the command line may have.
@@ -180,7 +180,7 @@ impl Recipe {
         })
     }
 
-    /// The settings of this picture, to be written as [`output`](Self::output) says, with so many threads.
+    /// The settings of this picture, to be written as [`output`](Self::output) says, with `threads` threads.
     pub fn settings(&self, threads: usize) -> Settings {
         let layers = self.output.iter().flat_map(|output| &output.layers).collect();
         let outputs = self.output.iter().cloned().collect();
@@ -193,42 +193,43 @@ mod tests {
     use super::*;
     use crate::render::Overrides;
 
-    fn recipe() -> Value {
+    fn provenance() -> Value {
         let desc = serde_json::from_str(r#"{ "camera": {}, "film": { "width": 40, "height": 30 } }"#).unwrap();
         let settings = Settings::new(&desc, &Overrides::default()).unwrap();
-        let recipe = Recipe::new(Path::new("s.json"), SceneFingerprint::default(), &settings, Vec::new());
-        Recipe { output: Some(OutputDesc::new("a.exr")), frame: Some(Frame { number: 3, per_second: 24.0 }), ..recipe }.to_value()
+        let provenance = RenderProvenance::new(Path::new("s.json"), SceneFingerprint::default(), &settings, Vec::new());
+        RenderProvenance { output: Some(OutputDesc::new("a.exr")), frame: Some(Frame { number: 3, per_second: 24.0 }), ..provenance }
+            .to_value()
     }
 
     fn refusal(value: Value) -> String {
-        let error = Recipe::from_value(value, Path::new("a.exr")).unwrap_err();
+        let error = RenderProvenance::from_value(value, Path::new("a.exr")).unwrap_err();
         assert_eq!(error.kind(), crate::ErrorKind::Scene, "{error}");
         error.to_string()
     }
 
     #[test]
     fn a_recipe_comes_back_as_it_was() {
-        let value = recipe();
-        assert_eq!(Recipe::from_value(value.clone(), Path::new("a.exr")).unwrap().to_value(), value);
-        let settings = Recipe::from_value(value.clone(), Path::new("a.exr")).unwrap().settings(3);
+        let value = provenance();
+        assert_eq!(RenderProvenance::from_value(value.clone(), Path::new("a.exr")).unwrap().to_value(), value);
+        let settings = RenderProvenance::from_value(value.clone(), Path::new("a.exr")).unwrap().settings(3);
         assert_eq!((serde_json::to_value(&settings).unwrap(), settings.threads), (value["settings"].clone(), 3));
         assert_eq!(settings.outputs[0].file, "a.exr");
     }
 
     #[test]
     fn frames_of_a_sequence_differ_in_their_seed_alone() {
-        let recipe = Recipe::from_value(recipe(), Path::new("a.exr")).unwrap();
+        let provenance = RenderProvenance::from_value(provenance(), Path::new("a.exr")).unwrap();
         let of_frame = |number: i64| {
-            let settings = Settings { seed: 5u64.wrapping_add_signed(number), ..recipe.settings.clone() };
-            Recipe { frame: Some(Frame { number, per_second: 24.0 }), settings, ..recipe.clone() }.of_frame(number)
+            let settings = Settings { seed: 5u64.wrapping_add_signed(number), ..provenance.settings.clone() };
+            RenderProvenance { frame: Some(Frame { number, per_second: 24.0 }), settings, ..provenance.clone() }.of_frame(number)
         };
-        let differences = |own: &Recipe, output: &OutputDesc| own.differences(&of_frame(-7), output);
+        let differences = |own: &RenderProvenance, output: &OutputDesc| own.differences(&of_frame(-7), output);
         let output = OutputDesc::new("b.exr");
         assert_eq!(differences(&of_frame(3), &output), Vec::<String>::new());
         let mut other = of_frame(9);
-        (other.settings.spp, other.denoise, other.scene.whole) = (recipe.settings.spp + 1, true, "x".into());
+        (other.settings.spp, other.denoise, other.scene.whole) = (provenance.settings.spp + 1, true, "x".into());
         other.scene.scene = "x".into();
-        let spp = format!("spp: {} in the file, {} for the rest", other.settings.spp, recipe.settings.spp);
+        let spp = format!("spp: {} in the file, {} for the rest", other.settings.spp, provenance.settings.spp);
         let expected = ["another scene: the scene's description", "denoise: true in the file, false for the rest", &spp];
         assert_eq!(differences(&other, &output), expected);
         let commented = OutputDesc { comments: Some("other".into()), ..output };
@@ -238,13 +239,13 @@ mod tests {
     #[test]
     fn recipes_of_other_versions_are_refused() {
         for (version, message) in [(Value::Null, "version no number"), (2.into(), "version 2"), ("1".into(), "version no number")] {
-            let mut value = recipe();
+            let mut value = provenance();
             value["version"] = version;
             assert!(refusal(value).contains(message));
         }
-        let mut value = recipe();
+        let mut value = provenance();
         value.as_object_mut().unwrap().remove("version");
-        assert!(refusal(value).contains("a.exr: its recipe has no version"));
+        assert!(refusal(value).contains("a.exr: its provenance has no version"));
         assert!(refusal(Value::Null).contains("no version"));
     }
 
@@ -252,13 +253,13 @@ mod tests {
     #[test]
     fn unknown_keys_are_refused_at_every_level() {
         for place in ["", "/scene", "/import", "/frame", "/settings", "/settings/filter", "/settings/integrator", "/output"] {
-            let mut value = recipe();
+            let mut value = provenance();
             value.pointer_mut(place).unwrap()["oidn_library"] = "evil.so".into();
             let message = refusal(value);
             assert!(message.contains("a.exr") && message.contains("unknown field `oidn_library`"), "{place}: {message}");
         }
-        for key in recipe()["settings"].as_object().unwrap().keys().filter(|key| *key != "target_error") {
-            let mut value = recipe();
+        for key in provenance()["settings"].as_object().unwrap().keys().filter(|key| *key != "target_error") {
+            let mut value = provenance();
             value["settings"].as_object_mut().unwrap().remove(key);
             assert!(refusal(value).contains(&format!("missing field `{key}`")), "{key}");
         }
@@ -293,7 +294,7 @@ mod tests {
             ("/denoise", json!("evil.so"), "denoise"),
         ];
         for (place, value, message) in cases {
-            let mut changed = recipe();
+            let mut changed = provenance();
             let (object, key) = place.rsplit_once('/').unwrap();
             changed.pointer_mut(object).unwrap()[key] = value;
             let refused = refusal(changed);

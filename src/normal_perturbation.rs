@@ -1,4 +1,4 @@
-//! Relief without geometry: shading normals from normal maps and bump maps.
+//! Normal maps and bump maps.
 
 use crate::geometry::{Geometry, Shape, SurfaceInteraction};
 use crate::id::TextureId;
@@ -7,7 +7,7 @@ use crate::texture::Texture;
 
 /// Where the shading normals of a surface come from, other than from the surface itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Relief {
+pub enum NormalPerturbation {
     /// An image of normals `2 rgb - 1` in the frame of u, v and the normal.
     NormalMap {
         /// The image.
@@ -29,7 +29,7 @@ pub enum Relief {
 /// The least cosine between a shading normal and the surface's own.
 const LEAST_COSINE: f32 = 0.01;
 
-impl Relief {
+impl NormalPerturbation {
     /// A normal map; x and y of its normals are multiplied by `strength`. With `flip_y`, green grows downward in the image.
     pub fn normal_map(texture: TextureId, strength: f32, flip_y: bool, textures: &[Texture]) -> Self {
         let green = vec2(1.0, if flip_y { -1.0 } else { 1.0 });
@@ -43,7 +43,7 @@ impl Relief {
         Self::BumpMap { texture, height, step: texel.unwrap_or(Vec2::splat(1.0 / 1024.0)) }
     }
 
-    /// This relief where lengths are `factor` times what they were.
+    /// The same where lengths are `factor` times what they were.
     pub fn rescale(&mut self, factor: f64) {
         if let Self::BumpMap { height, .. } = self {
             *height = (f64::from(*height) * factor) as f32;
@@ -100,7 +100,7 @@ fn surface_gradient(at: &SurfaceInteraction, dp_dv: Vec3, slope_u: f32, slope_v:
     if gradient.is_finite() { gradient } else { Vec3::ZERO }
 }
 
-/// A unit normal (or zero, which stands for none) raised to the hemisphere of the surface's own normal.
+/// A unit normal (or zero, which means none) raised to the hemisphere of the surface's own normal.
 fn above_surface(n: Vec3, at: &SurfaceInteraction) -> Vec3 {
     let cos = n.dot(at.n_g);
     if n == Vec3::ZERO {
