@@ -62,7 +62,7 @@ impl MaterialTable {
                 };
                 self.coated(base_id, &coating, &mut HashMap::new())
             }
-            MaterialDesc::NormalPerturbation { material, .. } => {
+            MaterialDesc::Relief { material, .. } => {
                 outer.push(name);
                 let place = format!("{path}.material");
                 let base = self.part(compiler, desc, &place, material, outer)?;

@@ -92,9 +92,7 @@ impl MaterialTable {
             None => compiler.material(&path, &desc.materials[name])?,
         };
         let medium = match &desc.materials[name] {
-            MaterialDesc::NormalPerturbation { material, .. } => {
-                self.names.get(material).and_then(|look| self.medium_of.get(&look.material)).copied()
-            }
+            MaterialDesc::Relief { material, .. } => self.names.get(material).and_then(|look| self.medium_of.get(&look.material)).copied(),
             plain => self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, plain)?),
         };
         let id = self.push(material);
@@ -195,10 +193,7 @@ impl Compiler<'_> {
                 }
                 TexturedMaterial::CookTorrance { albedo, d, s, m, f0 }.into()
             }
-            MaterialDesc::Mix { .. }
-            | MaterialDesc::TwoSided { .. }
-            | MaterialDesc::Coated { .. }
-            | MaterialDesc::NormalPerturbation { .. } => {
+            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } | MaterialDesc::Relief { .. } => {
                 return Err(files.error(path, "cannot be part of a material"));
             }
             MaterialDesc::Plastic(desc) => self.plastic(path, desc)?.into(),

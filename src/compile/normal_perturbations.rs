@@ -33,7 +33,7 @@ impl MaterialTable {
 impl Compiler<'_> {
     /// The relief that a material says, if it is one with relief.
     pub(super) fn normal_perturbation(&self, desc: &SceneDesc, path: &str, material: &MaterialDesc) -> Result<Option<NormalPerturbation>> {
-        let MaterialDesc::NormalPerturbation { normal_map, bump_map, .. } = material else { return Ok(None) };
+        let MaterialDesc::Relief { normal_map, bump_map, .. } = material else { return Ok(None) };
         Ok(Some(match (normal_map, bump_map) {
             (Some(map), None) => self.normal_map(desc, &format!("{path}.normal_map"), map)?,
             (None, Some(map)) => self.bump_map(&format!("{path}.bump_map"), map)?,

@@ -258,7 +258,7 @@ pub enum MaterialDesc {
     },
     /// Another material on a surface that looks as if it had relief: give `normal_map` or `bump_map`. The shape itself stays as it is, and
     /// needs uv: every shape has them but a mesh without `uvs`. It may be a part of other materials.
-    NormalPerturbation {
+    Relief {
         /// The material, by name; neither it nor a part of it has a relief of its own.
         material: String,
         /// An image of normals.

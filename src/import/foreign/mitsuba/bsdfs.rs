@@ -98,7 +98,7 @@ impl<'a> Reader<'a> {
 
     pub(super) fn add(&mut self, element: &Element, material: MaterialDesc, one_sided: bool) -> Look {
         let has_relief = match &material {
-            MaterialDesc::NormalPerturbation { .. } => true,
+            MaterialDesc::Relief { .. } => true,
             MaterialDesc::TwoSided { front, back } => self.reliefs.contains(front) || self.reliefs.contains(back),
             MaterialDesc::Mix { materials, .. } => materials.iter().any(|part| self.reliefs.contains(part)),
             _ => false,
@@ -348,7 +348,7 @@ impl<'a> Reader<'a> {
         } else {
             (None, Some(BumpMapDesc { texture, height: height as f32 }))
         };
-        let look = self.add(element, MaterialDesc::NormalPerturbation { material: inner.material, normal_map, bump_map }, inner.one_sided);
+        let look = self.add(element, MaterialDesc::Relief { material: inner.material, normal_map, bump_map }, inner.one_sided);
         Ok(Look { opacity: inner.opacity, ..look })
     }
 }

@@ -289,7 +289,7 @@ impl Materials<'_> {
             return Ok(desc);
         }
         let material = self.draft.add_material(&format!("{name}_flat"), &params.place, desc);
-        Ok(MaterialDesc::NormalPerturbation { material, normal_map, bump_map })
+        Ok(MaterialDesc::Relief { material, normal_map, bump_map })
     }
 }
 

@@ -303,7 +303,7 @@ impl<'a> Builder<'a, '_> {
             self.approximated("normalTexture", "the scale became the nearest from 0 to 16");
         }
         let map = NormalMapDesc { texture: image, strength, flip_y: false };
-        let relief = MaterialDesc::NormalPerturbation { material, normal_map: Some(map), bump_map: None };
+        let relief = MaterialDesc::Relief { material, normal_map: Some(map), bump_map: None };
         Ok(self.draft.add_material(&format!("{} with relief", self.name), &self.path, relief))
     }
 }

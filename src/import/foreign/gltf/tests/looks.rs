@@ -130,9 +130,7 @@ fn what_is_unlit_shows_its_colour() {
 fn normal_maps_are_relief_with_their_scale() {
     let imported = look_of(json!({ "normalTexture": { "index": 0, "scale": 0.5 } }));
     let name = imported.desc.shapes[0].common().material.unwrap();
-    let MaterialDesc::NormalPerturbation { material, normal_map: Some(map), bump_map: None } = &imported.desc.materials[name] else {
-        panic!()
-    };
+    let MaterialDesc::Relief { material, normal_map: Some(map), bump_map: None } = &imported.desc.materials[name] else { panic!() };
     assert_eq!((material.as_str(), map.strength, map.flip_y), ("m", 0.5, false));
     assert_eq!(image(&imported, &map.texture).2, ColorSpaceDesc::Linear);
 }

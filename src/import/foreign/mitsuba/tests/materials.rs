@@ -221,13 +221,13 @@ fn blends_and_reliefs_consist_of_others() {
     assert_eq!(v, 0.3);
     assert!(message("<shape type=\"sphere\"><bsdf type=\"blendbsdf\"><bsdf type=\"diffuse\"/></bsdf></shape>").contains("needs 2 bsdfs"));
     let bump = format!("<bsdf type=\"bumpmap\"><float name=\"scale\" value=\"0.5\"/>{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("x", ""));
-    let MaterialDesc::NormalPerturbation { bump_map: Some(map), .. } = front(&bump) else { panic!() };
+    let MaterialDesc::Relief { bump_map: Some(map), .. } = front(&bump) else { panic!() };
     assert_eq!(map.height, 0.5);
     let normal = format!("<bsdf type=\"normalmap\">{}<bsdf type=\"diffuse\"/></bsdf>", bitmap("normalmap", ""));
-    assert!(matches!(front(&normal), MaterialDesc::NormalPerturbation { normal_map: Some(_), .. }));
+    assert!(matches!(front(&normal), MaterialDesc::Relief { normal_map: Some(_), .. }));
     // Green is up on all shapes, whichever way their images are.
     let flips = |shape: &str| match material(&scene(&format!("<shape type=\"{shape}\">{normal}</shape>")), 0) {
-        MaterialDesc::NormalPerturbation { normal_map: Some(map), .. } => map.flip_y,
+        MaterialDesc::Relief { normal_map: Some(map), .. } => map.flip_y,
         other => panic!("{other:?}"),
     };
     assert!(flips("rectangle") && !flips("sphere"));
@@ -246,9 +246,7 @@ fn parts_and_textures_may_be_references() {
     for (bsdf, texture) in [("normalmap", "normalmap"), ("bumpmap", "arbitrary")] {
         for part in ["<ref id=\"d\"/>", "<ref name=\"bsdf\" id=\"d\"/>", "<bsdf type=\"twosided\"><ref id=\"d\"/></bsdf>"] {
             let desc = nested(&format!("<bsdf type=\"{bsdf}\"><ref name=\"{texture}\" id=\"t\"/>{part}</bsdf>"));
-            let MaterialDesc::NormalPerturbation { material: inner, normal_map, bump_map } = material(&desc, 0) else {
-                panic!("{bsdf} {part}")
-            };
+            let MaterialDesc::Relief { material: inner, normal_map, bump_map } = material(&desc, 0) else { panic!("{bsdf} {part}") };
             assert!(is_red(&desc, &inner), "{bsdf} {part}");
             assert_eq!(normal_map.map(|map| map.texture).or(bump_map.map(|map| map.texture)).as_deref(), Some("t"));
         }
