@@ -14,7 +14,21 @@ const NARROW: &[(&str, &[&str])] = &[
     ("output", &["film", "color", "error", "desc", "file", "math"]),
     (
         "scene",
-        &["attribute", "bsdf", "camera", "film", "geometry", "id", "light", "material", "medium", "relief", "texture", "math", "color"],
+        &[
+            "attribute",
+            "bsdf",
+            "camera",
+            "film",
+            "geometry",
+            "id",
+            "light",
+            "material",
+            "medium",
+            "normal_perturbation",
+            "texture",
+            "math",
+            "color",
+        ],
     ),
 ];
 

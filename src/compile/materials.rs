@@ -451,16 +451,6 @@ mod tests {
     }
 
     #[test]
-    fn the_schema_has_the_names_of_all_metals() {
-        let schema = crate::import::schema();
-        let (_, list) = schema.split_once("A metal by name: ").unwrap();
-        let (list, _) = list.split_once(".\"").unwrap();
-        let mut listed: Vec<_> = list.split(", ").map(|name| name.trim_matches('`')).collect();
-        listed.sort_unstable();
-        assert_eq!(listed, Metal::names(MetalNames::Steradian).collect::<Vec<_>>());
-    }
-
-    #[test]
     fn a_metal_has_the_colour_it_was_given() {
         let color = Rgb::new(0.9, 0.5, 0.1);
         let Material::Constant(metal) = metal_of_color(color, [0.0; 2]) else { panic!("varies") };

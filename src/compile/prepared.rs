@@ -287,13 +287,8 @@ impl Builder {
         if medium.is_some() && emission.is_some() {
             return Err(self.files.error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
         }
-        let mut surface = Surface {
-            material: look.material,
-            normal_perturbation: look.normal_perturbation,
-            medium,
-            first_light: None,
-            single_light: false,
-        };
+        let (material, normal_perturbation) = (look.material, look.normal_perturbation);
+        let mut surface = Surface { material, normal_perturbation, medium, first_light: None, single_light: false };
         if let Some(PreparedEmission { emission, group }) = emission {
             let emission = Emission { opacity: look.opacity, ..emission };
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);

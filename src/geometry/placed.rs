@@ -4,8 +4,9 @@
 //! passes the clips; `surface` gives the reprojected point, unit normal, derivatives and uv there; `bounds` and `area` are those of the
 //! clipped part; `sample` covers exactly that part and `pdf_area` is its density.
 //!
-//! Errors of an intersection are those of `f64` relative to the coordinates of the ray's origin in the shape's space. [`TransformedShape`] therefore
-//! moves the origin along the ray to the shape before it asks, so that they are relative to the shape's size.
+//! Errors of an intersection are those of `f64` relative to the coordinates of the ray's origin in the shape's space.
+//! [`TransformedShape`] therefore first moves the origin along the ray to the shape, so that they are relative to the
+//! shape's size.
 
 mod points;
 
@@ -351,7 +352,8 @@ impl TransformedShape {
         Vec2::new(s as f32, t as f32)
     }
 
-    /// The density (with respect to placed area) with which [`TransformedShape::sample_area`] finds the point where `ray` hits; `None` on a miss.
+    /// The density (with respect to transformed area) with which [`TransformedShape::sample_area`] finds the point where
+    /// `ray` hits; `None` on a miss.
     pub fn pdf_area(&self, ray: &Ray) -> Option<f64> {
         let centered = self.centered_ray(ray);
         let hit = self.shape.intersect(&centered.ray)?;
@@ -359,8 +361,8 @@ impl TransformedShape {
         Some(self.place(surface.p, surface.n, surface.pdf_area).pdf_area)
     }
 
-    /// [`TransformedShape::pdf_area`] at a point known to be on the surface, from its unit normal (of either side) alone; `None` for surfaces whose
-    /// sampling is not uniform by area in their own space.
+    /// [`TransformedShape::pdf_area`] at a point known to be on the surface, from its unit normal (of either side) alone;
+    /// `None` for surfaces whose sampling is not uniform by area in their own space.
     #[inline]
     pub fn pdf_area_from_normal(&self, n: Vec3) -> Option<f64> {
         if matches!(self.shape, Analytic::Revolution(_)) {

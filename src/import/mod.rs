@@ -19,3 +19,19 @@ pub fn schema() -> String {
     let schema = schemars::schema_for!(SceneDesc);
     serde_json::to_string_pretty(&schema).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metal::{Metal, MetalNames};
+
+    #[test]
+    fn the_schema_has_the_names_of_all_metals() {
+        let schema = schema();
+        let (_, list) = schema.split_once("A metal by name: ").unwrap();
+        let (list, _) = list.split_once(".\"").unwrap();
+        let mut listed: Vec<_> = list.split(", ").map(|name| name.trim_matches('`')).collect();
+        listed.sort_unstable();
+        assert_eq!(listed, Metal::names(MetalNames::Steradian).collect::<Vec<_>>());
+    }
+}

@@ -44,7 +44,7 @@ pub(super) unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post
 
 /// The distance at which `ray` hits the [`TransformedShape`] behind `shape`; negative on a miss.
 pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *const sys::StRay, _key: u32, _instance: u32) -> f32 {
-    // SAFETY: `shape` was made from a `&Placed` inside the geometry that the accelerator borrows, and `TransformedShape` is not changed by anyone;
+    // SAFETY: `shape` was made from a `&TransformedShape` inside the geometry that the accelerator borrows, which nobody changes;
     // `ray` points to a ray on the shim's stack, and `StRay` has the layout of `Ray`.
     let (placed, ray) = unsafe { (&*shape.cast::<TransformedShape>(), &*ray.cast::<Ray>()) };
     // Rounding to f32 keeps the order, so the result stays within the ray's interval.

@@ -62,7 +62,7 @@ impl FromStr for Shard {
 }
 
 /// The least that a file holds of a pixel, in bytes: the sums of colour and alpha.
-const LEAST_BYTES: u64 = 64;
+const LEAST_BYTES: u64 = 48;
 
 /// A bound for the width and height of pictures, far above those that can be rendered.
 const MOST_PIXELS: u64 = 1 << 30;
