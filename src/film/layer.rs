@@ -377,7 +377,7 @@ impl FromIterator<LayerKind> for LayerSet {
 
 impl<'a> FromIterator<&'a LayerKind> for LayerSet {
     fn from_iter<I: IntoIterator<Item = &'a LayerKind>>(descs: I) -> Self {
-        descs.into_iter().map(|desc| LayerKind::from(*desc)).collect()
+        descs.into_iter().copied().collect()
     }
 }
 
