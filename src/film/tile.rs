@@ -46,7 +46,8 @@ pub(super) struct InverseVarianceSums {
 /// A rectangle of the film. Tiles share nothing, so each can be filled by a thread of its own; what shared samples
 /// add to pixels of other tiles is in the borders of the tile's cells until the picture is made.
 ///
-/// [`Sums`] do not depend on the order of samples: whoever adds the same samples gets the same picture, in one tile or merged from several.
+/// [`SumPlane`]s do not depend on the order of samples: the same samples give the same picture, in one tile or merged
+/// from several.
 #[derive(Clone, Debug)]
 pub struct FilmTile {
     pub(super) area: Crop,

@@ -32,7 +32,7 @@ soa! {
 }
 
 soa! {
-    /// Points as [`SurfacePoint`](super::PlacedPoint) has them.
+    /// Points as [`SurfacePoint`](super::SurfacePoint) has them.
     pub struct PlacedSampleRows {
         /// The point, in the space the shape is placed in.
         p: DVec3,
