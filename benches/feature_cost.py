@@ -43,7 +43,7 @@ fn main() -> steradian::Result<()> {
     let (size, spp) = (Some([64, 64]), words[2].parse().ok());
     let default_outputs = vec!["unused.exr".into()];
     let settings = Settings::new(&imported.desc, &Overrides { size, spp, threads: Some(1), default_outputs, ..Overrides::default() })?;
-    let scene = compile::compile_imported(&imported, scene)?;
+    let scene = compile::compile_from(&imported.desc, imported.source(scene))?;
     let accel = accel::build(settings.accel, &scene.geometry, 1)?;
     let image = render::render(&scene, &*accel, &settings, &Silent, &AtomicBool::new(false))?.image;
     let values = image.layers.iter().flat_map(|layer| &layer.data);
@@ -107,7 +107,7 @@ FEATURES = {
             ("src/accel/embree/mod.rs", r"if raw\.instance == INVALID", "if true"),
         ],
     ),
-    "normal and bump maps": ("`Features::reliefs`", [flag("reliefs")]),
+    "normal and bump maps": ("`Features::normal_perturbations`", [flag("normal_perturbations")]),
     "smooth normals": ("`Features::shading_normals`", [flag("shading_normals")]),
     "environment": (
         "`LightSet::at_infinity`; `Features::environment`",
