@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::util::program::{SCENE, run, steradian, told};
+use crate::util::program::{Running, SCENE, Signal, run, steradian, told};
 
 /// Runs a line of shell with the program's path in `$0`.
 fn shell(folder: &Path, line: &str) -> Output {
@@ -174,10 +174,10 @@ fn memory_that_runs_out_is_one_error() {
 #[test]
 fn other_aborts_stay_aborts() {
     let folder = tempfile::tempdir().unwrap();
-    let mut child = steradian(folder.path(), "render scene.json -q -o a.exr --spp 1000000 --size 256x256").spawn().unwrap();
+    let child = Running::start(&mut steradian(folder.path(), "render scene.json -q -o a.exr --spp 1000000 --size 256x256"));
     std::thread::sleep(Duration::from_secs(1));
-    assert!(Command::new("kill").args(["-ABRT", &child.id().to_string()]).status().unwrap().success());
-    assert_eq!(child.wait().unwrap().signal(), Some(6));
+    child.signal(Signal::ABORT);
+    assert_eq!(child.output().status.signal(), Some(6));
 }
 
 #[test]
