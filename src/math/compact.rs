@@ -14,6 +14,8 @@ pub struct Compaction {
     masks: [u16; BATCH / WIDTH],
     count: usize,
     simd: Option<V4>,
+    /// Without AVX-512: the chosen lanes, in order.
+    lanes: Row<u8>,
 }
 
 /// Numbers that AVX-512 compacts.
@@ -69,7 +71,18 @@ impl Compaction {
             let within = count.saturating_sub(i * WIDTH).min(WIDTH);
             *mask = (chosen & ((1 << within) - 1)) as u16;
         }
-        Self { masks, count: masks.iter().map(|mask| mask.count_ones() as usize).sum(), simd: V4::try_new() }
+        Self::of_masks(masks, V4::try_new())
+    }
+
+    #[inline(always)]
+    fn of_masks(masks: [u16; BATCH / WIDTH], simd: Option<V4>) -> Self {
+        let count = masks.iter().map(|mask| mask.count_ones() as usize).sum();
+        let mut lanes = [0; BATCH];
+        if simd.is_none() {
+            let chosen = (0..BATCH).step_by(WIDTH).zip(masks).flat_map(|(first, bits)| set_bits(bits.into()).map(move |bit| first + bit));
+            lanes.iter_mut().zip(chosen).for_each(|(to, lane)| *to = lane as u8);
+        }
+        Self { masks, count, simd, lanes }
     }
 
     /// How many there are.
@@ -117,11 +130,11 @@ impl Compaction {
             );
             return;
         }
-        let mut next = next;
-        for (at, lane) in (at..).zip((0..BATCH).filter(|&lane| self.contains(lane))) {
-            if let Some(to) = place(to, next.as_deref_mut(), at) {
-                *to = from[lane];
-            }
+        let (here, after) = self.lanes[..self.count].split_at(self.count.min(BATCH - at));
+        let copy = |to: &mut [T], lanes: &[u8]| to.iter_mut().zip(lanes).for_each(|(to, &lane)| *to = from[usize::from(lane) % BATCH]);
+        copy(&mut to[at..], here);
+        if let Some(next) = next {
+            copy(next, after);
         }
     }
 
@@ -162,6 +175,16 @@ impl Compaction {
     }
 }
 
+/// The places of bits that are set, in order.
+#[inline(always)]
+pub fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (place < 32).then_some(place)
+    })
+}
+
 /// A lane of a block or of the next.
 #[inline(always)]
 fn place<'a, T>(to: &'a mut Row<T>, next: Option<&'a mut Row<T>>, at: usize) -> Option<&'a mut T> {
@@ -187,7 +210,7 @@ mod tests {
                 assert_eq!(Compaction::different(&flags, 0, count).masks, lanes.masks);
                 for at in [0, 1, 100, BATCH - 1] {
                     // With the instructions that the machine has, and without.
-                    for lanes in [lanes, Compaction { simd: None, ..lanes }] {
+                    for lanes in [lanes, Compaction::of_masks(lanes.masks, None)] {
                         let (mut first, mut second) = ([-1.0; BATCH], [-1.0; BATCH]);
                         lanes.append(&numbers, &mut first, Some(&mut second), at);
                         let (mut first_f64, mut second_f64) = ([-1.0; BATCH], [-1.0; BATCH]);

@@ -3,6 +3,7 @@
 use pulp::Simd;
 
 use crate::geometry::{PACKET_SIZE, RayPacket};
+use crate::math::compact::set_bits;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::rows::Row;
 use crate::math::{RayRows, Vec3};
@@ -97,12 +98,7 @@ impl LaneSet {
     /// The lanes in order.
     #[inline(always)]
     pub fn lanes(self) -> impl Iterator<Item = usize> {
-        let mut rest = self.0;
-        std::iter::from_fn(move || {
-            let lane = rest.trailing_zeros() as usize;
-            rest &= rest.wrapping_sub(1);
-            (lane < 32).then_some(lane)
-        })
+        set_bits(self.0)
     }
 }
 
