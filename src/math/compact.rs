@@ -1,11 +1,12 @@
 //! Compaction: the chosen lanes of rows, one after the other.
 
+use pulp::bytemuck::cast_mut;
 use pulp::cast;
-use pulp::x86::V4;
+use pulp::x86::{V3, V4};
 
 use super::rows::{BATCH, Row};
 
-/// Lanes of a vector of 32-bit numbers.
+/// Numbers that are compacted at once.
 const WIDTH: usize = 16;
 
 /// Chosen lanes of a block.
@@ -13,42 +14,122 @@ const WIDTH: usize = 16;
 pub struct Compaction {
     masks: [u16; BATCH / WIDTH],
     count: usize,
-    simd: Option<V4>,
-    /// Without AVX-512: the chosen lanes, in order.
-    lanes: Row<u8>,
+    instructions: Instructions,
 }
 
-/// Numbers that AVX-512 compacts.
+/// The instructions that the machine has.
+#[derive(Clone, Copy, Debug)]
+enum Instructions {
+    Avx512(V4),
+    Avx2(V3),
+    Scalar,
+}
+
+impl Instructions {
+    #[inline(always)]
+    fn detect() -> Self {
+        V4::try_new().map_or_else(|| V3::try_new().map_or(Self::Scalar, Self::Avx2), Self::Avx512)
+    }
+}
+
+/// Writes the numbers whose bits are set, then any others.
+pub trait Compress: Copy {
+    /// Numbers of 32 bits.
+    fn of_32_bits(self, bits: u16, numbers: [u32; WIDTH], to: &mut [u32; WIDTH]);
+    /// Numbers of 64 bits.
+    fn of_64_bits(self, bits: u16, numbers: [u64; WIDTH], to: &mut [u64; WIDTH]);
+}
+
+impl Compress for V4 {
+    #[inline(always)]
+    fn of_32_bits(self, bits: u16, numbers: [u32; WIDTH], to: &mut [u32; WIDTH]) {
+        *to = cast(self.avx512f._mm512_maskz_compress_epi32(bits, cast(numbers)));
+    }
+
+    #[inline(always)]
+    fn of_64_bits(self, bits: u16, numbers: [u64; WIDTH], to: &mut [u64; WIDTH]) {
+        store_parts(bits, cast::<_, [[u64; 8]; 2]>(numbers), to, |bits, part| {
+            cast(self.avx512f._mm512_maskz_compress_epi64(bits as u8, cast(part)))
+        });
+    }
+}
+
+impl Compress for V3 {
+    #[inline(always)]
+    fn of_32_bits(self, bits: u16, numbers: [u32; WIDTH], to: &mut [u32; WIDTH]) {
+        store_parts(bits, cast::<_, [[u32; 8]; 2]>(numbers), to, |bits, part| {
+            let order = self.avx2._mm256_cvtepu8_epi32(cast([ORDER_OF_8[usize::from(bits as u8)], 0]));
+            cast(self.avx2._mm256_permutevar8x32_epi32(cast(part), order))
+        });
+    }
+
+    #[inline(always)]
+    fn of_64_bits(self, bits: u16, numbers: [u64; WIDTH], to: &mut [u64; WIDTH]) {
+        store_parts(bits, cast::<_, [[u64; 4]; 4]>(numbers), to, |bits, part| {
+            let order = self.avx2._mm256_cvtepu8_epi32(cast([ORDER_OF_4[usize::from(bits % 16)], 0]));
+            cast(self.avx2._mm256_permutevar8x32_epi32(cast(part), order))
+        });
+    }
+}
+
+/// Compacts each part and writes it over what follows the chosen numbers of the part before.
+#[inline(always)]
+fn store_parts<T, const N: usize, const PARTS: usize>(
+    bits: u16,
+    parts: [[T; N]; PARTS],
+    to: &mut [T; WIDTH],
+    compress: impl Fn(u16, [T; N]) -> [T; N],
+) {
+    let mut at = 0;
+    for (i, part) in parts.into_iter().enumerate() {
+        let bits = bits >> (i * N) & (u16::MAX >> (16 - N));
+        if let Some(to) = to.get_mut(at..).and_then(<[T]>::first_chunk_mut::<N>) {
+            *to = compress(bits, part);
+        }
+        at += bits.count_ones() as usize;
+    }
+}
+
+/// The lanes whose bits are set in the index, a byte each.
+const ORDER_OF_8: [u64; 256] = order(1);
+/// The halves of lanes of twice the width.
+const ORDER_OF_4: [u64; 16] = order(2);
+
+const fn order<const N: usize>(halves: u32) -> [u64; N] {
+    let mut orders = [0; N];
+    let mut bits = 0;
+    while bits < N {
+        let (mut lane, mut shift) = (0, 0);
+        while lane < 8 {
+            if bits >> (lane / halves) & 1 != 0 {
+                orders[bits] |= (lane as u64) << shift;
+                shift += 8;
+            }
+            lane += 1;
+        }
+        bits += 1;
+    }
+    orders
+}
+
+/// Numbers that can be compacted.
 pub trait Compact: Copy + Default {
     /// Writes the numbers whose bits are set, then any others.
-    fn compress(simd: V4, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]);
+    fn compress(by: impl Compress, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]);
 }
 
 macro_rules! compact {
-    ($($number:ty),*) => {$(
+    ($($number:ty => $of_bits:ident,)*) => {$(
         impl Compact for $number {
             #[inline(always)]
-            fn compress(simd: V4, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]) {
-                *to = cast(simd.avx512f._mm512_maskz_compress_ps(bits, cast(*numbers)));
+            fn compress(by: impl Compress, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]) {
+                by.$of_bits(bits, cast(*numbers), cast_mut(to));
             }
         }
     )*};
 }
 
-compact!(f32, u32);
-
-impl Compact for f64 {
-    #[inline(always)]
-    fn compress(simd: V4, bits: u16, numbers: &[Self; WIDTH], to: &mut [Self; WIDTH]) {
-        let [low, high]: [[Self; WIDTH / 2]; 2] = cast(*numbers);
-        if let Some(to) = to.first_chunk_mut::<{ WIDTH / 2 }>() {
-            *to = cast(simd.avx512f._mm512_maskz_compress_pd(bits as u8, cast(low)));
-        }
-        if let Some(to) = to[(bits as u8).count_ones() as usize..].first_chunk_mut::<{ WIDTH / 2 }>() {
-            *to = cast(simd.avx512f._mm512_maskz_compress_pd((bits >> 8) as u8, cast(high)));
-        }
-    }
-}
+compact! { f32 => of_32_bits, u32 => of_32_bits, f64 => of_64_bits, }
 
 impl Compaction {
     /// Those of the first `count` lanes whose `flags` are `chosen`.
@@ -71,18 +152,7 @@ impl Compaction {
             let within = count.saturating_sub(i * WIDTH).min(WIDTH);
             *mask = (chosen & ((1 << within) - 1)) as u16;
         }
-        Self::of_masks(masks, V4::try_new())
-    }
-
-    #[inline(always)]
-    fn of_masks(masks: [u16; BATCH / WIDTH], simd: Option<V4>) -> Self {
-        let count = masks.iter().map(|mask| mask.count_ones() as usize).sum();
-        let mut lanes = [0; BATCH];
-        if simd.is_none() {
-            let chosen = (0..BATCH).step_by(WIDTH).zip(masks).flat_map(|(first, bits)| set_bits(bits.into()).map(move |bit| first + bit));
-            lanes.iter_mut().zip(chosen).for_each(|(to, lane)| *to = lane as u8);
-        }
-        Self { masks, count, simd, lanes }
+        Self { masks, count: masks.iter().map(|mask| mask.count_ones() as usize).sum(), instructions: Instructions::detect() }
     }
 
     /// How many there are.
@@ -123,24 +193,33 @@ impl Compaction {
             *to = *from;
             return;
         }
-        if let Some(simd) = self.simd {
-            simd.vectorize(
+        match self.instructions {
+            Instructions::Avx512(simd) => simd.vectorize(
                 #[inline(always)]
                 || self.compress(simd, from, to, next, at),
-            );
-            return;
-        }
-        let (here, after) = self.lanes[..self.count].split_at(self.count.min(BATCH - at));
-        let copy = |to: &mut [T], lanes: &[u8]| to.iter_mut().zip(lanes).for_each(|(to, &lane)| *to = from[usize::from(lane) % BATCH]);
-        copy(&mut to[at..], here);
-        if let Some(next) = next {
-            copy(next, after);
+            ),
+            Instructions::Avx2(simd) => simd.vectorize(
+                #[inline(always)]
+                || self.compress(simd, from, to, next, at),
+            ),
+            Instructions::Scalar => self.copy(from, to, next, at),
         }
     }
 
-    /// [`append`](Self::append) by one instruction for each vector.
+    /// [`append`](Self::append) one by one.
+    fn copy<T: Compact>(&self, from: &Row<T>, to: &mut Row<T>, mut next: Option<&mut Row<T>>, at: usize) {
+        let chosen = self.masks.iter().zip(from.as_chunks::<WIDTH>().0);
+        let chosen = chosen.flat_map(|(&bits, numbers)| set_bits(bits.into()).map(|bit| numbers[bit]));
+        for (at, number) in (at..).zip(chosen) {
+            if let Some(to) = place(to, next.as_deref_mut(), at) {
+                *to = number;
+            }
+        }
+    }
+
+    /// [`append`](Self::append) by vectors.
     #[inline(always)]
-    fn compress<T: Compact>(&self, simd: V4, from: &Row<T>, to: &mut Row<T>, mut next: Option<&mut Row<T>>, mut at: usize) {
+    fn compress<T: Compact>(&self, by: impl Compress, from: &Row<T>, to: &mut Row<T>, mut next: Option<&mut Row<T>>, mut at: usize) {
         for (&bits, numbers) in self.masks.iter().zip(from.as_chunks::<WIDTH>().0) {
             let count = bits.count_ones() as usize;
             // Of a length that the compiler knows: else each is a call.
@@ -150,11 +229,11 @@ impl Compaction {
                 next.as_mut().and_then(|next| next.get_mut(at - BATCH..)).and_then(<[T]>::first_chunk_mut::<WIDTH>)
             };
             if let Some(whole) = whole {
-                T::compress(simd, bits, numbers, whole);
+                T::compress(by, bits, numbers, whole);
             } else {
                 // Through memory, which waits for its own stores.
                 let mut compressed = [T::default(); WIDTH];
-                T::compress(simd, bits, numbers, &mut compressed);
+                T::compress(by, bits, numbers, &mut compressed);
                 for (at, number) in (at..).zip(&compressed[..count]) {
                     if let Some(to) = place(to, next.as_deref_mut(), at) {
                         *to = *number;
@@ -199,6 +278,8 @@ mod tests {
     #[test]
     fn chosen_lanes_follow_one_another() {
         let mut random = Rng::new(5);
+        let (avx512, avx2) = (V4::try_new().map(Instructions::Avx512), V3::try_new().map(Instructions::Avx2));
+        let instructions = [avx512, avx2, Some(Instructions::Scalar)];
         for share in [0, 1, 3, 8, 10] {
             for count in [0, 1, 17, 100, BATCH] {
                 let flags: Row<u32> = std::array::from_fn(|_| u32::from(random.below(10) < share));
@@ -210,7 +291,8 @@ mod tests {
                 assert_eq!(Compaction::different(&flags, 0, count).masks, lanes.masks);
                 for at in [0, 1, 100, BATCH - 1] {
                     // With the instructions that the machine has, and without.
-                    for lanes in [lanes, Compaction::of_masks(lanes.masks, None)] {
+                    for instructions in instructions.into_iter().flatten() {
+                        let lanes = Compaction { instructions, ..lanes };
                         let (mut first, mut second) = ([-1.0; BATCH], [-1.0; BATCH]);
                         lanes.append(&numbers, &mut first, Some(&mut second), at);
                         let (mut first_f64, mut second_f64) = ([-1.0; BATCH], [-1.0; BATCH]);
