@@ -20,8 +20,8 @@ use crate::texture::{Footprint, Texture};
 pub enum Material {
     /// The same scattering everywhere, prepared once.
     Constant(Bsdf),
-    /// Scattering that textures change.
-    Textured(Box<TexturedMaterial>),
+    /// Scattering that these textures change.
+    Textured(Box<TexturedMaterial>, Box<[TextureId]>),
     /// One of two materials at each point, chosen anew at each hit: the second with the probability `amount`.
     Mix {
         /// Where `amount` is 0.
@@ -231,10 +231,6 @@ impl TexturedMaterial {
         matches!(self, Self::Diffuse { .. })
     }
 
-    fn is_constant(&self) -> bool {
-        self.textures().is_empty()
-    }
-
     /// The textures of all inputs.
     fn textures(&self) -> Vec<TextureId> {
         let mut found = Vec::new();
@@ -293,7 +289,7 @@ impl Material {
     pub fn bsdf<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>) -> Bsdf {
         match self {
             Self::Constant(bsdf) => bsdf.clone(),
-            Self::Textured(textured) => textured.bsdf(textures, &footprint()),
+            Self::Textured(textured, _) => textured.bsdf(textures, &footprint()),
             Self::Mix { .. } | Self::TwoSided { .. } => Bsdf::Lambert(Lambert { albedo: Rgb::BLACK }),
         }
     }
@@ -302,7 +298,7 @@ impl Material {
     /// for all other materials.
     pub fn boundary<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>, ior: f32) -> Option<Bsdf> {
         match self {
-            Self::Textured(textured) => match **textured {
+            Self::Textured(textured, _) => match **textured {
                 TexturedMaterial::Dielectric { alpha, facets, tints, .. } => {
                     Some(TexturedMaterial::Dielectric { ior, alpha, facets, tints }.bsdf(textures, &footprint()))
                 }
@@ -322,7 +318,7 @@ impl Material {
         u: impl FnOnce() -> f32,
     ) -> Option<MaterialId> {
         match self {
-            Self::Constant(_) | Self::Textured(_) => None,
+            Self::Constant(_) | Self::Textured(..) => None,
             Self::Mix { first, second, amount } => Some(if u() < amount.at(textures, &point()) { *second } else { *first }),
             Self::TwoSided { front, back } => Some(if is_front { *front } else { *back }),
         }
@@ -331,7 +327,7 @@ impl Material {
     /// The materials that this one consists of.
     pub fn parts(&self) -> Option<[MaterialId; 2]> {
         match *self {
-            Self::Constant(_) | Self::Textured(_) => None,
+            Self::Constant(_) | Self::Textured(..) => None,
             Self::Mix { first, second, .. } => Some([first, second]),
             Self::TwoSided { front, back } => Some([front, back]),
         }
@@ -341,7 +337,7 @@ impl Material {
     pub fn flags(&self) -> BsdfFlags {
         match self {
             Self::Constant(bsdf) => bsdf.flags(),
-            Self::Textured(textured) => textured.flags(),
+            Self::Textured(textured, _) => textured.flags(),
             Self::Mix { .. } | Self::TwoSided { .. } => BsdfFlags::empty(),
         }
     }
@@ -355,7 +351,7 @@ impl Material {
     pub fn textures(&self) -> Vec<TextureId> {
         match self {
             Self::Constant(_) | Self::TwoSided { .. } => Vec::new(),
-            Self::Textured(textured) => textured.textures(),
+            Self::Textured(_, textures) => textures.to_vec(),
             Self::Mix { amount, .. } => amount.texture().into_iter().collect(),
         }
     }
@@ -364,10 +360,11 @@ impl Material {
 impl From<TexturedMaterial> for Material {
     /// What no texture changes is prepared once.
     fn from(textured: TexturedMaterial) -> Self {
-        if textured.is_constant() {
+        let textures = textured.textures();
+        if textures.is_empty() {
             Self::Constant(textured.bsdf(&[], &Footprint::point(Vec2::ZERO)))
         } else {
-            Self::Textured(Box::new(textured))
+            Self::Textured(Box::new(textured), textures.into())
         }
     }
 }

@@ -36,7 +36,7 @@ fn look(scene: &Scene, origin: DVec3, target: DVec3) -> Option<SurfaceInteractio
 
 /// The colour of the texture on the diffuse shape that a ray meets.
 fn texel(scene: &Scene, at: &SurfaceInteraction) -> steradian::color::Rgb {
-    let Material::Textured(varying) = scene.material(at.shape) else { panic!("constant") };
+    let Material::Textured(varying, _) = scene.material(at.shape) else { panic!("constant") };
     match &**varying {
         TexturedMaterial::Diffuse { albedo: ColorInput::Texture(id), .. } => scene.textures[id.index()].color(at.uv),
         other => panic!("{other:?}"),

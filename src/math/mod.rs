@@ -7,6 +7,7 @@ mod cone;
 pub mod float;
 mod frame;
 mod motion;
+pub mod prefetch;
 pub mod random;
 mod ray;
 mod render_space;

@@ -5,6 +5,7 @@
 //! memory once, however large the grid is.
 
 use crate::math::float::ONE_MINUS_EPSILON;
+use crate::math::vectorize::vectorize;
 
 /// The whole of a cumulative table. Tables count in units of `1 / WHOLE`: the density is then exactly that of the sampling, and a cell of
 /// positive weight never rounds to nothing.
@@ -89,17 +90,31 @@ fn invert_four(weights: &[f32; SIDE], u: f32) -> (usize, f32) {
     (index, ((x - limits[index]) / weights[index]).min(ONE_MINUS_EPSILON))
 }
 
-/// Cumulative distributions of equal length, one after another, each with a guide to where in it a number falls.
+/// Cumulative distributions of equal length, each a search tree whose nodes have [`FANOUT`] keys: a search has no
+/// branches, and all of its nodes but the last are few enough to stay in the caches.
 #[derive(Clone, Debug)]
 struct Table {
     len: usize,
-    /// `len + 1` limits for each distribution, from 0 to [`WHOLE`].
-    limits: Vec<u32>,
-    /// For the distributions: bits that a number keeps as index into the guide.
-    guide_shift: u32,
-    /// First index whose upper limit lies above each multiple of `1 << guide_shift`, and one entry more.
-    guide: Vec<u32>,
+    /// From the roots, one for each distribution, to the leaves.
+    levels: Vec<TableLevel>,
 }
+
+/// Nodes of the search trees at one depth.
+#[derive(Clone, Debug)]
+struct TableLevel {
+    /// Nodes of each tree.
+    count: usize,
+    /// Of leaves, the upper limits of entries, within `[0, WHOLE]`; of others, those of the last entries below each child.
+    /// Unused keys are [`WHOLE`].
+    nodes: Vec<Keys>,
+}
+
+/// Keys of a node: a cache line of them.
+const FANOUT: usize = 16;
+
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Keys([u32; FANOUT]);
 
 /// A block that was chosen.
 #[derive(Clone, Copy, Default)]
@@ -129,72 +144,70 @@ struct Inverse {
 
 impl Table {
     fn new(len: usize, count: usize) -> Self {
-        // As many guide entries as there are entries: a search then takes less than two steps on average, however
-        // uneven the weights are (Chen and Asau, "On Generating Random Variates from an Empirical Distribution").
-        let guide_bits = usize::BITS - len.leading_zeros();
-        let guide_shift = u32::BITS - guide_bits.clamp(1, 16);
-        Self { len, limits: Vec::with_capacity((len + 1) * count), guide_shift, guide: Vec::with_capacity(((1 << guide_bits) + 1) * count) }
+        let mut levels = Vec::new();
+        let mut nodes = len;
+        while nodes > 1 || levels.is_empty() {
+            nodes = nodes.div_ceil(FANOUT);
+            levels.push(TableLevel { count: nodes, nodes: Vec::with_capacity(nodes * count) });
+        }
+        levels.reverse();
+        Self { len, levels }
     }
 
-    fn guide_len(&self) -> usize {
-        (1 << (u32::BITS - self.guide_shift)) + 1
-    }
-
-    /// Adds one distribution. Each positive weight has at least one unit; those and the rest, in proportion, fill the whole. Without any
-    /// positive weight the limits stay 0.
+    /// Adds one distribution. Each positive weight has at least one unit; those and the rest, in proportion, fill the
+    /// whole. Without any positive weight all is in the last entry.
     fn push(&mut self, weights: impl Iterator<Item = f64> + Clone) {
         let positive = weights.clone().filter(|w| *w > 0.0).count();
         let total: f64 = weights.clone().sum();
         let free = f64::from(WHOLE) - positive as f64;
-        let start = self.limits.len();
         let (mut units, mut sum) = (0u64, 0.0);
-        self.limits.push(0);
-        for w in weights {
+        let limit = |w: f64| {
             if w > 0.0 {
                 units += 1;
                 sum += w;
             }
             let limit = if total > 0.0 { units + (sum / total * free).round() as u64 } else { 0 };
-            self.limits.push(limit.min(u64::from(WHOLE)) as u32);
+            limit.min(u64::from(WHOLE)) as u32
+        };
+        let mut keys: Vec<u32> = weights.map(limit).collect();
+        if total <= 0.0 {
+            keys[self.len - 1] = WHOLE;
         }
-
-        let limits = &self.limits[start..];
-        let mut index = 0;
-        for k in 0..self.guide_len() as u64 - 1 {
-            let floor = k << self.guide_shift;
-            while index + 1 < self.len && u64::from(limits[index + 1]) <= floor {
-                index += 1;
-            }
-            self.guide.push(index as u32);
+        for level in self.levels.iter_mut().rev() {
+            let nodes = keys.chunks(FANOUT).map(|keys| Keys(std::array::from_fn(|i| keys.get(i).copied().unwrap_or(WHOLE))));
+            level.nodes.extend(nodes);
+            keys = keys.chunks(FANOUT).filter_map(|keys| keys.last().copied()).collect();
         }
-        self.guide.push(self.len as u32 - 1);
     }
 
-    #[inline]
-    fn limits(&self, which: usize) -> &[u32] {
-        &self.limits[which * (self.len + 1)..][..=self.len]
+    /// The limits of an entry.
+    #[inline(always)]
+    fn limits(&self, which: usize, index: usize) -> [u32; 2] {
+        let Some(leaves) = self.levels.last() else { return [0; 2] };
+        let keys = &leaves.nodes[which * leaves.count..][..leaves.count];
+        let upper = |index: usize| keys[index / FANOUT].0[index % FANOUT];
+        [if index == 0 { 0 } else { upper(index - 1) }, upper(index)]
     }
 
     #[inline]
     fn pmf(&self, which: usize, index: usize) -> f64 {
-        let limits = self.limits(which);
-        f64::from(limits[index + 1] - limits[index]) * (1.0 / f64::from(WHOLE))
+        let [lower, upper] = self.limits(which, index);
+        f64::from(upper - lower) * (1.0 / f64::from(WHOLE))
     }
 
-    /// Inverts a distribution at `u` in `[0, 1)`: the cell with `lower <= u < upper`.
-    #[inline]
+    /// Inverts a distribution at `u` in `[0, 1)`: the entry with `lower <= u < upper`.
+    #[inline(always)]
     fn invert(&self, which: usize, u: f32) -> Inverse {
-        let limits = self.limits(which);
-        let guide = &self.guide[which * self.guide_len()..][..self.guide_len()];
         let x = f64::from(u) * f64::from(WHOLE);
         let unit = x as u32;
-        let k = (unit >> self.guide_shift) as usize;
-        let (mut index, last) = (guide[k] as usize, guide[k + 1] as usize);
-        while index < last && limits[index + 1] <= unit {
-            index += 1;
+        let mut index = 0;
+        for level in &self.levels {
+            let Keys(keys) = level.nodes[which * level.count + index];
+            let before: u32 = keys.iter().map(|&key| u32::from(key <= unit)).sum();
+            index = index * FANOUT + before as usize;
         }
-        let lower = limits[index];
-        let mass = f64::from(limits[index + 1] - lower);
+        let [lower, upper] = self.limits(which, index);
+        let mass = f64::from(upper - lower);
         let within = ((x - f64::from(lower)) / mass) as f32;
         Inverse { index, within: within.min(ONE_MINUS_EPSILON), pmf: mass * (1.0 / f64::from(WHOLE)) }
     }
@@ -240,9 +253,7 @@ impl Piecewise2d {
     #[inline]
     pub fn sample_cells<const N: usize>(&self, us: &[[f32; 2]], cells: &mut [PiecewiseCell; N]) {
         let mut chosen = [ChosenBlock::default(); N];
-        for (chosen, &u) in chosen.iter_mut().zip(us) {
-            *chosen = self.choose_block(u);
-        }
+        vectorize!(self.choose_blocks(us, &mut chosen));
         // Nothing but copies, which do not wait for one another.
         let mut blocks = [Block::default(); N];
         for (block, chosen) in blocks.iter_mut().zip(&chosen).take(us.len()) {
@@ -253,7 +264,14 @@ impl Piecewise2d {
         }
     }
 
-    #[inline]
+    #[inline(always)]
+    fn choose_blocks(&self, us: &[[f32; 2]], chosen: &mut [ChosenBlock]) {
+        for (chosen, &u) in chosen.iter_mut().zip(us) {
+            *chosen = self.choose_block(u);
+        }
+    }
+
+    #[inline(always)]
     fn choose_block(&self, u: [f32; 2]) -> ChosenBlock {
         let row = self.rows.invert(0, u[1]);
         let column = self.columns.invert(row.index, u[0]);

@@ -100,6 +100,17 @@ impl Bitmap {
         }
     }
 
+    /// Starts to load the texels for a footprint into the caches.
+    #[inline]
+    pub(super) fn prefetch(&self, footprint: &Footprint) {
+        let load =
+            |image: &TextureImage| self.around(image, footprint.uv).texels.into_iter().step_by(2).for_each(|texel| image.prefetch(texel));
+        match self.levels(footprint) {
+            None => load(&self.image),
+            Some(levels) => levels.images.iter().for_each(|(image, _)| load(image)),
+        }
+    }
+
     /// The levels of the pyramid for a footprint; `None` where the image itself is it.
     #[inline]
     fn levels(&self, footprint: &Footprint) -> Option<Levels<'_>> {

@@ -182,6 +182,12 @@ impl TextureImage {
         self.data.samples.memory_bytes()
     }
 
+    /// Starts to load a pixel (column, row) into the caches.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, [x, y]: [usize; 2]) {
+        self.data.samples.prefetch((y * self.data.width + x) * self.data.channels);
+    }
+
     /// The sum of `weights` times the colours of four pixels (column, row).
     #[inline]
     pub fn weigh(&self, pixels: [[usize; 2]; 4], weights: [f32; 4], decoding: Decoding) -> Rgb {

@@ -78,6 +78,17 @@ impl Texture {
         }
     }
 
+    /// Starts to load what a lookup over a footprint will read.
+    #[inline]
+    pub fn prefetch(&self, footprint: &Footprint) {
+        match self {
+            Self::Bitmap(bitmap) => bitmap.prefetch(footprint),
+            Self::Product(factors) => factors.iter().for_each(|factor| factor.prefetch(footprint)),
+            Self::Step(of, _) => of.prefetch(footprint),
+            Self::Constant(_) | Self::Checker(_) | Self::Attribute(..) => {}
+        }
+    }
+
     /// As [`scalar`](Self::scalar), over a footprint.
     #[inline]
     pub fn scalar_over(&self, footprint: &Footprint) -> f32 {

@@ -93,6 +93,8 @@ soa! {
         uv: Vec2,
         /// Of a triangle found in rows, as [`Geometry::uv_density`](crate::geometry::Geometry::uv_density); else zero.
         uv_density: f32,
+        /// The area of the footprint in uv, where the material has textures.
+        texture_area: f32,
         /// Whether the point is still to be found by [`World::resolve`](crate::integrator::World::resolve).
         is_unresolved: u32,
         flags: u32,
@@ -206,6 +208,8 @@ pub(super) struct Vertices {
     pub emitters: Vec<u8>,
     /// Vertices on surfaces that are not diffuse.
     pub non_diffuse: Vec<u8>,
+    /// Vertices whose materials have textures.
+    pub textured: Vec<u8>,
     pub bsdfs: BsdfTable,
     pub requests: SampleIdRows,
     /// Choice of a light (two) and a point of it (two).

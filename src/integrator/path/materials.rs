@@ -9,6 +9,7 @@ use crate::id::ShapeId;
 use crate::material::Material;
 use crate::math::rows::{BATCH, Row};
 use crate::scene::Scene;
+use crate::texture::Footprint;
 
 /// A BSDF by vertex: one of the scene's constant materials, or one made for the vertex.
 pub(super) struct BsdfTable {
@@ -55,10 +56,11 @@ impl BsdfTable {
 
 /// Evaluates the materials of a block's vertices, and finds those on emitters.
 pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
-    let Wave { vertices, rays, hits, cones, .. } = wave;
+    let vertices = &mut wave.vertices;
     vertices.emitters.clear();
     vertices.non_diffuse.clear();
     vertices.bsdfs.made.clear();
+    vertices.textured.clear();
     let scene = context.scene;
     for lane in 0..vertices.count.min(BATCH) {
         if vertices.is_miss(lane) {
@@ -73,29 +75,51 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
         if scene.materials[id.index()].parts().is_some() {
             id = scene.met_material_id(&vertices.interaction(lane), vertices.rows.direction.get(lane));
         }
+        vertices.bsdfs.ids[lane] = id.0;
         match &scene.materials[id.index()] {
             Material::Constant(Bsdf::Lambert(Lambert { albedo })) => set_diffuse(vertices, lane, *albedo),
-            Material::Constant(bsdf) => {
-                vertices.bsdfs.ids[lane] = id.0;
-                set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, bsdf);
-            }
-            Material::Textured(textured) => {
-                let path = vertices.path(lane);
-                let (at, ray) = (vertices.interaction(lane), rays[block].get(path));
-                let footprint = match (cones.get(block * BATCH + path), vertices.rows.uv_density[lane]) {
-                    (Some(cone), density) if density > 0.0 => context.world.covered(cone, ray.direction, &at, density),
-                    (cone, _) => context.world.footprint(cone, &ray, hits[block].get(path).as_ref(), &at),
-                };
-                match textured.bsdf(&scene.textures, &footprint) {
-                    Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
-                    bsdf => {
-                        set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
-                        vertices.bsdfs.set_made(lane, bsdf);
-                    }
-                }
-            }
+            Material::Constant(bsdf) => set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, bsdf),
+            Material::Textured(..) => vertices.textured.push(lane as u8),
             // Met materials do not consist of others.
             Material::Mix { .. } | Material::TwoSided { .. } => set_diffuse(vertices, lane, Rgb::BLACK),
+        }
+    }
+    find_footprints(context, wave, block);
+    evaluate_textured(context, &mut wave.vertices);
+}
+
+/// Finds the footprints of vertices with textures, and starts to load the texels below them: they then wait for memory together.
+fn find_footprints(context: &Context, wave: &mut Wave, block: usize) {
+    let Wave { vertices, rays, hits, cones, .. } = wave;
+    for i in 0..vertices.textured.len() {
+        let lane = usize::from(vertices.textured[i]);
+        let path = vertices.path(lane);
+        let (at, ray) = (vertices.interaction(lane), rays[block].get(path));
+        let footprint = match (cones.get(block * BATCH + path), vertices.rows.uv_density[lane]) {
+            (Some(cone), density) if density > 0.0 => context.world.covered(cone, ray.direction, &at, density),
+            (cone, _) => context.world.footprint(cone, &ray, hits[block].get(path).as_ref(), &at),
+        };
+        vertices.rows.texture_area[lane] = footprint.area;
+        if let Material::Textured(_, textures) = &context.scene.materials[vertices.bsdfs.ids[lane] as usize] {
+            textures.iter().for_each(|id| context.scene.textures[id.index()].prefetch(&footprint));
+        }
+    }
+}
+
+/// Evaluates the materials with textures.
+fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
+    let scene = context.scene;
+    for i in 0..vertices.textured.len() {
+        let lane = usize::from(vertices.textured[i]);
+        let Material::Textured(textured, _) = &scene.materials[vertices.bsdfs.ids[lane] as usize] else { continue };
+        let (uv, area) = (vertices.rows.uv.get(lane), vertices.rows.texture_area[lane]);
+        let footprint = scene.with_attributes(&vertices.interaction(lane), Footprint { uv, area, attributes: None });
+        match textured.bsdf(&scene.textures, &footprint) {
+            Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
+            bsdf => {
+                set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
+                vertices.bsdfs.set_made(lane, bsdf);
+            }
         }
     }
 }
