@@ -226,6 +226,11 @@ impl TexturedMaterial {
         }
     }
 
+    /// Whether nothing but colours comes from textures.
+    pub fn varies_in_colors(&self) -> bool {
+        matches!(self, Self::Plastic { coat, .. } if coat.textures().is_empty())
+    }
+
     /// Whether it is diffuse reflection, rough or not.
     pub fn is_diffuse(&self) -> bool {
         matches!(self, Self::Diffuse { .. })

@@ -195,6 +195,7 @@ impl<D: Microfacets> Conductor<D> {
 }
 
 /// A rough metal without multiple scattering, for vector code.
+#[derive(Clone, Copy)]
 pub(super) struct SingleScattering<'a, D>(pub &'a Conductor<D>);
 
 impl<D: Microfacets> LaneBsdf for SingleScattering<'_, D> {

@@ -332,6 +332,7 @@ pub(super) fn refract(o: Vec3, m: Vec3, cos_o: f32, cos_t: f32, eta: f32) -> Vec
 }
 
 /// A smooth boundary, for vector code.
+#[derive(Clone, Copy)]
 pub(super) struct Smooth<'a, D>(pub &'a Dielectric<D>);
 
 impl<D: Microfacets> LaneBsdf for Smooth<'_, D> {
@@ -348,6 +349,7 @@ impl<D: Microfacets> LaneBsdf for Smooth<'_, D> {
 }
 
 /// A rough boundary without multiple scattering, for vector code.
+#[derive(Clone, Copy)]
 pub(super) struct SingleScattering<'a, D>(pub &'a Dielectric<D>);
 
 impl<D: Microfacets> LaneBsdf for SingleScattering<'_, D> {

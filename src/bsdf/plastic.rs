@@ -47,13 +47,18 @@ impl Plastic {
 }
 
 impl<D: Microfacets> Plastic<D> {
+    #[inline(always)]
+    pub(super) fn layers(&self) -> PlasticLayers<'_, D> {
+        PlasticLayers { diffuse: self.diffuse, tint: self.tint, nonlinear: self.nonlinear, coat: &self.coat }
+    }
+
     /// Base and rough coat for directions on the same side.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
         match (self.coat.is_smooth(), self.coat.flags().is_anisotropic()) {
-            (true, _) => SmoothPlastic(self).eval(wo, wi),
-            (false, false) => IsotropicPlastic(self).eval(wo, wi),
-            (false, true) => self.eval_with::<false>(wo, wi, |w| self.coat.albedo(w)),
+            (true, _) => SmoothPlastic(self.layers()).eval(wo, wi),
+            (false, false) => IsotropicPlastic(self.layers()).eval(wo, wi),
+            (false, true) => self.layers().eval_with::<false>(wo, wi, |w| self.coat.albedo(w)),
         }
     }
 
@@ -61,13 +66,46 @@ impl<D: Microfacets> Plastic<D> {
     #[inline]
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         match (self.coat.is_smooth(), self.coat.flags().is_anisotropic()) {
-            (true, _) => SmoothPlastic(self).sample(wo, u_lobe, u),
-            (false, false) => IsotropicPlastic(self).sample(wo, u_lobe, u),
-            (false, true) => self.sample_with::<false>(wo, u_lobe, u, |w| self.coat.albedo(w)),
+            (true, _) => SmoothPlastic(self.layers()).sample(wo, u_lobe, u),
+            (false, false) => IsotropicPlastic(self.layers()).sample(wo, u_lobe, u),
+            (false, true) => self.layers().sample_with::<false>(wo, u_lobe, u, |w| self.coat.albedo(w)),
         }
     }
 
-    /// [`eval`](Self::eval) where it is known whether the coat is smooth, with its albedo.
+    /// As [`Bsdf::diffuse_fraction`](super::Bsdf::diffuse_fraction).
+    pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        let (o, i) = (upper(wo), upper(wi));
+        if self.coat.is_smooth() {
+            return Rgb::WHITE;
+        }
+        let (layers, albedo) = (self.layers(), |w| self.coat.albedo(w));
+        share(layers.base([albedo(o), albedo(i)], FRAC_1_PI * i.z), layers.eval_upper::<false>(o, i, albedo).value)
+    }
+
+    /// The lobes.
+    #[inline]
+    pub fn flags(&self) -> BsdfFlags {
+        BsdfFlags::DIFFUSE | self.coat.flags()
+    }
+
+    /// What coat and base reflect together.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        let coat = self.coat.albedo(upper(wo));
+        self.tint * coat + self.diffuse * (1.0 - coat)
+    }
+}
+
+/// Plastic apart from its coat, which many points of a surface share.
+#[derive(Clone, Copy)]
+pub(super) struct PlasticLayers<'a, D> {
+    pub diffuse: Rgb,
+    pub tint: Rgb,
+    pub nonlinear: bool,
+    pub coat: &'a Coat<D>,
+}
+
+impl<D: Microfacets> PlasticLayers<'_, D> {
+    /// [`Plastic::eval`] where it is known whether the coat is smooth, with its albedo.
     #[inline(always)]
     fn eval_with<const SMOOTH: bool>(&self, wo: Vec3, wi: Vec3, albedo: impl Fn(Vec3) -> f32) -> BsdfEval {
         let eval = self.eval_upper::<SMOOTH>(upper(wo), upper(wi), albedo);
@@ -88,7 +126,7 @@ impl<D: Microfacets> Plastic<D> {
         BsdfEval { value: value + self.tint * reflected, pdf: pdf + probability * density }
     }
 
-    /// [`sample`](Self::sample) where it is known whether the coat is smooth, with its albedo.
+    /// [`Plastic::sample`] where it is known whether the coat is smooth, with its albedo.
     #[inline(always)]
     fn sample_with<const SMOOTH: bool>(
         &self,
@@ -128,28 +166,6 @@ impl<D: Microfacets> Plastic<D> {
         }
         self.diffuse * (through * self.coat.interreflection(1.0))
     }
-
-    /// As [`Bsdf::diffuse_fraction`](super::Bsdf::diffuse_fraction).
-    pub fn diffuse_fraction(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let (o, i) = (upper(wo), upper(wi));
-        if self.coat.is_smooth() {
-            return Rgb::WHITE;
-        }
-        let albedo = |w| self.coat.albedo(w);
-        share(self.base([albedo(o), albedo(i)], FRAC_1_PI * i.z), self.eval_upper::<false>(o, i, albedo).value)
-    }
-
-    /// The lobes.
-    #[inline]
-    pub fn flags(&self) -> BsdfFlags {
-        BsdfFlags::DIFFUSE | self.coat.flags()
-    }
-
-    /// What coat and base reflect together.
-    pub fn albedo(&self, wo: Vec3) -> Rgb {
-        let coat = self.coat.albedo(upper(wo));
-        self.tint * coat + self.diffuse * (1.0 - coat)
-    }
 }
 
 /// The same direction on the upper side.
@@ -159,7 +175,8 @@ fn upper(w: Vec3) -> Vec3 {
 }
 
 /// Plastic with a smooth coat, for vector code.
-pub(super) struct SmoothPlastic<'a, D>(pub &'a Plastic<D>);
+#[derive(Clone, Copy)]
+pub(super) struct SmoothPlastic<'a, D>(pub PlasticLayers<'a, D>);
 
 impl<D: Microfacets> LaneBsdf for SmoothPlastic<'_, D> {
     #[inline(always)]
@@ -174,7 +191,8 @@ impl<D: Microfacets> LaneBsdf for SmoothPlastic<'_, D> {
 }
 
 /// Plastic with a rough isotropic coat, for vector code.
-pub(super) struct IsotropicPlastic<'a, D>(pub &'a Plastic<D>);
+#[derive(Clone, Copy)]
+pub(super) struct IsotropicPlastic<'a, D>(pub PlasticLayers<'a, D>);
 
 impl<D: Microfacets> LaneBsdf for IsotropicPlastic<'_, D> {
     #[inline(always)]

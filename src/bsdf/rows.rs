@@ -2,15 +2,15 @@
 
 use super::conductor::SingleScattering as Metal;
 use super::dielectric::{SingleScattering as Glass, Smooth as SmoothGlass};
-use super::plastic::{IsotropicPlastic, SmoothPlastic};
-use super::{Bsdf, BsdfEval, BsdfSample, SingleScatteringBsdf};
+use super::plastic::{IsotropicPlastic, PlasticLayers, SmoothPlastic};
+use super::{Bsdf, BsdfEval, BsdfSample, Plastic, SingleScatteringBsdf};
 use crate::color::Rgb;
 use crate::math::Vec3;
 use crate::math::rows::{BATCH, soa};
 use crate::math::vectorize::vectorize;
 
 soa! {
-    /// Arguments of [`Bsdf::eval`] and of [`Bsdf::sample`].
+    /// Arguments of [`Bsdf::eval`] and of [`Bsdf::sample`], and what differs between their BSDFs.
     pub struct BsdfQueryRows {
         /// The direction back.
         wo: Vec3,
@@ -22,6 +22,10 @@ soa! {
         u: f32,
         /// two numbers.
         v: f32,
+        /// Of BSDFs that vary, the colour of the base
+        color: Rgb,
+        /// and the factor on what a coat reflects.
+        tint: Rgb,
     }
 }
 
@@ -77,68 +81,139 @@ impl BsdfSampleRows {
     }
 }
 
+impl BsdfQueryRows {
+    /// Sets the parameters of a query's own BSDF, one for which [`Bsdf::can_vary`].
+    #[inline]
+    pub fn set_parameters(&mut self, i: usize, bsdf: &Bsdf) {
+        match bsdf {
+            Bsdf::Plastic(plastic) => self.set_plastic(i, plastic),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(plastic)) => self.set_plastic(i, plastic),
+            _ => {}
+        }
+    }
+
+    #[inline(always)]
+    fn set_plastic<D>(&mut self, i: usize, plastic: &Plastic<D>) {
+        self.color.set(i, plastic.diffuse);
+        self.tint.set(i, plastic.tint);
+    }
+}
+
 /// A BSDF whose functions are inlined into loops that become vector code.
 pub(super) trait LaneBsdf {
     fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval;
     fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample>;
 }
 
-/// `$body` with a BSDF that is fit for vector code as `$lane`, else `$otherwise`.
+/// A [`LaneBsdf`] for each lane.
+trait LaneBsdfs {
+    fn lane(&self, i: usize) -> impl LaneBsdf;
+}
+
+/// The same for all lanes.
+struct Uniform<B>(B);
+
+impl<B: LaneBsdf + Copy> LaneBsdfs for Uniform<B> {
+    #[inline(always)]
+    fn lane(&self, _i: usize) -> impl LaneBsdf {
+        self.0
+    }
+}
+
+/// Plastics under one coat.
+struct Plastics<'a, D, F> {
+    layers: PlasticLayers<'a, D>,
+    queries: &'a BsdfQueryRows,
+    lane_bsdf: F,
+}
+
+impl<'a, D: Copy, B: LaneBsdf, F: Fn(PlasticLayers<'a, D>) -> B> LaneBsdfs for Plastics<'a, D, F> {
+    #[inline(always)]
+    fn lane(&self, i: usize) -> impl LaneBsdf {
+        let (diffuse, tint) = (self.queries.color.get(i), self.queries.tint.get(i));
+        (self.lane_bsdf)(PlasticLayers { diffuse, tint, ..self.layers })
+    }
+}
+
+/// `$body` with BSDFs that are fit for vector code as `$lanes`, else `$otherwise`.
 macro_rules! lanes {
-    ($bsdf:expr, $lane:ident => $body:expr, $otherwise:expr) => {{
+    ($bsdf:expr, $varying:expr, $lanes:ident => $body:expr, $otherwise:expr) => {{
         macro_rules! with {
             ($made:expr) => {{
-                let $lane = $made;
+                let $lanes = $made;
                 $body
             }};
         }
+        macro_rules! with_plastic {
+            ($plastic:expr, $kind:path) => {
+                match $varying {
+                    None => with!(Uniform($kind($plastic.layers()))),
+                    Some(queries) => with!(Plastics { layers: $plastic.layers(), queries, lane_bsdf: $kind }),
+                }
+            };
+        }
         match $bsdf {
-            Bsdf::Conductor(bsdf) if bsdf.is_rough_single() => with!(Metal(bsdf)),
-            Bsdf::Dielectric(bsdf) if bsdf.flags().is_delta() => with!(SmoothGlass(bsdf)),
-            Bsdf::Dielectric(bsdf) if bsdf.is_rough_single() => with!(Glass(bsdf)),
-            Bsdf::Plastic(bsdf) if bsdf.coat.is_smooth() => with!(SmoothPlastic(bsdf)),
-            Bsdf::Plastic(bsdf) if !bsdf.flags().is_anisotropic() => with!(IsotropicPlastic(bsdf)),
-            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if bsdf.coat.is_smooth() => with!(SmoothPlastic(bsdf)),
-            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if !bsdf.flags().is_anisotropic() => with!(IsotropicPlastic(bsdf)),
-            Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(bsdf)) if bsdf.is_rough_single() => with!(Metal(bsdf)),
-            Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(bsdf)) if bsdf.is_rough_single() => with!(Glass(bsdf)),
+            Bsdf::Conductor(bsdf) if bsdf.is_rough_single() => with!(Uniform(Metal(bsdf))),
+            Bsdf::Dielectric(bsdf) if bsdf.flags().is_delta() => with!(Uniform(SmoothGlass(bsdf))),
+            Bsdf::Dielectric(bsdf) if bsdf.is_rough_single() => with!(Uniform(Glass(bsdf))),
+            Bsdf::Plastic(bsdf) if bsdf.coat.is_smooth() => with_plastic!(bsdf, SmoothPlastic),
+            Bsdf::Plastic(bsdf) if !bsdf.flags().is_anisotropic() => with_plastic!(bsdf, IsotropicPlastic),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if bsdf.coat.is_smooth() => with_plastic!(bsdf, SmoothPlastic),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if !bsdf.flags().is_anisotropic() => {
+                with_plastic!(bsdf, IsotropicPlastic)
+            }
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(bsdf)) if bsdf.is_rough_single() => with!(Uniform(Metal(bsdf))),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(bsdf)) if bsdf.is_rough_single() => with!(Uniform(Glass(bsdf))),
             _ => $otherwise,
         }
     }};
 }
 
 impl Bsdf {
-    /// [`eval`](Self::eval) for the first `count` queries, at most [`BATCH`].
-    pub fn eval_rows(&self, queries: &BsdfQueryRows, count: usize, out: &mut BsdfEvalRows) {
-        lanes!(self, bsdf => vectorize!(eval(&bsdf, queries, out, count)), {
-            for i in 0..count.min(BATCH) {
-                out.set(i, &self.eval(queries.wo.get(i), queries.wi.get(i)));
-            }
+    /// Whether the BSDFs of a material with this one that differ in colours alone can be one group of queries.
+    pub fn can_vary(&self) -> bool {
+        match self {
+            Self::Plastic(bsdf) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),
+            Self::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),
+            _ => false,
+        }
+    }
+
+    /// [`eval`](Self::eval) for the first `count` queries, at most [`BATCH`]; with the parameters of the queries where `varies`.
+    pub fn eval_rows(&self, queries: &BsdfQueryRows, varies: bool, count: usize, out: &mut BsdfEvalRows) {
+        let single = |i: usize| self.eval(queries.wo.get(i), queries.wi.get(i));
+        if count == 1 {
+            return out.set(0, &single(0));
+        }
+        lanes!(self, varies.then_some(queries), bsdfs => vectorize!(eval(&bsdfs, queries, out, count)), {
+            (0..count.min(BATCH)).for_each(|i| out.set(i, &single(i)));
         });
     }
 
-    /// [`sample`](Self::sample) for the first `count` queries, at most [`BATCH`].
-    pub fn sample_rows(&self, queries: &BsdfQueryRows, count: usize, out: &mut BsdfSampleRows) {
-        lanes!(self, bsdf => vectorize!(sample(&bsdf, queries, out, count)), {
-            for i in 0..count.min(BATCH) {
-                out.set(i, self.sample(queries.wo.get(i), queries.u_lobe[i], [queries.u[i], queries.v[i]]));
-            }
+    /// [`sample`](Self::sample) for the first `count` queries, as [`eval_rows`](Self::eval_rows).
+    pub fn sample_rows(&self, queries: &BsdfQueryRows, varies: bool, count: usize, out: &mut BsdfSampleRows) {
+        let single = |i: usize| self.sample(queries.wo.get(i), queries.u_lobe[i], [queries.u[i], queries.v[i]]);
+        if count == 1 {
+            return out.set(0, single(0));
+        }
+        lanes!(self, varies.then_some(queries), bsdfs => vectorize!(sample(&bsdfs, queries, out, count)), {
+            (0..count.min(BATCH)).for_each(|i| out.set(i, single(i)));
         });
     }
 }
 
 // Whole vectors: what is computed for lanes beyond the count is not used.
 #[inline(always)]
-fn eval<B: LaneBsdf>(bsdf: &B, queries: &BsdfQueryRows, out: &mut BsdfEvalRows, count: usize) {
+fn eval(bsdfs: &impl LaneBsdfs, queries: &BsdfQueryRows, out: &mut BsdfEvalRows, count: usize) {
     for i in 0..count.next_multiple_of(LANES).min(BATCH) {
-        out.set(i, &bsdf.eval(queries.wo.get(i), queries.wi.get(i)));
+        out.set(i, &bsdfs.lane(i).eval(queries.wo.get(i), queries.wi.get(i)));
     }
 }
 
 #[inline(always)]
-fn sample<B: LaneBsdf>(bsdf: &B, queries: &BsdfQueryRows, out: &mut BsdfSampleRows, count: usize) {
+fn sample(bsdfs: &impl LaneBsdfs, queries: &BsdfQueryRows, out: &mut BsdfSampleRows, count: usize) {
     for i in 0..count.next_multiple_of(LANES).min(BATCH) {
-        out.set(i, bsdf.sample(queries.wo.get(i), queries.u_lobe[i], [queries.u[i], queries.v[i]]));
+        out.set(i, bsdfs.lane(i).sample(queries.wo.get(i), queries.u_lobe[i], [queries.u[i], queries.v[i]]));
     }
 }
 

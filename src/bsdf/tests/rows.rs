@@ -25,35 +25,58 @@ fn plastics() -> impl Iterator<Item = Bsdf> {
     ggx.map(Bsdf::Plastic).chain(separable)
 }
 
+/// The same material with other colours.
+fn recolored(bsdf: &Bsdf, random: &mut Rng) -> Bsdf {
+    fn recolor<D: Copy>(plastic: &Plastic<D>, random: &mut Rng) -> Plastic<D> {
+        let [diffuse, tint] = std::array::from_fn(|_| Rgb::from(std::array::from_fn(|_| random.unit_f32())));
+        Plastic { diffuse, tint, ..*plastic }
+    }
+    match bsdf {
+        Bsdf::Plastic(plastic) => Bsdf::Plastic(recolor(plastic, random)),
+        Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(plastic)) => {
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(recolor(plastic, random)))
+        }
+        other => other.clone(),
+    }
+}
+
 #[test]
 fn queries_in_rows_have_the_bits_of_single_ones() {
+    let varying: Vec<Bsdf> = bsdfs().into_iter().filter(Bsdf::can_vary).collect();
+    assert!(varying.len() >= 8);
+    for (bsdf, varies) in bsdfs().into_iter().map(|bsdf| (bsdf, false)).chain(varying.into_iter().map(|bsdf| (bsdf, true))) {
+        check_rows(&bsdf, varies);
+    }
+}
+
+fn check_rows(first: &Bsdf, varies: bool) {
     let mut random = Rng::new(31);
     let (mut queries, mut evals, mut samples) = (BsdfQueryRows::default(), BsdfEvalRows::default(), BsdfSampleRows::default());
-    for bsdf in bsdfs() {
-        for count in [1, 15, 16, 100, BATCH] {
-            for i in 0..count {
-                // Some in the surface, where nothing is scattered.
-                let mut direction = || if random.below(20) == 0 { Vec3::X } else { random.direction().as_vec3() };
-                let (wo, wi) = (direction(), direction());
-                queries.wo.set(i, wo);
-                queries.wi.set(i, wi);
-                (queries.u_lobe[i], [queries.u[i], queries.v[i]]) = (random.unit_f32(), random.pair());
-            }
-            bsdf.eval_rows(&queries, count, &mut evals);
-            bsdf.sample_rows(&queries, count, &mut samples);
-            for i in 0..count {
-                let (wo, wi) = (queries.wo.get(i), queries.wi.get(i));
-                let eval = bsdf.eval(wo, wi);
-                let context = format!("{bsdf:?} {wo} {wi} of {count}");
-                assert_eq!((evals.value.get(i), evals.pdf[i]), (eval.value, eval.pdf), "{context}");
-                let sample = bsdf.sample(wo, queries.u_lobe[i], [queries.u[i], queries.v[i]]);
-                assert_eq!(samples.is_valid[i] != 0, sample.is_some(), "{context}");
-                let Some(sample) = sample else { continue };
-                let flags = (samples.is_delta[i] != 0, samples.is_transmission[i] != 0);
-                assert_eq!(flags, (sample.is_delta, sample.is_transmission), "{context}");
-                assert_eq!((samples.wi.get(i), samples.weight.get(i)), (sample.wi, sample.weight), "{context}");
-                assert_eq!((samples.pdf[i], samples.eta[i]), (sample.pdf, sample.eta), "{context}");
-            }
+    for count in [1, 15, 16, 100, BATCH] {
+        let bsdfs: Vec<Bsdf> = (0..count).map(|i| if varies && i > 0 { recolored(first, &mut random) } else { first.clone() }).collect();
+        for (i, bsdf) in bsdfs.iter().enumerate() {
+            // Some in the surface, where nothing is scattered.
+            let mut direction = || if random.below(20) == 0 { Vec3::X } else { random.direction().as_vec3() };
+            let (wo, wi) = (direction(), direction());
+            queries.wo.set(i, wo);
+            queries.wi.set(i, wi);
+            (queries.u_lobe[i], [queries.u[i], queries.v[i]]) = (random.unit_f32(), random.pair());
+            queries.set_parameters(i, bsdf);
+        }
+        first.eval_rows(&queries, varies, count, &mut evals);
+        first.sample_rows(&queries, varies, count, &mut samples);
+        for (i, bsdf) in bsdfs.iter().enumerate() {
+            let (wo, wi) = (queries.wo.get(i), queries.wi.get(i));
+            let eval = bsdf.eval(wo, wi);
+            let context = format!("{bsdf:?} {wo} {wi} of {count}");
+            assert_eq!((evals.value.get(i), evals.pdf[i]), (eval.value, eval.pdf), "{context}");
+            let sample = bsdf.sample(wo, queries.u_lobe[i], [queries.u[i], queries.v[i]]);
+            assert_eq!(samples.is_valid[i] != 0, sample.is_some(), "{context}");
+            let Some(sample) = sample else { continue };
+            let flags = (samples.is_delta[i] != 0, samples.is_transmission[i] != 0);
+            assert_eq!(flags, (sample.is_delta, sample.is_transmission), "{context}");
+            assert_eq!((samples.wi.get(i), samples.weight.get(i)), (sample.wi, sample.weight), "{context}");
+            assert_eq!((samples.pdf[i], samples.eta[i]), (sample.pdf, sample.eta), "{context}");
         }
     }
 }

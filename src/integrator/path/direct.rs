@@ -57,7 +57,11 @@ fn eval_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut BsdfS
             queries.wo.set(i, vertex.wo.get(usize::from(lane)));
             queries.wi.set(i, direct.wi.get(usize::from(lane)));
         }
-        bsdf.eval_rows(queries, lanes.len(), evals);
+        let varies = bsdfs.varies(usize::from(lanes[0]));
+        if varies {
+            bsdfs.set_parameters(context.scene, lanes, queries);
+        }
+        bsdf.eval_rows(queries, varies, lanes.len(), evals);
         for (i, &lane) in lanes.iter().enumerate() {
             direct.value.set(usize::from(lane), evals.value.get(i));
             direct.scatter_pdf[usize::from(lane)] = evals.pdf[i];

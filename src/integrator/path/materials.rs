@@ -3,7 +3,7 @@
 use super::Context;
 use super::block::{VertexRows, Vertices, vertex_flags};
 use super::wave::{Wave, path_flags};
-use crate::bsdf::{Bsdf, Lambert};
+use crate::bsdf::{Bsdf, BsdfQueryRows, Lambert};
 use crate::color::Rgb;
 use crate::id::ShapeId;
 use crate::material::Material;
@@ -15,15 +15,18 @@ use crate::texture::Footprint;
 pub(super) struct BsdfTable {
     /// Of constant materials their id, of others [`MADE`] and their place among those, or [`DIFFUSE`].
     ids: Row<u32>,
+    /// The same for the vertices of one group; of BSDFs that vary, [`VARYING`] and their material's id.
+    groups: Row<u32>,
     made: Vec<Bsdf>,
 }
 
 const DIFFUSE: u32 = u32::MAX;
 const MADE: u32 = 1 << 31;
+const VARYING: u32 = 1 << 30;
 
 impl Default for BsdfTable {
     fn default() -> Self {
-        Self { ids: [DIFFUSE; BATCH], made: Vec::with_capacity(BATCH) }
+        Self { ids: [DIFFUSE; BATCH], groups: [DIFFUSE; BATCH], made: Vec::with_capacity(BATCH) }
     }
 }
 
@@ -43,13 +46,29 @@ impl BsdfTable {
         }
     }
 
-    /// Runs of vertices with one BSDF, of vertices sorted by their BSDFs.
+    /// Runs of vertices that can be evaluated together, of sorted vertices.
     pub fn groups<'a>(&'a self, lanes: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
-        lanes.chunk_by(|&a, &b| self.ids[usize::from(a)] == self.ids[usize::from(b)])
+        lanes.chunk_by(|&a, &b| self.groups[usize::from(a)] == self.groups[usize::from(b)])
+    }
+
+    /// Whether the BSDFs in the group of a vertex differ.
+    #[inline]
+    pub fn varies(&self, lane: usize) -> bool {
+        self.groups[lane] & (MADE | VARYING) == VARYING
+    }
+
+    /// Sets the parameters of queries for a group whose BSDFs differ.
+    pub fn set_parameters(&self, scene: &Scene, lanes: &[u8], queries: &mut BsdfQueryRows) {
+        for (i, &lane) in lanes.iter().enumerate() {
+            if let Some(bsdf) = self.get(scene, usize::from(lane)) {
+                queries.set_parameters(i, bsdf);
+            }
+        }
     }
 
     fn set_made(&mut self, lane: usize, bsdf: Bsdf) {
         self.ids[lane] = MADE | self.made.len() as u32;
+        self.groups[lane] = self.ids[lane];
         self.made.push(bsdf);
     }
 }
@@ -75,7 +94,7 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
         if scene.materials[id.index()].parts().is_some() {
             id = scene.met_material_id(&vertices.interaction(lane), vertices.rows.direction.get(lane));
         }
-        vertices.bsdfs.ids[lane] = id.0;
+        (vertices.bsdfs.ids[lane], vertices.bsdfs.groups[lane]) = (id.0, id.0);
         match &scene.materials[id.index()] {
             Material::Constant(Bsdf::Lambert(Lambert { albedo })) => set_diffuse(vertices, lane, *albedo),
             Material::Constant(bsdf) => set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, bsdf),
@@ -118,7 +137,11 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
             Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
             bsdf => {
                 set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
+                let group = if textured.varies_in_colors() && bsdf.can_vary() { Some(VARYING | vertices.bsdfs.ids[lane]) } else { None };
                 vertices.bsdfs.set_made(lane, bsdf);
+                if let Some(group) = group {
+                    vertices.bsdfs.groups[lane] = group;
+                }
             }
         }
     }
@@ -144,10 +167,10 @@ fn flags(bsdf: &Bsdf) -> u32 {
     delta | transmits
 }
 
-/// Sorts the vertices that are not diffuse by their BSDFs.
+/// Sorts the vertices that are not diffuse by their groups.
 pub(super) fn sort_by_bsdf(vertices: &mut Vertices) {
     let Vertices { non_diffuse, bsdfs, .. } = vertices;
-    non_diffuse.sort_unstable_by_key(|&lane| u64::from(bsdfs.ids[usize::from(lane)]) << 8 | u64::from(lane));
+    non_diffuse.sort_unstable_by_key(|&lane| u64::from(bsdfs.groups[usize::from(lane)]) << 8 | u64::from(lane));
 }
 
 /// Replaces the BSDFs of boundaries between media, and of rough surfaces under path space regularization.

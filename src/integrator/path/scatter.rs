@@ -58,13 +58,17 @@ fn sample_non_diffuse(context: &Context, vertices: &mut Vertices, rows: &mut Bsd
     let BsdfScratch { queries, samples, .. } = rows;
     for lanes in bsdfs.groups(non_diffuse) {
         let Some(bsdf) = bsdfs.get(context.scene, usize::from(lanes[0])) else { continue };
+        let varies = bsdfs.varies(usize::from(lanes[0]));
         for (i, &lane) in lanes.iter().enumerate() {
             let lane = usize::from(lane);
             let u = u_bsdf.of(lane);
             queries.wo.set(i, vertex.wo.get(lane));
             (queries.u_lobe[i], queries.u[i], queries.v[i]) = (u[0], u[1], u[2]);
         }
-        bsdf.sample_rows(queries, lanes.len(), samples);
+        if varies {
+            bsdfs.set_parameters(context.scene, lanes, queries);
+        }
+        bsdf.sample_rows(queries, varies, lanes.len(), samples);
         for (i, &lane) in lanes.iter().enumerate() {
             let lane = usize::from(lane);
             scatter.wi.set(lane, samples.wi.get(i));
