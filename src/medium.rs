@@ -122,7 +122,7 @@ pub struct BoundaryMedia {
 
 impl BoundaryMedia {
     /// Of a surface of `medium` seen from a point within `here`, on the side of the normal if `is_front`. Where the
-    /// point is not known to be within the surface that it is about to leave, the surface is believed.
+    /// stack of the point does not hold the medium that it is about to leave, the side of the surface decides.
     pub fn new(current: MediumStack, medium: MediumId, is_front: bool) -> Self {
         let outside = if is_front { current } else { current.popped(medium) };
         Self { outside, inside: outside.pushed(medium) }

@@ -1,4 +1,4 @@
-//! Opacity: surfaces with holes, as a number or a texture says.
+//! Opacity: surfaces with holes, by a number or a texture.
 
 use crate::geometry::{AlphaMask, Hit, Mesh, Shape};
 use crate::id::{PrimId, ShapeId};

@@ -64,7 +64,7 @@ pub struct SceneFeatures {
     pub parameters: bool,
     /// Some material has only delta lobes.
     pub delta_materials: bool,
-    /// Some surface has a medium within it: paths know where they are.
+    /// Some surface has a medium within it: paths track their media.
     pub media: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
     pub anisotropic: bool,

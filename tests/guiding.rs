@@ -231,7 +231,7 @@ fn an_interrupted_guided_render_has_a_picture() {
 
     let more = self::kit(&room(), 65);
     let refused = RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings).unwrap_err();
-    assert!(refused.to_string().contains("spp: 64 in the checkpoint, 65 asked for"), "{refused}");
+    assert!(refused.to_string().contains("spp: 64 in the checkpoint, 65 requested"), "{refused}");
 }
 
 /// The last block of a state, which has the guide.

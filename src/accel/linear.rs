@@ -62,7 +62,7 @@ impl Accelerator for LinearAccel<'_> {
             let mut triangle_ray = TriangleRay::from(&local);
             for &id in ids {
                 for prim in self.prims(id) {
-                    // One float beyond the best hit, so that a hit which rounds to the same distance takes part in the tie.
+                    // One float beyond the best hit, so that a hit which rounds to the same distance is compared as a tie.
                     local.t_max = closest.map_or(ray.t_max, |best| best.t.next_up().min(ray.t_max));
                     triangle_ray.t_max = f64::from(local.t_max);
                     let Some(hit) = self.test(&local, &triangle_ray, key, Primitive { id, prim, instance }) else { continue };

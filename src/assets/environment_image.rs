@@ -48,7 +48,7 @@ fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
     let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
     let wanted = flat.filter_map(choose).next().ok_or_else(|| malformed(&"there are no channels R, G and B"))?;
     let header = &headers[wanted[0].part];
-    // The size is believed only after a look: memory is asked for before any pixel is read.
+    // The size is checked first: memory is allocated before any pixel is read.
     let mut pixels = vec![[0.0; 3]; pixel_count(header).map_err(|e| malformed(&e))?];
     let keep = |row: Row| row.write(pixels[row.start..].iter_mut().map(|pixel| &mut pixel[row.wanted]), |v| v);
     read_rows(BufReader::new(source), &headers, &wanted, false, keep).map_err(|e| malformed(&e))?;

@@ -139,7 +139,7 @@ fn parse(text: &str) -> Result<IesData, String> {
         candela.push(value);
     }
     if let Some((line, word)) = numbers.words.next() {
-        return Err(format!("line {line}: \"{word}\" is more than the angles ask for"));
+        return Err(format!("line {line}: \"{word}\" is beyond the number of values that the angles require"));
     }
     Ok(IesData { vertical, horizontal, candela })
 }

@@ -17,7 +17,7 @@ use crate::image_data::{ImageData, Samples};
 /// More pixels than any texture has; a header that claims more is damaged, or means harm.
 pub(super) const MAX_PIXELS: u64 = 1 << 28;
 
-/// Reads an image file, of the kind that its first bytes say (TGA, which has no mark: that its name says).
+/// Reads an image file, of the format of its first bytes (TGA, which has no magic number: of its extension).
 ///
 /// # Errors
 /// If the file is missing, malformed, cut short, of another kind, or has more than 2^28 pixels or none.
@@ -47,7 +47,7 @@ fn read_bytes(bytes: &[u8], is_tga: bool) -> Result<ImageData, AssetError> {
     }
 }
 
-/// Refuses sizes that no image has, before memory is asked for.
+/// Rejects sizes that no image has, before memory is allocated.
 pub(super) fn check_size(width: usize, height: usize) -> Result<(), String> {
     let pixels = (width as u64).saturating_mul(height as u64);
     match pixels {

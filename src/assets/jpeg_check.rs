@@ -1,4 +1,4 @@
-//! Whether a JPEG file is whole: decoders fill what is missing with grey and say nothing.
+//! Whether a JPEG file is whole: decoders silently fill what is missing with grey.
 
 /// Whether the segments of a JPEG file (ISO/IEC 10918-1, annex B) lead to its end mark.
 pub fn is_whole_jpeg(bytes: &[u8]) -> bool {

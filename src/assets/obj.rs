@@ -11,7 +11,7 @@ use super::{AssetError, MeshData};
 use crate::color::linear_from_srgb;
 use crate::file;
 
-/// What an MTL says of a material that is used here.
+/// The parameters of an MTL material that are supported.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjMaterial {
     /// Name.

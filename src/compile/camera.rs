@@ -9,7 +9,7 @@ use crate::math::{DAffine3, DMat3, DVec3, Motion, RenderSpace, Transform};
 
 const DEFAULT_FOV_DEGREES: f64 = 40.0;
 
-/// Blades beyond this number cannot be told from a disk.
+/// Blades beyond this number cannot be distinguished from a disk.
 const MAX_BLADES: u32 = 64;
 
 /// The camera, placed by a rotation and a translation.

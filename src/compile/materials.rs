@@ -34,7 +34,7 @@ pub struct MaterialTable {
     pub(super) medium_of: HashMap<MaterialId, Medium>,
 }
 
-/// How a shape looks: what a material of the scene file comes to.
+/// The compiled material of a shape.
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialBinding {
     pub material: MaterialId,
@@ -111,7 +111,7 @@ impl MaterialTable {
         MaterialId::new(self.materials.len() - 1)
     }
 
-    /// Whether a surface without uv cannot look so.
+    /// Whether a surface with it needs uv.
     pub fn needs_uv(&self, look: &MaterialBinding) -> bool {
         let cut_out = look.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
         let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.relief_of(id).is_some();
@@ -275,7 +275,7 @@ impl Compiler<'_> {
         })
     }
 
-    /// Two colours that do not exceed 1 together; of textures only the lookup can tell.
+    /// Two colours that do not exceed 1 together; textures are checked only when they are looked up.
     fn sum_to_one(&self, path: &str, [a, b]: [&str; 2], [x, y]: [&ColorDesc; 2]) -> Result<[ColorInput; 2]> {
         let inputs = [self.color(&format!("{path}.{a}"), x)?, self.color(&format!("{path}.{b}"), y)?];
         if let [ColorInput::Constant(x), ColorInput::Constant(y)] = inputs
@@ -375,11 +375,11 @@ pub struct MtlSurface {
     pub radiance: Option<Rgb>,
 }
 
-/// The nearest material for what an MTL says: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
+/// The nearest material for an MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
 /// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic otherwise; everything else
 /// is diffuse with Kd.
 ///
-/// The error says which number makes no sense.
+/// The error names the invalid number.
 pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
     let fault = |key: &str, value: &dyn Debug, must: &str| Err(format!("material \"{}\": {key} {value:?} must be {must}", mtl.name));
     for (key, color) in [("Kd", mtl.diffuse), ("Ks", mtl.specular)] {

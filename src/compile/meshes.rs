@@ -227,8 +227,8 @@ pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<Mesh
     Ok(Some(mesh))
 }
 
-/// Gives a placed mesh the normals of its shading, at each of its times; splits vertices where there are creases, and then
-/// says what each was.
+/// Gives a placed mesh the normals of its shading, at each of its times; splits vertices at creases, and then
+/// returns the original index of each.
 fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement: Placement) -> Option<Vec<u32>> {
     let given = steps.iter().all(|step| step.normals.is_some());
     let computed = match placement.shading {

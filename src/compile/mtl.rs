@@ -22,7 +22,7 @@ pub struct MtlBinding {
 }
 
 impl Builder {
-    /// What the faces with a material of an OBJ file look like; maps need uv. `path` is the shape, `file` the OBJ.
+    /// The material of the faces with a material of an OBJ file; maps need uv. `path` is the shape, `file` the OBJ.
     pub(super) fn mtl_look(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlBinding> {
         let maps = &mtl.maps;
         let every = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity, &maps.specular, &maps.emission];
@@ -35,7 +35,7 @@ impl Builder {
         let (specular, emission) = (wanted(&maps.specular), wanted(&maps.emission));
 
         let mut plain = mtl.clone();
-        // Exporters leave a colour black, or out, where a map says it all.
+        // Exporters leave a colour black, or out, where a map gives all of it.
         for (color, map) in [(&mut plain.diffuse, &diffuse), (&mut plain.specular, &specular), (&mut plain.emissive, &emission)] {
             if map.is_some() {
                 *color = Some(color.filter(|color| color.iter().any(|&c| c != 0.0)).unwrap_or([1.0; 3]));
@@ -105,7 +105,7 @@ impl Builder {
         Ok(id)
     }
 
-    /// `d` times `map_d` (the channel it says, or the image's alpha, or else its luminance), or times the alpha of `map_Kd`.
+    /// `d` times `map_d` (the channel it names, or the image's alpha, or else its luminance), or times the alpha of `map_Kd`.
     fn mtl_opacity(&mut self, path: &str, d: Option<f32>, map: Option<&ObjMap>, diffuse: Option<&ObjMap>) -> Result<Option<TextureId>> {
         let bitmap = match (map, diffuse) {
             (Some(map), _) => {
@@ -121,7 +121,7 @@ impl Builder {
         };
         let constant = d.filter(|&d| d < 1.0).map(|d| Texture::Constant(Rgb::splat(d)));
         let texture = match (bitmap.map(Texture::Bitmap), constant) {
-            // Exporters leave d at 0 where a map says it all.
+            // Exporters leave d at 0 where a map gives all of it.
             (Some(bitmap), Some(factor)) if d != Some(0.0) => Texture::Product([bitmap, factor].into()),
             (Some(bitmap), _) => bitmap,
             (None, Some(constant)) => constant,

@@ -1,4 +1,4 @@
-//! Materials with relief: normal maps and bump maps.
+//! Normal maps and bump maps: materials of the type `relief`.
 
 use super::materials::{Compiler, MaterialTable};
 use super::textures::TextureUse;
@@ -9,18 +9,18 @@ use crate::material::Material;
 use crate::normal_perturbation::NormalPerturbation;
 
 impl MaterialTable {
-    /// Adds a relief.
+    /// Adds a normal or bump map.
     pub(super) fn push_relief(&mut self, normal_perturbation: NormalPerturbation) -> NormalPerturbationId {
         self.normal_perturbations.push(normal_perturbation);
         NormalPerturbationId::new(self.normal_perturbations.len() - 1)
     }
 
-    /// The relief of a material by itself.
+    /// The normal or bump map of a material by itself.
     pub(super) fn relief_of(&self, id: MaterialId) -> Option<NormalPerturbationId> {
         self.by_material.get(&id).copied()
     }
 
-    /// Reliefs by material if some material consists of one with relief; none otherwise.
+    /// Normal and bump maps by material if some material has a part with one; none otherwise.
     pub(super) fn part_normal_perturbations(&self) -> Vec<Option<NormalPerturbationId>> {
         let mut parts = self.materials.iter().filter_map(Material::parts).flatten();
         if !parts.any(|part| self.relief_of(part).is_some()) {
@@ -31,7 +31,7 @@ impl MaterialTable {
 }
 
 impl Compiler<'_> {
-    /// The relief that a material says, if it is one with relief.
+    /// The normal or bump map of a material of the type `relief`.
     pub(super) fn normal_perturbation(&self, desc: &SceneDesc, path: &str, material: &MaterialDesc) -> Result<Option<NormalPerturbation>> {
         let MaterialDesc::Relief { normal_map, bump_map, .. } = material else { return Ok(None) };
         Ok(Some(match (normal_map, bump_map) {

@@ -16,7 +16,7 @@ use crate::material::ColorInput;
 use crate::math::{Bounds, DAffine3, Motion, RenderSpace, Transform};
 use crate::scene::Surface;
 
-/// A shape that knows everything but its final place.
+/// A shape complete but for its final transform.
 #[derive(Clone, Debug)]
 pub struct PreparedShape {
     form: ShapeSource,
@@ -164,7 +164,7 @@ impl Builder {
             if let Some(mtl) = &loaded.material {
                 identity.material = self.identities.name(&mtl.name);
                 let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
-                // What the scene says of the shape counts.
+                // The shape's own keys override the MTL.
                 let given = if desc.opacity.is_some() { look.opacity } else { from_mtl.look.opacity };
                 look = MaterialBinding { opacity: given, ..from_mtl.look };
                 emission = emission.or(from_mtl.emission.map(|emission| PreparedEmission { emission, group: None }));

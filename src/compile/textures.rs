@@ -27,9 +27,9 @@ const MAX_LOOKUPS: usize = 256;
 /// What a texture is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
-    /// A colour: whole numbers are sRGB unless the texture says otherwise.
+    /// A colour: whole numbers are sRGB unless the texture specifies otherwise.
     Color,
-    /// Roughness, normals, heights, opacity: numbers are linear unless the texture says otherwise.
+    /// Roughness, normals, heights, opacity: numbers are linear unless the texture specifies otherwise.
     Data,
 }
 
@@ -97,7 +97,7 @@ impl TextureTable {
         })
     }
 
-    /// The texture that `path` names, for something that knows nothing of a surface but uv.
+    /// The texture that `path` names, for a use where uv is all there is of a surface.
     pub fn find_by_uv(&self, files: &CompileContext, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
         let id = self.find(files, path, name, wanted)?;
         if !self.get(id).attributes().is_empty() {
@@ -143,7 +143,7 @@ impl TextureTable {
         Ok(id)
     }
 
-    /// Refuses a texture with colours that a surface cannot reflect; the error says what it does.
+    /// Rejects a texture with colours that a surface cannot reflect; the error names the fault.
     pub fn check_reflectance(&self, id: TextureId) -> Result<(), String> {
         let [min, max] = self.get(id).range();
         if min >= 0.0 && max <= 1.0 {
@@ -331,7 +331,7 @@ fn blank() -> ImageData {
     ImageData { width: 1, height: 1, channels: 1, samples: Samples::U8(vec![0]) }
 }
 
-/// The images of all used files that can be read, in parallel; what is wrong with the others is found when they are asked for.
+/// The images of all used files that can be read, in parallel; the others are reported when they are used.
 fn read_all(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> HashMap<PathBuf, Arc<TextureImage>> {
     let file = |texture: &TextureDesc| match texture {
         TextureDesc::Image { file, .. } if !files.source.assets.images.contains_key(file) => files.source.asset(file).canonicalize().ok(),
@@ -346,7 +346,7 @@ fn read_all(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> HashM
     names.into_par_iter().filter_map(read).collect()
 }
 
-/// An image that has no file, from `images` if it has been asked for before.
+/// An image that has no file, from `images` if it has been used before.
 fn kept_image(
     images: &mut HashMap<PathBuf, Arc<TextureImage>>,
     files: &CompileContext,

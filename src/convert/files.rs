@@ -13,7 +13,7 @@ use crate::image_data::{ImageData, Samples};
 use crate::import::Imported;
 use crate::output::FileUses;
 
-/// Brings files to the folder beside a scene.
+/// Copies files to the folder beside a scene.
 pub struct Files<'a> {
     assets: &'a Assets,
     source: &'a Path,
@@ -59,7 +59,7 @@ impl<'a> Files<'a> {
         self.assets.contains(name) || folder_of(self.source).join(name).is_file()
     }
 
-    /// Brings a file; the result is its name relative to the target. `path` is where the scene names it.
+    /// Copies a file; the result is its name relative to the target. `path` is where the scene names it.
     pub fn bring(&mut self, path: &str, name: &str) -> Result<String> {
         if let Some(done) = self.brought.get(name) {
             return Ok(done.clone());

@@ -53,7 +53,7 @@ pub fn write_scene(imported: &Imported, source: &Path, target: &Path, originals:
     Ok(files.count())
 }
 
-/// Brings all files of a scene; the result is the scene with their names.
+/// Copies all files of a scene; the result is the scene with their names.
 fn bring_all(imported: &Imported, files: &mut Files) -> Result<SceneDesc> {
     let mut desc = imported.desc.clone();
     for NamedFile { path, name, is_used } in desc.files_mut() {

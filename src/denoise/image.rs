@@ -14,7 +14,7 @@ pub const FEATURE_LAYERS: [LayerKind; 2] = [LayerKind::FeatureAlbedo, LayerKind:
 /// rounding of `f32`; all other layers stay as they are. On an error the picture is unchanged.
 ///
 /// # Errors
-/// [`Error::OutOfMemory`](crate::Error::OutOfMemory), or [`Error::Internal`](crate::Error::Internal) with what the library says.
+/// [`Error::OutOfMemory`](crate::Error::OutOfMemory), or [`Error::Internal`](crate::Error::Internal) with the library's message.
 pub fn denoise_image(denoiser: &Denoiser, image: &mut Image) -> Result<Report> {
     let size = [image.crop.width as usize, image.crop.height as usize];
     let [albedo, normal] = FEATURE_LAYERS.map(|kind| image.layer(kind).map(triples));

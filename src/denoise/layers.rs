@@ -99,7 +99,7 @@ impl<'f> Layers<'f> {
         if subsampled { Err(format!("layer {} is subsampled", full(name, rgb))) } else { Ok(Some(*rgb)) }
     }
 
-    /// What is said of a layer that is not there.
+    /// The message for a layer that is not there.
     pub fn no_layer(&self, name: &str) -> String {
         format!("there is no layer {name} with channels R, G, B or X, Y, Z; it has {}", self.channel_names())
     }

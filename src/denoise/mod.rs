@@ -1,4 +1,4 @@
-//! Denoising with Intel Open Image Denoise, a library that is opened at run time if it is asked for.
+//! Denoising with Intel Open Image Denoise, a library that is loaded at run time if it is needed.
 //!
 //! Albedo and normals are denoised first, each by a filter of its own; the picture is denoised with the help of both, linear and without a
 //! limit; alpha and parts of the picture (light groups, kinds of light) go through filters of their own with the same two. See
@@ -81,7 +81,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// The attribute of EXR files that says how they were denoised.
+    /// The attribute of EXR files with the parameters of their denoising.
     pub const ATTRIBUTE: &str = "steradian/denoised";
 
     /// The value of [`Report::ATTRIBUTE`], such as `OIDN 2.5.1, albedo and normal prefiltered`.

@@ -20,7 +20,7 @@ pub struct Prepared<'d> {
 
 impl<'d> Prepared<'d> {
     /// Denoises the features of a picture of `size` (width, height) pixels, row by row. Albedo is cut to 0..1, normals to -1..1. Features
-    /// that are 0 everywhere say nothing and are left out, as are normals without albedo, which the library has no use for.
+    /// that are 0 everywhere hold no information and are left out, as are normals without albedo, which the library has no use for.
     pub fn new(denoiser: &'d Denoiser, size: [usize; 2], albedo: Option<Vec<Triple>>, normal: Option<Vec<Triple>>) -> Result<Self> {
         let report = Report { version: denoiser.version(), ..Report::default() };
         let mut prepared = Self { denoiser, size, albedo: None, normal: None, report, start: Instant::now() };

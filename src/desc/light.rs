@@ -45,7 +45,7 @@ pub struct PointLightDesc {
     pub position: [f64; 3],
     /// Radiant intensity (power per solid angle), linear RGB.
     pub intensity: [f32; 3],
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -73,7 +73,7 @@ pub struct SpotLightDesc {
     /// For the texture: a direction that is up, not that of the axis. Default: +Y (-Z if the axis lies along Y).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<[f64; 3]>,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -101,7 +101,7 @@ pub struct ProjectorLightDesc {
     /// Width over height, above 0. Default: that of the image, if the texture is one; else 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aspect: Option<f64>,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -129,7 +129,7 @@ pub struct IesLightDesc {
     /// Radiant intensity for each candela of the file, linear RGB. Default: [1, 1, 1].
     #[serde(default = "white")]
     pub intensity: [f32; 3],
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -150,7 +150,7 @@ pub struct DirectionalLightDesc {
     /// angle is visible to rays that leave the scene. Default: 0.
     #[serde(default)]
     pub angular_diameter_degrees: f64,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -172,7 +172,7 @@ pub struct EnvironmentLightDesc {
     /// Rotation of the environment (translations are ignored; scales are an error).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transform: Option<TransformDesc>,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A file to write; its extension (`.exr` or `.png`) says which kind.
+/// A file to write; its extension (`.exr` or `.png`) selects the format.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutputDesc {
@@ -32,7 +32,7 @@ pub struct OutputDesc {
     /// EXR: store the whole picture, black around the crop, for programs that ignore data windows. Default: false.
     #[serde(default, skip_serializing_if = "is_default")]
     pub uncropped: bool,
-    /// EXR: how many objects Cryptomatte tells apart in a pixel: an even number. Default: 6.
+    /// EXR: Cryptomatte ranks, the number of objects stored per pixel: an even number. Default: 6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crypto_depth: Option<u32>,
     /// EXR: where Cryptomatte's names are stored. Default: embedded.
@@ -41,7 +41,7 @@ pub struct OutputDesc {
     /// EXR: the attribute `owner`. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub owner: Option<String>,
-    /// EXR: text before what the attribute `comments` says of the layers. Default: none.
+    /// EXR: text before the description of layers in the attribute `comments`. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub comments: Option<String>,
     /// EXR: the attribute `framesPerSecond`. Default: none.
@@ -134,10 +134,10 @@ pub enum LayerKind {
     /// Number of samples.
     #[serde(rename = "samples")]
     Samples,
-    /// Fraction of light scattered by the first surface that is no mirror and no clear glass: what denoisers ask for.
+    /// Fraction of light scattered by the first surface that is no mirror and no clear glass: the albedo feature for denoisers.
     #[serde(rename = "feature_albedo")]
     FeatureAlbedo,
-    /// Mean shading normal of that surface in world space: what denoisers ask for.
+    /// Mean shading normal of that surface in world space: the normal feature for denoisers.
     #[serde(rename = "feature_normal")]
     FeatureNormal,
     /// The picture before it was denoised, which denoisers add.

@@ -214,7 +214,7 @@ pub enum IntegratorDesc {
         /// How directions towards lights are found.
         #[serde(default)]
         strategy: StrategyDesc,
-        /// Takes the noise of rare bright paths, and some light with it: biased. No single path that was scattered more than once brings a
+        /// Takes the noise of rare bright paths, and some light with it: biased. No single path that was scattered more than once adds to a
         /// channel more than this, above 0. Default: no limit, no bias.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         clamp: Option<f32>,

@@ -30,7 +30,7 @@ macro_rules! shapes {
                 #[serde(default, skip_serializing_if = "Vec::is_empty")]
                 pub motion: Vec<KeyframeDesc>,
                 /// How much of the surface is there: a number from 0 to 1, or `{ "texture": "name" }`. Rays, shadow
-                /// rays too, pass through the rest. Default: 1, or what an MTL says. Not with `emission`.
+                /// rays too, pass through the rest. Default: 1, or that of an MTL. Not with `emission`.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub opacity: Option<OpacityDesc>,
                 /// Light that the shape gives off.
@@ -135,7 +135,7 @@ pub struct ShapeCommonMut<'a> {
 shapes! {
     /// A triangle mesh from a file, or inline by `positions` and `triangles`.
     Mesh(MeshDesc) {
-        /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ brings
+        /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ uses
         /// those of its MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular colour
         /// Ks with an exponent Ns has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic
         /// with base Kd otherwise; all else is diffuse with Kd. Ke is radiance given off. `map_Kd` is a texture times
@@ -416,7 +416,7 @@ pub enum OpacityDesc {
     Number(f32),
     /// A texture by name.
     Texture {
-        /// The texture's name. An image with alpha that names no `channel` stands for its alpha, other textures for their luminance.
+        /// The texture's name. An image with alpha and no `channel` gives its alpha, other textures their luminance.
         texture: String,
         /// Where the texture is below this number within `[0, 1]` there is a hole, elsewhere all of the surface: an
         /// alpha test, of the texture as filtered. Default: none, the texture is the fraction of light that the surface
@@ -438,7 +438,7 @@ pub struct EmissionDesc {
     /// Whether both sides emit; otherwise only the front does.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub two_sided: bool,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }

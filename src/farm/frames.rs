@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 /// The most frames of a sequence.
 const MOST_FRAMES: u64 = 1_000_000;
 
-/// Digits of a frame's number in names that do not say.
+/// Digits of a frame's number in names that do not give them.
 const DEFAULT_DIGITS: usize = 4;
 
 /// Frames in the order in which they are rendered, each once, and at least one.

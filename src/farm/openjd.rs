@@ -11,7 +11,7 @@ use super::job::{Job, quote};
 ///
 /// A task that is cancelled gets two minutes to write its checkpoint.
 pub fn openjd_template(job: &Job) -> Value {
-    // Paths are strings: the specification wants defaults of type PATH relative to the template.
+    // Paths are strings: the specification requires defaults of type PATH to be relative to the template.
     let text = |name: &str, value: &str, what: &str| json!({ "name": name, "type": "STRING", "default": value, "description": what });
     let mut parameters = vec![
         text("Scene", &job.scene.to_string_lossy(), "The scene"),

@@ -15,7 +15,7 @@ pub struct Status {
     pub frame: Option<i64>,
     /// Samples in a second.
     pub samples_per_second: f64,
-    /// Seconds until the end, as far as can be told.
+    /// Estimated seconds until the end.
     pub seconds_left: Option<f64>,
     /// Rate and time left in words; may be empty.
     pub text: String,
@@ -28,7 +28,7 @@ pub enum Event<'a> {
     Begin(Option<i64>),
     /// It goes on.
     Progress(&'a Status),
-    /// Something the user should know.
+    /// A warning.
     Warning(&'a str),
     /// The work has failed.
     Failure(&'a str),

@@ -4,7 +4,7 @@ use super::job::{Job, quote, quote_path};
 use crate::error::{Error, Result};
 use crate::printable;
 
-/// What Slurm is asked for.
+/// The resources requested from Slurm.
 #[derive(Clone, Debug, Default)]
 pub struct SlurmOptions {
     /// `--partition`.
@@ -28,7 +28,7 @@ pub type Script = (&'static str, String);
 /// which submits both for every frame.
 ///
 /// A task whose node is lost, which is preempted or reaches its time limit is queued again and goes on from its checkpoint; one that fails
-/// by itself is rendered again some times, unless its exit code says that this is of no use.
+/// by itself is rendered again some times, unless its exit code marks a permanent failure.
 ///
 /// # Errors
 /// [`Error::Usage`] if what stands in a directive for `sbatch`, which is a comment of the shell, has a control

@@ -139,7 +139,7 @@ fn remove_left_over(name: &Path) {
     }
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32;
     let Ok(file) = File::options().read(true).custom_flags(flags).open(name) else { return };
-    // Where there are no locks, nobody knows.
+    // Without locks, this cannot be determined.
     if file.try_lock().is_ok() && is_at(&file, name) {
         let _ = fs::remove_file(name);
     }

@@ -30,10 +30,10 @@ pub struct Place {
     pub channel: usize,
 }
 
-/// Consecutive samples of a wanted channel, in one row of the picture.
+/// Consecutive samples of a requested channel, in one row of the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
-    /// Which of the channels wanted.
+    /// Index into the channels requested.
     pub wanted: usize,
     /// The first sample's pixel: `y * width + x` in the part's data window.
     pub start: usize,
@@ -94,7 +94,7 @@ fn out_of_memory(path: &Path, bytes: usize) -> Error {
 }
 
 /// Reads the largest level of flat parts and gives each row of the channels `wanted` to `keep`, in no particular order
-/// but each sample once. The parts without wanted channels are decoded too, so that damage is found, if `every_part` is
+/// but each sample once. The parts without requested channels are decoded too, so that damage is found, if `every_part` is
 /// set. `headers` are those that the places come from.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Headers of EXR files, and whether a file can hold what they claim: memory is not asked for on a header's word alone.
+//! Headers of EXR files, and whether a file can hold what they claim: memory is not allocated by a header alone.
 
 use std::path::Path;
 

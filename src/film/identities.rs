@@ -11,7 +11,7 @@ use super::ShapeKey;
 const NONE: u32 = u32::MAX;
 
 /// What the shapes of a scene are called, by [`ShapeKey`]. A few numbers for each shape and instance; names that are
-/// made of another one and a number are put together when they are asked for. Things with the same name count as one.
+/// made of another one and a number are put together when they are requested. Things with the same name count as one.
 ///
 /// - The object of a shape is the instance that places it, or the shape itself. An instance within another is named
 ///   after both, `outer/inner`.

@@ -82,7 +82,7 @@ impl From<[u32; 4]> for Crop {
 /// A named group of channels, row by row from the top; a pixel's channels lie side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// Which layer; the table knows its name and channels.
+    /// Which layer; its name and channels are in the table.
     pub kind: LayerKind,
     /// Of layers of [groups of lights](LayerKind::LightGroups): the group's name.
     pub group: Option<String>,

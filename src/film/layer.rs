@@ -104,14 +104,14 @@ impl SurfaceChannels {
 pub struct LayerInfo {
     /// Which layer.
     pub kind: LayerKind,
-    /// The name users ask for it by.
+    /// Its name in scene files and on the command line.
     pub name: &'static str,
     /// Its channels' full names in a file, in the order of the pixel data; of groups of lights what follows their layers' names; none of
     /// layers made from [coverage](Source::Coverage).
     pub channels: &'static [&'static str],
     /// Stored as 32-bit floats whatever the pixel type: 16 bits would spoil it.
     pub always_float: bool,
-    /// What the file's comment says of it.
+    /// Its description in the file's comment.
     pub comment: &'static str,
     /// Where its numbers come from.
     pub source: Source,

@@ -61,7 +61,7 @@ impl AlphaMasks {
     }
 }
 
-/// Tells the hits of a ray with one analytic shape apart, for they have the same ids: it enters and leaves from different sides. Distances
+/// Distinguishes the hits of a ray with one analytic shape, which have the same ids: it enters and leaves from different sides. Distances
 /// would not do, for accelerators round them differently.
 fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
     match shape {

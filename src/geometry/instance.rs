@@ -47,7 +47,7 @@ impl Instance {
         Some(Self { object, transform, motion })
     }
 
-    /// Whether the map stretches so unevenly that an inverse made in `f32` is off by more than [`SurfaceInteraction::error`] says.
+    /// Whether the map stretches so unevenly that an inverse made in `f32` exceeds the bound of [`SurfaceInteraction::error`].
     pub fn is_uneven(&self) -> bool {
         let squared_norm = |m: &DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
         // The product is 9 for a rotation with a scale; the square of the limit is that of a stretch by about 8 along one axis.

@@ -64,7 +64,7 @@ pub struct Mesh {
     /// For normal maps, those of each triangle at each time; else empty.
     pub(super) tangents: Vec<Vec<CornerTangents>>,
     has_slivers: bool,
-    /// Found when they are first asked for.
+    /// Computed on first use.
     bounds: OnceLock<Aabb>,
 }
 

@@ -201,7 +201,7 @@ impl Geometry {
         self.interaction_with(Detail::Full, ray, hit)
     }
 
-    /// [`interaction`](Self::interaction), or only the part of it that is asked for.
+    /// [`interaction`](Self::interaction), or only the requested part of it.
     #[inline]
     pub fn interaction_with(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         if hit.instance == Hit::NO_INSTANCE {

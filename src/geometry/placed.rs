@@ -260,7 +260,7 @@ impl TransformedShape {
         self.interaction_with(Detail::Full, ray, hit)
     }
 
-    /// [`interaction`](Self::interaction), or only the part of it that is asked for.
+    /// [`interaction`](Self::interaction), or only the requested part of it.
     #[inline]
     pub fn interaction_with(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         self.interaction_and_dp_dv(detail, ray, hit).map(|(at, _)| at)

@@ -2,7 +2,7 @@
 //! Simulation", 2017, and "'Practical Path Guiding' in Production", 2019).
 //!
 //! For surfaces that face each of six sides, a binary tree divides space; each of its leaves has a distribution of
-//! directions, in proportion to what light from them has brought to paths that were scattered there. Paths record into
+//! directions, in proportion to the radiance that paths scattered there received from them. Paths record into
 //! sums of whole numbers, so what is learned does not depend on threads. From time to time leaves with many records are
 //! divided, and the directions of each where the light is.
 
@@ -42,15 +42,15 @@ const UNITS: f32 = 65_536.0;
 /// What a single record counts at most, in typical ones: 2^27 such fit into a sum.
 const LARGEST: f32 = 1_048_576.0;
 
-/// The share of directions that surfaces choose where nothing says what is better; the light chooses the others.
+/// The BSDF sampling fraction of regions where none has been learned; the other directions are sampled from the guide.
 const SURFACE_SHARE: f32 = 0.5;
 
-/// The shares that are tried instead. With smaller ones, light that the guide does not know of would weigh too much
+/// The fractions that are tried instead. With smaller ones, light that is not in the guide would get too large a weight
 /// when a path meets it.
 const OTHER_SHARES: [f32; 4] = [0.3, 0.4, 0.7, 0.9];
 
 /// A node of the tree over space: the index of the first of two children or, with [`IS_LEAF`], that of a leaf. Small,
-/// for paths ask at every turn.
+/// for paths look it up at every vertex.
 #[derive(Clone, Copy, Debug)]
 struct Node(u32);
 
@@ -109,11 +109,11 @@ pub struct Record {
     pub direction: Vec3,
     /// What was scattered towards the path, over the density with which the direction was chosen.
     pub light: f32,
-    /// The densities with which the surface and the guide choose the direction, if the guide knew anything.
+    /// The densities with which the surface and the guide choose the direction, if the guide had a distribution.
     pub densities: Option<[f32; 2]>,
 }
 
-/// What is known of the light that arrives at the points of a scene, and what is being learned of it.
+/// The learned distribution of incident radiance over a scene, and the records of the next one.
 #[derive(Debug)]
 pub struct Guide {
     /// Of the box around the scene, a cube.
@@ -129,7 +129,7 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Knows nothing yet. `typical` is how much light a typical record has, about: records far below it are lost, far
+    /// An empty guide. `typical` is about the radiance of a typical record: records far below it are lost, far
     /// above are cut. Without it (zero), only places are learned, not light.
     pub fn new(bounds: Aabb, typical: f32) -> Self {
         let mut guide = Self {

@@ -10,7 +10,7 @@ use crate::math::{Vec3, vec3};
 /// A quarter that holds more than this share of a tree's light is divided.
 const DIVIDED_SHARE: f64 = 0.01;
 
-/// As long as it got fewer records it is not: single ones tell of chance.
+/// With fewer records it is not: they are too noisy.
 const RECORDS_TO_DIVIDE: f64 = 16.0;
 
 /// Divisions in a row at most: a cell is then about 0.0005 radians wide.
@@ -216,7 +216,7 @@ impl Default for DTreeBuilder {
 }
 
 impl DTreeBuilder {
-    /// Adds light from a direction, moved at random (`jitter` in `[0, 1)²`) by up to half a cell, for a cell tells of
+    /// Adds light from a direction, moved at random (`jitter` in `[0, 1)²`) by up to half a cell, as a cell stands in for
     /// its neighbours too.
     #[inline]
     pub fn add(&self, direction: Vec3, jitter: [f32; 2], amount: u64) {
@@ -276,8 +276,8 @@ impl DTreeBuilder {
         Some(DTree { nodes })
     }
 
-    /// The same records, for each of so many parts of space, in a tree of at most so many nodes that is divided where
-    /// the light is: every quarter with more than a hundredth of it, if enough records tell so.
+    /// The same records, for each of `parts` parts of space, in a tree of at most `most` nodes that is divided where
+    /// the light is: every quarter with more than a hundredth of it, if it has enough records.
     pub fn refined(&self, most: usize, parts: usize) -> Self {
         let held = self.held();
         let threshold = DIVIDED_SHARE * held[0].iter().map(|h| h.light).sum::<f64>();

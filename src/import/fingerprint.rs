@@ -91,7 +91,7 @@ pub fn files_of_scene(imported: &Imported, scene_file: &Path) -> Vec<(PathBuf, S
     imported.chain(further).chain(named).collect()
 }
 
-/// The hash of what the description says beside the settings of a render.
+/// The hash of the description without the settings of a render.
 fn description_hash(mut desc: SceneDesc) -> Result<String> {
     desc.schema = None;
     desc.comment = None;

@@ -17,7 +17,7 @@ impl World<'_> {
     /// The footprint in uv of `ray`, whose hit led to `at`.
     #[inline(never)]
     pub(super) fn footprint(&self, cone: Option<&RayCone>, ray: &Ray, hit: Option<&Hit>, at: &SurfaceInteraction) -> Footprint<'_> {
-        // Behind a rounding artefact another surface is met than the hit says.
+        // By a rounding artefact, the ray meets another surface than that of the hit.
         let hit = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids());
         let (Some(cone), Some(hit)) = (cone, hit) else { return self.scene.texture_point(at) };
         self.covered(cone, ray.direction, at, self.scene.geometry.uv_density(ray, hit))

@@ -193,7 +193,7 @@ pub trait Integrator: Send + Sync {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace);
 }
 
-/// What integrators need to know beside their parameters.
+/// What integrators need beside their parameters.
 #[derive(Clone, Copy)]
 pub struct Setup {
     /// Where random numbers come from.

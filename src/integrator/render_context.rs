@@ -33,7 +33,7 @@ impl<'a> RenderContext<'a> {
         Self { shows_background: false, ..self }
     }
 
-    /// With what says that batches are to be given up.
+    /// With the flag that cancels batches.
     #[must_use]
     pub fn with_cancel(self, cancel: &'a Cancel<'a>) -> Self {
         Self { cancel: Some(cancel), ..self }

@@ -7,7 +7,7 @@ use crate::geometry::{Detail, Hit, SurfaceInteraction};
 use crate::math::{Frame, Ray, Vec2, Vec3};
 use crate::texture::Footprint;
 
-/// Which parts of [`SurfaceSample`] are wanted; the rest is not computed.
+/// Which parts of [`SurfaceSample`] are requested; the rest is not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SurfaceAovs {
     /// Any of depth, normals, position and the shape.
@@ -73,7 +73,7 @@ pub(super) fn albedo_at<'f>(world: &World, at: &SurfaceInteraction, ray: &Ray, f
     world.scene.bsdf(at, ray.direction, footprint).albedo(frame.to_local(-ray.direction))
 }
 
-/// Tells of the last surface so far that the sample shows, through mirrors and clear glass that leave `throughput`.
+/// Sets the denoising features to the surface reached last, through mirrors and clear glass of this `throughput`.
 pub(super) fn set_features(sample: &mut SurfaceSample, throughput: Rgb, albedo: Rgb, normal: Vec3) {
     sample.feature_albedo = (throughput * albedo).map(|value| value.clamp(0.0, 1.0));
     sample.feature_normal = normal;

@@ -26,7 +26,7 @@ struct Disk {
     pdf: f32,
 }
 
-/// Half-angles below this many radians cannot be told from zero with directions in `f32`.
+/// Half-angles below this many radians cannot be distinguished from zero with directions in `f32`.
 const SMALLEST_HALF_ANGLE: f64 = 1e-6;
 
 impl DirectionalLight {

@@ -27,7 +27,7 @@ pub enum LightSelection {
 
 /// All lights of a scene and the probability with which each is chosen.
 ///
-/// Few lights are chosen in proportion to their power, many by a tree that knows where they are and where they shine. What a light at
+/// Few lights are chosen in proportion to their power, many by a light tree over their positions and emission directions. What a light at
 /// infinity gives to a scene depends on the scene's size more than on what the camera sees; so if there are both lights at infinity and
 /// others, either kind has at least a quarter of the choices. Where power decides, a twentieth of the choices of a kind is spread evenly,
 /// so that no light of positive power starves beside a strong one.
@@ -61,7 +61,7 @@ const TREE_FROM: usize = 6;
 /// Least share of the choices for lights at infinity, and for all others, if both exist.
 const LEAST_SHARE: f64 = 0.25;
 
-/// Share of the choices that does not ask for power.
+/// Share of the choices that is independent of power.
 const EVEN_SHARE: f64 = 0.05;
 
 impl LightSet {

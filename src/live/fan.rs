@@ -9,7 +9,7 @@ pub struct Fan<'a> {
 }
 
 impl<'a> Fan<'a> {
-    /// For these listeners, told in this order.
+    /// For these listeners, notified in this order.
     pub fn new(listeners: impl IntoIterator<Item = &'a dyn Progress>) -> Self {
         Self { listeners: listeners.into_iter().collect() }
     }

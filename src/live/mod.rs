@@ -56,7 +56,7 @@ impl Live {
     /// Starts the threads of the viewers.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] if the page cannot be served at the address and port asked for. A tev that is not there is no error.
+    /// [`crate::Error::Usage`] if the page cannot be served at the requested address and port. A tev that is not running is no error.
     pub fn new(options: Options) -> Result<Self> {
         let statistics = Arc::new(Statistics::new(options.time_limit));
         let preview = options.preview.map(|preview| Preview::new(&preview, options.name.clone(), Arc::clone(&statistics))).transpose()?;
@@ -110,7 +110,7 @@ impl Progress for Live {
     }
 
     fn picture(&self, image: &Image, samples_per_pixel: u32) {
-        // Those who do not want it yet would only have it replaced sooner.
+        // A viewer that is not ready for it yet would only drop it for a later one.
         let tev = self.tev.as_ref().filter(|tev| tev.wants_picture());
         let preview = self.preview.as_ref().filter(|preview| preview.wants_picture());
         if tev.is_none() && preview.is_none() {

@@ -14,7 +14,7 @@ pub(super) struct Pace {
 
 #[derive(Debug, Default)]
 struct State {
-    /// When a picture was last asked for.
+    /// When a picture was last requested.
     asked: Option<Instant>,
     /// No picture before this time.
     next: Option<Instant>,
@@ -25,7 +25,7 @@ impl Pace {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the next picture may be made; if so, this is when it was asked for.
+    /// Whether the next picture may be made; if so, this is when it was requested.
     pub fn may_ask(&self) -> bool {
         let (now, mut state) = (Instant::now(), self.lock());
         let is_due = state.next.is_none_or(|next| now >= next);
@@ -35,7 +35,7 @@ impl Pace {
         is_due
     }
 
-    /// The picture asked for has been made and copied.
+    /// The requested picture has been made and copied.
     pub fn made(&self) {
         let (now, mut state) = (Instant::now(), self.lock());
         let cost = state.asked.take().map_or(Duration::ZERO, |asked| now - asked);
@@ -59,7 +59,7 @@ mod tests {
             std::thread::sleep(Duration::from_millis(1));
         }
         assert!(end.elapsed() >= Duration::from_millis(50) * (SHARE - 1));
-        // One that nobody asked for costs nothing.
+        // One without a request costs nothing.
         let pace = Pace::default();
         pace.made();
         assert!(pace.may_ask());

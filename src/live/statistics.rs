@@ -71,7 +71,7 @@ impl Statistics {
         (plan.total, plan.errors) = (samples, Some([error, target]));
     }
 
-    /// So many samples more.
+    /// Adds a number of samples.
     pub fn add(&self, samples: u64) {
         self.done.fetch_add(samples, Ordering::Relaxed);
     }

@@ -2,7 +2,7 @@
 
 use super::{DAffine3, DMat3, DVec3};
 
-/// An affine map with its inverse. The name says destination first: `world_from_object`.
+/// An affine map with its inverse. Names are destination first: `world_from_object`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform {
     /// Object to world.

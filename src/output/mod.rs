@@ -88,7 +88,7 @@ pub struct RenderInfo {
     pub settings: Option<serde_json::Value>,
 }
 
-/// Counts of a rendering that files tell of.
+/// Statistics of a render that are stored in files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RenderStatistics {
     /// Threads that rendered.
@@ -108,7 +108,7 @@ pub fn files_of_output(output: &OutputDesc) -> Vec<PathBuf> {
     std::iter::once(file.clone()).chain(sidecars).collect()
 }
 
-/// Writes `image` where and how `output` says.
+/// Writes `image` to the file of `output`, with its settings.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown extension; [`Error::Output`] if the file cannot be written, in which case nothing is left behind.

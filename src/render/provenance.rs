@@ -102,7 +102,7 @@ impl RenderProvenance {
         Self { frame: None, settings: Settings { seed, ..self.settings.clone() }, ..self.clone() }
     }
 
-    /// What of this is not as in `expected`, of which a file is to be written as `output` says: settings by name, each
+    /// Differences from `expected`, whose file is written with the settings of `output`: settings by name, each
     /// with both values. The command line, the folder and the version of the program do not count.
     pub fn differences(&self, expected: &Self, output: &OutputDesc) -> Vec<String> {
         let flat = |provenance: &Self, output: Option<&OutputDesc>| {
@@ -180,7 +180,7 @@ impl RenderProvenance {
         })
     }
 
-    /// The settings of this picture, to be written as [`output`](Self::output) says, with `threads` threads.
+    /// The settings of this picture, to be written with the settings of [`output`](Self::output), with `threads` threads.
     pub fn settings(&self, threads: usize) -> Settings {
         let layers = self.output.iter().flat_map(|output| &output.layers).collect();
         let outputs = self.output.iter().cloned().collect();
@@ -249,7 +249,7 @@ mod tests {
         assert!(refusal(Value::Null).contains("no version"));
     }
 
-    /// No object in a recipe takes a key that it does not know, and none that is needed may be missing.
+    /// No object in a recipe takes an unknown key, and no required key may be missing.
     #[test]
     fn unknown_keys_are_refused_at_every_level() {
         for place in ["", "/scene", "/import", "/frame", "/settings", "/settings/filter", "/settings/integrator", "/output"] {

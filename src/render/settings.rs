@@ -1,4 +1,4 @@
-//! Everything a render needs beside the scene: what the scene file says, with the command line's changes.
+//! Everything a render needs beside the scene: the values of the scene file, overridden by the command line.
 
 use std::num::NonZero;
 use std::time::Duration;
@@ -18,7 +18,7 @@ use crate::sampling::SamplerKind;
 /// Extensions of the files written if neither the scene nor the command line names one.
 pub const DEFAULT_EXTENSIONS: [&str; 2] = ["exr", "png"];
 
-/// The most samples of a pixel where a target error decides and nothing else is said.
+/// The most samples of a pixel with a target error, by default.
 const MOST_SAMPLES: u32 = 1 << 16;
 
 /// More threads than this are a slip of the keyboard.
@@ -69,7 +69,7 @@ pub struct Settings {
     pub layers: LayerSet,
 }
 
-/// What the command line changes; everything else is as the scene says.
+/// Overrides of the command line; `None` keeps the value of the scene.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
     /// `--spp`.

@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn large_tables_select_with_the_probability_they_state() {
-        // Every number that f32 can bring: the share of each entry is exact.
+        // Every number that f32 can represent: the share of each entry is exact.
         let weights: Vec<f64> = (0..1000).map(|i| f64::from(i % 17) * f64::from(i % 31) + if i == 500 { 1e5 } else { 0.0 }).collect();
         let table = AliasTable::new(&weights).unwrap();
         let mut count = vec![0u32; weights.len()];

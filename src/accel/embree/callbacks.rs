@@ -102,7 +102,7 @@ impl Filter {
     /// # Safety
     /// The geometry must be alive.
     unsafe fn geometry(&self) -> &Geometry {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { &*self.geometry }
     }
 

@@ -20,7 +20,7 @@ pub struct EmbreeInfo {
 }
 
 impl EmbreeInfo {
-    /// Asks the installed Embree, without a scene.
+    /// Queries the installed Embree, without a scene.
     ///
     /// # Errors
     /// If no device can be made, or the build of Embree lacks something this crate needs.

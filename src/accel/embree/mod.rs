@@ -33,7 +33,7 @@ use sys::StHit;
 /// thread of Embree's. It gets whether memory or threads ran out, and a description that lives during the call, and
 /// must not return.
 pub fn on_uncaught_exception(report: extern "C" fn(bool, *const c_char)) {
-    // SAFETY: the function pointer is valid for ever, and takes what the header says.
+    // SAFETY: the function pointer is valid for ever, and takes the parameters declared in the header.
     unsafe { sys::st_on_uncaught(Some(report)) }
 }
 

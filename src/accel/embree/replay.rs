@@ -41,8 +41,8 @@ impl<'a, 'g> EmbreeReplay<'a, 'g> {
         Self { accel, chunks: Vec::new() }
     }
 
-    /// Adds rays that were handed over together; one by one if nothing is said of their coherence. Rays that the
-    /// accelerator answers without Embree are left out.
+    /// Adds rays that were handed over together; one by one if their coherence is unspecified. Rays that the
+    /// accelerator traces without Embree are left out.
     pub fn push(&mut self, rays: &[Ray], any_hit: bool, coherence: Option<Coherence>) {
         if self.chunks.last().is_none_or(|chunk| chunk.rays >= CHUNK) {
             self.chunks.push(Chunk::default());

@@ -178,7 +178,7 @@ impl GeometryHandle {
     /// # Safety
     /// There must be as many, and they must outlive the geometry.
     unsafe fn share(&self, kind: sys::RTCBufferType, slot: u32, format: sys::RTCFormat, items: *const c_void, count: usize) {
-        // SAFETY: the handle is alive; the rest is the caller's promise.
+        // SAFETY: the handle is alive; the rest is guaranteed by the caller.
         unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, items, 0, 12, count) }
     }
 
@@ -287,7 +287,7 @@ impl Drop for Scene {
     }
 }
 
-/// What a failed creation says: the device's error, or at least what is missing.
+/// The message of a failed creation: the device's error, or at least what is missing.
 fn no_object(device: &Device, what: &str) -> Error {
     device.check().err().unwrap_or_else(|| Error::Embree(format!("no {what} could be created")))
 }

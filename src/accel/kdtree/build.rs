@@ -18,7 +18,7 @@ const STEP_COST: f32 = 0.5;
 /// How much cheaper a split is that cuts off empty space.
 const EMPTY_BONUS: f32 = 0.8;
 
-/// Splits in a row that cost more than they bring.
+/// Successive splits that cost more than they save, at most.
 const MAX_BAD_SPLITS: u32 = 3;
 
 /// Levels at most, whatever the number of items.
@@ -103,7 +103,7 @@ impl Builder<'_> {
         let (mut lower, mut upper) = (Vec::new(), Vec::new());
         for &Part { item, bounds } in &cell.parts {
             let (min, max) = (bounds.min[plane.axis], bounds.max[plane.axis]);
-            // What lies in the plane belongs below it.
+            // Primitives in the plane belong to the side below it.
             if max <= plane.at {
                 lower.push(Part { item, bounds });
             } else if min >= plane.at {

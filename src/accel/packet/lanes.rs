@@ -51,7 +51,7 @@ pub(super) struct Packet<S: Simd> {
     pub moment: Vector<S>,
     /// Bound of the rounding error of distances to edges, times the length of the direction.
     pub edge_error: S::f32s,
-    /// Products of the direction and a unit normal up to this say that the ray is nearly parallel to the plane.
+    /// Products of the direction and a unit normal up to this mean that the ray is nearly parallel to the plane.
     pub flat: S::f32s,
     /// Reciprocal of the direction, finite.
     reciprocal: Vector<S>,

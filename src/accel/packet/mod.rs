@@ -22,7 +22,7 @@ const FEW: usize = 40;
 
 /// Traces batches in packets, and single rays as the BVH does.
 ///
-/// An answer of a batch depends on its ray alone, and is the same on every machine. Edges are widened by a bound of the rounding errors: no
+/// A result in a batch depends on its ray alone, and is the same on every machine. Edges are widened by a bound of the rounding errors: no
 /// ray slips between triangles that share an edge or a corner.
 pub struct PacketBvh<'g> {
     single: TwoLevel<'g, Bvh>,

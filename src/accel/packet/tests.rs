@@ -134,7 +134,7 @@ fn packets_hit_what_the_oracle_hits() {
     }
 }
 
-/// The answers of packets to a block of rays.
+/// The hits of packets for a block of rays.
 fn answers<S: Simd>(simd: S, packets: &Hierarchy<'_>, rays: &[Ray]) -> (Vec<Option<Hit>>, Vec<bool>) {
     let (rows, count) = (RayRows::of(rays), rays.len());
     let (mut hits, mut occluded) = (HitRows::default(), [false; BATCH]);

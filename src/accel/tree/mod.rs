@@ -25,7 +25,7 @@ pub(super) trait Tree: Send + Sync + Sized {
     /// Builds the tree. It must end for any finite input, with a bounded depth and with memory of the order of the number of items.
     fn build(items: &Items<'_>, options: &Self::Options) -> Self;
 
-    /// Visits every item that the query's ray may hit within its interval, nearer ones first as far as the tree knows, until a visit
+    /// Visits every item that the query's ray may hit within its interval, nearer ones first as far as the bounds show, until a visit
     /// returns true. An item may be visited twice.
     fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Self, C, ANY>);
 

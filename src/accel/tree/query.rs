@@ -1,4 +1,4 @@
-//! One ray on its way through a tree: tests items, keeps the best hit, counts if asked to.
+//! One ray on its way through a tree: tests items, keeps the best hit, optionally counts the work.
 
 use super::{Tree, TwoLevel};
 use crate::accel::inspect::{Item, ItemKind, TraversalCounts};
@@ -36,7 +36,7 @@ impl Counter for TraversalCounts {
 /// A closest-hit query (`ANY` false) or an any-hit query.
 pub(in crate::accel) struct Query<'a, T, C, const ANY: bool> {
     /// The ray in the tree's space. Its `t_max` shrinks to one float beyond the best hit, so that a hit which rounds to the same distance
-    /// takes part in the tie.
+    /// is compared as a tie.
     pub ray: Ray,
     /// The ray prepared for triangles, with the same `t_max`.
     pub triangle_ray: TriangleRay,

@@ -15,7 +15,7 @@ const LARGEST_RECIPROCAL: f32 = 1e30;
 /// A ray prepared for conservative slab tests.
 ///
 /// A box is entered at `max((near plane - near_origin) * near_reciprocal)` and left at `min((far plane - far_origin) *
-/// far_reciprocal)` over the axes. Origins stand one float (or the slack asked for) outside, reciprocals are scaled by
+/// far_reciprocal)` over the axes. Origins stand one float (or the given slack) outside, reciprocals are scaled by
 /// a few roundings, so entries are never late and exits never early. A far product is NaN where a plane holds the
 /// origin and the direction has no component; it then does not count.
 #[derive(Clone, Copy, Debug)]

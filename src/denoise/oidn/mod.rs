@@ -54,8 +54,8 @@ impl Device {
         // SAFETY: opening runs the library's initialisers. The file is named by the user, or has the name of a library known to be fit.
         let library = unsafe { Library::new(file) }.map_err(|e| Unusable(loader_message(&e)))?;
         let library = ManuallyDrop::new(library);
-        // SAFETY: the types are those of version 2, which is checked below before anything but the version is asked
-        // for; the library is never closed.
+        // SAFETY: the types are those of version 2, which is checked below before anything but the version is looked up
+        // in it; the library is never closed.
         let functions = unsafe { Functions::find(&library) }.map_err(|missing| {
             // SAFETY: the symbol is only looked for, not called.
             let old = unsafe { library.get::<unsafe extern "C" fn()>(sys::OF_VERSION_1) }.is_ok();
@@ -157,7 +157,7 @@ impl Device {
         self.check()
     }
 
-    /// What the library has to complain about since it was last asked on this thread.
+    /// The library's error since it was last queried on this thread.
     fn check(&self) -> Result<()> {
         match last_error(&self.functions, self.handle.as_ptr()) {
             None => Ok(()),
@@ -174,7 +174,7 @@ impl Drop for Device {
     }
 }
 
-// SAFETY: the library's calls are thread-safe, as its documentation says; the handle is a counted reference.
+// SAFETY: the library's calls are thread-safe, by its documentation; the handle is a counted reference.
 unsafe impl Send for Device {}
 // SAFETY: as above.
 unsafe impl Sync for Device {}

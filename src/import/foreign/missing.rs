@@ -58,7 +58,7 @@ impl Imported {
     }
 }
 
-/// Keeps what `keep` says of a list, and the places of what is kept in step with it. `keep` is given the place of each, or its path.
+/// Retains the entries of a list for which `keep` is true, and the places of what is kept in step with it. `keep` is given the place of each, or its path.
 fn retain<T>(path: &str, list: &mut Vec<T>, places: &mut BTreeMap<String, String>, mut keep: impl FnMut(&str, &T) -> bool) {
     let (mut index, mut kept) = (0, 0);
     list.retain(|item| {

@@ -9,11 +9,11 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The scene says the same.
+    /// Imported exactly.
     Mapped,
-    /// The scene says something near to it.
+    /// Imported approximately.
     Approximated,
-    /// The scene says nothing of it.
+    /// Not imported.
     Ignored,
 }
 
@@ -50,7 +50,7 @@ impl ImportReport {
         self.entries.iter().filter(|entry| entry.outcome == outcome).count()
     }
 
-    /// Whether the scene says all that the file said.
+    /// Whether everything was imported exactly.
     pub fn is_exact(&self) -> bool {
         self.entries.iter().all(|entry| entry.outcome == Outcome::Mapped)
     }

@@ -135,7 +135,7 @@ fn planck(wavelength: f64, kelvin: f64) -> f64 {
     1.0 / (x.powi(5) * (SECOND_CONSTANT / (wavelength * kelvin)).exp_m1())
 }
 
-/// The integral of the spectrum times the observer, and D65 if asked for. All are straight lines between knots, so that
+/// The integral of the spectrum times the observer, and optionally D65. All are straight lines between knots, so that
 /// three points of each (Simpson's rule) give it exactly; Planck's law is smooth.
 fn integrate(spectrum: &Spectrum, under_d65: bool) -> [f64; 3] {
     let mut sum = [0.0; 3];

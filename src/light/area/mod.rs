@@ -64,7 +64,7 @@ impl Emission {
         self.texture.is_none() && self.opacity.is_none()
     }
 
-    /// The expected radiance of a point sampled on the surface: rays meet it as often as its opacity says, so this is the mean over rays.
+    /// The expected radiance of a point sampled on the surface: rays hit it with the probability of its opacity, so this is the mean over rays.
     fn expected(&self, textures: &[Texture], point: &Footprint) -> Rgb {
         let coverage = self.opacity.map_or(1.0, |id| textures[id.index()].scalar_over(point));
         self.at(textures, || *point) * coverage
@@ -88,7 +88,7 @@ pub struct AreaLight {
     form: Form,
 }
 
-/// What is known of the surface before any point asks. Meshes may have millions of triangles, so this is small.
+/// What is computed of the surface once. Meshes may have millions of triangles, so this is small.
 #[derive(Clone, Debug)]
 enum Form {
     Sphere(Box<SphereEmitter>),
@@ -274,7 +274,7 @@ impl AreaLight {
             Form::Triangle { area } => SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
             Form::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return 0.0 };
-                // Where the normal does not tell how densely the shape is sampled, the hit itself must.
+                // Where the normal does not determine the density, the hit itself does.
                 let pdf_area = placed.pdf_area_from_normal(at.n_g).or_else(|| placed.pdf_area(ray));
                 pdf_area.map_or(0.0, |pdf_area| SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), pdf_area))
             }

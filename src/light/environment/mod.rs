@@ -91,7 +91,7 @@ impl Environment {
 /// Why an image cannot be an environment.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EnvironmentMapError {
-    /// No texels, or not as many as the size says.
+    /// No texels, or not as many as the size requires.
     #[error("{texels} texels for an image of {width} x {height}")]
     Size {
         /// Width as stated.
@@ -117,7 +117,7 @@ pub enum EnvironmentMapError {
 /// A lat-long image around the scene, sampled by luminance.
 ///
 /// The cells of the density are bounded by texel centres (and the poles), like those of the bilinear lookup: wherever the lookup is not
-/// black, neither is the density zero. Within a cell it is constant per solid angle, so the poles need no care.
+/// black, neither is the density zero. Within a cell it is constant per solid angle, so the poles need no special case.
 #[derive(Clone, Debug)]
 pub struct EnvironmentMap {
     width: usize,

@@ -1,4 +1,4 @@
-//! The newest picture, and who looks at it.
+//! The newest picture, and the pages that show it.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::Snapshot;
 use crate::live::PICTURE_PERIOD;
 
-/// A page that has not asked for so long is closed.
+/// A page without a request for this time counts as closed.
 const PAGE_LIFE: Duration = Duration::from_secs(3);
 
 /// Most pages that are waited for.
@@ -18,7 +18,7 @@ const MOST_SENT: usize = 4;
 /// A page open somewhere.
 struct Page {
     id: u64,
-    /// When it last asked.
+    /// When its last request came.
     seen: Instant,
     /// The picture that it has.
     version: u64,
@@ -129,7 +129,7 @@ impl Board {
         self.changed.notify_all();
     }
 
-    /// Waits until every page open has the newest picture, no longer than until `deadline`; says whether they have.
+    /// Waits until every page open has the newest picture, no longer than until `deadline`; returns whether they have.
     pub fn wait(&self, deadline: Instant) -> bool {
         let mut state = self.lock();
         loop {
@@ -140,7 +140,7 @@ impl Board {
             if left.is_zero() {
                 return false;
             }
-            // Pages close without a word: look again now and then.
+            // Pages close without a notification: check again now and then.
             state = self.changed.wait_timeout(state, left.min(PICTURE_PERIOD)).unwrap_or_else(PoisonError::into_inner).0;
         }
     }

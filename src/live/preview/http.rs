@@ -29,11 +29,11 @@ impl Default for Patience {
 /// How long what is left of a refused request is read.
 const LINGER: Duration = Duration::from_secs(1);
 
-/// What the page may do: show what is in it, and ask its own server.
+/// What the page may do: show what is in it, and send requests to its own server.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Why a request is not answered.
+/// Why a request is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum HttpError {
     /// Not HTTP, or without a host.
@@ -42,7 +42,7 @@ pub(crate) enum HttpError {
     TooLong,
     /// Anything but GET.
     Method,
-    /// Asked under a foreign name or by a foreign page.
+    /// A request for a foreign host or by a page of a foreign origin.
     Foreign,
     /// Too many connections.
     Busy,
@@ -60,7 +60,7 @@ impl HttpError {
     }
 }
 
-/// What is asked for.
+/// The target of a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     path: String,
@@ -98,7 +98,7 @@ impl Connection {
         Ok(Self { stream, patience, deadline: None, buffer: Vec::new() })
     }
 
-    /// The next request; `None` if there is none. Its head must be there in time, and it must ask for this machine or for `host`.
+    /// The next request; `None` if there is none. Its head must arrive in time, and its host must be this machine or `host`.
     pub fn request(&mut self, host: &str) -> io::Result<Option<Result<Request, HttpError>>> {
         let deadline = Instant::now() + self.patience.stall;
         loop {
@@ -201,7 +201,7 @@ fn check(request: &httparse::Request, host: &str) -> Result<Request, HttpError> 
     let mut hosts = values("Host");
     let (Some(asked), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(HttpError::Malformed) };
     let asked = std::str::from_utf8(asked).map_err(|_| HttpError::Malformed)?;
-    // Browsers say which kind of page a request comes from; pages of other origins have no business here.
+    // Browsers send the origin of a request's page; other origins are rejected.
     let from_elsewhere = values("Sec-Fetch-Site").any(|site| site != b"same-origin" && site != b"none");
     if !is_own_host(asked, host) || from_elsewhere {
         return Err(HttpError::Foreign);
@@ -211,7 +211,7 @@ fn check(request: &httparse::Request, host: &str) -> Result<Request, HttpError> 
     Ok(Request { path: path.to_owned(), query: query.to_owned() })
 }
 
-/// Whether a Host header names this machine: by address, as localhost, or by the name asked for on the command line. A
+/// Whether a Host header names this machine: by address, as localhost, or by the name given on the command line. A
 /// foreign name that has been made to point here (DNS rebinding) is none of these. The port may be another, that of a
 /// tunnel.
 fn is_own_host(asked: &str, host: &str) -> bool {

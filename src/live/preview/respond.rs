@@ -1,9 +1,9 @@
-//! What there is to ask for.
+//! The resources of the server.
 //!
 //! | path | answer |
 //! |---|---|
 //! | `/` | the page |
-//! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and wants the next one, not so with `idle=1` |
+//! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and requests the next one, except with `idle=1` |
 //! | `/layer?index=I` | a layer: version, width, height, channels as little-endian u32, then 16-bit floats, row by row from the top |
 //! | `/pixel?x=X&y=Y` | every layer's exact values at a pixel as JSON |
 

@@ -16,7 +16,7 @@ use super::{PICTURE_PERIOD, Snapshot};
 use queue::Queue;
 use sender::Sender;
 
-/// Where tev listens unless told otherwise.
+/// Where tev listens by default.
 pub const DEFAULT_ADDRESS: &str = "127.0.0.1:14158";
 
 /// Where tev listens, and how patient to be with it.
@@ -80,7 +80,7 @@ impl Tev {
         self.queue.offer_final(snapshot);
     }
 
-    /// Waits until the last picture is sent, no longer than until `deadline`, and not at all if nobody is there; says whether it was sent.
+    /// Waits until the last picture is sent, no longer than until `deadline`, and not at all without a connection; returns whether it was sent.
     pub fn wait(&self, deadline: Instant) -> bool {
         self.queue.wait(deadline)
     }

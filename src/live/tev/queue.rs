@@ -121,7 +121,7 @@ impl Queue {
         let mut state = self.lock();
         state.finishing = true;
         if let Some(socket) = state.socket.take().filter(|_| !state.delivered) {
-            // A write under way ends with an error; there is nobody left to tell.
+            // A write under way ends with an error, which is no longer reported.
             let _ = socket.shutdown(Shutdown::Both);
         }
         self.changed.notify_all();
@@ -184,7 +184,7 @@ impl Queue {
         state.delivered = state.finishing && state.waiting.is_none();
     }
 
-    /// For the sender: waits before the next attempt to connect; says whether the render has ended, which ends the wait.
+    /// For the sender: waits before the next attempt to connect; returns whether the render has ended, which ends the wait.
     pub fn pause(&self, period: Duration) -> bool {
         let waited = self.changed.wait_timeout_while(self.lock(), period, |state| !state.finishing);
         waited.unwrap_or_else(PoisonError::into_inner).0.finishing

@@ -1,4 +1,4 @@
-//! The thread that talks to tev.
+//! The thread that sends to tev.
 
 use std::io::{self, ErrorKind};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -123,7 +123,7 @@ impl Sender {
     }
 }
 
-/// Whether the other side has hung up: tev never says anything, so whatever can be read is the end.
+/// Whether the connection is closed: tev never sends anything, so whatever can be read is the end.
 fn is_closed(stream: &TcpStream) -> bool {
     let peek = || {
         stream.set_nonblocking(true)?;

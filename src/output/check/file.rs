@@ -1,4 +1,4 @@
-//! What a file says of itself.
+//! The headers of a file.
 
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::output::role::Role;
 pub struct ExrFile {
     pub path: PathBuf,
     pub headers: Vec<Header>,
-    /// The samples of channels of mattes; empty if the file is deep or of a compression that the library does not know.
+    /// The samples of channels of mattes; empty if the file is deep or of a compression that the library does not support.
     planes: Vec<(Place, Vec<f32>)>,
 }
 
@@ -47,7 +47,7 @@ impl ExrFile {
             let mut planes = wanted.iter().map(plane).collect::<Result<Vec<Vec<f32>>>>()?;
             let keep = |row: Row| row.write(planes[row.wanted][row.start..].iter_mut(), |v| v);
             match read_rows(BufReader::new(source), &file.headers, &wanted, true, keep) {
-                // Of a compression that the library does not know, the headers can still be checked.
+                // With an unsupported compression, the headers can still be checked.
                 Err(exr::error::Error::NotSupported(_)) => {}
                 result => {
                     result.map_err(|e| malformed(e.to_string()))?;

@@ -25,7 +25,7 @@ fn put(attributes: &mut LayerAttributes, name: &str, value: AttributeValue) {
     attributes.other.insert(text(name), value);
 }
 
-/// What is said of the mattes of a file.
+/// The metadata of the mattes of a file.
 pub struct Mattes<'a> {
     /// The mattes.
     pub mattes: &'a [Matte],

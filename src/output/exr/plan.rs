@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::film::{LayerInfo, Source};
 use crate::output::role::Role;
 
-/// Ranks of Cryptomatte if nothing is said.
+/// Ranks of Cryptomatte by default.
 const DEFAULT_DEPTH: u32 = 6;
 /// The most ranks: what two digits of a layer's number allow would be 200, what anyone uses is 16.
 const MAX_DEPTH: u32 = 64;

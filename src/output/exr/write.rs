@@ -79,7 +79,7 @@ struct Contents<'a> {
     sources: Vec<Source<'a>>,
     mattes: Vec<Matte>,
     texts: Vec<(String, String)>,
-    /// What is said of layers, by the part that they go to.
+    /// Descriptions of layers, by the part that they go to.
     comments: Vec<(PartKind, &'static str)>,
 }
 

@@ -1,15 +1,15 @@
 //! Adaptive sampling: samples go where the picture's relative squared error needs them, until that is below a target.
 //!
 //! Blocks of 4 x 4 pixels get samples in groups of eight, a stretch of each pixel's own sequence. The means of a
-//! pixel's groups tell their variance, which is that of well-spread samples (single ones would tell of independent
-//! samples and overestimate it). With `v` a block's variance of a group over `color² + 0.01` and `n` its groups, the
+//! pixel's groups estimate their variance, which is that of well-spread samples (single ones would estimate that of independent
+//! samples, which is larger). With `v` a block's variance of a group over `color² + 0.01` and `n` its groups, the
 //! picture's error is the mean of `v / n`, and for a given cost it is least with `n` in proportion to `sqrt(v)`
 //! (Neyman).
 //!
 //! A block that met a bright path by luck must not get more samples for it, for that would take weight from the path:
 //! the picture would be too dark where such paths are rare. So what a block gets depends on the blocks around it alone.
 //! In the first stage its samples are thus independent of their number; later ones depend on it only through how
-//! precisely its neighbours know their variance.
+//! precisely the variance of its neighbours is estimated.
 
 use crate::film::{Crop, Film, FilmTile};
 use crate::render::tile_renderer::{TileRenderer, TileWorkspace};
@@ -24,7 +24,7 @@ const PILOT: u32 = 2;
 /// By this factor a block's groups may grow in one stage: estimates get better on the way.
 const GROWTH: u32 = 8;
 
-/// Blocks this far away tell how much a block needs. Nearer ones alone would tell of chance.
+/// Blocks up to this distance enter the estimate of what a block needs. Nearer ones alone would be too noisy.
 const REACH: u32 = 2;
 
 /// How much of what a block seems to need is what blocks need on average: rare bright paths are still to be met where
@@ -170,7 +170,7 @@ impl AdaptivePlanner {
         Estimate { variances, error, deviation: (spread + actual).sqrt() }
     }
 
-    /// Sets what is wanted so that the error becomes `goal`, as far as one stage may go; the most groups of a block are
+    /// Plans groups so that the error becomes `goal`, as far as one stage may go; the most groups of a block are
     /// `most`.
     fn distribute(&mut self, variances: &[f64], goal: f64, most: u32) {
         let roots: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
@@ -204,7 +204,7 @@ impl AdaptivePlanner {
         }
     }
 
-    /// Samples done and wanted.
+    /// Samples done and planned.
     fn samples(&self, film: &Film) -> [u64; 2] {
         let mut sums = [0; 2];
         for tile in film.tiles() {
@@ -250,7 +250,7 @@ impl PixelStatistics {
                 let count = block.area() as f64;
                 for ((x, y), (mean, variance)) in block.pixels().zip(statistics()) {
                     let weight = [0, 1, 2].map(|k| {
-                        // What makes a pixel uncertain may make it bright: the others of its block know better.
+                        // What makes a pixel uncertain may make it bright: the mean of the others of its block is the better estimate.
                         let others = (totals[k] - mean[k]) / (count - 1.0).max(1.0);
                         let color = if count > 1.0 { mean[k].abs().min(others.abs()) } else { mean[k] };
                         1.0 / (color * color + FLOOR)

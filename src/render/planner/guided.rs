@@ -1,6 +1,6 @@
 //! Guided renders: every iteration has as many samples as all before it, whose incident radiance guides its paths.
 //!
-//! Later iterations are better than earlier ones, so [`IterationWeights`] weigh them.
+//! Later iterations are better than earlier ones, so they are averaged with [`IterationWeights`].
 
 use super::iteration_weights::{IterationWeights, mean};
 use super::training_schedule::{is_refinement, iteration_end, iteration_start, next_refinement};
@@ -70,7 +70,7 @@ impl GuidedPlanner {
         }
     }
 
-    /// Adds the iteration to the film, and gives up guiding if it is not worth its cost.
+    /// Adds the iteration to the film, and ends guiding if it is not worth its cost.
     fn complete_iteration(&mut self, film: &mut Film, done: u32) {
         let samples = done - self.merged;
         let gain = self.weights.add(film, &self.iteration, samples, self.rays);

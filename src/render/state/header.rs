@@ -1,4 +1,4 @@
-//! What a checkpoint or shard says of itself, and whether it fits.
+//! The header of a checkpoint or shard, and whether it is compatible.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -67,7 +67,7 @@ const LEAST_BYTES: u64 = 48;
 /// A bound for the width and height of pictures, far above those that can be rendered.
 const MOST_PIXELS: u64 = 1 << 30;
 
-/// What a checkpoint or shard says of itself.
+/// The header of a checkpoint or shard.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Header {
     /// Name and version of the program.
@@ -92,7 +92,7 @@ pub struct Header {
     pub film: FilmShape,
     /// The files that the picture is to be written to.
     pub outputs: Vec<OutputDesc>,
-    /// What these tell of the rendering.
+    /// The metadata of the render that these files hold.
     pub info: RenderInfo,
     /// Rays so far: from the camera, indirect, and to lights.
     pub rays: [u64; 3],

@@ -1,10 +1,10 @@
-//! Numbers for many samples at once, the same as for each of them alone.
+//! Sample values in batches, the same as for each sample alone.
 
 use super::{PixelSeed, SOBOL_COLUMNS, Sampler, SamplerKind, SobolSeeds, owen_scramble, pcg_4d, unit};
 use crate::math::rows::BATCH;
 use crate::math::vectorize::vectorize;
 
-/// Samples of pixels for which numbers are wanted.
+/// The pixel samples of a batch.
 #[derive(Clone, Debug)]
 pub struct SampleIdRows {
     /// Seeds of the pixels.

@@ -1,4 +1,4 @@
-//! What every analytic shape promises: derivatives, parameters, singular points, bounds, sampling, placement.
+//! Properties of every analytic shape: derivatives, parameters, singular points, bounds, sampling, placement.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

@@ -81,7 +81,7 @@ fn bytes_at<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     bytes.get(at..at + N).and_then(|bytes| bytes.try_into().ok()).unwrap_or([0; N])
 }
 
-/// What an accessor is wanted for.
+/// The use of an accessor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wanted {
     Floats,
@@ -98,7 +98,7 @@ impl<'a> Source<'a> {
     fn checked_column(&self, index: Index<accessor::Accessor>, types: &[Type], wanted: Wanted) -> Result<Column<'a>, String> {
         let accessor = self.root.get(index).ok_or("there is no such accessor")?;
         let (Checked::Valid(kind), Checked::Valid(type_)) = (accessor.component_type, accessor.type_) else {
-            return Err("the type is not one that glTF knows".into());
+            return Err("the type is not one of glTF".into());
         };
         let kind = kind.0;
         if !types.contains(&type_) {
@@ -153,7 +153,7 @@ impl<'a> Source<'a> {
             return Err(format!("replaces {replaced} of {count} elements"));
         }
         let Checked::Valid(kind) = sparse.indices.component_type else {
-            return Err("the type of its sparse indices is not one that glTF knows".into());
+            return Err("the type of its sparse indices is not one of glTF".into());
         };
         let size = kind.0.size();
         let (indices, index_stride) = self.elements(sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0, replaced, size)?;

@@ -105,7 +105,7 @@ impl<'a> Curve<'a> {
         let times = source.column(&format!("{path}: input"), sampler.input, &[Type::Scalar], Wanted::Floats)?;
         let values = source.column(&format!("{path}: output"), sampler.output, &[type_], Wanted::Floats)?;
         let Checked::Valid(interpolation) = sampler.interpolation else {
-            return Err(source.fault(path, "the interpolation is not one that glTF knows"));
+            return Err(source.fault(path, "the interpolation is not one of glTF"));
         };
         let mut curve = Self { times, values, interpolation, width: 1 };
         let (slots, count) = (curve.slots(), curve.values.count());

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::import::Draft;
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// Width of the picture in pixels, and its height where the file says nothing of its shape.
+/// Width of the picture in pixels, and its height where the file gives no aspect ratio.
 const WIDTH: u32 = 1280;
 const HEIGHT: u32 = 720;
 

@@ -1,4 +1,4 @@
-//! What extensions say, as plain structs: each field with the default of its extension.
+//! Extensions as plain structs: each field with the default of its extension.
 
 use gltf::json::Root;
 use serde::Deserialize;

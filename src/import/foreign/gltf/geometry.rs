@@ -61,7 +61,7 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
     let positions = source.column(&format!("{path}.attributes.POSITION"), positions, &[Type::Vec3], Wanted::Floats)?;
     let count = positions.count();
     let Checked::Valid(mode) = primitive.mode else {
-        return Err(source.fault(&format!("{path}.mode"), "is not one that glTF knows"));
+        return Err(source.fault(&format!("{path}.mode"), "is not one of glTF"));
     };
     let reader = PrimitiveReader { source, path, primitive, count };
     let corners = reader.corners()?;

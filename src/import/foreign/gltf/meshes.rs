@@ -113,7 +113,7 @@ fn form(source: Source, node: usize, mesh: Index<Mesh>, pose: &Pose) -> Result<F
     Ok(Form { mesh: index, weights, skinned_node: is_skinned.then_some(node) })
 }
 
-/// Where a node's mesh stands: once, unless an extension says more.
+/// Where a node's mesh stands: once, unless an extension instances it.
 fn placements(source: Source, path: &str, node: usize, world: DAffine3, draft: &mut Draft) -> Result<Vec<DAffine3>> {
     const NAME: &str = "EXT_mesh_gpu_instancing";
     let json = source.root.nodes.get(node);
@@ -204,7 +204,7 @@ impl Builder<'_, '_> {
         Ok(())
     }
 
-    /// Says what became of the attributes.
+    /// Reports what became of the attributes.
     fn report(&mut self, path: &str, primitive: &Primitive) {
         self.draft.mapped(path, "primitive", "attributes");
         let material = primitive.material.and_then(|index| self.source.root.get(index));

@@ -1,7 +1,7 @@
 //! glTF 2.0 scenes, `.gltf` and `.glb`.
 //!
-//! The JSON and the indices in it are checked by the crate `gltf`; buffers, images and all that extensions say are read here. A path tracer
-//! shows both sides of every surface, whatever `doubleSided` says; only light is given off by one side of what is not double-sided.
+//! The JSON and the indices in it are checked by the crate `gltf`; buffers, images and extensions are read here. A path tracer
+//! shows both sides of every surface, whatever `doubleSided` is; only light is given off by one side of what is not double-sided.
 
 mod accessors;
 mod animation;
@@ -29,7 +29,7 @@ use self::nodes::Tree;
 use super::{Draft, ImportOptions, Imported};
 use crate::error::{Error, Result};
 
-/// What is read: the JSON and the bytes that it speaks of.
+/// What is read: the JSON and its buffers.
 #[derive(Clone, Copy, Debug)]
 struct Source<'a> {
     file: &'a Path,
@@ -47,7 +47,7 @@ impl Source<'_> {
 /// Reads a `.gltf` or `.glb` file.
 ///
 /// # Errors
-/// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for what it says.
+/// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for faults in it.
 pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     let document = document::parse(path, &bytes)?;

@@ -10,7 +10,7 @@ use super::nodes::Pose;
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// World from mesh as each joint of a skin says it.
+/// World from mesh by each joint of a skin.
 pub fn joints(source: Source, index: Index<Skin>, pose: &Pose) -> Result<Vec<DAffine3>> {
     let path = format!("skins[{}]", index.value());
     let skin = source.root.get(index).ok_or_else(|| source.fault(&path, "there is no such skin"))?;

@@ -36,7 +36,7 @@ pub struct TextureSet {
 }
 
 impl TextureRef {
-    /// A texture with what extensions say about it.
+    /// A texture with its extensions.
     pub fn new(source: Source, place: &str, index: usize, uv_set: u32, extensions: Option<&Map<String, Value>>) -> Result<Self> {
         let transform: TextureTransform = source.extension(place, extensions, "KHR_texture_transform")?.unwrap_or_default();
         let numbers = [transform.offset, transform.scale].concat();
@@ -53,7 +53,7 @@ impl TextureRef {
 }
 
 impl TextureSet {
-    /// Adds a texture: one channel of it, or its colour. `None` if there is no image that can be read, which the report says.
+    /// Adds a texture: one channel of it, or its colour. `None` if there is no image that can be read, which is reported.
     pub fn add(
         &mut self,
         source: Source,

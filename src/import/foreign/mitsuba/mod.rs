@@ -120,7 +120,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Says that a plugin is ignored with all that is in it.
+    /// Reports that a plugin is ignored with all that is in it.
     fn whole(&mut self, id: PluginId, why: &str) {
         let plugin = &self.document.plugins[id.0];
         self.draft.ignored(&plugin.place.to_string(), &plugin.title(), "", why);

@@ -2,7 +2,7 @@
 
 use crate::math::{DAffine3, DMat3, DVec3, dvec3};
 
-/// What is wrong with a value; the caller knows where it stands.
+/// What is wrong with a value; the caller adds its place.
 pub type Fault = String;
 
 /// A finite number.

@@ -135,7 +135,7 @@ fn set_projection(draft: &mut Draft, camera: &mut CameraDesc, directive: &Camera
     Ok(())
 }
 
-/// Sets the camera; the result says how the world becomes ours.
+/// Sets the camera; the result is the map from its world to ours.
 pub fn set_camera(draft: &mut Draft, directive: &CameraDirective, size: [u32; 2], times: Times) -> Result<World> {
     let params = &directive.params;
     let Some(world_from_camera) = directive.camera_from_world.inverse() else {

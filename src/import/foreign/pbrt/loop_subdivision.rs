@@ -31,7 +31,7 @@ pub fn possible_levels(triangles: usize, levels: u32) -> u32 {
     (0..=levels.min(30)).rev().find(|&levels| made(levels) <= MAX_TRIANGLES).unwrap_or(0)
 }
 
-/// Subdivides a mesh, by at most [`possible_levels`]. The error says why it is no surface.
+/// Subdivides a mesh, by at most [`possible_levels`]. The error is the reason why it is no surface.
 pub fn subdivide(positions: &[[f32; 3]], triangles: &[[u32; 3]], levels: u32) -> Result<MeshData, String> {
     let levels = possible_levels(triangles.len(), levels);
     let positions = positions.iter().map(|p| DVec3::from(p.map(f64::from))).collect();

@@ -171,7 +171,7 @@ pub fn rotation_and_scale(map: &DMat3) -> Option<(DMat3, f64)> {
     (scale > 0.0 && scale.is_finite()).then_some((DMat3::from_cols(x, y, z), scale))
 }
 
-/// Whether a map is a rotation (or mirrored one) times a scale, as far as six digits in a file can say.
+/// Whether a map is a rotation (or mirrored one) times a scale, within the precision of six digits in a file.
 pub fn is_similar(map: &DMat3) -> bool {
     let Some((rotation, scale)) = rotation_and_scale(map) else { return false };
     let error = (0..3).map(|i| (map.col(i) / scale - rotation.col(i)).length()).fold(0.0, f64::max);
