@@ -15,7 +15,7 @@ pub(super) struct Pace {
 #[derive(Debug, Default)]
 struct State {
     /// When a picture was last requested.
-    asked: Option<Instant>,
+    requested: Option<Instant>,
     /// No picture before this time.
     next: Option<Instant>,
 }
@@ -30,7 +30,7 @@ impl Pace {
         let (now, mut state) = (Instant::now(), self.lock());
         let is_due = state.next.is_none_or(|next| now >= next);
         if is_due {
-            state.asked = Some(now);
+            state.requested = Some(now);
         }
         is_due
     }
@@ -38,7 +38,7 @@ impl Pace {
     /// The requested picture has been made and copied.
     pub fn made(&self) {
         let (now, mut state) = (Instant::now(), self.lock());
-        let cost = state.asked.take().map_or(Duration::ZERO, |asked| now - asked);
+        let cost = state.requested.take().map_or(Duration::ZERO, |requested| now - requested);
         state.next = Some(now + cost * (SHARE - 1));
     }
 }

@@ -15,7 +15,7 @@ use crate::log::{self, Level};
 use crate::progress::Reporter;
 use crate::text;
 
-/// The denoiser of a render, if it is asked for: opened before the render, so that it is not missed after it.
+/// The denoiser of a render, if it is requested: opened before the render, so that a missing library is an error at the start.
 pub fn prepare(arguments: &RenderDenoiseArgs, settings: &mut Settings) -> Result<Option<Denoiser>> {
     if !arguments.denoise {
         return Ok(None);
@@ -111,7 +111,7 @@ pub fn value(report: &Report, denoiser: &Denoiser) -> Value {
     })
 }
 
-/// What a user should know of a picture.
+/// Warnings about a picture.
 pub fn warnings(report: &Report) -> Vec<String> {
     let mut lines = report.notes.clone();
     let pixels = |count: u64| if count == 1 { "1 pixel was".to_owned() } else { format!("{count} pixels were") };

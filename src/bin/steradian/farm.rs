@@ -106,7 +106,7 @@ fn job(arguments: &JobArgs) -> Result<Job> {
     })
 }
 
-/// Options that render does not know are found before they fail on every node.
+/// Unknown options of render are found before they fail on every node.
 fn check_options(options: &[String]) -> Result<()> {
     let is_own = |option: &&String| OWN.iter().any(|own| *option == own || option.starts_with(&format!("{own}=")));
     if let Some(own) = options.iter().find(is_own) {

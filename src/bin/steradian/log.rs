@@ -25,7 +25,7 @@ use crate::args::{ColorChoice, LogArgs, LogFormat, Verbosity};
 pub enum Level {
     /// Why the program ends.
     Error,
-    /// What the user should know.
+    /// Warnings.
     Warning,
     /// What was done.
     Note,
@@ -57,7 +57,7 @@ impl Level {
     }
 }
 
-/// Where messages go and how they look.
+/// Where messages go and their format.
 struct Log {
     shown: Level,
     format: LogFormat,
@@ -118,7 +118,7 @@ pub fn colored(choice: ColorChoice) -> bool {
     decide_color(choice, &variable, std::io::stderr().is_terminal())
 }
 
-/// `NO_COLOR` speaks before `CLICOLOR_FORCE`, which speaks before the terminal.
+/// `NO_COLOR` takes precedence over `CLICOLOR_FORCE`, which takes precedence over the terminal.
 fn decide_color(choice: ColorChoice, variable: &dyn Fn(&str) -> String, terminal: bool) -> bool {
     match choice {
         ColorChoice::Always => true,
@@ -200,7 +200,7 @@ fn now() -> String {
     text
 }
 
-/// What the library says.
+/// Messages of the library.
 struct Events;
 
 impl<S: tracing::Subscriber> Layer<S> for Events {

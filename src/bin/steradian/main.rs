@@ -56,7 +56,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Compares the names of files, starts to log, shows what the configuration brought, and runs the command.
+/// Compares the names of files, starts to log, shows the settings of the configuration, and runs the command.
 fn start(parsed: config::Parsed) -> Result<u8> {
     let cli = parsed.cli;
     let mut uses = FileUses::default();
@@ -145,7 +145,7 @@ fn chain(error: &Error) -> String {
     line
 }
 
-/// A panic is a fault of the program, not of its input: it says so in one line and ends with the code of an internal failure.
+/// A panic is a fault of the program, not of its input: it is reported in one line and ends with the code of an internal failure.
 fn report_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let message = panic.payload_as_str().unwrap_or("unknown");

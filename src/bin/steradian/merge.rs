@@ -62,7 +62,7 @@ fn check_plain(name: &str) -> Result<()> {
     match (components.next(), components.next()) {
         (Some(Component::Normal(only)), None) if only == name => Ok(()),
         _ => {
-            Err(Error::Usage(format!("the shards name the output {name:?}, which is not in the working folder; say with -o what to write")))
+            Err(Error::Usage(format!("the shards name the output {name:?}, which is not in the working folder; name the file to write with -o")))
         }
     }
 }

@@ -59,7 +59,7 @@ struct State {
 }
 
 impl Reporter {
-    /// Tells progress in `format`, if that is given, in any case; else as fits where stderr goes, or not at all if `quiet`.
+    /// Reports progress in `format`, if that is given, in any case; else as fits where stderr goes, or not at all if `quiet`.
     pub fn new(format: Option<&'static ProgressFormat>, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb");
         let human = format.is_none_or(|format| format.name == "human");
@@ -105,7 +105,7 @@ impl Reporter {
         if let Ok(mut state) = self.state.lock() {
             state.frame = frame;
         }
-        self.tell(&Event::Begin(frame));
+        self.emit(&Event::Begin(frame));
     }
 
     /// The rendering of a frame ends after this time.
@@ -128,7 +128,7 @@ impl Reporter {
             let is_last = state.frames_done >= state.frames;
             if self.sink == Sink::Lines && (is_last || state.last.is_none_or(|last| last.elapsed() >= LINE_PERIOD)) {
                 let status = Status { fraction, frame_fraction: 1.0, frame: state.frame, ..Status::default() };
-                self.tell(&Event::Progress(&status));
+                self.emit(&Event::Progress(&status));
                 state.last = Some(Instant::now());
             }
         }
@@ -136,16 +136,16 @@ impl Reporter {
 
     /// All is done, and well.
     pub fn succeed(&self) {
-        self.tell(&Event::Success);
+        self.emit(&Event::Success);
     }
 
     /// The work has failed.
     pub fn fail(&self, message: &str) {
         self.finish();
-        self.tell(&Event::Failure(message));
+        self.emit(&Event::Failure(message));
     }
 
-    fn tell(&self, event: &Event) {
+    fn emit(&self, event: &Event) {
         if self.sink == Sink::Lines {
             (self.format.lines)(event).iter().for_each(|line| log::line(line));
         }
@@ -176,7 +176,7 @@ impl Reporter {
                 if state.last_percent == Some(percent) && state.last.is_some_and(|last| now - last < SIGN_OF_LIFE) {
                     return;
                 }
-                self.tell(&Event::Progress(&status));
+                self.emit(&Event::Progress(&status));
             }
             _ => {}
         }
@@ -268,7 +268,7 @@ impl Progress for Reporter {
 
     fn warn(&self, message: &str) {
         log::message(Level::Warning, message);
-        self.tell(&Event::Warning(message));
+        self.emit(&Event::Warning(message));
     }
 }
 

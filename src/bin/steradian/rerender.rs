@@ -16,7 +16,7 @@ use crate::frames::{self, Shot};
 /// A picture to be made again.
 #[derive(Clone, Debug)]
 pub struct Repeat {
-    /// How it was made, with what is wanted otherwise.
+    /// How it was made, with the overrides of the command line.
     pub provenance: RenderProvenance,
     /// The file that holds it.
     pub file: PathBuf,
@@ -67,7 +67,7 @@ fn plain() -> Result<RenderArgs> {
     }
 }
 
-/// Where the scene is: where the user says, or at its name, from here or from where it was rendered.
+/// The scene's file: the one given, or its recorded name, relative to here or to where it was rendered.
 fn scene_file(arguments: &RerenderArgs, provenance: &RenderProvenance) -> PathBuf {
     let named = arguments.scene.clone().unwrap_or_else(|| provenance.scene_file.clone());
     if arguments.scene.is_some() || named.exists() { named } else { provenance.folder.join(named) }

@@ -57,7 +57,7 @@ pub(in crate::render) struct AdaptivePlanner {
     /// Groups that each block has had.
     done: Vec<u32>,
     /// Groups that each block is to have.
-    wanted: Vec<u32>,
+    planned: Vec<u32>,
     /// Of the picture's relative squared error.
     target: f64,
     /// The error by the samples so far, if it was estimated since the last pass.
@@ -81,23 +81,23 @@ impl AdaptivePlanner {
         let last = [(crop.x + crop.width - 1) / BLOCK_SIZE, (crop.y + crop.height - 1) / BLOCK_SIZE];
         let count = [last[0] - first[0] + 1, last[1] - first[1] + 1];
         let blocks = count[0] as usize * count[1] as usize;
-        Self { first, count, done: vec![0; blocks], wanted: vec![PILOT; blocks], target, error: None }
+        Self { first, count, done: vec![0; blocks], planned: vec![PILOT; blocks], target, error: None }
     }
 
     /// As bytes: what each block has and is to have, little endian.
     pub fn save(&self) -> Vec<u8> {
-        self.done.iter().chain(&self.wanted).flat_map(|groups| groups.to_le_bytes()).collect()
+        self.done.iter().chain(&self.planned).flat_map(|groups| groups.to_le_bytes()).collect()
     }
 
     /// Takes what [`save`](Self::save) gave for a picture of the same crop; `None` if it is of another.
     pub fn load(&mut self, bytes: &[u8]) -> Option<()> {
         let (numbers, rest) = bytes.as_chunks();
-        let (done, wanted) = numbers.split_at_checked(self.done.len())?;
-        if !rest.is_empty() || wanted.len() != done.len() {
+        let (done, planned) = numbers.split_at_checked(self.done.len())?;
+        if !rest.is_empty() || planned.len() != done.len() {
             return None;
         }
         let numbers = |bytes: &[[u8; 4]]| bytes.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
-        (self.done, self.wanted) = (numbers(done), numbers(wanted));
+        (self.done, self.planned) = (numbers(done), numbers(planned));
         Some(())
     }
 
@@ -193,14 +193,14 @@ impl AdaptivePlanner {
             let middle = 0.5 * (low + high);
             if error(middle.exp()) > goal { low = middle } else { high = middle }
         }
-        let wanted: Vec<u32> = (0..shares.len()).map(|i| groups(i, high.exp())).collect();
-        self.wanted = wanted;
+        let planned: Vec<u32> = (0..shares.len()).map(|i| groups(i, high.exp())).collect();
+        self.planned = planned;
     }
 
     /// Gives every block some more: where there is no better plan.
     fn add_to_all(&mut self, most: u32) {
-        for (wanted, done) in self.wanted.iter_mut().zip(&self.done) {
-            *wanted = (done + done.div_ceil(8)).min(most).max(*done);
+        for (planned, done) in self.planned.iter_mut().zip(&self.done) {
+            *planned = (done + done.div_ceil(8)).min(most).max(*done);
         }
     }
 
@@ -211,7 +211,7 @@ impl AdaptivePlanner {
             for index in self.of_tile(tile) {
                 let pixels = block_area(tile, self.place(index)).area() * u64::from(GROUP);
                 sums[0] += pixels * u64::from(self.done[index]);
-                sums[1] += pixels * u64::from(self.wanted[index]);
+                sums[1] += pixels * u64::from(self.planned[index]);
             }
         }
         sums
@@ -276,11 +276,11 @@ impl AdaptivePlanner {
     /// Reports what is planned at first, and what is there from an earlier run.
     pub fn start(&self, film: &Film, progress: &dyn Progress) {
         progress.start(PILOT * GROUP, film.sampled().area());
-        let [done, wanted] = self.samples(film);
+        let [done, planned] = self.samples(film);
         if done > 0 {
             progress.resumed(done);
             if self.has_pilot() {
-                progress.plan(wanted, self.estimate(film).error, self.target);
+                progress.plan(planned, self.estimate(film).error, self.target);
             }
         }
     }
@@ -294,7 +294,7 @@ impl AdaptivePlanner {
     /// would get more samples than `spp`.
     pub fn plan(&mut self, film: &Film, spp: u32, progress: &dyn Progress) -> bool {
         let most = spp.div_ceil(GROUP).max(PILOT);
-        while self.done.iter().zip(&self.wanted).all(|(done, wanted)| done >= wanted) {
+        while self.done.iter().zip(&self.planned).all(|(done, planned)| done >= planned) {
             let estimate = self.estimate(film);
             self.error = Some(estimate.error);
             let is_reached = estimate.error + CONFIDENCE * estimate.deviation <= self.target;
@@ -305,13 +305,13 @@ impl AdaptivePlanner {
             let deviation = (estimate.deviation / estimate.error).min(0.1);
             let goal = (0.97 * self.target / (1.0 + CONFIDENCE * deviation)).max(estimate.error / STEP);
             self.distribute(&estimate.variances, goal, most);
-            let [mut done, mut wanted] = self.samples(film);
-            if wanted < done + done / 50 {
+            let [mut done, mut planned] = self.samples(film);
+            if planned < done + done / 50 {
                 self.add_to_all(most);
-                [done, wanted] = self.samples(film);
+                [done, planned] = self.samples(film);
             }
-            debug_assert!(wanted >= done, "samples are never taken back");
-            progress.plan(wanted, estimate.error, self.target);
+            debug_assert!(planned >= done, "samples are never taken back");
+            progress.plan(planned, estimate.error, self.target);
         }
         true
     }
@@ -320,8 +320,8 @@ impl AdaptivePlanner {
     /// pixel.
     pub fn complete_pass(&mut self, film: &Film, groups: u32) -> u32 {
         self.error = None;
-        for (done, wanted) in self.done.iter_mut().zip(&self.wanted) {
-            *done = (*done + groups).min(*wanted);
+        for (done, planned) in self.done.iter_mut().zip(&self.planned) {
+            *done = (*done + groups).min(*planned);
         }
         (self.samples(film)[0] as f64 / film.sampled().area() as f64).round() as u32
     }
@@ -334,7 +334,7 @@ impl AdaptivePlanner {
     /// Renders at most `most` more groups of every block of a tile that lacks them; the result is how many samples are
     /// in the picture.
     pub fn render_tile(&self, renderer: &TileRenderer, tile: &mut FilmTile, most: u32, workspace: &mut TileWorkspace) -> u64 {
-        let missing = |index: usize| self.done[index]..(self.done[index] + most).min(self.wanted[index]);
+        let missing = |index: usize| self.done[index]..(self.done[index] + most).min(self.planned[index]);
         let of_block = |index: usize| missing(index).map(move |group| (self.place(index), group));
         let groups: Vec<([u32; 2], u32)> = self.of_tile(tile).flat_map(of_block).collect();
         groups.chunks(BATCH_GROUPS).map(|groups| render_groups(renderer, tile, groups, workspace)).sum()

@@ -83,10 +83,10 @@ pub struct BenchErrorArgs {
     /// Largest number of segments from the camera
     #[arg(long, value_name = "N", help_heading = "Render")]
     pub max_depth: Option<u32>,
-    /// Limit what a single path of indirect light brings
+    /// Clamp the contribution of a single path of indirect light
     #[arg(long, value_name = "LIMIT", help_heading = "Render")]
     pub clamp: Option<f32>,
-    /// Number of threads; 0 stands for all
+    /// Number of threads; 0 means all
     #[arg(long, value_name = "N", help_heading = "Render")]
     pub threads: Option<usize>,
     /// Seed of the first repeat
@@ -99,7 +99,7 @@ pub struct BenchErrorArgs {
     /// Without --out: print JSON instead of tables
     #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// Say nothing but results and errors
+    /// Print only results and errors
     #[arg(short, long, help_heading = "Output")]
     pub quiet: bool,
     #[command(flatten)]

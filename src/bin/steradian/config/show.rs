@@ -73,7 +73,7 @@ pub fn run(arguments: &ConfigShowArgs) -> Result<()> {
     text::print(&rows.iter().map(line).collect::<Vec<_>>().join("\n"))
 }
 
-/// What the scene says, and what holds if it does not.
+/// The scene's values, and the defaults of those it does not have.
 fn scene_rows(scene: Option<&Path>) -> Result<Vec<Row>> {
     let as_json = |desc: &steradian::desc::SceneDesc| serde_json::to_value(desc).map_err(|e| Error::Internal(e.to_string()));
     let bare = as_json(&import::parse_scene(r#"{ "camera": {} }"#, Path::new("scene.json"))?)?;
@@ -90,7 +90,7 @@ fn scene_rows(scene: Option<&Path>) -> Result<Vec<Row>> {
         if values.len() < places.len() || values.iter().any(|value| value.as_array().is_some_and(Vec::is_empty)) {
             continue;
         }
-        // A scene of ours says it or not; in a scene of another kind, what differs from the default was said.
+        // A scene in our format has the key or not; in an imported scene, a value that differs from the default was given.
         let said = match &written {
             Some(written) => places.iter().any(|place| written.pointer(place).is_some()),
             None => places.iter().any(|place| desc.pointer(place) != bare.pointer(place)),
