@@ -79,7 +79,7 @@ fn shape_tests(criterion: &mut Criterion) {
     }
 }
 
-/// A wavy column of so many cubic segments, as a B-spline.
+/// A wavy column of a number of cubic segments, as a B-spline.
 fn column(segments: usize) -> Analytic {
     let points: Vec<[f64; 2]> = (0..segments + 3)
         .map(|i| {

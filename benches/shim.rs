@@ -108,7 +108,7 @@ fn trace(file: &Path, passes: usize) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What is asked of every ray.
+/// The query of every ray.
 #[derive(Clone, Copy)]
 enum Query {
     Closest(Option<Coherence>),

@@ -1,4 +1,4 @@
-//! Adaptive sampling: pictures keep what they promise, are not biased, and take fewer samples.
+//! Adaptive sampling: pictures reach the target error, are not biased, and take fewer samples.
 
 use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
@@ -178,7 +178,7 @@ fn yard() -> Value {
     })
 }
 
-/// The promise by 200 renders each, with samples that pixels share.
+/// The error reached by 200 renders each, with samples that pixels share.
 #[test]
 #[ignore = "takes minutes: for changes to filters, their variance or adaptive sampling"]
 fn of_200_pictures_95_in_100_are_as_good_as_promised_with_every_filter() {

@@ -6,7 +6,7 @@ use steradian::film::{Crop, Image, LayerKind};
 use crate::util::folder::Folder;
 use crate::util::render::{merge, pixels, render};
 
-/// A picture of a box whose faces are told apart by their normals, at depths from 4 to 6.
+/// A picture of a box whose faces are distinguished by their normals, at depths from 4 to 6.
 fn scene(camera: Value) -> Value {
     let mut scene = json!({
         "film": { "width": 32, "height": 16, "filter": { "type": "box", "radius": 1e-3 } },

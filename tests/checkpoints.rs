@@ -125,7 +125,7 @@ fn a_resumed_render_has_the_bits_of_one_run() {
     }
 }
 
-/// Stops a render after so many tiles.
+/// Stops a render after a number of tiles.
 pub struct StopAfter<'a> {
     pub tiles: AtomicU32,
     pub stop: &'a AtomicBool,

@@ -1,4 +1,4 @@
-//! Denoising. Tests that need Intel Open Image Denoise are ignored unless asked for: `cargo test -- --include-ignored`.
+//! Denoising. Tests that need Intel Open Image Denoise are ignored by default: `cargo test -- --include-ignored`.
 
 use std::path::Path;
 use std::process::{Command, Output};

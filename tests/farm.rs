@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::util::program::{Running, Signal};
 
-/// A render that does as the file `behaviour` says: `sleep`, or an exit code; 0 writes the shard that `-o` names.
+/// A render that does what is in the file `behaviour`: `sleep`, or an exit code; 0 writes the shard that `-o` names.
 const RENDER: &str = r#"#!/bin/bash
 echo "$@" >>calls
 trap 'echo terminated >>calls; kill "$sleeper"; exit 143' TERM

@@ -184,7 +184,7 @@ fn other_commands_overwrite_nothing_that_they_read() {
     assert_refused(dir, "denoise f.####.exr f.0###.exr", ["f.0001.exr (a noisy picture)", "f.0001.exr (a denoised picture)"]);
 }
 
-/// Files that a conversion brings beside the scene are compared before the first is written.
+/// Files that a conversion copies beside the scene are compared before the first is written.
 #[test]
 fn conversions_overwrite_no_file_that_they_copy() {
     let folder = tempfile::tempdir().unwrap();

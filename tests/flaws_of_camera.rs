@@ -35,7 +35,7 @@ fn centroid(image: &Image) -> [f64; 2] {
 
 #[test]
 fn the_tent_filter_does_not_shift_the_picture_by_a_quarter_pixel() {
-    // An offset that lacks half a pixel moves the picture by 1/4; the centroid of the symmetric scene tells.
+    // An offset that lacks half a pixel moves the picture by 1/4; the centroid of the symmetric scene shows it.
     for filter in [json!({ "type": "tent" }), json!({ "type": "box" }), json!({ "type": "gaussian" }), json!({ "type": "mitchell" })] {
         let [x, y] = centroid(&render(&symmetric([16, 16], filter.clone())));
         assert!((x - 8.0).abs() < 5e-3 && (y - 8.0).abs() < 5e-3, "{filter}: {x} {y}");

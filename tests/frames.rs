@@ -45,7 +45,7 @@ fn folder_with(scenes: &[(&str, Value)]) -> tempfile::TempDir {
     folder
 }
 
-/// Everything that a file says of its pixels.
+/// The header of a file and its pixels.
 fn pixels(path: &Path) -> Vec<u32> {
     let image = output::read_exr(path).unwrap();
     image.layers.iter().flat_map(|layer| layer.data.iter().map(|value| value.to_bits())).collect()

@@ -20,7 +20,7 @@ fn every_format_has_whole_lines_and_ends_with_all() {
         assert_eq!(output.status.code(), Some(0), "{text}");
         assert!(text.ends_with(&format!("\n{all}\n{last}")) && !text.contains(['\r', '\x1b']), "{format}: {text:?}");
         assert!(!text.contains("Error"), "{text}");
-        // The files are told of before all is done.
+        // The files are printed before all is done.
         let place = |what: &str| text.find(what).unwrap_or(usize::MAX);
         assert!(place("wrote a.exr") < place(all), "{text}");
         assert!(output.stdout.is_empty());
@@ -52,7 +52,7 @@ fn messages_are_json_and_go_to_files_if_asked() {
     assert_eq!(progress.last().unwrap()["percent"], 100.0);
     assert_eq!(values.last().unwrap()["event"], "success");
 
-    // Another run adds to the file, whatever it says on stderr; each line has its time, level and text.
+    // Another run adds to the file, whatever it prints to stderr; each line has its time, level and text.
     assert_eq!(told(&run(folder.path(), "render scene.json -o b.exr -q --log-format text --log-file log.txt")), "");
     let log = std::fs::read_to_string(folder.path().join("log.txt")).unwrap();
     let lines: Vec<&str> = log.lines().collect();
@@ -84,7 +84,7 @@ fn colours_are_shown_only_where_they_are_wanted() {
     }
 }
 
-/// Flag, environment, project, user, scene, built-in: each speaks where those before it are silent.
+/// Flag, environment, project, user, scene, built-in: each applies where those before it have no value.
 #[test]
 fn options_come_from_the_strongest_place() {
     let folder = tempfile::tempdir().unwrap();

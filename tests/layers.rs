@@ -257,7 +257,7 @@ fn two_lamps(names: &[&str], integrator: Value) -> Value {
 
 #[test]
 fn groups_show_what_their_lights_alone_give() {
-    // Whitted's method asks every light: the very sums.
+    // Whitted's method samples every light: the very sums.
     let whitted = || json!({ "type": "whitted", "max_depth": 4, "rr_depth": null });
     let of = |names: &[&str]| {
         let mut scene = two_lamps(names, whitted());

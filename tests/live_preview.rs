@@ -167,7 +167,7 @@ fn a_reader_that_takes_nothing_keeps_neither_the_render_nor_others_waiting() {
         preview.show(&Arc::new(Snapshot::new(&image(), version)));
         assert_eq!(others.get("/state?page=1&have=0").json()["version"], version);
     }
-    // The slow ones are served what they asked for.
+    // The slow ones are served what they requested.
     drop(others);
     let mut body = Vec::new();
     slow[0].set_read_timeout(Some(Duration::from_secs(60))).unwrap();
@@ -252,7 +252,7 @@ fn pictures_are_made_only_for_those_who_look() {
     assert!(fan.wants_picture());
     fan.picture(&image(), 1);
     assert_eq!((fan.wants_picture(), version("/state?page=5&have=0")), (false, 1));
-    // Not wanted, not shown.
+    // Not requested, not shown.
     fan.picture(&image(), 2);
     assert_eq!(version("/state"), 1);
     let start = Instant::now();
@@ -261,7 +261,7 @@ fn pictures_are_made_only_for_those_who_look() {
         version("/state?page=5&have=1");
         thread::sleep(Duration::from_millis(10));
     }
-    // A page that is gone wants nothing.
+    // A page that is gone requests nothing.
     thread::sleep(Duration::from_secs(3));
     assert!(!fan.wants_picture());
     // And nobody waits for it at the end.

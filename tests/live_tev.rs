@@ -1,4 +1,4 @@
-//! A viewer of our own that speaks tev's protocol, with and without manners.
+//! A viewer of our own with tev's protocol, well behaved or not.
 
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
@@ -21,7 +21,7 @@ struct Picture {
     channels: BTreeMap<String, Vec<u32>>,
 }
 
-/// What the viewer was told, one word for each packet, and what it shows.
+/// What the viewer received, one word for each packet, and what it shows.
 #[derive(Default)]
 struct Viewer {
     packets: Vec<String>,
@@ -128,7 +128,7 @@ fn viewer(listener: TcpListener) -> thread::JoinHandle<Viewer> {
     })
 }
 
-/// A free port of an address where no other test asks for one.
+/// A free port of an address that no other test uses.
 fn listen() -> (TcpListener, String) {
     let listener = TcpListener::bind("127.0.83.7:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -166,7 +166,7 @@ fn expected(image: &Image) -> Picture {
     Picture { size: image.size.map(|side| side as usize), channels: channels.collect() }
 }
 
-/// Waits for what another thread is to bring about.
+/// Waits for a condition set by another thread.
 fn eventually(what: &str, mut is_so: impl FnMut() -> bool) {
     let start = Instant::now();
     while !is_so() {

@@ -61,7 +61,7 @@ fn names_steer_neither_farms_nor_terminals() {
     assert!(output.status.code() == Some(2) && is_harmless(&told(&output)), "{}", told(&output));
 }
 
-/// A light in a group whose name has so many letters.
+/// A light in a group whose name has a number of letters.
 fn grouped(letters: usize) -> String {
     scene(|scene| {
         scene["lights"] = json!([{ "type": "point", "position": [0, 0, 4], "intensity": [9, 9, 9], "group": "g".repeat(letters) }]);

@@ -1,4 +1,4 @@
-//! Opacity: leaves cut out by images, veils by numbers, and what an MTL says of it.
+//! Opacity: leaves cut out by images, veils by numbers, and by an MTL.
 
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
 

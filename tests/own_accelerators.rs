@@ -161,7 +161,7 @@ fn visits(geometry: &Geometry, rays: &[Ray], most: &[(&str, f64)]) {
     }
 }
 
-/// A mesh alone, and small on a large floor, which trees that halve space or want every half to be smaller do not get through.
+/// A mesh alone, and small on a large floor, which trees that halve space or require every half to be smaller do not get through.
 #[test]
 fn a_ray_visits_few_nodes_and_primitives() {
     let floor = || grid(DVec3::new(-20.0, -20.0, -1.5), 40.0 * DVec3::X, 40.0 * DVec3::Y, 1, |_, _| 0.0);
@@ -229,7 +229,7 @@ fn garbage_ends_in_bounded_trees() {
     }
 }
 
-/// What is in a leaf twice must be met once: nothing a hit says depends on how often its primitive was tested.
+/// What is in a leaf twice must be met once: nothing of a hit depends on how often its primitive was tested.
 #[test]
 fn a_hit_does_not_depend_on_the_order_of_tests() {
     let long: Vec<_> = (0..200).map(|i| 0.01 * f64::from(i)).collect();

@@ -1,4 +1,4 @@
-//! What scene files say reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
+//! The content of scene files reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;

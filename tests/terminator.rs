@@ -1,4 +1,4 @@
-//! Where a coarse smooth mesh turns away from a light: shadow as soft as that of the surface it stands for, and no leaks instead.
+//! Where a coarse smooth mesh turns away from a light: shadow as soft as that of the surface it approximates, and no leaks instead.
 
 use serde_json::{Value, json};
 use steradian::film::Image;
@@ -6,7 +6,7 @@ use steradian::film::Image;
 use crate::util::geometry::Rng;
 use crate::util::render::{Estimate, merge, pixels, render};
 
-/// An octahedron whose triangles are divided into four so many times, on the unit sphere, with the sphere's normals.
+/// An octahedron whose triangles are divided into four a number of times, on the unit sphere, with the sphere's normals.
 fn ball(divisions: u32) -> Value {
     let signs = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0]];
     let octant = |s: [f64; 3]| [[s[0], 0.0, 0.0], [0.0, s[1], 0.0], [0.0, 0.0, s[2]]];

@@ -309,7 +309,7 @@ fn images_of_any_size_and_number_of_channels_are_textures() {
     }
 }
 
-/// A uv of 100 does not stand for "no uv"; uv projected to a plane would be 0/0 for triangles upright to it.
+/// A uv of 100 does not mean "no uv"; uv projected to a plane would be 0/0 for triangles upright to it.
 #[test]
 fn triangles_show_their_part_of_the_image_however_they_stand() {
     let folder = Folder::new();

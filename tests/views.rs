@@ -1,4 +1,4 @@
-//! What the command line says of how a picture is shown and focused.
+//! Options of the command line for view and focus.
 
 use std::path::Path;
 

@@ -33,9 +33,9 @@ pub struct Agreement {
 pub struct Disagreement {
     /// For `--ray`: origin, direction, `t_min`, `t_max`, time.
     pub ray: String,
-    /// What the oracle says.
+    /// The oracle's hit.
     pub expected: String,
-    /// What the accelerator says.
+    /// The accelerator's hit.
     pub found: String,
 }
 
@@ -154,7 +154,7 @@ fn reach(geometry: &Geometry, ray: &Ray, hit: &Hit) -> f64 {
     f64::from(far[0].max(far[1]).max(far[2]))
 }
 
-/// What an answer says, for people.
+/// A hit as text.
 pub fn describe(hit: Option<&Hit>) -> String {
     let Some(hit) = hit else { return "no hit".into() };
     let instance = if hit.instance == Hit::NO_INSTANCE { String::new() } else { format!(" instance {}", hit.instance.0) };

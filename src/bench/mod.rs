@@ -24,7 +24,7 @@ pub use record::{RayKind, RaySet, record};
 pub use reports::{Comparison, FrameTiming, ReportsOptions, ReportsReport, Row, bench_reports};
 pub use scaling::{Fit, ScalingPoint, ScalingReport, bench_scaling, fit, fitted_slope};
 
-/// Is told what a benchmark is doing, and may end it.
+/// Receives the progress of a benchmark, and may end it.
 pub trait Watch: Sync {
     /// A step begins.
     fn step(&self, what: &str);
@@ -33,7 +33,7 @@ pub trait Watch: Sync {
     fn is_stopped(&self) -> bool;
 }
 
-/// Tells nobody and never ends a benchmark.
+/// Ignores progress and never ends a benchmark.
 #[cfg(test)]
 struct Unwatched;
 

@@ -70,7 +70,7 @@ pub struct RaySet {
 /// As a render.
 pub fn record(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, count: usize) -> Result<Vec<RaySet>> {
     let [width, height] = settings.size.map(f64::from);
-    // About as many pixels as rays are wanted, in the picture's own shape.
+    // About as many pixels as rays are requested, with the picture's aspect ratio.
     let scale = (count as f64 / (width * height)).sqrt();
     let size = [width, height].map(|side| ((side * scale).round() as u32).clamp(1, 1 << 15));
     let mut settings = Settings {

@@ -39,7 +39,7 @@ pub struct Comparison {
     pub title: &'static str,
     /// Triangles of the mesh.
     pub triangles: usize,
-    /// What the report says.
+    /// The figures of the report.
     pub claim: &'static str,
     /// Where the figures and the setting are from, or that they are inferred.
     pub sources: Vec<String>,

@@ -15,7 +15,7 @@ const MAX_FUNCTION_LINES: usize = 60;
 const MAX_PARAMETERS: usize = 5;
 
 /// Why a kernel has many parameters.
-const ROWS: &str = "rows are separate parameters, so that the compiler knows that they do not overlap";
+const ROWS: &str = "rows are separate parameters, so that the compiler can assume that they do not overlap";
 
 /// Functions that break a rule of [`Rule`], by file and name, with the reason.
 const EXCEPTIONS: &[(Rule, &str, &str, &str)] = &[

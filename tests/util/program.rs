@@ -13,7 +13,7 @@ use rustix::process::{Pid, kill_process, kill_process_group};
 pub const SCENE: &str = r#"{
     "film": { "width": 24, "height": 16 },
     "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
-    // Said in the scene, though it is the default.
+    // Given in the scene, though it is the default.
     "sampler": { "spp": 2, "seed": 0 },
     "shapes": [{ "type": "sphere", "radius": 1 }],
     "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
@@ -34,7 +34,7 @@ pub fn run(folder: &Path, arguments: &str) -> Output {
     steradian(folder, arguments).output().unwrap()
 }
 
-/// What the program said on stderr.
+/// What the program printed to stderr.
 pub fn told(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }

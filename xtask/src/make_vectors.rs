@@ -283,7 +283,7 @@ fn revolution_file(points: &[[f64; 2]], seed: u64) -> String {
         }
         let ray = Ray::new((through - direction * rng.magnitude(0.5, 2.0)).as_vec3(), direction.as_vec3());
         let hits = all_hits(points, &ray);
-        // Pairs so close that f64 cannot tell them from one tangency.
+        // Pairs so close that f64 cannot distinguish them from one tangency.
         if hits.windows(2).any(|pair| pair[1] - pair[0] < 1e-6) {
             excluded += 1;
             continue;

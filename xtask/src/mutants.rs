@@ -1,4 +1,4 @@
-//! Injects faults, one at a time, and says whether the tests named for each find it.
+//! Injects faults, one at a time, and reports whether the tests named for each find it.
 //!
 //! ```text
 //! cargo xtask mutants [NAME...]

@@ -30,8 +30,8 @@ impl External {
         };
         needs("{out}", "the EXR file that it shall write")?;
         match budgets.first() {
-            Some(Budget::Seconds(_)) => needs("{seconds}", "the time that it may take, which --times asks for")?,
-            _ => needs("{spp}", "the samples per pixel, which --spp asks for")?,
+            Some(Budget::Seconds(_)) => needs("{seconds}", "the time that it may take, of --times")?,
+            _ => needs("{spp}", "the samples per pixel, of --spp")?,
         }
         Ok(Self { name: name.to_owned(), template: template.to_owned(), scene: scene.to_owned() })
     }
@@ -73,7 +73,7 @@ impl External {
     }
 }
 
-/// What a renderer says of itself on standard output, as JSON.
+/// Statistics that a renderer prints to standard output as JSON.
 #[derive(Debug, Default, PartialEq)]
 struct Told {
     /// Seconds of the render without what comes before.

@@ -73,12 +73,12 @@ pub enum Standard {
     Halves,
 }
 
-/// What is asked of the benchmark.
+/// Options of the benchmark.
 #[derive(Clone, Debug)]
 pub struct ErrorOptions {
     /// The scene's name.
     pub scene: String,
-    /// The command that asks.
+    /// The command line.
     pub command: String,
     /// What is compared; the first must be ours unless there is a reference.
     pub variants: Vec<Variant>,

@@ -24,7 +24,7 @@ use crate::error::{Error, Result};
 /// gives, as JSON. `after` is given what there is after each sweep of each repeat; a run that is ended early gives what there is.
 ///
 /// # Errors
-/// If a sweep does not exist, or what `after` says. A case that fails is part of the report.
+/// If a sweep does not exist, or the error of `after`. A case that fails is part of the report.
 pub fn bench_scale(
     options: &ScaleOptions,
     program: impl Fn() -> Command,

@@ -45,7 +45,7 @@ pub struct Measured {
     pub accelerator_bytes: u64,
     /// Bytes of the film for each pixel.
     pub film_bytes_per_pixel: u64,
-    /// Memory of the process; none where the system does not say.
+    /// Memory of the process; none where the system does not provide it.
     pub memory: Option<Memory>,
 }
 

@@ -1,7 +1,7 @@
 //! Numerical stability: a catalogue of checks with criteria, which `steradian bench stability` and the tests run alike.
 //!
 //! Each group has its file: a `checks!` list of ids, names and set-ups, and below it one function for each check, which
-//! measures and says what the numbers must be.
+//! measures numbers and sets their bounds.
 
 pub mod geometry;
 pub mod oracle;
@@ -160,7 +160,7 @@ impl Check {
     }
 }
 
-/// Runs checks one after the other, all but those in `kept`, which stand for themselves; ends early if `watch` says so. `after` is given
+/// Runs checks one after the other, all but those in `kept`, whose results are reused; ends early if `watch` is stopped. `after` is given
 /// what there is after each.
 ///
 /// # Errors

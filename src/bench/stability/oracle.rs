@@ -85,7 +85,7 @@ impl ExactTransform {
     }
 }
 
-/// What the oracle says about a ray.
+/// The oracle's result for a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
     /// It meets nothing.
@@ -101,7 +101,7 @@ pub enum Answer {
     Undecidable,
 }
 
-/// The surface a shape stands for.
+/// The surface of a shape.
 #[derive(Clone, Copy, Debug)]
 enum Surface {
     /// `round (x² + y²) + z_squared z² + z_linear z + constant = 0` between two heights.

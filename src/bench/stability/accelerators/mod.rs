@@ -51,12 +51,12 @@ fn differing(accel: &dyn Accelerator, rays: &[(Ray, Option<Hit>)]) -> usize {
     count(rays, |(ray, expected)| accel.intersect(ray) != *expected || accel.occluded(ray) != expected.is_some())
 }
 
-/// What the oracle answers.
+/// The oracle's hits.
 fn asked(oracle: &dyn Accelerator, rays: Vec<Ray>) -> Vec<(Ray, Option<Hit>)> {
     rays.into_par_iter().map(|ray| (ray, oracle.intersect(&ray))).collect()
 }
 
-/// A scene with rays and what the oracle says of them.
+/// A scene with rays and the oracle's hits.
 struct Case {
     geometry: Geometry,
     asked: Vec<(Ray, Option<Hit>)>,

@@ -54,7 +54,7 @@ fn leaks(effort: Effort, rng: &mut Rng) -> usize {
     kinds.map(|(kind, _)| lost(&*build(kind, &geometry))).sum()
 }
 
-/// Answers of three accelerators, asked in turn, that are not those each gives alone.
+/// Hits of three accelerators, traced in turn, that differ from those of each alone.
 fn disturbed(rng: &mut Rng) -> usize {
     let geometries = [10, 100, 300].map(|count| meshes(vec![soup(rng, count, 0.4)]));
     let rays = test_rays(rng, &geometries[0], 1_000);

@@ -41,7 +41,7 @@ pub(super) fn m1_integrals(effort: Effort) -> Outcome {
         outside += places.into_iter().filter(|&p| filter.evaluate(p) != 0.0).count();
     }
     Outcome::new()
-        // Midpoints of 256 steps err by some h^2 / 24 of the second derivative: far below the percent that pbrt asks for.
+        // Midpoints of 256 steps err by some h^2 / 24 of the second derivative: far below the percent of pbrt's test.
         .at_most("relative error of the integral", worst, 1e-3)
         .none("values outside of the radius", outside)
 }

@@ -133,7 +133,7 @@ impl View<'_> {
         found
     }
 
-    /// The integral of the density over the directions of a cone around the emitter, over the share of samples that it stands for: both
+    /// The integral of the density over the directions of a cone around the emitter, over the share of samples in the cone: both
     /// without the silhouettes.
     fn integral(&self, n: u32, rng: &mut Rng) -> f64 {
         let bounds = self.geometry.shape(ShapeId(0)).bounds();

@@ -13,7 +13,7 @@ use crate::light::{
 };
 use crate::math::{DMat3, DVec3, Rng, Vec3};
 
-/// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and a sky if asked.
+/// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and optionally a sky.
 fn cloud(seed: u64, sky: bool, selection: LightSelection) -> LightSet {
     let mut rng = Rng::new(seed);
     let (mut geometry, mut lights, mut corners) = (Geometry::default(), Vec::new(), Vec::new());
@@ -102,7 +102,7 @@ fn sums(seed: u64) -> [f64; 2] {
 struct Choices {
     /// By light, and last how often there was none.
     counts: Vec<u32>,
-    /// Largest relative difference of a probability told and asked for.
+    /// Largest relative difference of the probability of a sample and that of its query.
     difference: f64,
     /// Mean of 1 / (n p) over n lights that can be chosen, and how many standard deviations it lies from 1.
     mean: f64,

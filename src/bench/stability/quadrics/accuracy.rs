@@ -123,7 +123,7 @@ struct Tallies {
     among_at_rims: Tally,
 }
 
-/// Spheres behind the start of a ray, so that the accelerator has boxes to tell apart.
+/// Spheres behind the start of a ray, so that the accelerator has several boxes.
 fn bystanders(ray: &Ray, unit: f64) -> impl Iterator<Item = Shape> + '_ {
     let back = -ray.direction.as_dvec3().normalize();
     (1..=3).map(move |i| {

@@ -1,4 +1,4 @@
-//! What every analytic shape promises: which root, derivatives, parameters, singular points, bounds, one answer for both queries.
+//! Properties of every analytic shape: which root, derivatives, parameters, singular points, bounds, one answer for both queries.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -183,7 +183,7 @@ pub(super) fn c5_parameters_round_trip(effort: Effort) -> Outcome {
         let geometry = placed(shape, rng.rotation(), rng.cube());
         let Shape::Analytic(on) = geometry.shape(crate::id::ShapeId(0)) else { return };
         let p = on.transform.point(at);
-        // From a side that sees the point: the normal found in the shape's own space tells.
+        // From a side that sees the point, by the normal in the shape's own space.
         let (u, v) = (at.cross(DVec3::Z), at);
         let normal = [u, v, DVec3::Z, DVec3::X].into_iter().find_map(|n| {
             let n = if n.length() > 0.1 { n.normalize() } else { DVec3::Z };

@@ -14,12 +14,12 @@ use crate::math::Vec3;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::sampling::statistics::random_points;
 
-/// Light from everywhere that tells directions apart.
+/// Incident radiance that differs by direction.
 fn sky(w: Vec3) -> f64 {
     f64::from(1.0 + 0.5 * w.x + 0.3 * w.y - 0.4 * w.z)
 }
 
-/// Light that one sample brings.
+/// The contribution of one sample.
 fn brought(bsdf: &Bsdf, wo: Vec3, u: [f32; 4]) -> f64 {
     bsdf.sample(wo, u[2], [u[0], u[1]]).map_or(0.0, |s| f64::from(s.weight.g) * sky(s.wi))
 }

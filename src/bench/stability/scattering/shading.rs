@@ -66,7 +66,7 @@ fn cases() -> impl Iterator<Item = (bool, Value, [f64; 3])> {
 }
 
 /// Pixels that are not black where all light comes from below the quad but from above the plane of its shading normal.
-/// Only with a normal map: vertex normals stand for a smooth surface, which may see below the plane of a facet that
+/// Only with a normal map: vertex normals approximate a smooth surface, which may see below the plane of a facet that
 /// nothing covers.
 fn leaks() -> usize {
     let below = json!([{ "type": "directional", "direction": [-0.95, 0, 0.3], "irradiance": [9, 9, 9] }]);

@@ -6,7 +6,7 @@ use super::materials::{Material, direction, rough, smooth};
 use crate::bsdf::Bsdf;
 use crate::math::Vec3;
 
-/// How far each component of a direction may be from what it stands for: it is the sum of a few products of numbers up to 2, each of which
+/// How far each component of a direction may be from its exact value: it is the sum of a few products of numbers up to 2, each of which
 /// is rounded.
 const ROUNDING: f32 = 1.0 / (1 << 22) as f32;
 
@@ -51,7 +51,7 @@ pub struct Weights {
     pub unexplained: f64,
     /// Where that is.
     pub worst: String,
-    /// Samples that leave on another side than they say, or by a lobe that is a delta and yet has a density.
+    /// Samples on another side than that of their lobe, or by a lobe that is a delta and yet has a density.
     pub wrong: usize,
 }
 

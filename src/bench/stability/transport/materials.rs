@@ -21,7 +21,7 @@ fn with(mut m: Value, rest: Value) -> Value {
     json!({ "m": m })
 }
 
-/// Every material at its whitest, with what `docs/materials.md` says of it; the object has the material `m`.
+/// Every material at its whitest, with the bound of `docs/materials.md`; the object has the material `m`.
 fn materials() -> Vec<(&'static str, Whiteness, Value)> {
     let metal = |rest: Value| with(json!({ "type": "conductor", "eta": [0.01, 0.01, 0.01], "k": [1e4, 1e4, 1e4] }), rest);
     let glass = |rest: Value| with(json!({ "type": "dielectric", "ior": 1.5 }), rest);
