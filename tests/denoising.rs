@@ -161,7 +161,7 @@ fn the_result_does_not_depend_on_threads() {
 fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
     let denoiser = denoiser(2);
     let kinds: Vec<&str> =
-        LayerInfo::ALL.iter().filter(|info| matches!(info.source, steradian::film::Source::LightAov(_))).map(|info| info.name).collect();
+        LayerInfo::ALL.iter().filter(|info| matches!(info.source, steradian::film::LayerSource::LightAov(_))).map(|info| info.name).collect();
     let layers: Vec<&str> = ["feature_albedo", "feature_normal", "light_groups", "variance"].into_iter().chain(kinds).collect();
     let (reference, noisy) = (render(&room(4096, &["light_groups"])), render(&room(16, &layers)));
     let mut image = noisy.clone();
@@ -177,7 +177,7 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
         assert_eq!(image.layer(kind), noisy.layer(kind));
     }
     let is_group = |layer: &&Layer| layer.kind == LayerKind::LightGroups;
-    let is_part = |layer: &&Layer| matches!(LayerInfo::of(layer.kind).source, steradian::film::Source::LightAov(_));
+    let is_part = |layer: &&Layer| matches!(LayerInfo::of(layer.kind).source, steradian::film::LayerSource::LightAov(_));
     let sums = [image.layers.iter().filter(is_group).collect::<Vec<_>>(), image.layers.iter().filter(is_part).collect()];
     assert_eq!(sums.each_ref().map(Vec::len), [3, 8]);
     assert_eq!(report.layers.len(), 12);

@@ -10,7 +10,7 @@ use image::{DynamicImage, ImageFormat, ImageReader};
 
 use super::AssetError;
 use super::jpeg_check::is_whole_jpeg;
-use crate::file::exr_blocks::{Place, Row, read_rows};
+use crate::file::exr_blocks::{ChannelRow, Place, read_rows};
 use crate::file::exr_headers::check_claims;
 use crate::image_data::{ImageData, Samples};
 
@@ -130,7 +130,7 @@ fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
     chosen.extend(find("A"));
     let wanted: Vec<Place> = chosen.iter().map(|&channel| Place { part, channel }).collect();
     let (width, height, channels) = (size.width(), size.height(), chosen.len());
-    let read = |keep: &mut dyn FnMut(Row)| read_rows(Cursor::new(bytes), &headers, &wanted, false, keep).map_err(|e| malformed(&e));
+    let read = |keep: &mut dyn FnMut(ChannelRow)| read_rows(Cursor::new(bytes), &headers, &wanted, false, keep).map_err(|e| malformed(&e));
     let samples = if chosen.iter().all(|&channel| all[channel].sample_type == SampleType::F16) {
         let mut out = vec![f16::ZERO; width * height * channels];
         read(&mut |row| row.write(out[channels * row.start + row.wanted..].iter_mut().step_by(channels), f16::from_f32))?;

@@ -127,7 +127,7 @@ impl MaterialTable {
 
     /// That neither a material nor a part of it has a relief.
     fn check_no_relief(&self, compiler: &Compiler, place: &str, name: &str, id: MaterialId) -> Result<()> {
-        if self.any_part(id, &|id| self.relief_of(id).is_some()) {
+        if self.any_part(id, &|id| self.normal_perturbation_of(id).is_some()) {
             return Err(compiler.files.error(place, format!("\"{name}\" has a relief of its own")));
         }
         Ok(())

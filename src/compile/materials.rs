@@ -83,8 +83,8 @@ impl MaterialTable {
         name: &'a str,
         outer: &mut Vec<&'a str>,
     ) -> Result<MaterialId> {
-        if let Some(look) = self.names.get(name) {
-            return Ok(look.material);
+        if let Some(binding) = self.names.get(name) {
+            return Ok(binding.material);
         }
         let path = format!("materials.{name}");
         let material = match self.composite(compiler, desc, name, outer)? {
@@ -92,14 +92,14 @@ impl MaterialTable {
             None => compiler.material(&path, &desc.materials[name])?,
         };
         let medium = match &desc.materials[name] {
-            MaterialDesc::Relief { material, .. } => self.names.get(material).and_then(|look| self.medium_of.get(&look.material)).copied(),
+            MaterialDesc::Relief { material, .. } => self.names.get(material).and_then(|binding| self.medium_of.get(&binding.material)).copied(),
             plain => self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, plain)?),
         };
         let id = self.push(material);
         self.medium_of.extend(medium.map(|medium| (id, medium)));
         let normal_perturbation = compiler
             .normal_perturbation(desc, &path, &desc.materials[name])?
-            .map(|normal_perturbation| self.push_relief(normal_perturbation));
+            .map(|normal_perturbation| self.push_normal_perturbation(normal_perturbation));
         self.by_material.extend(normal_perturbation.map(|normal_perturbation| (id, normal_perturbation)));
         self.names.insert(name.to_owned(), MaterialBinding { normal_perturbation, ..MaterialBinding::plain(id) });
         Ok(id)
@@ -112,10 +112,10 @@ impl MaterialTable {
     }
 
     /// Whether a surface with it needs uv.
-    pub fn needs_uv(&self, look: &MaterialBinding) -> bool {
-        let cut_out = look.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
-        let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.relief_of(id).is_some();
-        cut_out || look.normal_perturbation.is_some() || self.any_part(look.material, &needs)
+    pub fn needs_uv(&self, binding: &MaterialBinding) -> bool {
+        let cut_out = binding.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
+        let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.normal_perturbation_of(id).is_some();
+        cut_out || binding.normal_perturbation.is_some() || self.any_part(binding.material, &needs)
     }
 
     fn has_texture(&self, id: MaterialId, is: impl Fn(&Texture) -> bool) -> bool {
@@ -123,11 +123,11 @@ impl MaterialTable {
     }
 
     /// Whether a surface's normals come from a normal map.
-    pub fn has_normal_map(&self, look: &MaterialBinding) -> bool {
+    pub fn has_normal_map(&self, binding: &MaterialBinding) -> bool {
         let is_map = |normal_perturbation: Option<NormalPerturbationId>| {
             normal_perturbation.is_some_and(|id| matches!(self.normal_perturbations[id.index()], NormalPerturbation::NormalMap { .. }))
         };
-        is_map(look.normal_perturbation) || self.any_part(look.material, &|id| is_map(self.relief_of(id)))
+        is_map(binding.normal_perturbation) || self.any_part(binding.material, &|id| is_map(self.normal_perturbation_of(id)))
     }
 
     /// The material of a name, or the default.

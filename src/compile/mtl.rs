@@ -16,7 +16,7 @@ use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
 
 /// What a material of an MTL comes to.
 pub struct MtlBinding {
-    pub look: MaterialBinding,
+    pub binding: MaterialBinding,
     /// Light given off, if not black.
     pub emission: Option<Emission>,
 }
@@ -59,20 +59,20 @@ impl Builder {
         if !unused.is_empty() {
             tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.source.file.display(), mtl.name, unused.join(", "));
         }
-        let mut look = MaterialBinding::plain(self.materials.push(material));
+        let mut binding = MaterialBinding::plain(self.materials.push(material));
         // Glass lets through what it does not reflect.
         if !is_glass {
-            look.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
+            binding.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
         }
         let normal_perturbation = match (wanted(&maps.normal), wanted(&maps.bump)) {
-            (Some(map), _) => Some(self.relief_map(path, &map, true)?),
-            (None, Some(map)) => Some(self.relief_map(path, &map, false)?),
+            (Some(map), _) => Some(self.normal_or_bump_map(path, &map, true)?),
+            (None, Some(map)) => Some(self.normal_or_bump_map(path, &map, false)?),
             (None, None) => None,
         };
-        look.normal_perturbation = normal_perturbation.map(|normal_perturbation| self.materials.push_relief(normal_perturbation));
+        binding.normal_perturbation = normal_perturbation.map(|map| self.materials.push_normal_perturbation(map));
         let texture = emission.map(|map| self.emission_map(path, &map)).transpose()?;
         let emission = surface.radiance.map(|radiance| Emission { texture, ..Emission::constant(radiance) });
-        Ok(MtlBinding { look, emission })
+        Ok(MtlBinding { binding, emission })
     }
 
     fn map_texture(&mut self, path: &str, map: &ObjMap, wanted: TextureUse) -> Result<Bitmap> {
@@ -131,7 +131,7 @@ impl Builder {
     }
 
     /// A normal map, which `bump` may name too: then it is one with colours.
-    fn relief_map(&mut self, path: &str, map: &ObjMap, is_normal_map: bool) -> Result<NormalPerturbation> {
+    fn normal_or_bump_map(&mut self, path: &str, map: &ObjMap, is_normal_map: bool) -> Result<NormalPerturbation> {
         let bitmap = self.map_texture(path, map, TextureUse::Data)?;
         let holds_normals = is_normal_map || (map.channel.is_none() && !bitmap.image.is_grey());
         let bitmap = if holds_normals { Bitmap { channel: None, ..bitmap } } else { bitmap };

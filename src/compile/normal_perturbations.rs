@@ -10,23 +10,23 @@ use crate::normal_perturbation::NormalPerturbation;
 
 impl MaterialTable {
     /// Adds a normal or bump map.
-    pub(super) fn push_relief(&mut self, normal_perturbation: NormalPerturbation) -> NormalPerturbationId {
+    pub(super) fn push_normal_perturbation(&mut self, normal_perturbation: NormalPerturbation) -> NormalPerturbationId {
         self.normal_perturbations.push(normal_perturbation);
         NormalPerturbationId::new(self.normal_perturbations.len() - 1)
     }
 
     /// The normal or bump map of a material by itself.
-    pub(super) fn relief_of(&self, id: MaterialId) -> Option<NormalPerturbationId> {
+    pub(super) fn normal_perturbation_of(&self, id: MaterialId) -> Option<NormalPerturbationId> {
         self.by_material.get(&id).copied()
     }
 
     /// Normal and bump maps by material if some material has a part with one; none otherwise.
     pub(super) fn part_normal_perturbations(&self) -> Vec<Option<NormalPerturbationId>> {
         let mut parts = self.materials.iter().filter_map(Material::parts).flatten();
-        if !parts.any(|part| self.relief_of(part).is_some()) {
+        if !parts.any(|part| self.normal_perturbation_of(part).is_some()) {
             return Vec::new();
         }
-        (0..self.materials.len()).map(|i| self.relief_of(MaterialId::new(i))).collect()
+        (0..self.materials.len()).map(|i| self.normal_perturbation_of(MaterialId::new(i))).collect()
     }
 }
 

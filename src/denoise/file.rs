@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::file::exr_blocks::{Place, check_memory};
 use crate::file::exr_headers::read_headers;
 use crate::file::{self, write_atomically};
-use crate::film::{LayerInfo, Source};
+use crate::film::{LayerInfo, LayerSource};
 use crate::output::write_image;
 
 /// Names of layers that hold albedo, in lower case, the best first: ours, then those of Blender, pbrt, Mitsuba.
@@ -98,7 +98,7 @@ impl Plan {
         }
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
         let groups: Vec<_> = layers.all_of(color).filter(|(name, _)| last(name).starts_with(LIGHT_GROUP)).collect();
-        let is_kind = |name: &str| LayerInfo::ALL.iter().any(|info| matches!(info.source, Source::LightAov(_)) && info.name == last(name));
+        let is_kind = |name: &str| LayerInfo::ALL.iter().any(|info| matches!(info.source, LayerSource::LightAov(_)) && info.name == last(name));
         let kinds: Vec<_> = layers.all_of(color).filter(|(name, _)| is_kind(name)).collect();
         let mut sets = Vec::new();
         for (set, what) in [(groups, "light groups"), (kinds, "kinds of light")].into_iter().filter(|(set, _)| !set.is_empty()) {

@@ -4,7 +4,7 @@ use super::oidn::Triple;
 use super::prepared::Prepared;
 use super::{Denoiser, Report};
 use crate::error::Result;
-use crate::film::{Image, Layer, LayerInfo, LayerKind, LayerSet, Source};
+use crate::film::{Image, Layer, LayerInfo, LayerKind, LayerSet, LayerSource};
 
 /// The layers that help to denoise a picture.
 pub const FEATURE_LAYERS: [LayerKind; 2] = [LayerKind::FeatureAlbedo, LayerKind::FeatureNormal];
@@ -61,7 +61,7 @@ fn kinds_of_light(image: &Image) -> Vec<usize> {
 }
 
 fn is_kind_of_light(kind: LayerKind) -> bool {
-    matches!(LayerInfo::of(kind).source, Source::LightAov(_))
+    matches!(LayerInfo::of(kind).source, LayerSource::LightAov(_))
 }
 
 /// A layer's name in a file.

@@ -32,7 +32,7 @@ pub struct Place {
 
 /// Consecutive samples of a requested channel, in one row of the picture.
 #[derive(Clone, Copy, Debug)]
-pub struct Row<'a> {
+pub struct ChannelRow<'a> {
     /// Index into the channels requested.
     pub wanted: usize,
     /// The first sample's pixel: `y * width + x` in the part's data window.
@@ -41,7 +41,7 @@ pub struct Row<'a> {
     bytes: &'a [u8],
 }
 
-impl Row<'_> {
+impl ChannelRow<'_> {
     /// Writes the samples to the items of `to`, one after the other.
     pub fn write<'t, T: 't>(&self, to: impl Iterator<Item = &'t mut T>, convert: impl Fn(f32) -> T) {
         match self.sample_type {
@@ -104,7 +104,7 @@ pub fn read_rows(
     headers: &[Header],
     wanted: &[Place],
     every_part: bool,
-    mut keep: impl FnMut(Row),
+    mut keep: impl FnMut(ChannelRow),
 ) -> ExrResult<()> {
     let reader = exr::block::read(source, false)?;
     let shape = |headers: &[Header]| headers.iter().map(|header| (header.layer_size, header.channels.list.len())).collect::<Vec<_>>();
@@ -130,7 +130,7 @@ pub fn read_rows(
             let at = line.location;
             for &wanted in &uses[part][at.channel] {
                 let start = at.position.y() * header.layer_size.width() + at.position.x();
-                keep(Row { wanted, start, sample_type: header.channels.list[at.channel].sample_type, bytes: line.value });
+                keep(ChannelRow { wanted, start, sample_type: header.channels.list[at.channel].sample_type, bytes: line.value });
             }
         }
         Ok(())

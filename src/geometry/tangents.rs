@@ -9,7 +9,7 @@ use crate::math::Vec3;
 pub type CornerTangents = [[f32; 4]; 3];
 
 /// What the algorithm reads and writes.
-struct Source<'a> {
+struct TangentSpaceInput<'a> {
     positions: &'a [[f32; 3]],
     normals: Option<&'a [[f32; 3]]>,
     uvs: &'a [[f32; 2]],
@@ -17,13 +17,13 @@ struct Source<'a> {
     tangents: Vec<CornerTangents>,
 }
 
-impl Source<'_> {
+impl TangentSpaceInput<'_> {
     fn vertex(&self, face: usize, corner: usize) -> usize {
         self.triangles[face][corner] as usize
     }
 }
 
-impl bevy_mikktspace::Geometry for Source<'_> {
+impl bevy_mikktspace::Geometry for TangentSpaceInput<'_> {
     fn num_faces(&self) -> usize {
         self.triangles.len()
     }
@@ -62,7 +62,7 @@ pub(super) fn corner_tangents(
     uvs: &[[f32; 2]],
     triangles: &[[u32; 3]],
 ) -> Option<Vec<CornerTangents>> {
-    let mut source = Source { positions, normals, uvs, triangles, tangents: vec![[[0.0; 4]; 3]; triangles.len()] };
+    let mut source = TangentSpaceInput { positions, normals, uvs, triangles, tangents: vec![[[0.0; 4]; 3]; triangles.len()] };
     bevy_mikktspace::generate_tangents(&mut source).ok()?;
     Some(source.tangents)
 }

@@ -16,7 +16,7 @@ mod tile_renderer;
 pub use driver::RenderSession;
 pub use exr_overrides::ExrOverrides;
 pub use progress::{Progress, Silent};
-pub use provenance::{Frame, RenderProvenance};
+pub use provenance::{RenderProvenance, SequenceFrame};
 pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings, threads};
 pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 

@@ -45,7 +45,7 @@ pub struct RenderProvenance {
     pub allow_missing: bool,
     /// The frame of a sequence that a single scene file holds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frame: Option<Frame>,
+    pub frame: Option<SequenceFrame>,
     /// What the picture depends on beside the scene.
     pub settings: Settings,
     /// Whether the picture was denoised, with the denoiser's own defaults.
@@ -59,7 +59,7 @@ pub struct RenderProvenance {
 /// A frame of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Frame {
+pub struct SequenceFrame {
     /// Its number.
     pub number: i64,
     /// Frames in a second.
@@ -197,7 +197,7 @@ mod tests {
         let desc = serde_json::from_str(r#"{ "camera": {}, "film": { "width": 40, "height": 30 } }"#).unwrap();
         let settings = Settings::new(&desc, &Overrides::default()).unwrap();
         let provenance = RenderProvenance::new(Path::new("s.json"), SceneFingerprint::default(), &settings, Vec::new());
-        RenderProvenance { output: Some(OutputDesc::new("a.exr")), frame: Some(Frame { number: 3, per_second: 24.0 }), ..provenance }
+        RenderProvenance { output: Some(OutputDesc::new("a.exr")), frame: Some(SequenceFrame { number: 3, per_second: 24.0 }), ..provenance }
             .to_value()
     }
 
@@ -221,7 +221,7 @@ mod tests {
         let provenance = RenderProvenance::from_value(provenance(), Path::new("a.exr")).unwrap();
         let of_frame = |number: i64| {
             let settings = Settings { seed: 5u64.wrapping_add_signed(number), ..provenance.settings.clone() };
-            RenderProvenance { frame: Some(Frame { number, per_second: 24.0 }), settings, ..provenance.clone() }.of_frame(number)
+            RenderProvenance { frame: Some(SequenceFrame { number, per_second: 24.0 }), settings, ..provenance.clone() }.of_frame(number)
         };
         let differences = |own: &RenderProvenance, output: &OutputDesc| own.differences(&of_frame(-7), output);
         let output = OutputDesc::new("b.exr");

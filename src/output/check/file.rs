@@ -9,7 +9,7 @@ use exr::meta::header::Header;
 use super::crypto_pixels;
 use crate::error::{Error, Result};
 use crate::file;
-use crate::file::exr_blocks::{Place, Row, allocate, read_rows};
+use crate::file::exr_blocks::{ChannelRow, Place, allocate, read_rows};
 use crate::file::exr_headers::read_headers;
 use crate::output::role::Role;
 
@@ -45,7 +45,7 @@ impl ExrFile {
             let wanted = crypto_pixels::places(&file);
             let plane = |place: &Place| allocate(path, &file.headers[place.part], 1, 0.0);
             let mut planes = wanted.iter().map(plane).collect::<Result<Vec<Vec<f32>>>>()?;
-            let keep = |row: Row| row.write(planes[row.wanted][row.start..].iter_mut(), |v| v);
+            let keep = |row: ChannelRow| row.write(planes[row.wanted][row.start..].iter_mut(), |v| v);
             match read_rows(BufReader::new(source), &file.headers, &wanted, true, keep) {
                 // With an unsupported compression, the headers can still be checked.
                 Err(exr::error::Error::NotSupported(_)) => {}

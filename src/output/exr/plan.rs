@@ -4,7 +4,7 @@ use exr::compression::Compression;
 
 use crate::desc::{CompressionDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc};
 use crate::error::{Error, Result};
-use crate::film::{LayerInfo, Source};
+use crate::film::{LayerInfo, LayerSource};
 use crate::output::role::Role;
 
 /// Ranks of Cryptomatte by default.
@@ -123,7 +123,7 @@ fn is_lossy(compression: CompressionDesc) -> bool {
 
 fn is_data(layer: LayerKind) -> bool {
     let info = LayerInfo::of(layer);
-    matches!(info.source, Source::Coverage) || info.channels.iter().any(|name| Role::of(name).is_data())
+    matches!(info.source, LayerSource::Coverage) || info.channels.iter().any(|name| Role::of(name).is_data())
 }
 
 fn layer_name(layer: LayerKind) -> &'static str {

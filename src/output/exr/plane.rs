@@ -19,7 +19,7 @@ pub struct Plane {
 }
 
 /// Where values are taken from: pixels whose channels lie side by side.
-pub struct Source<'a> {
+pub struct SampleSource<'a> {
     /// Full names of the channels, in the order of the data.
     pub names: Vec<String>,
     /// Values, pixel by pixel.
@@ -54,8 +54,8 @@ impl Region {
 }
 
 /// The channels of all sources, in parallel. Numbers beyond what 16 bits hold become their largest, 65504.
-pub fn planes(sources: &[Source], region: Region) -> Vec<Plane> {
-    let jobs: Vec<(&Source, usize)> = sources.iter().flat_map(|source| (0..source.names.len()).map(move |i| (source, i))).collect();
+pub fn planes(sources: &[SampleSource], region: Region) -> Vec<Plane> {
+    let jobs: Vec<(&SampleSource, usize)> = sources.iter().flat_map(|source| (0..source.names.len()).map(move |i| (source, i))).collect();
     jobs.into_par_iter()
         .map(|(source, i)| {
             let name = source.names[i].clone();

@@ -9,7 +9,7 @@ use exr::prelude::Vec2;
 use super::metadata::{SETTINGS, text};
 use crate::error::{Error, Result};
 use crate::file;
-use crate::file::exr_blocks::{Place, Row, allocate, read_rows};
+use crate::file::exr_blocks::{ChannelRow, Place, allocate, read_rows};
 use crate::file::exr_headers::read_headers;
 use crate::film::{Crop, Image, Layer, LayerKind};
 
@@ -42,7 +42,7 @@ pub fn read_exr(path: &Path) -> Result<Image> {
         components.push(component);
     }
     let mut data = allocate(path, header, 4, 1.0)?;
-    let keep = |row: Row| row.write(data[4 * row.start + components[row.wanted]..].iter_mut().step_by(4), |v| v);
+    let keep = |row: ChannelRow| row.write(data[4 * row.start + components[row.wanted]..].iter_mut().step_by(4), |v| v);
     read_rows(BufReader::new(source), &headers, &wanted, false, keep).map_err(|e| malformed(e.to_string()))?;
     let (size, crop) = windows(&header.shared_attributes.display_window, header.own_attributes.layer_position, header.layer_size);
     Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() })

@@ -200,7 +200,7 @@ fn full_picture() -> Image {
     // A quarter torus, half bunny in every pixel; the rest shows nothing.
     let weights = vec![(key(0), 1.0), (key(1), 2.0), (ShapeKey::NONE, 1.0)];
     let mut layers = Vec::new();
-    for info in LayerInfo::ALL.iter().filter(|info| !matches!(info.source, crate::film::Source::Coverage)) {
+    for info in LayerInfo::ALL.iter().filter(|info| !matches!(info.source, crate::film::LayerSource::Coverage)) {
         let data: Vec<f32> = (0..pixels * info.channels.len()).map(|i| (i % 101) as f32 / 64.0).collect();
         let groups: &[Option<&str>] = if info.kind == LayerKind::LightGroups { &[Some("key light"), Some("default")] } else { &[None] };
         layers.extend(groups.iter().map(|group| Layer { kind: info.kind, group: group.map(str::to_owned), data: data.clone() }));

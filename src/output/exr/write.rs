@@ -12,7 +12,7 @@ use super::coverage::{self, Matte};
 use super::metadata::{Common, Mattes, part_attributes, text};
 use super::names::{channel_name, motion_channels, plain_word};
 use super::plan::{self, PartKind};
-use super::plane::{Plane, Region, Source, planes};
+use super::plane::{Plane, Region, SampleSource, planes};
 use crate::desc::{CryptoManifestDesc, ExrProfileDesc, OutputDesc};
 use crate::error::Result;
 use crate::film::{Crop, Identities, Image, Layer, LayerInfo, LayerKind, LayerSet};
@@ -76,7 +76,7 @@ impl Windows {
 
 /// What goes into a file.
 struct Contents<'a> {
-    sources: Vec<Source<'a>>,
+    sources: Vec<SampleSource<'a>>,
     mattes: Vec<Matte>,
     texts: Vec<(String, String)>,
     /// Descriptions of layers, by the part that they go to.
@@ -115,11 +115,11 @@ impl<'a> Contents<'a> {
             if names.len() == 2 { vec![x, y] } else { halves.to_vec() }
         });
         self.comments.push((PartKind::Utility, comment));
-        self.sources.push(Source { names: names.iter().map(|name| (*name).to_owned()).collect(), data: data.collect(), half: false });
+        self.sources.push(SampleSource { names: names.iter().map(|name| (*name).to_owned()).collect(), data: data.collect(), half: false });
     }
 
     fn add_covered(&mut self, wanted: LayerSet, coverage: &crate::film::Coverage, identities: &Identities, output: &OutputDesc) {
-        for layer in wanted.iter().filter(|layer| matches!(layer.source, crate::film::Source::Coverage)) {
+        for layer in wanted.iter().filter(|layer| matches!(layer.source, crate::film::LayerSource::Coverage)) {
             if let Some(mut matte) = coverage::matte(layer.kind, coverage, identities, plan::crypto_depth(output)) {
                 self.add(layer.kind, matte.channels.clone(), Cow::Owned(std::mem::take(&mut matte.data)), output);
                 self.mattes.push(matte);
@@ -137,7 +137,7 @@ impl<'a> Contents<'a> {
             self.comments.push((part, LayerInfo::of(kind).comment));
         }
         let names = names.iter().map(|name| channel_name(output.profile, name)).collect();
-        self.sources.push(Source { names, data, half: plan::is_half(output, kind) });
+        self.sources.push(SampleSource { names, data, half: plan::is_half(output, kind) });
     }
 }
 

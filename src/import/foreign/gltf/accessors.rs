@@ -6,7 +6,7 @@ use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, accessor};
 
-use super::Source;
+use super::GltfSource;
 use crate::error::Result;
 
 /// The elements of an accessor.
@@ -88,7 +88,7 @@ pub enum Wanted {
     Indices,
 }
 
-impl<'a> Source<'a> {
+impl<'a> GltfSource<'a> {
     /// The elements of an accessor that `path` names, which must be of one of these types.
     pub fn column(&self, path: &str, index: Index<accessor::Accessor>, types: &[Type], wanted: Wanted) -> Result<Column<'a>> {
         let place = format!("{path} (accessors[{}])", index.value());

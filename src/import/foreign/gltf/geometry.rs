@@ -5,7 +5,7 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, accessor};
 
-use super::Source;
+use super::GltfSource;
 use super::accessors::{Column, Wanted};
 use super::skins;
 use crate::assets::MeshData;
@@ -54,7 +54,7 @@ pub fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Index<acce
 }
 
 /// Reads the triangles of a primitive; `None` if there are none.
-pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation: Deformation) -> Result<Option<Triangles>> {
+pub fn triangles(source: GltfSource, path: &str, primitive: &Primitive, deformation: Deformation) -> Result<Option<Triangles>> {
     let Some(positions) = attribute(primitive, Semantic::Positions) else {
         return Err(source.fault(path, "has no positions"));
     };
@@ -92,7 +92,7 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
 
 impl Triangles {
     /// Reads the uv of one set, if the primitive has it.
-    pub fn read_uvs(&mut self, source: Source, path: &str, primitive: &Primitive, set: u32) -> Result<()> {
+    pub fn read_uvs(&mut self, source: GltfSource, path: &str, primitive: &Primitive, set: u32) -> Result<()> {
         let name = format!("TEXCOORD_{set}");
         let reader = PrimitiveReader { source, path, primitive, count: self.count };
         let uvs = reader.column(&name, Semantic::TexCoords(set), &[Type::Vec2], Wanted::Floats)?;
@@ -105,7 +105,7 @@ impl Triangles {
 
 /// Reads the data of a primitive with `count` vertices.
 struct PrimitiveReader<'a, 'p> {
-    source: Source<'a>,
+    source: GltfSource<'a>,
     path: &'p str,
     primitive: &'p Primitive,
     count: usize,

@@ -31,13 +31,13 @@ use crate::error::{Error, Result};
 
 /// What is read: the JSON and its buffers.
 #[derive(Clone, Copy, Debug)]
-struct Source<'a> {
+struct GltfSource<'a> {
     file: &'a Path,
     root: &'a Root,
     buffers: &'a Buffers<'a>,
 }
 
-impl Source<'_> {
+impl GltfSource<'_> {
     /// An error at a place in the JSON.
     fn fault(&self, path: &str, message: impl Into<String>) -> Error {
         Error::Scene { file: self.file.into(), path: path.into(), message: message.into() }
@@ -52,7 +52,7 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     let document = document::parse(path, &bytes)?;
     let buffers = Buffers::load(path, &document.root, document.bin)?;
-    let source = Source { file: path, root: &document.root, buffers: &buffers };
+    let source = GltfSource { file: path, root: &document.root, buffers: &buffers };
 
     let mut draft = Draft::of_files(&buffers.files);
     document::report_extensions(source.root, &mut draft);

@@ -30,7 +30,7 @@ use std::path::Path;
 
 use super::{Draft, ImportOptions, Imported};
 use crate::error::Result;
-use bsdfs::Look;
+use bsdfs::BsdfBinding;
 use textures::{Role, TextureValue, UvOrigin};
 use tree::{Document, PluginId, Value};
 
@@ -42,7 +42,7 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
         scene: path,
         draft: Draft::of_files(&document.files),
         textures: BTreeMap::new(),
-        looks: BTreeMap::new(),
+        bindings: BTreeMap::new(),
         surfaces: BTreeMap::new(),
         groups: BTreeMap::new(),
         reliefs: BTreeSet::new(),
@@ -61,7 +61,7 @@ struct Reader<'a> {
     /// What textures have become.
     textures: BTreeMap<(PluginId, Role, UvOrigin), TextureValue>,
     /// What BSDFs have become.
-    looks: BTreeMap<(PluginId, UvOrigin), Look>,
+    bindings: BTreeMap<(PluginId, UvOrigin), BsdfBinding>,
     /// The materials of shapes with these BSDFs.
     surfaces: BTreeMap<(PluginId, UvOrigin), String>,
     /// Objects of shape groups; none where a group is empty.

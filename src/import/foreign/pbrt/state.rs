@@ -41,9 +41,9 @@ impl Ctm {
     }
 }
 
-/// What a shape looks like.
+/// The material of a shape.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Look {
+pub(crate) enum ShapeMaterial {
     /// A material of the scene.
     Material(Material),
     /// Nothing: a boundary of media only.
@@ -70,8 +70,8 @@ pub struct Graphics {
     pub active: [bool; 2],
     /// Whether surfaces' fronts are turned.
     pub reverse_orientation: bool,
-    /// What shapes look like; `None` is pbrt's default, diffuse of 0.5.
-    pub look: Option<Rc<Look>>,
+    /// The material of shapes; `None` is pbrt's default, diffuse of 0.5.
+    pub material: Option<Rc<ShapeMaterial>>,
     /// What shapes emit.
     pub area_light: Option<Rc<AreaLight>>,
     /// Of `rgb` parameters.
@@ -86,7 +86,7 @@ impl Default for Graphics {
             ctm: Ctm::default(),
             active: [true; 2],
             reverse_orientation: false,
-            look: None,
+            material: None,
             area_light: None,
             color_space: ColorSpace::default(),
             attributes: Rc::default(),
