@@ -101,7 +101,7 @@ fn many_threads_get_the_answers_of_one() {
 }
 
 #[test]
-fn embree_tells_its_name_and_memory() {
+fn embree_reports_its_name_and_memory() {
     let info = EmbreeInfo::query().expect("a device");
     assert_eq!(info.version.split('.').count(), 3, "{info:?}");
     let geometry = meshes(vec![soup(&mut Rng::new(17), 10_000, 0.1)]);

@@ -343,7 +343,7 @@ impl Progress for Warnings {
 }
 
 #[test]
-fn a_checkpoint_that_cannot_be_written_is_told_and_ends_nothing() {
+fn a_checkpoint_that_cannot_be_written_is_reported_and_ends_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let inner = folder.path().join("inner");
     std::fs::create_dir(&inner).unwrap();

@@ -322,8 +322,8 @@ fn the_program_denoises_renders_and_files() {
     assert!(run(root, "render room.json --float --layers feature_albedo,feature_normal,light_groups -o n.0003.exr").status.success());
     let done = run(root, "denoise n.####.exr d.####.exr -o d.####.png --json");
     assert!(done.status.success() && root.join("d.0003.png").exists(), "{}", stderr(&done));
-    let told: Value = serde_json::from_slice(&done.stdout).unwrap();
-    assert_eq!(told["layers"], json!(["color", "light_cool", "light_default", "light_warm"]));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(report["layers"], json!(["color", "light_cool", "light_default", "light_warm"]));
     let [one, two] = ["one.exr", "d.0003.exr"].map(|name| output::read_exr(&root.join(name)).unwrap());
     assert!(one.layers[0].data == two.layers[0].data);
 }

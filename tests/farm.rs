@@ -88,8 +88,8 @@ impl Farm {
 #[test]
 fn a_job_is_submitted_as_arrays_and_the_merges_that_wait_for_them() {
     let farm = Farm::new();
-    let told = farm.job("--shards 3 --frames 7-8 -o out.exr --submit -- --spp 5");
-    assert_eq!(told, "frame 7: array 41, merge 42\nframe 8: array 43, merge 44\n");
+    let printed = farm.job("--shards 3 --frames 7-8 -o out.exr --submit -- --spp 5");
+    assert_eq!(printed, "frame 7: array 41, merge 42\nframe 8: array 43, merge 44\n");
     let (folder, calls) = (farm.path().display().to_string(), farm.calls());
     let lines: Vec<&str> = calls.lines().collect();
     assert_eq!(lines[0], format!("sbatch --parsable --array=1-3 {folder}/room.farm/render.sh 7"));

@@ -133,7 +133,7 @@ fn glass_ball(shape: Value) -> Image {
 }
 
 #[test]
-fn glass_of_revolution_knows_its_inside() {
+fn glass_of_revolution_has_a_consistent_inside() {
     // The same ball as a sphere and as a turned profile; one that always reports its outside would never let light out as it came in.
     let sphere = glass_ball(json!({ "type": "sphere" }));
     let turned = glass_ball(json!({ "type": "revolution", "profile": { "bezier": BALL } }));

@@ -87,7 +87,7 @@ fn images_stand_upright() {
 }
 
 #[test]
-fn transforms_move_images_as_the_extension_says() {
+fn transforms_move_images_by_the_extension() {
     let map = [RED, GREEN, BLUE, [255, 255, 255, 255]];
     let white = map[3];
     let moved = |transform: Value, expected: [[u8; 4]; 4]| {

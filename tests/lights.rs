@@ -14,7 +14,7 @@ use crate::util::render::{AssertIs, Estimate, assert_irradiance, floor_probe, me
 const LAMP: &str = "IESNA:LM-63-2002\n[TEST] none\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10 6 0\n";
 
 #[test]
-fn a_measured_light_shines_as_its_file_says() {
+fn a_measured_light_has_the_intensity_of_its_file() {
     let folder = Folder::new();
     let file = folder.write("lamp.ies", LAMP);
     let lamp = |turned: f64| json!([{ "type": "ies", "file": file, "position": [0, 1, 0], "intensity": [0.5, 0.5, 0.5], "rotation_degrees": turned }]);

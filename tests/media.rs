@@ -322,7 +322,7 @@ fn a_lamp_in_a_medium_is_as_bright_by_every_strategy() {
 }
 
 #[test]
-fn a_camera_knows_the_media_it_stands_in() {
+fn a_camera_starts_in_the_media_around_it() {
     // Indices of 1: the sky is as bright as what is left on the way out. One sphere in another and a camera in both, in a gap, in one.
     let materials = json!({
         "a": { "type": "dielectric", "ior": 1, "absorption": { "color": RED } },
@@ -384,7 +384,7 @@ fn a_relief_leaves_the_medium_within() {
 }
 
 #[test]
-fn a_prism_parts_colours_as_snells_law_says() {
+fn a_prism_parts_colours_by_snells_law() {
     // A ray meets a wedge of 30 degrees: each colour leaves it by its own angle, and lamps wait where red and blue go.
     let (ior, abbe) = (1.6f64, 10.0f64);
     let inverse_square = |nm: f64| (1000.0 / nm).powi(2);

@@ -360,7 +360,7 @@ fn creases_are_edges_and_what_is_flatter_is_smooth() {
 
 /// Which part of a mix a ray meets and whose normals it sees are one choice, on two-sided surfaces and in mixes of mixes too.
 #[test]
-fn a_part_of_a_mix_brings_its_relief_along() {
+fn a_part_of_a_mix_keeps_its_relief() {
     let folder = Folder::new();
     save_normal(&folder, [0.6, 0.0, 0.8]);
     let materials = json!({

@@ -144,7 +144,7 @@ fn comments_fit_on_their_lines() {
 }
 
 #[test]
-fn unsafe_stays_in_its_home_and_says_why() {
+fn unsafe_stays_in_its_home_with_a_reason() {
     let mut faults = Vec::new();
     for source in sources(&["src"]) {
         let lines: Vec<&str> = source.text.lines().collect();

@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn files_and_options_are_told_apart() {
+    fn files_and_options_are_distinguished() {
         let plain = maps("  map_Kd wall.png").diffuse.unwrap();
         assert_eq!((plain.file, plain.scale, plain.clamp), ("textures/wall.png".into(), [1.0; 2], false));
         let all = maps("map_Kd -blendu on -s 2 3 1 -o 0.5 -clamp on -imfchan r -mm 0 1 old\\my wall.png").diffuse.unwrap();

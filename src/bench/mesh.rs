@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn meshes_have_the_number_of_triangles_that_was_asked_for() {
+    fn meshes_have_the_requested_number_of_triangles() {
         for count in [968, 1_000, 10_000, 70_000, 100_000] {
             assert_eq!(bumpy_sphere(count).triangles().len(), count);
         }

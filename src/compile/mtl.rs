@@ -23,7 +23,7 @@ pub struct MtlBinding {
 
 impl Builder {
     /// The material of the faces with a material of an OBJ file; maps need uv. `path` is the shape, `file` the OBJ.
-    pub(super) fn mtl_look(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlBinding> {
+    pub(super) fn mtl_binding(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlBinding> {
         let maps = &mtl.maps;
         let every = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity, &maps.specular, &maps.emission];
         let has_maps = every.iter().any(|map| map.is_some());

@@ -163,7 +163,7 @@ impl Builder {
             let has_uvs = loaded.data.uvs.is_some();
             if let Some(mtl) = &loaded.material {
                 identity.material = self.identities.name(&mtl.name);
-                let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
+                let from_mtl = self.mtl_binding(path, desc.file.as_deref(), mtl, has_uvs)?;
                 // The shape's own keys override the MTL.
                 let given = if desc.opacity.is_some() { binding.opacity } else { from_mtl.binding.opacity };
                 binding = MaterialBinding { opacity: given, ..from_mtl.binding };

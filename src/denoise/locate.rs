@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn without_python_the_message_says_so() {
+    fn without_python_the_message_names_it() {
         let text = message(open_first(None, &ProcessEnvironment::default(), refuse(&mut Vec::new())));
         assert!(text.contains("where the system keeps libraries, in Python's packages, of which there are none"), "{text}");
     }

@@ -24,14 +24,14 @@ impl<'d> Prepared<'d> {
     pub fn new(denoiser: &'d Denoiser, size: [usize; 2], albedo: Option<Vec<Triple>>, normal: Option<Vec<Triple>>) -> Result<Self> {
         let report = Report { version: denoiser.version(), ..Report::default() };
         let mut prepared = Self { denoiser, size, albedo: None, normal: None, report, start: Instant::now() };
-        let says_something = |pixels: &Vec<Triple>| pixels.as_flattened().iter().any(|v| *v != 0.0);
-        let Some(mut albedo) = albedo.filter(says_something) else { return Ok(prepared) };
+        let is_not_black = |pixels: &Vec<Triple>| pixels.as_flattened().iter().any(|v| *v != 0.0);
+        let Some(mut albedo) = albedo.filter(is_not_black) else { return Ok(prepared) };
         prepared.clean(&mut albedo);
         albedo.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
         prepared.albedo = Some(prepared.filter(Inputs { albedo: Some(&albedo), ..Inputs::default() })?);
         prepared.report.features = Features::Albedo;
         drop(albedo);
-        if let Some(mut normal) = normal.filter(says_something) {
+        if let Some(mut normal) = normal.filter(is_not_black) {
             prepared.clean(&mut normal);
             normal.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(-1.0, 1.0));
             prepared.normal = Some(prepared.filter(Inputs { normal: Some(&normal), ..Inputs::default() })?);

@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn scripts_say_what_was_asked() {
+    fn scripts_hold_the_requested_options() {
         let options = SlurmOptions {
             partition: Some("farm".to_owned()),
             time: Some("2:00:00".to_owned()),

@@ -41,8 +41,8 @@ impl Integrator for Whitted {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
         let (world, Workspace { out, counts, .. }) = (pass.world, workspace);
         counts.camera += samples.len() as u64;
-        let wants_surface = self.needs != SurfaceAovs::default();
-        out.reset(samples.len(), wants_surface, self.light_aovs);
+        let needs_surface = self.needs != SurfaceAovs::default();
+        out.reset(samples.len(), needs_surface, self.light_aovs);
         for (i, sample) in samples.iter().enumerate() {
             let sample = &sample;
             let in_media = world.scene.features.media;
@@ -53,7 +53,7 @@ impl Integrator for Whitted {
                 counts.camera += 1 + world.skip_emitters(&mut ray, hit).1;
             }
             let segment = Segment::trace(world, ray, pass.render.camera_cone(&ray), current, counts);
-            if wants_surface {
+            if needs_surface {
                 out.surfaces[i] = match &segment.end {
                     Some(at) => {
                         let first = FirstSurface { ray: &segment.ray, hit: segment.hit.as_ref(), at };

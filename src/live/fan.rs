@@ -40,8 +40,8 @@ impl Progress for Fan<'_> {
         self.listeners.iter().for_each(|listener| listener.warn(message));
     }
 
-    fn wants_picture(&self) -> bool {
-        self.listeners.iter().any(|listener| listener.wants_picture())
+    fn needs_picture(&self) -> bool {
+        self.listeners.iter().any(|listener| listener.needs_picture())
     }
 
     fn picture(&self, image: &Image, spp: u32) {

@@ -26,7 +26,7 @@ impl Pace {
     }
 
     /// Whether the next picture may be made; if so, this is when it was requested.
-    pub fn may_ask(&self) -> bool {
+    pub fn may_request(&self) -> bool {
         let (now, mut state) = (Instant::now(), self.lock());
         let is_due = state.next.is_none_or(|next| now >= next);
         if is_due {
@@ -50,18 +50,18 @@ mod tests {
     #[test]
     fn dear_pictures_are_rare() {
         let pace = Pace::default();
-        assert!(pace.may_ask());
+        assert!(pace.may_request());
         std::thread::sleep(Duration::from_millis(50));
         let end = Instant::now();
         pace.made();
-        assert!(end.elapsed() > Duration::from_millis(900) || !pace.may_ask());
-        while !pace.may_ask() {
+        assert!(end.elapsed() > Duration::from_millis(900) || !pace.may_request());
+        while !pace.may_request() {
             std::thread::sleep(Duration::from_millis(1));
         }
         assert!(end.elapsed() >= Duration::from_millis(50) * (SHARE - 1));
         // One without a request costs nothing.
         let pace = Pace::default();
         pace.made();
-        assert!(pace.may_ask());
+        assert!(pace.may_request());
     }
 }

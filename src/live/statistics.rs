@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_follow_what_the_render_tells() {
+    fn numbers_follow_the_progress_of_the_render() {
         let statistics = Statistics::new(None);
         assert_eq!((statistics.numbers().spp, statistics.numbers().error), (0.0, None));
         statistics.start(8, 100);

@@ -188,7 +188,7 @@ impl Driver<'_> {
         if let Some(checkpoints) = &mut self.checkpoints {
             self.pool.install(|| checkpoints.pass_done(state, elapsed, next, progress));
         }
-        if progress.wants_picture() {
+        if progress.needs_picture() {
             progress.picture(&state.picture(self.session.settings), state.done);
         }
     }

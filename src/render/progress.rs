@@ -25,7 +25,7 @@ pub trait Progress: Sync {
     }
 
     /// Whether a picture of the samples so far is needed: called between passes. Making one takes time.
-    fn wants_picture(&self) -> bool {
+    fn needs_picture(&self) -> bool {
         false
     }
 

@@ -35,7 +35,7 @@ pub fn run(folder: &Path, arguments: &str) -> Output {
 }
 
 /// What the program printed to stderr.
-pub fn told(output: &Output) -> String {
+pub fn stderr_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 

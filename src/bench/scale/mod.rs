@@ -61,13 +61,13 @@ pub fn bench_scale(
 fn in_a_process(mut program: Command, case: &Case, stop: &AtomicBool) -> Result<Option<Measured>> {
     let failed = |message: String| Error::Internal(message);
     let case = serde_json::to_string(case).map_err(|e| failed(e.to_string()))?;
-    let Some(Ended { status, said, complained, .. }) = child::run(&mut program, Some(&case), stop).map_err(failed)? else {
+    let Some(Ended { status, stdout, stderr, .. }) = child::run(&mut program, Some(&case), stop).map_err(failed)? else {
         return Ok(None);
     };
     if !status.success() {
-        return Err(failed(format!("{status}: {complained}")));
+        return Err(failed(format!("{status}: {stderr}")));
     }
-    serde_json::from_str(&said).map(Some).map_err(|e| failed(format!("no answer: {e}")))
+    serde_json::from_str(&stdout).map(Some).map_err(|e| failed(format!("no result: {e}")))
 }
 
 #[cfg(test)]

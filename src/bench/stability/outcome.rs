@@ -119,7 +119,7 @@ impl Outcome {
 
     /// A number without a bound.
     #[must_use]
-    pub fn tell(self, what: impl Into<String>, value: f64) -> Self {
+    pub fn record(self, what: impl Into<String>, value: f64) -> Self {
         self.with(what, value, Bound::Any)
     }
 

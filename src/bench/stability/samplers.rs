@@ -227,7 +227,7 @@ fn s6_decorrelation(effort: Effort) -> Outcome {
         let limit = -Normal::standard().inverse_cdf(0.5 * sidak_level(found.len()));
         outcome = outcome
             .at_most(format!("largest of {} correlations in 1 / sqrt({count}), {kind:?}", found.len()), largest, limit)
-            .tell(format!("their root mean square, {kind:?}"), mean_square.sqrt());
+            .record(format!("their root mean square, {kind:?}"), mean_square.sqrt());
     }
     outcome
 }
@@ -329,5 +329,5 @@ fn s8_seeds_and_counts(effort: Effort) -> Outcome {
             p_values.iter().copied().fold(1.0, f64::min),
             sidak_level(p_values.len()),
         )
-        .tell("largest relative error of a mean", relative)
+        .record("largest relative error of a mean", relative)
 }

@@ -292,7 +292,7 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
         .none("other triangles than the ray meets, ours", wrong)
         // Corners less the origin have one unit of roundoff, the edge functions made of them up to seven more.
         .at_most("embree: distance of the ray from the triangle found, units of roundoff of the origin", off, 8.0)
-        .tell("embree: fraction with another triangle than aimed at", other as f64 / f64::from(rays))
+        .record("embree: fraction with another triangle than aimed at", other as f64 / f64::from(rays))
         .short("Embree forms edge functions in f32 from corners less the origin, which are 0.03 units off at 1e6; the catalogue asks for 99.998 % right, which f32 rays cannot name")
 }
 

@@ -54,7 +54,7 @@ struct State {
     last_percent: Option<u64>,
     /// What the picture's error is and is to be.
     errors: Option<[f64; 2]>,
-    stop_told: bool,
+    stop_reported: bool,
     bar: Option<ProgressBar>,
 }
 
@@ -81,7 +81,7 @@ impl Reporter {
             last: None,
             last_percent: None,
             errors: None,
-            stop_told: false,
+            stop_reported: false,
             bar: None,
         };
         let format = format.or_else(|| ProgressFormat::by_name("plain")).unwrap_or(&steradian::farm::FORMATS[0]);
@@ -157,8 +157,8 @@ impl Reporter {
         if state.last.is_some_and(|last| now - last < period) {
             return;
         }
-        if !state.stop_told && self.stop.get().is_some_and(|stop| stop.load(Ordering::Relaxed)) {
-            state.stop_told = true;
+        if !state.stop_reported && self.stop.get().is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            state.stop_reported = true;
             self.say("interrupted: finishing the samples under way; interrupt again to leave at once");
         }
         let mut status = status(state, self.done.load(Ordering::Relaxed), now);

@@ -66,8 +66,8 @@ impl ImportReport {
     pub fn kinds(&self) -> (Vec<String>, Vec<String>) {
         let mut kinds: BTreeMap<(Reverse<Outcome>, String), (usize, &str)> = BTreeMap::new();
         let mut whole = BTreeSet::new();
-        let is_told = |entry: &&ReportEntry| entry.outcome != Outcome::Mapped && entry.note != PART_OF_IGNORED;
-        for entry in self.entries.iter().filter(is_told) {
+        let is_listed = |entry: &&ReportEntry| entry.outcome != Outcome::Mapped && entry.note != PART_OF_IGNORED;
+        for entry in self.entries.iter().filter(is_listed) {
             let kind: Vec<&str> = entry.element.split(" \"").take(1).collect();
             let what =
                 [&kind.concat(), entry.parameter.as_str()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(": ");

@@ -104,7 +104,7 @@ enum Form {
 }
 
 /// A point of an emitter as seen from another point.
-struct SurfaceSample {
+struct EmitterSample {
     p: DVec3,
     /// Unit normal, towards the front.
     n: Vec3,
@@ -114,7 +114,7 @@ struct SurfaceSample {
     pdf: f32,
 }
 
-impl SurfaceSample {
+impl EmitterSample {
     /// The point `q` with the unit normal `n`, found with a density per area, as seen from `p`; `None` if it is seen edge-on.
     #[inline]
     fn from_area(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> Option<Self> {
@@ -216,7 +216,7 @@ impl AreaLight {
 
     /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where `p` sees the dark side.
     #[inline(always)]
-    fn sample_surface(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(SurfaceSample, f32)> {
+    fn sample_surface(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(EmitterSample, f32)> {
         let both = self.emission.two_sided;
         Some(match &self.form {
             Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
@@ -225,7 +225,7 @@ impl AreaLight {
             Form::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
                 let point = placed.sample_area(u);
-                let sample = SurfaceSample::from_area(p, point.p, point.n.as_dvec3(), point.pdf_area)?;
+                let sample = EmitterSample::from_area(p, point.p, point.n.as_dvec3(), point.pdf_area)?;
                 if !both && sample.wi.dot(sample.n) >= 0.0 {
                     return None;
                 }
@@ -237,7 +237,7 @@ impl AreaLight {
 
     /// A point of a triangle and its error; out of the way of rectangles and spheres.
     #[inline(never)]
-    fn sample_triangle(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(SurfaceSample, f32)> {
+    fn sample_triangle(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(EmitterSample, f32)> {
         let triangle = self.triangle(geometry)?;
         let seen = self.emission.two_sided || triangle.sees_front(p);
         Some((triangle.sample(p, u).filter(|_| seen)?, triangle.error))
@@ -271,12 +271,12 @@ impl AreaLight {
         match &self.form {
             Form::Sphere(sphere) => sphere.pdf(p, at.p),
             Form::Parallelogram(quad) => quad.pdf(p, at.p),
-            Form::Triangle { area } => SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
+            Form::Triangle { area } => EmitterSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
             Form::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return 0.0 };
                 // Where the normal does not determine the density, the hit itself does.
                 let pdf_area = placed.pdf_area_from_normal(at.n_g).or_else(|| placed.pdf_area(ray));
-                pdf_area.map_or(0.0, |pdf_area| SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), pdf_area))
+                pdf_area.map_or(0.0, |pdf_area| EmitterSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), pdf_area))
             }
         }
     }

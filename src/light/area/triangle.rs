@@ -1,6 +1,6 @@
 //! Triangles, sampled by area.
 
-use super::SurfaceSample;
+use super::EmitterSample;
 use crate::geometry::TrianglePoints;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Vec3};
@@ -56,8 +56,8 @@ impl TriangleEmitter {
 
     /// A point as seen from `p`; `None` in the plane.
     #[inline]
-    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<EmitterSample> {
         let [b, c] = warp::uniform_triangle(u);
-        SurfaceSample::from_area(p, self.corner + self.edge_u * b + self.edge_v * c, self.normal, 1.0 / self.area)
+        EmitterSample::from_area(p, self.corner + self.edge_u * b + self.edge_v * c, self.normal, 1.0 / self.area)
     }
 }

@@ -76,7 +76,7 @@ impl Board {
     }
 
     /// Whether a page that has the newest picture is open, and that picture is not too young.
-    pub fn wants_picture(&self) -> bool {
+    pub fn needs_picture(&self) -> bool {
         let state = self.lock();
         let is_due = state.shown.is_none_or(|shown| shown.elapsed() >= PICTURE_PERIOD);
         is_due && !state.finished && state.open_pages().any(|page| page.version >= state.version && !page.idle)
@@ -96,14 +96,14 @@ impl Board {
     }
 
     /// What there is to see.
-    pub fn look(&self) -> Shown {
+    pub fn current(&self) -> Shown {
         let state = self.lock();
         Shown { snapshot: state.snapshot.clone(), version: state.version, finished: state.finished }
     }
 
     /// What there is to see, to be sent, which may take long; `None` if slow readers hold [`MOST_SENT`] older pictures already.
     pub fn take(&self) -> Option<Shown> {
-        let shown = self.look();
+        let shown = self.current();
         let mut state = self.lock();
         state.sent.retain(|sent| sent.strong_count() > 0);
         if let Some(snapshot) = shown.snapshot.as_ref().map(Arc::downgrade)
@@ -155,25 +155,25 @@ mod tests {
     fn pictures_are_wanted_only_while_somebody_waits_for_one() {
         let picture = Arc::new(Snapshot::new(&Image { size: [1, 1], crop: Crop::full([1, 1]), ..Image::default() }, 1));
         let board = Board::default();
-        assert!(!board.wants_picture());
+        assert!(!board.needs_picture());
         board.visit(7, 0, true);
-        assert!(!board.wants_picture());
+        assert!(!board.needs_picture());
         board.visit(7, 0, false);
-        assert!(board.wants_picture());
+        assert!(board.needs_picture());
         board.show(&picture, false);
-        assert!(!board.wants_picture() && !board.wait(Instant::now()));
+        assert!(!board.needs_picture() && !board.wait(Instant::now()));
         // One of two pages has fetched it.
         board.visit(8, 0, false);
         board.visit(7, 1, false);
         std::thread::sleep(PICTURE_PERIOD);
-        assert!(board.wants_picture());
+        assert!(board.needs_picture());
         assert!(!board.wait(Instant::now()));
         board.visit(8, 1, false);
         assert!(board.wait(Instant::now()));
         board.show(&picture, true);
         board.visit(8, 2, false);
         std::thread::sleep(PICTURE_PERIOD);
-        assert!(!board.wants_picture() && board.look().finished && board.look().version == 2);
+        assert!(!board.needs_picture() && board.current().finished && board.current().version == 2);
     }
 
     #[test]
@@ -191,7 +191,7 @@ mod tests {
             held.push(board.take().unwrap());
         }
         show();
-        assert!(board.take().is_none() && board.look().version == MOST_SENT as u64 + 1);
+        assert!(board.take().is_none() && board.current().version == MOST_SENT as u64 + 1);
         held.drain(..2);
         assert!(board.take().is_some());
     }

@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn only_this_machine_may_be_asked_for() {
+    fn only_this_machine_is_a_valid_host() {
         for host in ["127.0.0.1:8000", "localhost", "LOCALHOST:1", "[::1]:8000", "192.168.1.7", "node7:80"] {
             assert!(is_own_host(host, "node7"), "{host}");
         }

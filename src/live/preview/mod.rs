@@ -98,8 +98,8 @@ impl Preview {
     }
 
     /// Whether a page that shows the newest picture waits for a newer one.
-    pub fn wants_picture(&self) -> bool {
-        self.shared.board.wants_picture()
+    pub fn needs_picture(&self) -> bool {
+        self.shared.board.needs_picture()
     }
 
     /// Shows a picture from now on. Never blocks.

@@ -47,7 +47,7 @@ fn not_found(connection: &mut Connection) -> io::Result<()> {
 }
 
 fn state(shared: &Shared) -> Value {
-    let shown = shared.board.look();
+    let shown = shared.board.current();
     let snapshot = shown.snapshot.as_deref();
     let layers = snapshot.map(|snapshot| {
         let layer = |names: &[String]| json!({ "name": Snapshot::title(names), "channels": names });
@@ -90,7 +90,7 @@ fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io:
 }
 
 fn pixel(request: &Request, shared: &Shared) -> Option<Value> {
-    let shown = shared.board.look();
+    let shown = shared.board.current();
     let snapshot = shown.snapshot?;
     let [x, y] = [request.number("x")?, request.number("y")?];
     let [width, height] = snapshot.size().map(u64::from);
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_told_exactly() {
+    fn values_are_sent_exactly() {
         for value in [0.1f32, -1.5e-30, 16_777_217.0, f32::MAX, 1.0 / 3.0] {
             let told = number(value).to_string();
             assert_eq!(told.parse::<f32>().unwrap(), value, "{told}");

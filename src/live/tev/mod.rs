@@ -66,8 +66,8 @@ impl Tev {
     }
 
     /// Whether tev is connected and could be sent a picture at once.
-    pub fn wants_picture(&self) -> bool {
-        self.queue.wants_picture()
+    pub fn needs_picture(&self) -> bool {
+        self.queue.needs_picture()
     }
 
     /// Hands over a picture; one that still waits is replaced. Never blocks.

@@ -83,7 +83,7 @@ impl Queue {
         self.lock().viewer == Viewer::Connected
     }
 
-    pub fn wants_picture(&self) -> bool {
+    pub fn needs_picture(&self) -> bool {
         let state = self.lock();
         let is_due = state.offered.is_none_or(|last| last.elapsed() >= self.period);
         state.viewer == Viewer::Connected && state.waiting.is_none() && is_due && !state.finishing

@@ -80,7 +80,7 @@ fn files_come_back_exactly() {
 }
 
 #[test]
-fn only_the_layers_asked_for_are_written() {
+fn only_the_requested_layers_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let desc = OutputDesc { layers: vec![LayerKind::Z], ..OutputDesc::new("a.exr") };
@@ -304,7 +304,7 @@ fn parts_hold_colour_data_and_mattes() {
 }
 
 #[test]
-fn pixels_around_a_crop_are_black_if_asked_for() {
+fn pixels_around_a_crop_are_black_if_uncropped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let image = picture();

@@ -31,7 +31,7 @@ pub(super) fn f9_visits(effort: Effort) -> Outcome {
             .at_most(format!("{name}, camera rays"), camera, most)
             .within(format!("{name}, camera rays over the recorded figure"), camera / of_camera, 0.9, 1.1)
             .within(format!("{name}, bounce rays over the recorded figure"), bounce / of_bounce, 0.9, 1.1)
-            .tell(format!("{name}, bounce rays"), bounce);
+            .record(format!("{name}, bounce rays"), bounce);
     }
     outcome
 }

@@ -176,5 +176,5 @@ pub(super) fn l1_power(effort: Effort) -> Outcome {
     Outcome::new()
         .at_most(format!("relative error of closed forms ({})", closed.1), closed.0, 1e-6)
         .at_most(format!("relative error of the flux ({})", flow.1), flow.0, effort.pick(1e-2, 3e-3))
-        .tell("relative error of the power of a map of 6 x 4 texels, which only weighs it against other lights", gathered)
+        .record("relative error of the power of a map of 6 x 4 texels, which only weighs it against other lights", gathered)
 }

@@ -141,7 +141,7 @@ pub(super) fn c3_grid_of_rays(effort: Effort) -> Outcome {
             }
         }
     }
-    Outcome::new().none("hit outside or missed inside", wrong).tell("rays", f64::from(rays))
+    Outcome::new().none("hit outside or missed inside", wrong).record("rays", f64::from(rays))
 }
 
 pub(super) fn c4_derivatives(effort: Effort) -> Outcome {
@@ -171,7 +171,7 @@ pub(super) fn c4_derivatives(effort: Effort) -> Outcome {
         .at_most("error of the change of u and v", change, 2e-2)
         .at_most("sine between derivatives and tangent plane", slope, 1e-9)
         .none("shapes with few points tried", few)
-        .tell("points", tried as f64)
+        .record("points", tried as f64)
 }
 
 pub(super) fn c5_parameters_round_trip(effort: Effort) -> Outcome {
@@ -345,7 +345,7 @@ pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
         .none("closest hit, any hit and batches disagree", differ)
         .none("hits outside the interval", late)
         .none("hits lost or kept one float from the end of the interval", lost)
-        .tell("rays", f64::from(rays))
+        .record("rays", f64::from(rays))
 }
 
 pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {

@@ -94,7 +94,7 @@ impl Weights {
                 1e-4,
             )
             .none("samples with a wrong side or index", self.wrong)
-            .tell("relative difference in all", self.raw)
+            .record("relative difference in all", self.raw)
     }
 }
 
@@ -146,7 +146,7 @@ pub(super) fn g4_reciprocity(effort: Effort) -> Outcome {
     }
     Outcome::new()
         .at_most(format!("relative difference beyond what rounding the directions by 2^-22 changes ({worst})"), unexplained, 1e-4)
-        .tell("relative difference in all", raw)
+        .record("relative difference in all", raw)
         .at_least("pairs on the same side", compared[0] as f64, 1e4)
         .at_least("pairs on opposite sides", compared[1] as f64, 1e4)
 }

@@ -125,8 +125,8 @@ pub(super) fn b13_schemes(effort: Effort) -> Outcome {
                 .at_most("ours: leaks over distance, largest fraction", leaks[1], 5e-4)
         } else {
             outcome
-                .tell(format!("{name}: false hits, largest fraction"), again)
-                .tell(format!("{name}: leaks, largest fraction"), leaks[0].max(leaks[1]))
+                .record(format!("{name}: false hits, largest fraction"), again)
+                .record(format!("{name}: leaks, largest fraction"), leaks[0].max(leaks[1]))
         };
     }
     let [a, b] = sweep("half size", &by_scale);

@@ -60,7 +60,7 @@ pub(super) fn i7_strategies(effort: Effort) -> Outcome {
     tests
         .judge(Outcome::new())
         .at_most(format!("variance of both over its bound ({at})"), worst, noise)
-        .tell(format!("variance of both over the lesser of one ({ratio_at})"), ratio)
+        .record(format!("variance of both over the lesser of one ({ratio_at})"), ratio)
         .short(
             "1.1 times the lesser variance is asked everywhere: a strategy that is good already is exceeded by more, since light sampling gets \
              its share of the weight where both densities are alike, as in the tail of a sharp lobe within a large lamp",

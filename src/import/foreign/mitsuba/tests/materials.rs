@@ -261,7 +261,7 @@ fn parts_and_textures_may_be_references() {
 }
 
 #[test]
-fn where_a_number_is_asked_for_checkers_have_the_other_colour() {
+fn where_a_number_is_needed_checkers_have_the_other_colour() {
     // As in Mitsuba 3.9.
     let checker =
         r#"<texture type="checkerboard" name="NAME"><float name="color0" value="0.1"/><float name="color1" value="0.9"/></texture>"#;
