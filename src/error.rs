@@ -69,7 +69,7 @@ pub enum Error {
         /// Why it cannot be read, and where the scene names it.
         message: String,
     },
-    /// A file that is read (an image to compare, say) is malformed.
+    /// A file that is read (an image to compare, for example) is malformed.
     #[error("{}: {message}", file.display())]
     Malformed {
         /// The file.

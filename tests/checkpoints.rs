@@ -450,12 +450,12 @@ fn signals_are_answered() {
         wait_for(&folder.join(".a.state.lock"), None);
         child.signal(Signal::USR1);
         wait_for(&folder.join("a.state"), there);
-        let asked = done();
-        assert!(asked > before);
+        let requested = done();
+        assert!(requested > before);
         child.signal(signal);
         assert_code(&child.output(), code, "");
         before = done();
-        assert!(before >= asked && folder.join("a.exr").exists());
+        assert!(before >= requested && folder.join("a.exr").exists());
     }
 }
 

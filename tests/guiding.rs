@@ -143,7 +143,7 @@ fn crops_limits_and_layers_hold() {
     assert!(guided.layer(LayerKind::Variance).unwrap().data.iter().all(|v| v.is_finite() && *v >= 0.0));
 }
 
-/// Under an even sky there is nothing to learn, and guiding is given up: later samples are those of other renders.
+/// Under an even sky there is nothing to learn, and guiding ends: later samples are those of other renders.
 #[test]
 fn scenes_without_lamps_stay_what_they_are() {
     let mut open = room();
@@ -185,7 +185,7 @@ fn part(kit: &Kit, state: RenderState, tiles: usize, file: &StateFile) -> Render
     kit.kept(&kit.go_on(state, &progress, &stop), file)
 }
 
-/// Interrupted while the guide learns, at the ends of iterations and within them, and after guiding was given up.
+/// Interrupted while the guide learns, at the ends of iterations and within them, and after guiding has ended.
 #[test]
 fn a_resumed_guided_render_has_the_bits_of_one_run() {
     let folder = tempfile::tempdir().unwrap();

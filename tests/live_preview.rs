@@ -362,5 +362,5 @@ fn a_port_in_use_ends_the_program_before_the_render() {
     let output = Command::new(env!("CARGO_BIN_EXE_steradian")).current_dir(&folder).args(line.split_whitespace()).output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{stderr}");
-    assert!(stderr.contains("--preview") && told.contains(&address.to_string()), "{told}");
+    assert!(stderr.contains("--preview") && stderr.contains(&address.to_string()), "{stderr}");
 }

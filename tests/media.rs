@@ -419,8 +419,8 @@ fn a_prism_parts_colours_by_snells_law() {
         let rp = ((ci - n * ct) / (ci + n * ct)).powi(2);
         let expected = first * (1.0 - 0.5 * (rs + rp));
         for c in 0..3 {
-            let wanted = if c == channel { expected } else { 0.0 };
-            Estimate::of(&image, c).assert_is(wanted, &format!("lamp at {nm} nm, channel {c}"));
+            let expected = if c == channel { expected } else { 0.0 };
+            Estimate::of(&image, c).assert_is(expected, &format!("lamp at {nm} nm, channel {c}"));
         }
     }
 }

@@ -128,16 +128,16 @@ fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
         _ => return Err(AssetError::Malformed("the EXR image has several channels, but neither R, G and B nor Y".into())),
     };
     chosen.extend(find("A"));
-    let wanted: Vec<Place> = chosen.iter().map(|&channel| Place { part, channel }).collect();
+    let requested: Vec<Place> = chosen.iter().map(|&channel| Place { part, channel }).collect();
     let (width, height, channels) = (size.width(), size.height(), chosen.len());
-    let read = |keep: &mut dyn FnMut(ChannelRow)| read_rows(Cursor::new(bytes), &headers, &wanted, false, keep).map_err(|e| malformed(&e));
+    let read = |keep: &mut dyn FnMut(ChannelRow)| read_rows(Cursor::new(bytes), &headers, &requested, false, keep).map_err(|e| malformed(&e));
     let samples = if chosen.iter().all(|&channel| all[channel].sample_type == SampleType::F16) {
         let mut out = vec![f16::ZERO; width * height * channels];
-        read(&mut |row| row.write(out[channels * row.start + row.wanted..].iter_mut().step_by(channels), f16::from_f32))?;
+        read(&mut |row| row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), f16::from_f32))?;
         Samples::F16(out)
     } else {
         let mut out = vec![0.0; width * height * channels];
-        read(&mut |row| row.write(out[channels * row.start + row.wanted..].iter_mut().step_by(channels), |v| v))?;
+        read(&mut |row| row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), |v| v))?;
         in_half_if_exact(out)
     };
     Ok(ImageData { width, height, channels, samples })

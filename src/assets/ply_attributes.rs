@@ -32,9 +32,9 @@ impl Column {
     }
 }
 
-/// The attributes of an element, those in `wanted` or (without it) all: consecutive numbers whose names differ in a last letter behind an
+/// The attributes of an element, those in `requested` or (without it) all: consecutive numbers whose names differ in a last letter behind an
 /// underscore, one or three of them. Of several with the same name, the first.
-pub fn columns(element: &ElementDef, prefix: &str, wanted: Option<&BTreeSet<String>>) -> Vec<Column> {
+pub fn columns(element: &ElementDef, prefix: &str, requested: Option<&BTreeSet<String>>) -> Vec<Column> {
     struct Group<'a> {
         stem: &'a str,
         endings: &'static str,
@@ -67,7 +67,7 @@ pub fn columns(element: &ElementDef, prefix: &str, wanted: Option<&BTreeSet<Stri
     };
     let mut found: Vec<Column> = Vec::new();
     for column in groups.into_iter().filter(|group| matches!(group.properties.len(), 1 | 3)).map(column) {
-        if wanted.is_none_or(|wanted| wanted.contains(&column.name)) && !found.iter().any(|other| other.name == column.name) {
+        if requested.is_none_or(|requested| requested.contains(&column.name)) && !found.iter().any(|other| other.name == column.name) {
             found.push(column);
         }
     }

@@ -110,8 +110,8 @@ fn thin(rays: &[Ray], count: usize) -> Vec<Ray> {
     if rays.len() <= count {
         return rays.to_vec();
     }
-    let (runs, wanted) = (rays.len() / RUN, (count / RUN).max(1));
-    (0..wanted).flat_map(|i| rays[i * runs / wanted * RUN..].iter().take(RUN)).copied().collect()
+    let (runs, selected) = (rays.len() / RUN, (count / RUN).max(1));
+    (0..selected).flat_map(|i| rays[i * runs / selected * RUN..].iter().take(RUN)).copied().collect()
 }
 
 /// Keeps a copy of the rays. One thread at a time: which bounce a batch belongs to follows from the batches before it.

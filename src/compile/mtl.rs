@@ -30,9 +30,9 @@ impl Builder {
         if has_maps && !has_uvs {
             tracing::warn!("{}: {path}: material \"{}\": faces without uv have no maps", self.files.source.file.display(), mtl.name);
         }
-        let wanted = |map: &Option<ObjMap>| map.clone().filter(|_| has_uvs);
-        let (diffuse, opacity) = (wanted(&maps.diffuse), wanted(&maps.opacity));
-        let (specular, emission) = (wanted(&maps.specular), wanted(&maps.emission));
+        let with_uvs = |map: &Option<ObjMap>| map.clone().filter(|_| has_uvs);
+        let (diffuse, opacity) = (with_uvs(&maps.diffuse), with_uvs(&maps.opacity));
+        let (specular, emission) = (with_uvs(&maps.specular), with_uvs(&maps.emission));
 
         let mut plain = mtl.clone();
         // Exporters leave a colour black, or out, where a map gives all of it.
@@ -64,7 +64,7 @@ impl Builder {
         if !is_glass {
             binding.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
         }
-        let normal_perturbation = match (wanted(&maps.normal), wanted(&maps.bump)) {
+        let normal_perturbation = match (with_uvs(&maps.normal), with_uvs(&maps.bump)) {
             (Some(map), _) => Some(self.normal_or_bump_map(path, &map, true)?),
             (None, Some(map)) => Some(self.normal_or_bump_map(path, &map, false)?),
             (None, None) => None,
@@ -75,9 +75,9 @@ impl Builder {
         Ok(MtlBinding { binding, emission })
     }
 
-    fn map_texture(&mut self, path: &str, map: &ObjMap, wanted: TextureUse) -> Result<Bitmap> {
+    fn map_texture(&mut self, path: &str, map: &ObjMap, texture_use: TextureUse) -> Result<Bitmap> {
         let image = self.materials.textures.image(&self.files, &format!("{path}.file"), &map.file)?;
-        let decoding = if wanted == TextureUse::Color { Decoding::Srgb } else { Decoding::Linear };
+        let decoding = if texture_use == TextureUse::Color { Decoding::Srgb } else { Decoding::Linear };
         Ok(Bitmap {
             wrap: [if map.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2],
             transform: UvTransform::new(Vec2::from(map.scale), 0.0, Vec2::from(map.offset)),

@@ -89,17 +89,17 @@ impl TextureTable {
     }
 
     /// The texture that `path` names.
-    pub fn find(&self, files: &CompileContext, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
+    pub fn find(&self, files: &CompileContext, path: &str, name: &str, texture_use: TextureUse) -> Result<TextureId> {
         let entry = self.names.get(name).ok_or_else(|| files.unknown(path, "texture", name, self.names.keys().map(String::as_str)))?;
-        Ok(match wanted {
+        Ok(match texture_use {
             TextureUse::Color => entry.color,
             TextureUse::Data => entry.data,
         })
     }
 
     /// The texture that `path` names, for a use where uv is all there is of a surface.
-    pub fn find_by_uv(&self, files: &CompileContext, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
-        let id = self.find(files, path, name, wanted)?;
+    pub fn find_by_uv(&self, files: &CompileContext, path: &str, name: &str, texture_use: TextureUse) -> Result<TextureId> {
+        let id = self.find(files, path, name, texture_use)?;
         if !self.get(id).attributes().is_empty() {
             let message = format!(
                 "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and emission of shapes can"
@@ -182,8 +182,8 @@ struct Made {
 
 impl Loader<'_> {
     /// The texture that `place` names, made at its first use.
-    fn named(&mut self, place: &str, name: &str, wanted: TextureUse) -> Result<Made> {
-        let key = (name.to_owned(), wanted);
+    fn named(&mut self, place: &str, name: &str, texture_use: TextureUse) -> Result<Made> {
+        let key = (name.to_owned(), texture_use);
         if let Some(made) = self.made.get(&key) {
             return Ok(made.clone());
         }
@@ -197,7 +197,7 @@ impl Loader<'_> {
             return Err(self.files.error(place, format!("products of textures are nested more than {MAX_DEPTH} deep")));
         }
         self.open.push(name.to_owned());
-        let made = self.texture(name, desc, wanted);
+        let made = self.texture(name, desc, texture_use);
         self.open.pop();
         let made = made?;
         self.made.insert(key, made.clone());
@@ -225,7 +225,7 @@ impl Loader<'_> {
     }
 
     /// The product of these factors.
-    fn product(&mut self, path: &str, factors: &[ColorDesc], wanted: TextureUse) -> Result<Made> {
+    fn product(&mut self, path: &str, factors: &[ColorDesc], texture_use: TextureUse) -> Result<Made> {
         let files = self.files;
         let place = format!("{path}.factors");
         if factors.is_empty() {
@@ -240,7 +240,7 @@ impl Loader<'_> {
                 ColorDesc::Grey(v) => constant([*v; 3])?,
                 ColorDesc::Rgb(v) => constant(*v)?,
                 ColorDesc::Texture { texture } => {
-                    let factor = self.named(&key, texture, wanted)?;
+                    let factor = self.named(&key, texture, texture_use)?;
                     made.depth = made.depth.max(factor.depth + 1);
                     made.lookups += factor.lookups - 1;
                     made.depends_on_use |= factor.depends_on_use;
@@ -260,7 +260,7 @@ impl Loader<'_> {
         Ok(Made { texture: Texture::Product(product.into()), ..made })
     }
 
-    fn texture(&mut self, name: &str, desc: &TextureDesc, wanted: TextureUse) -> Result<Made> {
+    fn texture(&mut self, name: &str, desc: &TextureDesc, texture_use: TextureUse) -> Result<Made> {
         let (files, path) = (self.files, &format!("textures.{name}"));
         let color = |key: &str, value: [f32; 3]| files.reflectance(&format!("{path}.{key}"), value).map(Rgb::from);
         let depends_on_use = matches!(desc, TextureDesc::Image { color_space: ColorSpaceDesc::Auto, .. });
@@ -272,7 +272,7 @@ impl Loader<'_> {
             }
             TextureDesc::VertexColor => Texture::Attribute(self.attribute(VERTEX_COLOR), 1.0),
             TextureDesc::MeshAttribute { name, scale } => self.mesh_attribute(path, name, *scale)?,
-            TextureDesc::Product { factors } => return self.product(path, factors, wanted),
+            TextureDesc::Product { factors } => return self.product(path, factors, texture_use),
             TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert } => {
                 let scale = files.uv(&format!("{path}.scale"), *scale)?;
                 let offset = files.uv(&format!("{path}.offset"), *offset)?;
@@ -289,7 +289,7 @@ impl Loader<'_> {
                     return Err(files.error(&format!("{path}.color_space"), "the image has floats, which are linear"));
                 }
                 Texture::Bitmap(Bitmap {
-                    decoding: match (color_space, wanted) {
+                    decoding: match (color_space, texture_use) {
                         (ColorSpaceDesc::Srgb, _) | (ColorSpaceDesc::Auto, TextureUse::Color) => Decoding::Srgb,
                         (ColorSpaceDesc::Linear, _) | (ColorSpaceDesc::Auto, TextureUse::Data) => Decoding::Linear,
                     },

@@ -22,7 +22,7 @@ pub struct Files<'a> {
     folder: String,
     originals: Originals,
     /// The name in the target for a name of the source.
-    brought: BTreeMap<String, String>,
+    copied: BTreeMap<String, String>,
     /// Files in the folder beside the scene.
     count: usize,
     /// If there are any, files are only compared with these: nothing is written.
@@ -38,7 +38,7 @@ impl<'a> Files<'a> {
             target_folder: folder_of(target),
             folder: format!("{stem}_files"),
             originals,
-            brought: BTreeMap::new(),
+            copied: BTreeMap::new(),
             count: 0,
             uses: None,
         }
@@ -60,8 +60,8 @@ impl<'a> Files<'a> {
     }
 
     /// Copies a file; the result is its name relative to the target. `path` is where the scene names it.
-    pub fn bring(&mut self, path: &str, name: &str) -> Result<String> {
-        if let Some(done) = self.brought.get(name) {
+    pub fn add(&mut self, path: &str, name: &str) -> Result<String> {
+        if let Some(done) = self.copied.get(name) {
             return Ok(done.clone());
         }
         let new = if self.assets.contains(name) {
@@ -91,7 +91,7 @@ impl<'a> Files<'a> {
                 }
             }
         };
-        self.brought.insert(name.to_owned(), new.clone());
+        self.copied.insert(name.to_owned(), new.clone());
         Ok(new)
     }
 
@@ -100,7 +100,7 @@ impl<'a> Files<'a> {
         let is_obj = is_obj(original);
         let file = original.file_name().map_or("file".into(), |name| name.to_string_lossy().into_owned());
         let (stem, extension) = file.rsplit_once('.').unwrap_or((&file, ""));
-        let taken = |name: &String| self.brought.values().any(|other| other == name);
+        let taken = |name: &String| self.copied.values().any(|other| other == name);
         let name = |n: usize| match (is_obj, n) {
             (true, 1) => format!("{}/{stem}/{file}", self.folder),
             (true, n) => format!("{}/{stem}_{n}/{file}", self.folder),

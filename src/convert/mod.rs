@@ -58,7 +58,7 @@ fn bring_all(imported: &Imported, files: &mut Files) -> Result<SceneDesc> {
     let mut desc = imported.desc.clone();
     for NamedFile { path, name, is_used } in desc.files_mut() {
         if is_used || files.is_there(name) {
-            *name = files.bring(&path, name)?;
+            *name = files.add(&path, name)?;
         }
     }
     Ok(desc)

@@ -87,10 +87,10 @@ impl<'f> Layers<'f> {
     /// If its window is not that of the picture.
     pub fn named(&self, names: &[&str], color: Rgb) -> Result<Option<Rgb>, String> {
         let full = |name: &str, rgb: &Rgb| if name.is_empty() { self.part_name(rgb[0].part) } else { name.to_owned() };
-        let matches = |wanted: &str| {
-            self.triples.iter().find(|(name, rgb)| *rgb != color && ends_with_layer(&full(name, rgb).to_lowercase(), wanted))
+        let matches = |requested: &str| {
+            self.triples.iter().find(|(name, rgb)| *rgb != color && ends_with_layer(&full(name, rgb).to_lowercase(), requested))
         };
-        let Some((name, rgb)) = names.iter().find_map(|wanted| matches(wanted)) else { return Ok(None) };
+        let Some((name, rgb)) = names.iter().find_map(|requested| matches(requested)) else { return Ok(None) };
         let [own, picture] = [rgb[0].part, color[0].part].map(|part| &self.file.layer_data[part]);
         if own.size != picture.size || own.attributes.layer_position != picture.attributes.layer_position {
             return Err(format!("layer {} has another data window than the picture", full(name, rgb)));

@@ -121,7 +121,7 @@ pub fn open_first<T>(
         looked.push("in Python's packages, of which there are none".to_owned());
     }
     let message = format!(
-        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` brings it, and --oidn-library or {VARIABLE} name its file or folder; looked {}",
+        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` installs it, and --oidn-library or {VARIABLE} name its file or folder; looked {}",
         looked.join(", ")
     );
     Err(Error::Missing { file: FILE_NAME.into(), message })
@@ -130,12 +130,12 @@ pub fn open_first<T>(
 fn open_named<T>(path: &Path, by: &str, open: &mut impl FnMut(&Path) -> std::result::Result<T, Unusable>) -> Result<T> {
     let missing = |file: &Path, message: String| Error::Missing { file: file.to_owned(), message: format!("{message} (named by {by})") };
     let file = if path.is_dir() {
-        inside(path).ok_or_else(|| missing(path, format!("there is no {FILE_NAME} in the folder; `pip install pyoidn` brings it")))?
+        inside(path).ok_or_else(|| missing(path, format!("there is no {FILE_NAME} in the folder; `pip install pyoidn` installs it")))?
     } else if path.is_file() {
         // A bare name would be looked for among the system's libraries.
         path.canonicalize().map_err(|e| missing(path, e.to_string()))?
     } else {
-        return Err(missing(path, "there is no such file or folder; `pip install pyoidn` brings the library".to_owned()));
+        return Err(missing(path, "there is no such file or folder; `pip install pyoidn` installs the library".to_owned()));
     };
     open(&file).map_err(|Unusable(why)| missing(&file, format!("it cannot serve as Open Image Denoise: {why}")))
 }

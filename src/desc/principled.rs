@@ -71,8 +71,8 @@ macro_rules! written {
 macro_rules! describe {
     ($($(#[doc = $doc:literal])* $(#[serde $serde:tt])? $name:ident: $kind:ident = $default:tt,)*) => {
         /// Disney's principled model ("Physically Based Shading at Disney" and its extension to transmission): a clear coat
-        /// over a blend of metal, a diffuse base below a dielectric layer, and glass. Every number is within `[0, 1]` unless it
-        /// says otherwise and may come from a texture. It never scatters more than it receives.
+        /// over a blend of metal, a diffuse base below a dielectric layer, and glass. Every number is within `[0, 1]` unless
+        /// noted otherwise, and may come from a texture. It never scatters more than it receives.
         #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct PrincipledDesc {

@@ -99,7 +99,7 @@ struct Pattern {
 fn find_pattern(text: &str) -> Option<Pattern> {
     let bytes = text.as_bytes();
     for start in 0..bytes.len() {
-        let run = |from: usize, wanted: fn(&u8) -> bool| bytes[from..].iter().take_while(|b| wanted(b)).count();
+        let run = |from: usize, accepted: fn(&u8) -> bool| bytes[from..].iter().take_while(|b| accepted(b)).count();
         if bytes[start] == b'#' {
             let digits = run(start, |b| *b == b'#');
             if digits == 1 && bytes[start..].contains(&b'/') {

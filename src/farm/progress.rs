@@ -200,14 +200,14 @@ mod tests {
         ];
         assert_eq!(expected.len(), FORMATS.len());
         for (name, line) in expected {
-            let told = lines(name, &Event::Progress(&status));
+            let printed = lines(name, &Event::Progress(&status));
             match name {
                 "json" => {
                     let parse = |text: &str| serde_json::from_str::<Value>(text).unwrap();
-                    assert_eq!(parse(&told[0]), parse(line));
-                    assert!(!told[0].contains('\n'));
+                    assert_eq!(parse(&printed[0]), parse(line));
+                    assert!(!printed[0].contains('\n'));
                 }
-                _ => assert_eq!(told, [line], "{name}"),
+                _ => assert_eq!(printed, [line], "{name}"),
             }
         }
     }

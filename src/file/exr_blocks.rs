@@ -34,7 +34,7 @@ pub struct Place {
 #[derive(Clone, Copy, Debug)]
 pub struct ChannelRow<'a> {
     /// Index into the channels requested.
-    pub wanted: usize,
+    pub requested: usize,
     /// The first sample's pixel: `y * width + x` in the part's data window.
     pub start: usize,
     sample_type: SampleType,
@@ -93,7 +93,7 @@ fn out_of_memory(path: &Path, bytes: usize) -> Error {
     Error::OutOfMemory(format!("the pixels of {} need {} MiB", path.display(), bytes >> 20))
 }
 
-/// Reads the largest level of flat parts and gives each row of the channels `wanted` to `keep`, in no particular order
+/// Reads the largest level of flat parts and gives each row of the channels `requested` to `keep`, in no particular order
 /// but each sample once. The parts without requested channels are decoded too, so that damage is found, if `every_part` is
 /// set. `headers` are those that the places come from.
 ///
@@ -102,7 +102,7 @@ fn out_of_memory(path: &Path, bytes: usize) -> Error {
 pub fn read_rows(
     source: impl Read + Seek,
     headers: &[Header],
-    wanted: &[Place],
+    requested: &[Place],
     every_part: bool,
     mut keep: impl FnMut(ChannelRow),
 ) -> ExrResult<()> {
@@ -111,12 +111,12 @@ pub fn read_rows(
     if shape(reader.headers()) != shape(headers) {
         return Err(ExrError::Invalid("the file changed while it was read".into()));
     }
-    // Which of `wanted` a channel is, by part and channel; none for parts that are passed over.
+    // Which of `requested` a channel is, by part and channel; none for parts that are passed over.
     let mut uses: Vec<Vec<Vec<usize>>> = headers.iter().map(|header| vec![Vec::new(); header.channels.list.len()]).collect();
-    for (i, place) in wanted.iter().enumerate() {
+    for (i, place) in requested.iter().enumerate() {
         uses[place.part][place.channel].push(i);
     }
-    let is_read = |part: usize, level: Vec2<usize>| level == Vec2(0, 0) && (every_part || wanted.iter().any(|place| place.part == part));
+    let is_read = |part: usize, level: Vec2<usize>| level == Vec2(0, 0) && (every_part || requested.iter().any(|place| place.part == part));
     let chunks = reader.filter_chunks(false, |_, _, block| is_read(block.layer, block.level))?;
 
     let mut seen = HashSet::new();
@@ -128,9 +128,9 @@ pub fn read_rows(
         }
         for line in block.lines(&header.channels) {
             let at = line.location;
-            for &wanted in &uses[part][at.channel] {
+            for &requested in &uses[part][at.channel] {
                 let start = at.position.y() * header.layer_size.width() + at.position.x();
-                keep(ChannelRow { wanted, start, sample_type: header.channels.list[at.channel].sample_type, bytes: line.value });
+                keep(ChannelRow { requested, start, sample_type: header.channels.list[at.channel].sample_type, bytes: line.value });
             }
         }
         Ok(())
@@ -187,7 +187,7 @@ mod tests {
     fn wanted_channels_are_kept_and_no_others() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
-        let wanted = [(1, 3), (0, 11), (1, 100), (1, 3)].map(|(part, channel)| Place { part, channel });
+        let requested = [(1, 3), (0, 11), (1, 100), (1, 3)].map(|(part, channel)| Place { part, channel });
         for (compression, blocks) in [
             (Compression::ZIP16, Blocks::ScanLines),
             (Compression::Uncompressed, Blocks::ScanLines),
@@ -195,17 +195,17 @@ mod tests {
         ] {
             write(&path, compression, blocks);
             let headers = read_headers(&path).unwrap();
-            let mut kept = vec![vec![f32::NAN; SIZE.area()]; wanted.len()];
+            let mut kept = vec![vec![f32::NAN; SIZE.area()]; requested.len()];
             let mut count = 0;
             let source = crate::file::open(&path).unwrap();
-            read_rows(source, &headers, &wanted, false, |row| {
-                let to = &mut kept[row.wanted][row.start..];
+            read_rows(source, &headers, &requested, false, |row| {
+                let to = &mut kept[row.requested][row.start..];
                 row.write(to.iter_mut().inspect(|_| count += 1), |v| v);
             })
             .unwrap();
             // Four of 320 channels.
-            assert_eq!(count, wanted.len() * SIZE.area());
-            for (place, kept) in wanted.iter().zip(kept) {
+            assert_eq!(count, requested.len() * SIZE.area());
+            for (place, kept) in requested.iter().zip(kept) {
                 let expected: Vec<f32> = (0..SIZE.area()).map(|pixel| sample(place.part, place.channel, pixel)).collect();
                 assert!(kept == expected, "{compression:?} {place:?}");
             }

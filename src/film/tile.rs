@@ -187,7 +187,7 @@ impl FilmTile {
         }
     }
 
-    /// [`add`](Self::add) where nothing but the colour is kept, and all samples weigh the same.
+    /// [`add`](Self::add) where nothing but the colour is kept, and all samples have the same weight.
     #[inline(always)]
     fn add_color(&mut self, pixel: usize, sample: u32, PixelSample { radiance, alpha }: &PixelSample, weight: f32) -> bool {
         if !is_finite(weight, *radiance, *alpha) {
@@ -258,8 +258,8 @@ impl FilmTile {
         Some(values)
     }
 
-    /// Adds a group of the pixel's samples, which have been added, by their mean radiance, if the variance is asked
-    /// for. The better the samples of a group are spread, the less is their variance overestimated; all groups of a
+    /// Adds a group of the pixel's samples, which have been added, by their mean radiance, if the variance is
+    /// needed. The better the samples of a group are spread, the less is their variance overestimated; all groups of a
     /// pixel are of one size.
     #[inline]
     pub fn add_moments(&mut self, pixel: usize, radiance: [f64; 3]) {

@@ -48,12 +48,12 @@ impl RenderSpace {
         let origin = if moves { middle } else { DVec3::ZERO };
         let extent = reach(origin);
         let exponent = if extent > 0.0 { extent.log2().floor() as i32 } else { 0 };
-        let wanted = match exponent {
+        let target = match exponent {
             e if e < UNSCALED[0] => SCALED[0],
             e if e > UNSCALED[1] => SCALED[1],
             e => e,
         };
-        Self { origin, scale: f64::from(wanted - exponent).exp2() }
+        Self { origin, scale: f64::from(target - exponent).exp2() }
     }
 
     /// Whether it is the world.

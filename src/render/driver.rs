@@ -110,7 +110,7 @@ impl Driver<'_> {
             let start = Instant::now();
             let rays = self.render_pass(state, &pass);
             state.rays.add(&rays);
-            if self.cancel.given_up() {
+            if self.cancel.is_cancelled() {
                 self.ends(&mut stats, true);
                 state.give_up_pass();
                 break;

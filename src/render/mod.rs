@@ -109,7 +109,7 @@ fn light_groups(scene: &Scene) -> Vec<String> {
 }
 
 /// Renders a scene. When `stop` becomes true, or the time limit passes, the pass under way is finished and what there
-/// is becomes the picture. A pass that is not done a second later is given up; tiles then differ in their samples, and
+/// is becomes the picture. A pass that is not done a second later is cancelled; tiles then differ in their samples, and
 /// of a first pass there is no picture ([`Stats::spp_done`] is 0).
 ///
 /// # Errors

@@ -257,11 +257,11 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
         }
         *regularize = Some(alpha).filter(|&alpha| alpha > 0.0);
     }
-    if let Some(wanted) = overrides.guiding {
+    if let Some(enabled) = overrides.guiding {
         let IntegratorDesc::Path { guiding, .. } = &mut integrator else {
             return Err(usage("--guiding: only the integrator path can be guided"));
         };
-        *guiding = wanted;
+        *guiding = enabled;
     }
     if matches!(integrator, IntegratorDesc::Path { guiding: true, .. }) && overrides.target_error.is_some() {
         return Err(usage("--target-error: not with guiding; give --guiding off, or --spp or --time-limit in its place"));
@@ -273,8 +273,8 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
 ///
 /// # Errors
 /// [`Error::Usage`] if there are too many.
-pub fn threads(wanted: Option<usize>) -> Result<usize> {
-    match wanted.unwrap_or(0) {
+pub fn threads(requested: Option<usize>) -> Result<usize> {
+    match requested.unwrap_or(0) {
         0 => Ok(std::thread::available_parallelism().map_or(1, NonZero::get)),
         threads if threads > MAX_THREADS => Err(usage(format!("--threads {threads}: at most {MAX_THREADS}"))),
         threads => Ok(threads),
@@ -306,8 +306,8 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
         by_name(&overrides.default_outputs)
     };
     let has_extension = |output: &OutputDesc, extension: &str| output.file.to_ascii_lowercase().ends_with(extension);
-    let needs = |option: &str, asked: bool, extension: &str| {
-        if asked && !outputs.iter().any(|output| has_extension(output, extension)) {
+    let needs = |option: &str, given: bool, extension: &str| {
+        if given && !outputs.iter().any(|output| has_extension(output, extension)) {
             return Err(usage(format!("{option} has no effect: no output is an {extension} file")));
         }
         Ok(())

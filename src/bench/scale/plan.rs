@@ -122,8 +122,8 @@ pub(super) fn sweeps(options: &ScaleOptions) -> Result<Vec<Sweep>> {
         let known: Vec<&str> = SWEEPS.iter().map(|(known, _)| *known).collect();
         return Err(Error::Usage(format!("there is no sweep \"{name}\"; there are {}", known.join(", "))));
     }
-    let wanted = |name: &str| options.sweeps.is_empty() || options.sweeps.iter().any(|sweep| sweep == name);
-    Ok(SWEEPS.iter().filter(|(name, _)| wanted(name)).map(|(name, axis)| sweep(name, axis, options)).collect())
+    let selected = |name: &str| options.sweeps.is_empty() || options.sweeps.iter().any(|sweep| sweep == name);
+    Ok(SWEEPS.iter().filter(|(name, _)| selected(name)).map(|(name, axis)| sweep(name, axis, options)).collect())
 }
 
 fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Sweep {

@@ -141,10 +141,10 @@ pub fn choose(names: &[String]) -> Result<Vec<&'static Check>> {
             return Err(Error::Usage(format!("no check is called {name:?}; --list shows them; groups are {}", groups.join(", "))));
         }
     }
-    let wanted = |check: &&Check| {
+    let selected = |check: &&Check| {
         names.is_empty() || names.iter().any(|name| check.id == name || check.id.trim_end_matches(char::is_numeric) == name)
     };
-    Ok(catalogue().filter(wanted).collect())
+    Ok(catalogue().filter(selected).collect())
 }
 
 impl Check {

@@ -96,7 +96,7 @@ impl<'a> Resumable<'a> {
         // What an interrupted shard has is in its checkpoint; a shard that is there is complete.
         let unfinished = stats.interrupted && checkpoints.is_some();
         if state.torn && self.shard_file.is_some() && !unfinished {
-            let message = "the pass under way took too long and was given up";
+            let message = "the pass under way took too long and was cancelled";
             if !stats.interrupted {
                 return Err(Error::Usage(format!("--time-limit: {message}, so there is no shard")));
             }

@@ -233,7 +233,7 @@ mod tests {
     #[test]
     fn colours_follow_the_option_then_the_environment_then_the_terminal() {
         let with =
-            |name: &'static str, value: &'static str| move |asked: &str| if asked == name { value.to_owned() } else { String::new() };
+            |name: &'static str, value: &'static str| move |variable: &str| if variable == name { value.to_owned() } else { String::new() };
         let none = |_: &str| String::new();
         use ColorChoice::{Always, Auto, Never};
         assert!(decide_color(Auto, &none, true) && !decide_color(Auto, &none, false));

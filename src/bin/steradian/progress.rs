@@ -120,7 +120,7 @@ impl Reporter {
         log::message(Level::Note, line);
     }
 
-    /// The frame's files are in their places, or it was given up: only now is the work on it complete.
+    /// The frame's files are in their places, or it failed: only now is the work on it complete.
     pub fn complete_frame(&self) {
         if let Ok(mut state) = self.state.lock() {
             state.frames_done += 1;

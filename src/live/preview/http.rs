@@ -199,11 +199,11 @@ fn check(request: &httparse::Request, host: &str) -> Result<Request, HttpError> 
     // A request with a body would leave it where the next request is looked for.
     let has_body = values("Transfer-Encoding").next().is_some() || values("Content-Length").any(|value| value != b"0");
     let mut hosts = values("Host");
-    let (Some(asked), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(HttpError::Malformed) };
-    let asked = std::str::from_utf8(asked).map_err(|_| HttpError::Malformed)?;
+    let (Some(requested), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(HttpError::Malformed) };
+    let requested = std::str::from_utf8(requested).map_err(|_| HttpError::Malformed)?;
     // Browsers send the origin of a request's page; other origins are rejected.
     let from_elsewhere = values("Sec-Fetch-Site").any(|site| site != b"same-origin" && site != b"none");
-    if !is_own_host(asked, host) || from_elsewhere {
+    if !is_own_host(requested, host) || from_elsewhere {
         return Err(HttpError::Foreign);
     }
     let target = request.path.filter(|path| path.starts_with('/')).ok_or(HttpError::Malformed)?;
@@ -214,11 +214,11 @@ fn check(request: &httparse::Request, host: &str) -> Result<Request, HttpError> 
 /// Whether a Host header names this machine: by address, as localhost, or by the name given on the command line. A
 /// foreign name that has been made to point here (DNS rebinding) is none of these. The port may be another, that of a
 /// tunnel.
-fn is_own_host(asked: &str, host: &str) -> bool {
-    let asked = asked.to_ascii_lowercase();
-    let (name, port) = match asked.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+fn is_own_host(requested: &str, host: &str) -> bool {
+    let requested = requested.to_ascii_lowercase();
+    let (name, port) = match requested.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
         Some(parts) => parts,
-        None => asked.split_at(asked.find(':').unwrap_or(asked.len())),
+        None => requested.split_at(requested.find(':').unwrap_or(requested.len())),
     };
     let is_port = port.is_empty() || port.strip_prefix(':').is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()));
     is_port && (name == "localhost" || name == host || name.parse::<IpAddr>().is_ok())

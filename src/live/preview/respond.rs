@@ -121,8 +121,8 @@ mod tests {
     #[test]
     fn values_are_sent_exactly() {
         for value in [0.1f32, -1.5e-30, 16_777_217.0, f32::MAX, 1.0 / 3.0] {
-            let told = number(value).to_string();
-            assert_eq!(told.parse::<f32>().unwrap(), value, "{told}");
+            let printed = number(value).to_string();
+            assert_eq!(printed.parse::<f32>().unwrap(), value, "{printed}");
         }
         assert_eq!(number(0.1), json!(0.1));
         assert_eq!([number(f32::NAN), number(f32::INFINITY), number(f32::NEG_INFINITY)], [json!("NaN"), json!("inf"), json!("-inf")]);

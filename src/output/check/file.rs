@@ -42,16 +42,16 @@ impl ExrFile {
         let mut file = Self { path: path.into(), headers, planes: Vec::new() };
         // Flat files are decoded as a whole, so that a truncated one is not called clean.
         if file.headers.iter().all(|header| !header.deep) {
-            let wanted = crypto_pixels::places(&file);
+            let requested = crypto_pixels::places(&file);
             let plane = |place: &Place| allocate(path, &file.headers[place.part], 1, 0.0);
-            let mut planes = wanted.iter().map(plane).collect::<Result<Vec<Vec<f32>>>>()?;
-            let keep = |row: ChannelRow| row.write(planes[row.wanted][row.start..].iter_mut(), |v| v);
-            match read_rows(BufReader::new(source), &file.headers, &wanted, true, keep) {
+            let mut planes = requested.iter().map(plane).collect::<Result<Vec<Vec<f32>>>>()?;
+            let keep = |row: ChannelRow| row.write(planes[row.requested][row.start..].iter_mut(), |v| v);
+            match read_rows(BufReader::new(source), &file.headers, &requested, true, keep) {
                 // With an unsupported compression, the headers can still be checked.
                 Err(exr::error::Error::NotSupported(_)) => {}
                 result => {
                     result.map_err(|e| malformed(e.to_string()))?;
-                    file.planes = wanted.into_iter().zip(planes).collect();
+                    file.planes = requested.into_iter().zip(planes).collect();
                 }
             }
         }

@@ -32,21 +32,21 @@ pub struct SampleSource<'a> {
 #[derive(Clone, Copy)]
 pub struct Region {
     /// The pixels that there are.
-    pub have: Crop,
+    pub available: Crop,
     /// The pixels to store.
-    pub want: Crop,
+    pub written: Crop,
 }
 
 impl Region {
     /// The values of one channel out of `stride` in the pixels to store.
     fn values(self, data: &[f32], channel: usize, stride: usize) -> impl Iterator<Item = f32> + '_ {
-        let Self { have, want } = self;
-        (want.y..want.y + want.height).flat_map(move |y| {
-            (want.x..want.x + want.width).map(move |x| {
-                if !have.contains(x, y) {
+        let Self { available, written } = self;
+        (written.y..written.y + written.height).flat_map(move |y| {
+            (written.x..written.x + written.width).map(move |x| {
+                if !available.contains(x, y) {
                     return 0.0;
                 }
-                let pixel = (y - have.y) as usize * have.width as usize + (x - have.x) as usize;
+                let pixel = (y - available.y) as usize * available.width as usize + (x - available.x) as usize;
                 data.get(pixel * stride + channel).copied().unwrap_or(0.0)
             })
         })
@@ -60,7 +60,7 @@ pub fn planes(sources: &[SampleSource], region: Region) -> Vec<Plane> {
         .map(|(source, i)| {
             let name = source.names[i].clone();
             let stride = source.names.len();
-            let samples = if region.have == region.want {
+            let samples = if region.available == region.written {
                 let values = source.data.iter().skip(i).step_by(stride).copied();
                 collect(values, source.half)
             } else {

@@ -32,18 +32,18 @@ pub fn read_exr(path: &Path) -> Result<Image> {
         return Err(malformed(format!("there are no channels R, G and B and no Y{deep}; it has {}", names.join(", "))));
     };
     let header = &headers[part];
-    let (mut wanted, mut components) = (Vec::new(), Vec::new());
+    let (mut requested, mut components) = (Vec::new(), Vec::new());
     for (component, channel) in choice.into_iter().enumerate().filter_map(|(component, channel)| Some((component, channel?))) {
         let channel_header = &header.channels.list[channel];
         if channel_header.sampling != Vec2(1, 1) {
             return Err(malformed(format!("channel {} is subsampled", channel_header.name)));
         }
-        wanted.push(Place { part, channel });
+        requested.push(Place { part, channel });
         components.push(component);
     }
     let mut data = allocate(path, header, 4, 1.0)?;
-    let keep = |row: ChannelRow| row.write(data[4 * row.start + components[row.wanted]..].iter_mut().step_by(4), |v| v);
-    read_rows(BufReader::new(source), &headers, &wanted, false, keep).map_err(|e| malformed(e.to_string()))?;
+    let keep = |row: ChannelRow| row.write(data[4 * row.start + components[row.requested]..].iter_mut().step_by(4), |v| v);
+    read_rows(BufReader::new(source), &headers, &requested, false, keep).map_err(|e| malformed(e.to_string()))?;
     let (size, crop) = windows(&header.shared_attributes.display_window, header.own_attributes.layer_position, header.layer_size);
     Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() })
 }

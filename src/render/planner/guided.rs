@@ -22,7 +22,7 @@ const GUIDED_COST: f64 = 2.5;
 /// The guide, and the samples that have no weight yet.
 #[derive(Clone, Debug)]
 pub(in crate::render) struct GuidedPlanner {
-    /// `None` once guiding was given up.
+    /// `None` once guiding has ended.
     pub guide: Option<Guide>,
     /// The samples of the iteration under way; all before are in the film of the render.
     pub iteration: Film,
@@ -80,7 +80,7 @@ impl GuidedPlanner {
         }
         let is_worth_it = MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain >= min_gain);
         if self.merged > 0 && !is_worth_it && self.guide.take().is_some() {
-            tracing::info!("guiding does not pay and is given up after {done} samples per pixel");
+            tracing::info!("guiding does not pay and ends after {done} samples per pixel");
         }
         self.merged = done;
         self.clear_iteration();

@@ -147,7 +147,7 @@ impl RenderState {
         }
     }
 
-    /// The pass under way was given up: tiles differ in their samples.
+    /// The pass under way was cancelled: tiles differ in their samples.
     pub(super) fn give_up_pass(&mut self) {
         self.torn = true;
         if let Planner::Guided(planner) = &mut self.planner {

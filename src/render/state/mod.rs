@@ -178,17 +178,17 @@ fn rays([camera, indirect, shadow]: [u64; 3]) -> RayCounts {
     RayCounts { camera, indirect, shadow }
 }
 
-/// Whether the state in a file can be continued to what `wanted` describes.
-fn fits(reader: &Reader, wanted: &Header) -> Result<()> {
+/// Whether the state in a file can be continued to what `requested` describes.
+fn fits(reader: &Reader, requested: &Header) -> Result<()> {
     let there = reader.header();
-    let mut differences = there.differences(wanted, "in the checkpoint", "requested");
-    if there.shard != wanted.shard {
-        differences.push(format!("shard: {} in the checkpoint, {} requested", there.shard, wanted.shard));
-    } else if there.shard != Shard::WHOLE && there.spp != wanted.spp {
+    let mut differences = there.differences(requested, "in the checkpoint", "requested");
+    if there.shard != requested.shard {
+        differences.push(format!("shard: {} in the checkpoint, {} requested", there.shard, requested.shard));
+    } else if there.shard != Shard::WHOLE && there.spp != requested.spp {
         // Other samples would belong to it.
-        differences.push(format!("spp: {} in the checkpoint, {} requested, and shards are parts of a fixed number", there.spp, wanted.spp));
-    } else if there.done + u32::from(there.tiles_ahead > 0) > wanted.spp {
-        differences.push(format!("spp: pixels have {} samples already, {} requested", there.done, wanted.spp));
+        differences.push(format!("spp: {} in the checkpoint, {} requested, and shards are parts of a fixed number", there.spp, requested.spp));
+    } else if there.done + u32::from(there.tiles_ahead > 0) > requested.spp {
+        differences.push(format!("spp: pixels have {} samples already, {} requested", there.done, requested.spp));
     }
     if differences.is_empty() {
         return Ok(());

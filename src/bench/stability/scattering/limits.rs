@@ -20,7 +20,7 @@ fn sky(w: Vec3) -> f64 {
 }
 
 /// The contribution of one sample.
-fn brought(bsdf: &Bsdf, wo: Vec3, u: [f32; 4]) -> f64 {
+fn contribution(bsdf: &Bsdf, wo: Vec3, u: [f32; 4]) -> f64 {
     bsdf.sample(wo, u[2], [u[0], u[1]]).map_or(0.0, |s| f64::from(s.weight.g) * sky(s.wi))
 }
 
@@ -38,7 +38,7 @@ fn estimate(values: impl Iterator<Item = f64>) -> (f64, f64) {
 
 /// p-value of Welch's test of two materials by different random numbers, and the relative difference of their means by the same.
 fn welch(a: &Bsdf, b: &Bsdf, wo: Vec3, count: u32) -> (f64, f64) {
-    let of = |bsdf: &Bsdf, seed: u32| estimate(random_points(seed, count).map(|u| brought(bsdf, wo, u)));
+    let of = |bsdf: &Bsdf, seed: u32| estimate(random_points(seed, count).map(|u| contribution(bsdf, wo, u)));
     let ((mean_a, variance_a), (mean_b, variance_b)) = (of(a, 1), of(b, 2));
     let t = (mean_a - mean_b) / (variance_a + variance_b).sqrt();
     let freedom = (variance_a + variance_b).powi(2) / (variance_a.powi(2) + variance_b.powi(2)) * f64::from(count - 1);

@@ -91,12 +91,12 @@ fn scene_rows(scene: Option<&Path>) -> Result<Vec<SettingRow>> {
             continue;
         }
         // A scene in our format has the key or not; in an imported scene, a value that differs from the default was given.
-        let said = match &written {
+        let is_given = match &written {
             Some(written) => places.iter().any(|place| written.pointer(place).is_some()),
             None => places.iter().any(|place| desc.pointer(place) != bare.pointer(place)),
         };
         let origin = match scene {
-            Some(path) if said => format!("scene: {}", path.display()),
+            Some(path) if is_given => format!("scene: {}", path.display()),
             _ => "built-in".to_owned(),
         };
         let separator = if key == "size" { "x" } else { "," };

@@ -83,19 +83,19 @@ fn bytes_at<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
 
 /// The use of an accessor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wanted {
+pub enum AccessorUse {
     Floats,
     Indices,
 }
 
 impl<'a> GltfSource<'a> {
     /// The elements of an accessor that `path` names, which must be of one of these types.
-    pub fn column(&self, path: &str, index: Index<accessor::Accessor>, types: &[Type], wanted: Wanted) -> Result<Column<'a>> {
+    pub fn column(&self, path: &str, index: Index<accessor::Accessor>, types: &[Type], accessor_use: AccessorUse) -> Result<Column<'a>> {
         let place = format!("{path} (accessors[{}])", index.value());
-        self.checked_column(index, types, wanted).map_err(|message| self.fault(&place, message))
+        self.checked_column(index, types, accessor_use).map_err(|message| self.fault(&place, message))
     }
 
-    fn checked_column(&self, index: Index<accessor::Accessor>, types: &[Type], wanted: Wanted) -> Result<Column<'a>, String> {
+    fn checked_column(&self, index: Index<accessor::Accessor>, types: &[Type], accessor_use: AccessorUse) -> Result<Column<'a>, String> {
         let accessor = self.root.get(index).ok_or("there is no such accessor")?;
         let (Checked::Valid(kind), Checked::Valid(type_)) = (accessor.component_type, accessor.type_) else {
             return Err("the type is not one of glTF".into());
@@ -108,7 +108,7 @@ impl<'a> GltfSource<'a> {
                 types.iter().map(|t| name(*t)).collect::<Vec<_>>().join(" or ")
             ));
         }
-        if wanted == Wanted::Indices && !matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
+        if accessor_use == AccessorUse::Indices && !matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
             return Err("has numbers that are no indices".into());
         }
         let (width, size) = (type_.multiplicity(), kind.size());

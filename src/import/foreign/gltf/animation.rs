@@ -7,7 +7,7 @@ use gltf::json::animation::{Interpolation, Property, Sampler};
 use gltf::json::validation::Checked;
 
 use super::GltfSource;
-use super::accessors::{Column, Wanted};
+use super::accessors::{Column, AccessorUse};
 use super::nodes::unit;
 use crate::error::Result;
 use crate::import::Draft;
@@ -102,8 +102,8 @@ struct Moment {
 
 impl<'a> Curve<'a> {
     fn new(source: GltfSource<'a>, path: &str, sampler: &Sampler, type_: Type) -> Result<Self> {
-        let times = source.column(&format!("{path}: input"), sampler.input, &[Type::Scalar], Wanted::Floats)?;
-        let values = source.column(&format!("{path}: output"), sampler.output, &[type_], Wanted::Floats)?;
+        let times = source.column(&format!("{path}: input"), sampler.input, &[Type::Scalar], AccessorUse::Floats)?;
+        let values = source.column(&format!("{path}: output"), sampler.output, &[type_], AccessorUse::Floats)?;
         let Checked::Valid(interpolation) = sampler.interpolation else {
             return Err(source.fault(path, "the interpolation is not one of glTF"));
         };

@@ -7,7 +7,7 @@ use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mesh, Primitive, Semantic};
 
 use super::GltfSource;
-use super::accessors::{Column, Wanted};
+use super::accessors::{Column, AccessorUse};
 use super::extensions::Instancing;
 use super::geometry::{self, Deformation};
 use super::materials::MaterialSet;
@@ -123,7 +123,7 @@ fn placements(source: GltfSource, path: &str, node: usize, world: DAffine3, draf
         Some(&index) => {
             let place = format!("{path}.extensions.{NAME}.attributes.{name}");
             let index = u32::try_from(index).map_err(|_| source.fault(&place, "there is no such accessor"))?;
-            source.column(&place, Index::new(index), &[type_], Wanted::Floats).map(Some)
+            source.column(&place, Index::new(index), &[type_], AccessorUse::Floats).map(Some)
         }
         None => Ok(None),
     };
