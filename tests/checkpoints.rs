@@ -218,7 +218,7 @@ fn others(value: &Value) -> Vec<Value> {
     }
 }
 
-/// Every way to change one field of serialized settings, with the field's name: whatever is added to them is found here.
+/// Every way to change one field of serialized settings, with the field's name: new fields are included.
 fn changed_settings(settings: &Value) -> Vec<(String, Value)> {
     let mut changed = Vec::new();
     for (name, value) in settings.as_object().unwrap() {

@@ -14,7 +14,7 @@ use crate::import::Imported;
 use crate::output::FileUses;
 
 /// Copies files to the folder beside a scene.
-pub struct Files<'a> {
+pub struct AssetCopier<'a> {
     assets: &'a Assets,
     source: &'a Path,
     target_folder: PathBuf,
@@ -29,7 +29,7 @@ pub struct Files<'a> {
     uses: Option<FileUses>,
 }
 
-impl<'a> Files<'a> {
+impl<'a> AssetCopier<'a> {
     pub fn new(imported: &'a Imported, source: &'a Path, target: &Path, originals: Originals) -> Self {
         let stem = target.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy().into_owned());
         Self {

@@ -43,11 +43,11 @@ const UNITS: f32 = 65_536.0;
 const LARGEST: f32 = 1_048_576.0;
 
 /// The BSDF sampling fraction of regions where none has been learned; the other directions are sampled from the guide.
-const SURFACE_SHARE: f32 = 0.5;
+const BSDF_SAMPLING_FRACTION: f32 = 0.5;
 
 /// The fractions that are tried instead. With smaller ones, light that is not in the guide would get too large a weight
 /// when a path meets it.
-const OTHER_SHARES: [f32; 4] = [0.3, 0.4, 0.7, 0.9];
+const OTHER_FRACTIONS: [f32; 4] = [0.3, 0.4, 0.7, 0.9];
 
 /// A node of the tree over space: the index of the first of two children or, with [`IS_LEAF`], that of a leaf. Small,
 /// for paths look it up at every vertex.
@@ -77,15 +77,15 @@ struct Region {
 struct Leaf {
     records: DTreeBuilder,
     count: AtomicU64,
-    /// How much better each of [`OTHER_SHARES`] is than half, as the mean logarithm of the density weighted by light.
+    /// How much better each of [`OTHER_FRACTIONS`] is than half, as the mean logarithm of the density weighted by light.
     gains: [AtomicI64; 4],
 }
 
 impl Leaf {
     /// The best share by the records.
     fn best_share(&self) -> f32 {
-        let best = self.gains.iter().zip(OTHER_SHARES).max_by_key(|(gain, _)| gain.load(Ordering::Relaxed));
-        best.filter(|(gain, _)| gain.load(Ordering::Relaxed) > 0).map_or(SURFACE_SHARE, |(_, share)| share)
+        let best = self.gains.iter().zip(OTHER_FRACTIONS).max_by_key(|(gain, _)| gain.load(Ordering::Relaxed));
+        best.filter(|(gain, _)| gain.load(Ordering::Relaxed) > 0).map_or(BSDF_SAMPLING_FRACTION, |(_, share)| share)
     }
 }
 
@@ -136,7 +136,7 @@ impl Guide {
             corner: Vec3::ZERO,
             inverse_size: 0.0,
             nodes: (0..6).map(|leaf| Node(leaf | IS_LEAF)).collect(),
-            learned: vec![Region { directions: None, surface_share: SURFACE_SHARE }; 6],
+            learned: vec![Region { directions: None, surface_share: BSDF_SAMPLING_FRACTION }; 6],
             leaves: (0..6).map(|_| Leaf::default()).collect(),
             scale: scale_of(typical),
             learns: true,
@@ -192,8 +192,8 @@ impl Guide {
         }
         let amount = (light * self.scale).min(LARGEST * UNITS);
         if let Some([surface, guide]) = densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0) {
-            let usual = SURFACE_SHARE * surface + (1.0 - SURFACE_SHARE) * guide;
-            for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_SHARES) {
+            let usual = BSDF_SAMPLING_FRACTION * surface + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
+            for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_FRACTIONS) {
                 let gain = ((share * surface + (1.0 - share) * guide) / usual).ln();
                 sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
             }

@@ -53,7 +53,7 @@ impl<'a> RenderContext<'a> {
 
     /// Whether a batch was cancelled.
     #[inline]
-    pub fn has_given_up(&self) -> bool {
+    pub fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(Cancel::is_cancelled)
     }
 

@@ -112,7 +112,7 @@ impl Driver<'_> {
             state.rays.add(&rays);
             if self.cancel.is_cancelled() {
                 self.ends(&mut stats, true);
-                state.give_up_pass();
+                state.cancel_pass();
                 break;
             }
             state.complete_pass(&pass, self.session, &rays);

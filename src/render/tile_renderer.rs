@@ -186,7 +186,7 @@ impl<'a> TileRenderer<'a> {
         let count = samples.len() as u64 * active.area();
         for sample in samples {
             self.render_batch(origin, sample, guide, workspace);
-            if self.context.has_given_up() {
+            if self.context.is_cancelled() {
                 break;
             }
             workspace.placed.clear();

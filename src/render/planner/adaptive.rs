@@ -350,7 +350,7 @@ fn render_groups(renderer: &TileRenderer, tile: &mut FilmTile, groups: &[([u32; 
         (group * GROUP..(group + 1) * GROUP).flat_map(of_sample)
     };
     renderer.render_samples(groups.iter().flat_map(of_group), None, workspace);
-    if renderer.context.has_given_up() {
+    if renderer.context.is_cancelled() {
         return 0;
     }
     let active = tile.active();

@@ -92,7 +92,7 @@ impl GuidedPlanner {
     }
 
     /// Drops the samples of the iteration under way; the result is how many samples every pixel has left.
-    pub fn give_up_iteration(&mut self) -> u32 {
+    pub fn discard_iteration(&mut self) -> u32 {
         self.clear_iteration();
         self.merged
     }
