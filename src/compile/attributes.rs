@@ -48,7 +48,7 @@ impl MaterialTable {
 }
 
 impl Builder {
-    /// Refuses a surface that takes attributes which its shape does not have, or with values that make no sense; drops
+    /// Rejects a surface that takes attributes which its shape does not have, or with values that make no sense; drops
     /// those that it does not take.
     pub(super) fn check_attributes(
         &self,
@@ -84,7 +84,7 @@ impl Builder {
     }
 }
 
-/// Refuses attributes with more or fewer values than vertices or triangles.
+/// Rejects attributes with more or fewer values than vertices or triangles.
 pub fn check_counts(attributes: &BTreeMap<String, AttributeValues>, vertices: usize, triangles: usize) -> std::result::Result<(), String> {
     for (name, values) in attributes {
         let (count, what) = if is_of_faces(name) == Some(true) { (triangles, "triangles") } else { (vertices, "vertices") };

@@ -135,7 +135,7 @@ impl MaterialTable {
 
     /// Whether something is true of a material or of a part of it.
     pub(super) fn any_part(&self, id: MaterialId, is: &impl Fn(MaterialId) -> bool) -> bool {
-        // Parts of several parts are looked at once.
+        // Parts of several parts are visited once.
         let (mut open, mut seen) = (vec![id], HashSet::from([id]));
         while let Some(id) = open.pop() {
             if is(id) {

@@ -327,7 +327,7 @@ fn out_of_range(data: &MeshData) -> Option<(usize, u32)> {
     data.triangles.iter().enumerate().find_map(bad)
 }
 
-/// Whether three corners span an area; NaN counts as area, so that the mesh is refused for it and not merely thinned.
+/// Whether three corners span an area; NaN counts as area, so that the mesh is rejected for it and not merely thinned.
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
     (b - a).cross(c - a) != DVec3::ZERO
@@ -337,7 +337,7 @@ fn place_normals(mut normals: Vec<[f32; 3]>, transform: &Transform, reverse: boo
     let sign = if reverse { -1.0 } else { 1.0 };
     for n in &mut normals {
         let moved = transform.normal(DVec3::from(n.map(f64::from))) * sign;
-        // Zero and NaN stay as they are; the first falls back to the flat normal, the second is refused.
+        // Zero and NaN stay as they are; the first falls back to the flat normal, the second is rejected.
         *n = if moved.length_squared() > 0.0 { moved.normalize().as_vec3().to_array() } else { *n };
     }
     normals

@@ -1,4 +1,4 @@
-//! What the user wrote to a scene ready to render: names become ids, meshes are loaded and placed, and whatever makes no sense is refused
+//! What the user wrote to a scene ready to render: names become ids, meshes are loaded and placed, and whatever makes no sense is rejected
 //! with its place. The only module that sees both [`SceneDesc`] and [`Scene`].
 
 mod attributes;

@@ -6,7 +6,7 @@ use super::CompileContext;
 use crate::desc::{InstanceDesc, SceneDesc};
 use crate::error::Result;
 
-/// More instances than memory holds are refused before they are made.
+/// More instances than memory holds are rejected before they are made.
 const MAX_PLACED: u64 = 1 << 24;
 
 /// Objects are nested at most this deep.

@@ -230,7 +230,7 @@ impl Builder {
         Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
-    /// Refuses a placed shape that is too large or too small for `f32`.
+    /// Rejects a placed shape that is too large or too small for `f32`.
     fn check_size(&self, path: &str, shape: &Shape, space: &RenderSpace) -> Result<()> {
         let bounds = shape.bounds();
         if !bounds.min.is_finite() || !bounds.max.is_finite() {

@@ -215,7 +215,7 @@ impl<'a> AssetCopier<'a> {
 /// Bytes at the start of a file that its type is detected from.
 const START: u64 = 1 << 16;
 
-/// Refuses to copy what is not what its name says: a scene of a stranger could name any file, and who gets the copy would have it.
+/// Rejects files whose content does not match their extension: a scene of a stranger could name any file, and the copy would disclose it.
 fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
     let kind = path.extension().map(|e| e.to_string_lossy().to_uppercase()).unwrap_or_default();
     let start = start.strip_prefix(MARK).unwrap_or(start);

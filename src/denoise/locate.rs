@@ -87,7 +87,7 @@ fn inside(folder: &Path) -> Option<PathBuf> {
 }
 
 /// Opens the library with `open`: the file or folder that the user names, else the one that the environment variable names, else the
-/// system's, else that of Python's package `pyoidn`. What is named is used or refused; what is found is passed over if unusable.
+/// system's, else that of Python's package `pyoidn`. What is named is used or rejected; what is found is passed over if unusable.
 ///
 /// # Errors
 /// [`Error::Missing`] if what is named is not there or not the library, or if none is found: with where was looked and how to get it.

@@ -17,7 +17,7 @@ const MAX_STREAM: u64 = 1 << 32;
 /// # Errors
 /// The system's, or [`io::ErrorKind::InvalidInput`] for folders, devices, pipes and sockets: reading those may wait, or go on, for ever.
 pub fn open(path: &Path) -> io::Result<Take<File>> {
-    // Looked at before opening, which can make a device act; and after it, in case the file was exchanged in between.
+    // Checked before opening, which can make a device act; and after it, in case the file was exchanged in between.
     check_regular(&std::fs::metadata(path)?)?;
     let file = File::options().read(true).custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32).open(path)?;
     let metadata = file.metadata()?;

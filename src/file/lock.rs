@@ -23,7 +23,7 @@ pub struct Lock {
 pub enum LockError {
     /// Another process holds it; its number as text, if it left one.
     Held(String),
-    /// The system refuses.
+    /// The system rejects.
     System(io::Error),
 }
 

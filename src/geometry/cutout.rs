@@ -10,7 +10,7 @@ use crate::math::random::mix_32;
 
 /// Opacity of surfaces, decided stochastically hit by hit during traversal.
 ///
-/// A hit counts if a number in `[0, 1)`, hashed from the ray, the ids and the side, lies below alpha. So the answer is
+/// A hit counts if a number in `[0, 1)`, hashed from the ray, the ids and the side, lies below alpha. So the result is
 /// the same in any order of visits, for closest and any hits, and a ray that looks again meets the same surfaces.
 pub trait AlphaMask: Debug + Send + Sync {
     /// Whether a shape has holes; [`alpha`](Self::alpha) is evaluated on no other.

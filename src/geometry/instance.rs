@@ -70,7 +70,7 @@ impl Instance {
         let offsets = rows.map(|row| row.abs().dot(translation.abs()));
         let reach = rows.iter().map(|row| row.abs().element_sum()).fold(0.0, f32::max);
         let offset = offsets.into_iter().fold(0.0, f32::max);
-        // A NaN row would be lost in the maxima, so each is looked at.
+        // A NaN row would be lost in the maxima, so each is checked.
         let finite = rows.iter().all(|row| row.is_finite()) && offsets.iter().all(|o| *o < 0.25 * EMBREE_LARGE);
         (finite && reach.is_normal()).then_some(InverseReach { reach, offset })
     }

@@ -12,7 +12,7 @@ use crate::id::PrimId;
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
 use crate::math::{Aabb, Bounds, DVec3, Ray, Transform, Vec2, Vec3};
 
-/// Why a mesh is refused; indices count from 0.
+/// Why a mesh is rejected; indices count from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// No triangles at all.

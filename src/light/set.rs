@@ -1,4 +1,4 @@
-//! All lights of a scene, and which one a path looks at.
+//! All lights of a scene, and the sampling of one of them.
 
 use super::tree::{LightSampleContext, LightTree};
 use super::{Environment, EnvironmentMap, Light, MisCompensation};

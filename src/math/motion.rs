@@ -107,7 +107,7 @@ impl Motion {
 
     /// The transform at a time from 0 to 1.
     pub fn at(&self, time: f64) -> Transform {
-        // Regular at all times that were looked at; between them it can fail only by a hair.
+        // Regular at all times that were sampled; between them it can fail only by a hair.
         Transform::new(self.map_at(time)).unwrap_or(Transform::IDENTITY)
     }
 
@@ -120,7 +120,7 @@ impl Motion {
         all.fold(Bounds::EMPTY, |a, b| a.union(&b))
     }
 
-    /// Times at which [`at`](Self::at) may be looked at to learn its range.
+    /// Times at which [`at`](Self::at) may be evaluated to find its range.
     pub fn sample_times() -> impl Iterator<Item = f64> {
         (0..=INTERVALS).map(|i| f64::from(i) / f64::from(INTERVALS))
     }

@@ -28,7 +28,7 @@ pub struct RenderProvenance {
     pub version: u64,
     /// Name and version of the program.
     pub program: String,
-    /// What followed the program's name on its command line. Only for people who look at the file.
+    /// What followed the program's name on its command line. Only for the information of people.
     #[serde(default)]
     pub arguments: Vec<String>,
     /// The folder that names of files refer to.

@@ -34,7 +34,7 @@ pub(super) unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError,
     let _ = monitor.first_error.set((code, message));
 }
 
-/// Counts bytes; called from all building threads at once. An allocation is never refused.
+/// Counts bytes; called from all building threads at once. An allocation is never rejected.
 pub(super) unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post: bool) -> bool {
     // SAFETY: as in `on_error`.
     let monitor = unsafe { &*user.cast::<Monitor>() };

@@ -42,7 +42,7 @@ impl RayLimits {
         // Half the limit leaves room for rounding.
         const LIMIT: f32 = 0.5 * EMBREE_LARGE;
         let mut gate = Self::OPEN;
-        // Instances that move look at each ray themselves.
+        // Instances that move test each ray themselves.
         for (i, instance) in instances.iter().enumerate().filter(|(_, instance)| instance.motion.is_none()) {
             let InverseReach { reach, offset } = instance
                 .inverse_reach()

@@ -105,7 +105,7 @@ unsafe fn set_ray(out: *mut RTCRay, words: &RayWords, key: u32) {
     }
 }
 
-/// Which lanes Embree may look at: -1, others 0.
+/// The valid lanes for Embree: -1, others 0.
 #[repr(C, align(64))]
 pub(super) struct LaneMask(pub(super) [i32; WIDTH]);
 

@@ -162,7 +162,7 @@ impl EnvironmentMap {
             return Err(EnvironmentMapError::Size { width, height, texels: pixels.len() });
         }
         let product = rotation.transpose() * rotation;
-        // Written so that a NaN is refused.
+        // Written so that a NaN is rejected.
         if !(product - DMat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() < 1e-6) {
             return Err(EnvironmentMapError::Rotation);
         }

@@ -12,7 +12,7 @@ const PAGE_LIFE: Duration = Duration::from_secs(3);
 /// Most pages that are waited for.
 const MAX_PAGES: usize = 64;
 
-/// Most pictures in answers at a time.
+/// Most pictures in responses at a time.
 const MOST_SENT: usize = 4;
 
 /// A page open somewhere.
@@ -34,7 +34,7 @@ struct State {
     shown: Option<Instant>,
     finished: bool,
     pages: Vec<Page>,
-    /// Pictures that answers hold while they are sent.
+    /// Pictures that responses hold while they are sent.
     sent: Vec<Weak<Snapshot>>,
 }
 

@@ -13,7 +13,7 @@ const MAX_HEADERS: usize = 64;
 /// How long readers are waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// A connection ends after this time without a request, or without a byte of an answer taken.
+    /// A connection ends after this time without a request, or without a byte of a response taken.
     pub stall: Duration,
     /// Bytes a second that a reader has to take, after a first `stall`; at least 1.
     pub least_rate: u64,
@@ -26,7 +26,7 @@ impl Default for Patience {
     }
 }
 
-/// How long what is left of a refused request is read.
+/// How long what is left of a rejected request is read.
 const LINGER: Duration = Duration::from_secs(1);
 
 /// What the page may do: show what is in it, and send requests to its own server.
@@ -84,7 +84,7 @@ impl Request {
 pub struct Connection {
     stream: TcpStream,
     patience: Patience,
-    /// When the present answer has to be sent.
+    /// When the present response has to be sent.
     deadline: Option<Instant>,
     /// What has been read and not yet been used.
     buffer: Vec<u8>,
@@ -123,13 +123,13 @@ impl Connection {
         }
     }
 
-    /// Answers with a refusal, the last answer of the connection.
+    /// Responds with an error, the last response of the connection.
     pub fn refuse(&mut self, refusal: HttpError) -> io::Result<()> {
         let allow = if refusal == HttpError::Method { "Allow: GET\r\n" } else { "" };
         let (status, length) = (refusal.status(), refusal.status().len());
         let head = format!("HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n");
         self.stream.write_all(format!("{head}{status}").as_bytes())?;
-        // A connection closed before all of the request is read would take the answer with it.
+        // A connection closed before all of the request is read would take the response with it.
         self.stream.shutdown(Shutdown::Write)?;
         self.stream.set_read_timeout(Some(LINGER))?;
         let (start, mut read) = (Instant::now(), 1);
@@ -139,7 +139,7 @@ impl Connection {
         Ok(())
     }
 
-    /// Starts an answer; the body of `length` bytes follows by [`Connection::write`].
+    /// Starts a response; the body of `length` bytes follows by [`Connection::write`].
     pub fn start(&mut self, status: &str, kind: &str, length: u64) -> io::Result<()> {
         let head = format!(
             "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nCache-Control: no-store\r\n\
@@ -171,8 +171,8 @@ impl Connection {
         Ok(())
     }
 
-    /// A whole answer.
-    pub fn answer(&mut self, status: &str, kind: &str, body: &[u8]) -> io::Result<()> {
+    /// A whole response.
+    pub fn respond(&mut self, status: &str, kind: &str, body: &[u8]) -> io::Result<()> {
         self.start(status, kind, body.len() as u64)?;
         self.write(body)
     }

@@ -153,7 +153,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
     }
 }
 
-/// Answers the requests of a connection, one after the other.
+/// Responds to the requests of a connection, one after the other.
 fn serve(stream: TcpStream, shared: &Shared, has_room: bool) -> std::io::Result<()> {
     let mut connection = Connection::new(stream, shared.patience)?;
     if !has_room {

@@ -1,6 +1,6 @@
 //! The resources of the server.
 //!
-//! | path | answer |
+//! | path | response |
 //! |---|---|
 //! | `/` | the page |
 //! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and requests the next one, except with `idle=1` |
@@ -26,16 +26,16 @@ const JSON: &str = "application/json";
 
 pub fn respond(connection: &mut Connection, request: &Request, shared: &Shared) -> io::Result<()> {
     match request.path() {
-        "/" => connection.answer(OK, "text/html; charset=utf-8", PAGE.as_bytes()),
+        "/" => connection.respond(OK, "text/html; charset=utf-8", PAGE.as_bytes()),
         "/state" => {
             if let (Some(page), Some(version)) = (request.number("page"), request.number("have")) {
                 shared.board.visit(page, version, request.number("idle") == Some(1));
             }
-            connection.answer(OK, JSON, state(shared).to_string().as_bytes())
+            connection.respond(OK, JSON, state(shared).to_string().as_bytes())
         }
         "/layer" => layer(connection, request, shared),
         "/pixel" => match pixel(request, shared) {
-            Some(value) => connection.answer(OK, JSON, value.to_string().as_bytes()),
+            Some(value) => connection.respond(OK, JSON, value.to_string().as_bytes()),
             None => not_found(connection),
         },
         _ => not_found(connection),
@@ -43,7 +43,7 @@ pub fn respond(connection: &mut Connection, request: &Request, shared: &Shared) 
 }
 
 fn not_found(connection: &mut Connection) -> io::Result<()> {
-    connection.answer("404 Not Found", "text/plain", b"not found")
+    connection.respond("404 Not Found", "text/plain", b"not found")
 }
 
 fn state(shared: &Shared) -> Value {
@@ -69,7 +69,7 @@ fn state(shared: &Shared) -> Value {
 /// The connection holds its picture while it sends.
 fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io::Result<()> {
     let Some(shown) = shared.board.take() else {
-        return connection.answer("503 Service Unavailable", "text/plain", b"too many slow readers");
+        return connection.respond("503 Service Unavailable", "text/plain", b"too many slow readers");
     };
     let index = request.number("index").and_then(|index| usize::try_from(index).ok());
     let (Some(snapshot), Some(index)) = (shown.snapshot, index) else { return not_found(connection) };

@@ -13,7 +13,7 @@ use crate::file::exr_blocks::{ChannelRow, Place, allocate, read_rows};
 use crate::file::exr_headers::read_headers;
 use crate::output::role::Role;
 
-/// A file's headers, and the pixels that rules look at.
+/// A file's headers, and the pixels that rules check.
 pub struct ExrFile {
     pub path: PathBuf,
     pub headers: Vec<Header>,

@@ -1,6 +1,6 @@
 //! What the library that writes files leaves out of their headers: attributes in the order of their names, as other
 //! programs write them, since equal pictures would come in different files; and the mark of files with long names,
-//! without which OpenEXR refuses to read them.
+//! without which OpenEXR does not read them.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 

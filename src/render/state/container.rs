@@ -100,7 +100,7 @@ impl Reader {
         Self::begin(path, file, length)
     }
 
-    /// The header of a file, read without a look at the rest; of one that is damaged it may be wrong.
+    /// The header of a file, read without the rest; of one that is damaged it may be wrong.
     ///
     /// # Errors
     /// As [`open`](Self::open), as far as the damage shows.

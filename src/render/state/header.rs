@@ -115,7 +115,7 @@ impl Header {
         }
     }
 
-    /// That of a file, without a look at the rest of it.
+    /// That of a file, without reading the rest of it.
     ///
     /// # Errors
     /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Checkpoint`](crate::Error::Checkpoint)

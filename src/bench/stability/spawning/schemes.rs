@@ -10,7 +10,7 @@ use crate::math::{DMat3, DVec3, Ray, Vec3};
 /// A way to start a ray.
 #[derive(Clone, Copy, PartialEq)]
 enum Scheme {
-    /// Moved by the bound of the error, and false hits refused in `f64`.
+    /// Moved by the bound of the error, and false hits rejected in `f64`.
     Ours,
     /// Not moved at all.
     None,

@@ -145,7 +145,7 @@ pub struct BenchAccelArgs {
     /// Without --out: print JSON instead of tables
     #[arg(long)]
     pub json: bool,
-    /// Trace only this ray and print each accelerator's answer
+    /// Trace only this ray and print each accelerator's hit
     #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN[,TMAX[,TIME]]]", allow_hyphen_values = true)]
     pub ray: Option<String>,
     /// Print only results and errors

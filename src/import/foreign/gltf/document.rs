@@ -83,7 +83,7 @@ pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
     check_positions(&root).map_err(|path| fault(&path, NO_ELEMENT.into()))?;
     let mut flaws = Vec::new();
     root.validate(&root, JsonPath::new, &mut |path, flaw| {
-        // Bounds of accessors are not needed; required extensions have been looked at.
+        // Bounds of accessors are not needed; required extensions have been checked.
         let path = path().0;
         let is_bound = flaw == Flaw::Missing && (path.ends_with(".min") || path.ends_with(".max"));
         if !is_bound && flaw != Flaw::Unsupported && flaws.len() < 10 {

@@ -126,7 +126,7 @@ impl Reader<'_> {
         self.draft.ignored(&plugin.place.to_string(), &plugin.title(), "", why);
     }
 
-    /// Refuses a plugin that is a part of itself, or lies too deep. `open.pop()` ends what this begins.
+    /// Rejects a plugin that is a part of itself, or lies too deep. `open.pop()` ends what this begins.
     fn guard(&mut self, id: PluginId) -> Result<()> {
         let plugin = &self.document.plugins[id.0];
         if self.open.contains(&id) {

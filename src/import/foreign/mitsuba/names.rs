@@ -103,7 +103,7 @@ const PLUGINS: &[(&str, &[&str])] = &[
     ("spectrum", &["uniform", "regular", "irregular", "srgb", "d65", "blackbody", "rawconstant"]),
 ];
 
-/// Refuses the name of a plugin that does not exist; or an error message.
+/// Rejects the name of a plugin that does not exist, with an error message.
 pub fn check(class: &str, kind: &str) -> Result<(), String> {
     let known = PLUGINS.iter().find(|(name, _)| *name == class).map_or(&[][..], |(_, kinds)| *kinds);
     if known.contains(&kind) {
