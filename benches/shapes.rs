@@ -1,6 +1,6 @@
-//! Nanoseconds per ray of analytic shapes: the test alone, through Embree as user geometry, and of a mesh of the same sphere through Embree.
-//! Answers are compared before anything is timed. One thread. At the end a table of surfaces of revolution by the number of their segments
-//! and the kind of ray, beside a sphere.
+//! Nanoseconds per ray of analytic shapes: the test alone, through Embree as user geometry, and of a mesh of the same
+//! sphere through Embree. Answers are compared before anything is timed. One thread. At the end a table of surfaces of
+//! revolution by the number of their segments and the kind of ray, beside a sphere.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;

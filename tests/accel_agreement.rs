@@ -28,7 +28,8 @@ fn any_hit_means_that_there_is_a_closest_hit() {
                     let cut = Ray { t_max, ..*ray };
                     assert_eq!(accel.occluded(&cut), accel.intersect(&cut).is_some(), "{name}: {cut:?}");
                 }
-                // On triangles the interval is closed at the very t that was reported; a shape's f64 distance may round below itself.
+                // On triangles the interval is closed at the very t that was reported; a shape's f64 distance may round
+                // below itself.
                 if matches!(geometry.shape(hit.shape), Shape::Mesh(_)) && accel.description() != "linear" {
                     assert!(accel.occluded(&Ray { t_max: hit.t, ..*ray }), "{name}: {ray:?}");
                 }

@@ -63,8 +63,8 @@ fn even(spp: u32, seed: u64) -> Vec<[f64; 3]> {
     colors(&render(&room(), &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() }).image)
 }
 
-/// In 20 renders, the picture is as good as promised at least 19 times, its mean is that of a reference, and it took fewer samples than one
-/// that has as many everywhere.
+/// In 20 renders, the picture is as good as promised at least 19 times, its mean is that of a reference, and it took
+/// fewer samples than one that has as many everywhere.
 #[test]
 fn pictures_are_as_good_as_promised_with_fewer_samples_and_without_bias() {
     let (scene, target) = (room(), 0.0005);
@@ -103,7 +103,8 @@ fn the_picture_and_its_statistics_do_not_depend_on_threads() {
     assert_eq!((a.stats.samples, a.stats.estimated_error), (b.stats.samples, b.stats.estimated_error));
 }
 
-/// The variance layer is the variance of pictures with different seeds, and the layer of samples adds up to all of them.
+/// The variance layer is the variance of pictures with different seeds, and the layer of samples adds up to all of
+/// them.
 #[test]
 fn layers_hold_variance_and_samples() {
     let mut scene = room();

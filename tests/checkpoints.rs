@@ -242,7 +242,8 @@ fn changed_settings(settings: &Value) -> Vec<(String, Value)> {
     changed
 }
 
-/// Whatever setting the picture depends on differs: neither is a checkpoint continued nor are shards merged, and the setting is named.
+/// Whatever setting the picture depends on differs: neither is a checkpoint continued nor are shards merged, and the
+/// setting is named.
 #[test]
 fn every_setting_that_differs_is_named() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Jobs for farms: their scripts are run here with stand-ins for Slurm's commands and for the render, and a shard's options are checked.
+//! Jobs for farms: their scripts are run here with stand-ins for Slurm's commands and for the render, and a shard's
+//! options are checked.
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;

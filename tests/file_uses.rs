@@ -1,4 +1,5 @@
-//! No command overwrites a file that it reads, or writes two things to one file: usage errors that name both uses, before anything is written.
+//! No command overwrites a file that it reads, or writes two things to one file: usage errors that name both uses,
+//! before anything is written.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

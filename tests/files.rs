@@ -185,8 +185,9 @@ fn threads_that_cannot_be_started_are_one_error() {
     use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o777)).unwrap();
-    // The limit does not hold for root, and other users may not reach the program where it was built. The copy is made by another process:
-    // a file that this one had open for writing could be inherited by the child of another test, and would not start ("text file busy").
+    // The limit does not hold for root, and other users may not reach the program where it was built. The copy is made
+    // by another process: a file that this one had open for writing could be inherited by the child of another test,
+    // and would not start ("text file busy").
     let user = "[ $(id -u) != 0 ] || user='setpriv --reuid 64321 --regid 64321 --clear-groups'; $user true";
     let line = format!("cp \"$0\" steradian && {user} && $user ./steradian --version");
     let output = shell(folder.path(), &line);

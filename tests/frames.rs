@@ -69,7 +69,8 @@ fn a_frame_is_the_scene_with_its_shutter_moved() {
 #[test]
 fn frames_that_are_there_are_skipped_unless_they_are_to_be_overwritten() {
     let folder = folder_with(&[("a.json", scene())]);
-    // Without a place for the number there is one before the extension; of a half-finished frame the other half is rendered.
+    // Without a place for the number there is one before the extension; of a half-finished frame the other half is
+    // rendered.
     std::fs::write(folder.path().join("a.0002.exr"), "stays").unwrap();
     std::fs::write(folder.path().join("a.0002.png"), "stays").unwrap();
     std::fs::write(folder.path().join("a.0003.exr"), "goes").unwrap();

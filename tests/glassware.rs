@@ -140,7 +140,8 @@ fn crossings_are_those_of_a_fine_tessellation() {
                 worst = found.iter().zip(&expected).map(|(f, e)| (f - e).abs()).fold(worst, f64::max);
                 continue;
             }
-            // Only a line that touches the surface may miss its chords: two hits that nearly coincide are one more or less.
+            // Only a line that touches the surface may miss its chords: two hits that nearly coincide are one more or
+            // less.
             let more = if found.len() > expected.len() { &found } else { &expected };
             assert!(more.windows(2).any(|pair| pair[1] - pair[0] < 0.02), "{name}: {found:?}, expected {expected:?}");
             touching += 1;

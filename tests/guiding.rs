@@ -45,7 +45,8 @@ fn room() -> Value {
     })
 }
 
-/// A room with a lamp at the bottom of a shaft, which lights nothing but a spot of the ceiling: only paths that happen to meet it contribute.
+/// A room with a lamp at the bottom of a shaft, which lights nothing but a spot of the ceiling: only paths that happen
+/// to meet it contribute.
 fn room_with_shaft() -> Value {
     let (bottom, height, half) = (0.4, 1.1, 0.15);
     let wall = |x: f64, z: f64, along: [f64; 3]| quad("black", [x, bottom, z], along, [0.0, height, 0.0]);
@@ -211,7 +212,8 @@ fn a_resumed_guided_render_has_the_bits_of_one_run() {
     }
 }
 
-/// What is there of a guided render is a picture of the same brightness, from its checkpoint too; the number of samples is part of what it is.
+/// What is there of a guided render is a picture of the same brightness, from its checkpoint too; the number of samples
+/// is part of what it is.
 #[test]
 fn an_interrupted_guided_render_has_a_picture() {
     let folder = tempfile::tempdir().unwrap();

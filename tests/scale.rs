@@ -1,4 +1,5 @@
-//! Scenes far too small, too large or too far away for 32-bit coordinates: the same picture, layers in the scene's own units, or an error.
+//! Scenes far too small, too large or too far away for 32-bit coordinates: the same picture, layers in the scene's own
+//! units, or an error.
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
@@ -192,7 +193,8 @@ fn coincident_faces_of_an_emitter_are_one() {
     assert_eq!(picture(json!([[0, 3, 1], [0, 1, 2]])), picture(json!([[0, 3, 1]])));
 }
 
-/// One warning with the number and the first two shapes where another accelerator may meet another surface; none where it does not matter.
+/// One warning with the number and the first two shapes where another accelerator may meet another surface; none where
+/// it does not matter.
 #[test]
 fn coincident_faces_that_differ_are_one_warning() {
     let folder = tempfile::tempdir().unwrap();

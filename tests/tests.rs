@@ -47,7 +47,8 @@ mod flaws_of_camera;
 mod flaws_of_glass;
 /// Known flaws of renderers in lights and light transport: each test fails on the flawed formula.
 mod flaws_of_light;
-/// Known flaws of renderers in textures and surfaces, beyond those of [`textures`] and [`relief`]: each test fails on the flawed formula.
+/// Known flaws of renderers in textures and surfaces, beyond those of [`textures`] and [`relief`]: each test fails on
+/// the flawed formula.
 mod flaws_of_textures;
 /// Sequences of frames from the command line.
 mod frames;

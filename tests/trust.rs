@@ -1,4 +1,5 @@
-//! What files may do: scenes, EXR files and project configuration set what a picture is; they load, overwrite and connect to nothing.
+//! What files may do: scenes, EXR files and project configuration set what a picture is; they load, overwrite and
+//! connect to nothing.
 
 use std::collections::BTreeSet;
 use std::net::TcpListener;
@@ -103,7 +104,8 @@ fn rerender_writes_only_the_files_of_the_command_line() {
     assert_code(dir, "rerender denoised.exr -o b.exr --oidn-library none.so", 4, &["none.so", "--oidn-library"]);
 }
 
-/// What else the picture depends on is in the recipe: definitions, and the frame of one scene or of a scene for each frame.
+/// What else the picture depends on is in the recipe: definitions, and the frame of one scene or of a scene for each
+/// frame.
 #[test]
 fn a_recipe_holds_how_the_scene_was_read() {
     let folder = tempfile::tempdir().unwrap();

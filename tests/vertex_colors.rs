@@ -174,7 +174,8 @@ fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
         scene
     };
     let shown = |scene: &Value| -> Vec<[f32; 3]> { pixels(&folder.render(scene)).collect() };
-    // Right and below the diagonal the first triangle with an area, else the second: the one without is left out with its values.
+    // Right and below the diagonal the first triangle with an area, else the second: the one without is left out with
+    // its values.
     let corners = |image: &[[f32; 3]]| [image[16 * 15 + 15], image[0]];
     let none = || json!({});
     let is_near = |found: [[f32; 3]; 2], expected: [[f32; 3]; 2], bound: f32| {

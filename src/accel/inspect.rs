@@ -100,9 +100,9 @@ pub struct StructureStats {
     pub references: u64,
     /// The most items in one leaf.
     pub max_leaf: u64,
-    /// Expected work of a random line that meets the first tree's root: the sum over its nodes of area over the root's area, times
-    /// [`SAH_NODE_COST`], plus for each item of a leaf [`SAH_PRIM_COST`] (Goldsmith and Salmon, "Automatic Creation of
-    /// Object Hierarchies for Ray Tracing").
+    /// Expected work of a random line that meets the first tree's root: the sum over its nodes of area over the root's
+    /// area, times [`SAH_NODE_COST`], plus for each item of a leaf [`SAH_PRIM_COST`] (Goldsmith and Salmon, "Automatic
+    /// Creation of Object Hierarchies for Ray Tracing").
     pub sah_cost: f64,
 }
 

@@ -57,7 +57,8 @@ pub(super) fn check_size(width: usize, height: usize) -> Result<(), String> {
     }
 }
 
-/// The most pixels that a byte of a file can encode, where the format has a bound: a header alone never leads to a large allocation.
+/// The most pixels that a byte of a file can encode, where the format has a bound: a header alone never leads to a
+/// large allocation.
 fn pixels_per_byte(format: ImageFormat) -> u64 {
     match format {
         // Deflate makes at most 1,032 bytes of one, and a byte may hold eight pixels.

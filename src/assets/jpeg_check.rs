@@ -4,7 +4,8 @@
 pub fn is_whole_jpeg(bytes: &[u8]) -> bool {
     let mut at = 2;
     loop {
-        // A mark is one or more bytes 0xff, then its code. Within entropy-coded data, 0 and the restart marks D0 to D7 are no segments.
+        // A mark is one or more bytes 0xff, then its code. Within entropy-coded data, 0 and the restart marks D0 to D7
+        // are no segments.
         let Some(mark) = bytes.get(at..).and_then(|rest| rest.windows(2).position(is_segment)) else {
             return false;
         };

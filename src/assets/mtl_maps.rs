@@ -109,7 +109,8 @@ fn parse_map(words: SplitWhitespace, line: &str, folder: &Path) -> Result<ObjMap
         }
     }
     let first = words.next().ok_or("no file is named")?;
-    // A word of the rest may also stand among the options: the name starts at its last occurrence that the rest of the words follow.
+    // A word of the rest may also stand among the options: the name starts at its last occurrence that the rest of the
+    // words follow.
     let rest: Vec<&str> = std::iter::once(first).chain(words).collect();
     let start = line.rmatch_indices(first).map(|(at, _)| at).find(|&at| line[at..].split_whitespace().eq(rest.iter().copied()));
     let name = line[start.unwrap_or(0)..].trim().replace('\\', "/");

@@ -17,7 +17,8 @@ use super::{AssetError, MeshData};
 use crate::attribute::{AttributeValues, VERTEX_COLOR};
 use crate::color::linear_from_srgb;
 
-/// Reads a PLY file with all of its attributes. One with no faces, such as a cloud of points, is a mesh without triangles.
+/// Reads a PLY file with all of its attributes. One with no faces, such as a cloud of points, is a mesh without
+/// triangles.
 ///
 /// # Errors
 /// If the file is missing, malformed, ends early, or has no element `vertex`, or faces without a list `vertex_indices`.

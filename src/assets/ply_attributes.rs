@@ -32,8 +32,8 @@ impl Column {
     }
 }
 
-/// The attributes of an element, those in `requested` or (without it) all: consecutive numbers whose names differ in a last letter behind an
-/// underscore, one or three of them. Of several with the same name, the first.
+/// The attributes of an element, those in `requested` or (without it) all: consecutive numbers whose names differ in a
+/// last letter behind an underscore, one or three of them. Of several with the same name, the first.
 pub fn columns(element: &ElementDef, prefix: &str, requested: Option<&BTreeSet<String>>) -> Vec<Column> {
     struct Group<'a> {
         stem: &'a str,
@@ -99,7 +99,8 @@ pub fn is_marked(name: &str) -> bool {
     name.starts_with(MARK)
 }
 
-/// Adds the numbers of one vertex or face, in the order of the file, to the values of the attributes; those that are missing are 0.
+/// Adds the numbers of one vertex or face, in the order of the file, to the values of the attributes; those that are
+/// missing are 0.
 pub fn push(columns: &mut [(Column, AttributeValues)], numbers: &[f32], times: usize) {
     let mut numbers = numbers.iter().copied();
     let mut next = || numbers.next().unwrap_or_default();

@@ -107,8 +107,8 @@ pub struct StructureReport {
     pub max_leaf: u64,
     /// Cost by the surface area heuristic: 1 for a node, 1 for a primitive.
     pub sah_cost: f64,
-    /// End-point overlap, of hierarchies whose items are in one leaf each: expected nodes and primitives opened in vain around a point of a
-    /// surface.
+    /// End-point overlap, of hierarchies whose items are in one leaf each: expected nodes and primitives opened in vain
+    /// around a point of a surface.
     pub epo: Option<f64>,
 }
 
@@ -266,7 +266,8 @@ fn build<'g>(kind: AccelKind, geometry: &'g Geometry, primitives: usize, options
     Ok((report, accel))
 }
 
-/// The accelerator that stands in for the oracle on rays that would take the oracle too long: one of ours, which is checked against it.
+/// The accelerator that stands in for the oracle on rays that would take the oracle too long: one of ours, which is
+/// checked against it.
 fn choose_oracle(accels: &[Measured]) -> Option<usize> {
     accels.iter().position(|(report, accel)| accel.inspect().is_some() && report.name.starts_with("bvh"))
 }

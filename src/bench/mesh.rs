@@ -7,8 +7,8 @@ use crate::geometry::{Geometry, Mesh, Shape};
 use crate::id::ShapeId;
 use crate::math::DVec3;
 
-/// A sphere of radius about 1 with bumps of several sizes, of `triangles` triangles if that number is even and has a factor near its square
-/// root, else of about as many.
+/// A sphere of radius about 1 with bumps of several sizes, of `triangles` triangles if that number is even and has a
+/// factor near its square root, else of about as many.
 pub fn bumpy_sphere(triangles: usize) -> Mesh {
     checked(bumpy_sphere_data(triangles))
 }
@@ -88,7 +88,8 @@ fn checked(data: MeshData) -> Mesh {
     Mesh::new(data.positions, data.triangles, None, None).unwrap_or_else(|e| unreachable!("{e}"))
 }
 
-/// Slices and bands with `2 * slices * bands` equal or near to `triangles`, the first no more than four times the second.
+/// Slices and bands with `2 * slices * bands` equal or near to `triangles`, the first no more than four times the
+/// second.
 fn slices_and_bands(triangles: usize) -> [usize; 2] {
     let cells = (triangles / 2).max(9);
     let root = cells.isqrt();

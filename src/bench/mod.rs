@@ -1,4 +1,5 @@
-//! Accelerators compared on the same rays: record, replay, check, report; error against time; cost as scenes grow; and numerical stability.
+//! Accelerators compared on the same rays: record, replay, check, report; error against time; cost as scenes grow; and
+//! numerical stability.
 
 pub mod agreement;
 mod child;

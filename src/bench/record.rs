@@ -63,8 +63,9 @@ pub struct RaySet {
     pub rays: Vec<Ray>,
 }
 
-/// Renders the scene with one sample a pixel on one thread and keeps up to about `count` rays of each kind, taken evenly in runs of 16 from
-/// the whole picture. Kinds that do not occur are left out. The rays depend on the scene and on `count` alone.
+/// Renders the scene with one sample a pixel on one thread and keeps up to about `count` rays of each kind, taken
+/// evenly in runs of 16 from the whole picture. Kinds that do not occur are left out. The rays depend on the scene and
+/// on `count` alone.
 ///
 /// # Errors
 /// As a render.

@@ -22,7 +22,8 @@ pub struct ReportsOptions {
     pub size: [u32; 2],
     /// Frames of each accelerator, in turn.
     pub rounds: usize,
-    /// Triangle tests that one frame may cost; where every triangle is tested, smaller frames are measured and their times scaled up.
+    /// Triangle tests that one frame may cost; where every triangle is tested, smaller frames are measured and their
+    /// times scaled up.
     pub tests: u64,
 }
 

@@ -95,7 +95,8 @@ impl MaterialTable {
         self.add(compiler, desc, part, outer)
     }
 
-    /// A material below a coat: one that consists of others becomes one that consists of coated others, each coated once.
+    /// A material below a coat: one that consists of others becomes one that consists of coated others, each coated
+    /// once.
     fn coated(&mut self, id: MaterialId, coating: &Coating, done: &mut HashMap<MaterialId, MaterialId>) -> Material {
         match self.materials[id.index()].clone() {
             Material::Mix { first, second, amount } => {

@@ -376,8 +376,8 @@ pub struct MtlSurface {
 }
 
 /// The nearest material for an MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
-/// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic otherwise; everything else
-/// is diffuse with Kd.
+/// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic
+/// otherwise; everything else is diffuse with Kd.
 ///
 /// The error names the invalid number.
 pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {

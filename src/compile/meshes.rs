@@ -167,8 +167,8 @@ pub fn refusal(files: &CompileContext, path: &str, file: Option<&str>, message: 
     }
 }
 
-/// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the front. Triangles
-/// without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
+/// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the
+/// front. Triangles without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
 pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<MeshData>, placement: Placement) -> Result<Option<Mesh>> {
     let refuse = |error: MeshError| refusal(files, path, placement.file, error.to_string());
     let count = data.positions.len();
@@ -227,8 +227,8 @@ pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<Mesh
     Ok(Some(mesh))
 }
 
-/// Gives a placed mesh the normals of its shading, at each of its times; splits vertices at creases, and then
-/// returns the original index of each.
+/// Gives a placed mesh the normals of its shading, at each of its times; splits vertices at creases, and then returns
+/// the original index of each.
 fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement: Placement) -> Option<Vec<u32>> {
     let given = steps.iter().all(|step| step.normals.is_some());
     let computed = match placement.shading {
@@ -299,8 +299,8 @@ impl Faces {
         !self.triangles.is_empty()
     }
 
-    /// Of triangles of an emitter that are in one place, keeps the first, with a warning: which of them a ray meets, and
-    /// so which side shines, is otherwise left to the accelerator.
+    /// Of triangles of an emitter that are in one place, keeps the first, with a warning: which of them a ray meets,
+    /// and so which side shines, is otherwise left to the accelerator.
     fn drop_coincident(&mut self, files: &CompileContext, path: &str, positions: &[[f32; 3]]) {
         let before = self.triangles.len();
         let mut places = HashSet::with_capacity(before);

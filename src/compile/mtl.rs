@@ -105,7 +105,8 @@ impl Builder {
         Ok(id)
     }
 
-    /// `d` times `map_d` (the channel it names, or the image's alpha, or else its luminance), or times the alpha of `map_Kd`.
+    /// `d` times `map_d` (the channel it names, or the image's alpha, or else its luminance), or times the alpha of
+    /// `map_Kd`.
     fn mtl_opacity(&mut self, path: &str, d: Option<f32>, map: Option<&ObjMap>, diffuse: Option<&ObjMap>) -> Result<Option<TextureId>> {
         let bitmap = match (map, diffuse) {
             (Some(map), _) => {
@@ -145,7 +146,8 @@ impl Builder {
     }
 }
 
-/// The colour that a map multiplies where a material's reflection has one: of mirrors, and of metals, which have the colour themselves.
+/// The colour that a map multiplies where a material's reflection has one: of mirrors, and of metals, which have the
+/// colour themselves.
 fn specular_tint(material: &Material) -> Option<Rgb> {
     match material {
         Material::Constant(Bsdf::Mirror(mirror)) => Some(mirror.reflectance),

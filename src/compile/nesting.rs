@@ -1,4 +1,5 @@
-//! Which objects contain which: unknown names and cycles are found before anything is placed, and how much will be placed is counted.
+//! Which objects contain which: unknown names and cycles are found before anything is placed, and how much will be
+//! placed is counted.
 
 use std::collections::HashMap;
 

@@ -101,8 +101,8 @@ impl PreparedShape {
 }
 
 impl Builder {
-    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may contain several.
-    /// Where it is not used, its files are not read.
+    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may contain
+    /// several. Where it is not used, its files are not read.
     pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc, is_used: bool) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
         let identity = self.identities.shape(&self.files, number, desc);

@@ -21,7 +21,8 @@ use crate::texture::{Bitmap, Channel, Checker, Decoding, Texture, TextureFilter,
 /// Products of textures are nested at most this deep.
 const MAX_DEPTH: usize = 64;
 
-/// Textures and colours that a product has at most, those of the products in it counted: each is looked up at every point.
+/// Textures and colours that a product has at most, those of the products in it counted: each is looked up at every
+/// point.
 const MAX_LOOKUPS: usize = 256;
 
 /// What a texture is used for.
@@ -152,7 +153,8 @@ impl TextureTable {
         Err(format!("reaches from {min} to {max}: a surface can only reflect from 0 to 1"))
     }
 
-    /// The image in a file that is no texture of the scene's own, read unless it has been; `place` is where the scene leads to it.
+    /// The image in a file that is no texture of the scene's own, read unless it has been; `place` is where the scene
+    /// leads to it.
     pub fn image(&mut self, files: &CompileContext, place: &str, asset: &Path) -> Result<Arc<TextureImage>> {
         load_image(&mut self.images, files, place, asset)
     }

@@ -95,7 +95,8 @@ impl<'a> AssetCopier<'a> {
         Ok(new)
     }
 
-    /// A name in the folder beside the scene that nothing else has. An OBJ, which names further files, has a folder of its own.
+    /// A name in the folder beside the scene that nothing else has. An OBJ, which names further files, has a folder of
+    /// its own.
     fn free_name(&self, original: &Path) -> String {
         let is_obj = is_obj(original);
         let file = original.file_name().map_or("file".into(), |name| name.to_string_lossy().into_owned());
@@ -215,7 +216,8 @@ impl<'a> AssetCopier<'a> {
 /// Bytes at the start of a file that its type is detected from.
 const START: u64 = 1 << 16;
 
-/// Rejects files whose content does not match their extension: a scene of a stranger could name any file, and the copy would disclose it.
+/// Rejects files whose content does not match their extension: a scene of a stranger could name any file, and the copy
+/// would disclose it.
 fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
     let kind = path.extension().map(|e| e.to_string_lossy().to_uppercase()).unwrap_or_default();
     let start = start.strip_prefix(MARK).unwrap_or(start);

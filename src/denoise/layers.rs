@@ -43,8 +43,8 @@ impl<'f> Layers<'f> {
         Self { file, triples }
     }
 
-    /// The picture and what its channels' names begin with, the dot included: bare channels, else a layer "Combined", else the first with
-    /// the shortest name; parts and layers with a name among `others` are something else.
+    /// The picture and what its channels' names begin with, the dot included: bare channels, else a layer "Combined",
+    /// else the first with the shortest name; parts and layers with a name among `others` are something else.
     pub fn picture(&self, others: &[&str]) -> Result<(String, Rgb), String> {
         let is_other = |name: &str| others.iter().any(|other| ends_with_layer(&name.to_lowercase(), other));
         let is_color = |rgb: &Rgb| !matches!(self.letter(rgb[0]).as_str(), "x");
@@ -80,8 +80,8 @@ impl<'f> Layers<'f> {
         self.triples.iter().filter(move |(_, rgb)| rgb[0].part == color[0].part && *rgb != color).cloned()
     }
 
-    /// The layer with the first of these names, in lower case, that there is: of channels, or of a part with bare channels. A name may
-    /// follow others and a dot.
+    /// The layer with the first of these names, in lower case, that there is: of channels, or of a part with bare
+    /// channels. A name may follow others and a dot.
     ///
     /// # Errors
     /// If its window is not that of the picture.

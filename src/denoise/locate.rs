@@ -41,7 +41,8 @@ impl ProcessEnvironment {
         }
     }
 
-    /// The folders in which Python's packages may be: of the active environment, of every `python3` on `PATH`, and the user's own.
+    /// The folders in which Python's packages may be: of the active environment, of every `python3` on `PATH`, and the
+    /// user's own.
     fn site_packages(&self) -> Vec<PathBuf> {
         let mut prefixes: Vec<PathBuf> = self.virtual_env.iter().cloned().collect();
         for python in self.path.iter().map(|folder| folder.join("python3")).filter(|file| file.is_file()) {
@@ -86,11 +87,13 @@ fn inside(folder: &Path) -> Option<PathBuf> {
     folders.flat_map(|folder| INSIDE.map(|below| folder.join(below).join(FILE_NAME))).find(|file| file.is_file())
 }
 
-/// Opens the library with `open`: the file or folder that the user names, else the one that the environment variable names, else the
-/// system's, else that of Python's package `pyoidn`. What is named is used or rejected; what is found is passed over if unusable.
+/// Opens the library with `open`: the file or folder that the user names, else the one that the environment variable
+/// names, else the system's, else that of Python's package `pyoidn`. What is named is used or rejected; what is found
+/// is passed over if unusable.
 ///
 /// # Errors
-/// [`Error::Missing`] if what is named is not there or not the library, or if none is found: with where was looked and how to get it.
+/// [`Error::Missing`] if what is named is not there or not the library, or if none is found: with where was looked and
+/// how to get it.
 pub fn open_first<T>(
     named: Option<&Path>,
     environment: &ProcessEnvironment,

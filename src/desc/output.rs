@@ -50,7 +50,8 @@ pub struct OutputDesc {
     /// PNG: exposure in stops before the view. Default: 0.
     #[serde(default)]
     pub exposure: f32,
-    /// PNG: how light becomes colours of the display. Default: agx; srgb with the integrators that show data in place of light.
+    /// PNG: how light becomes colours of the display. Default: agx; srgb with the integrators that show data in place
+    /// of light.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<ViewDesc>,
 }
@@ -84,7 +85,8 @@ pub enum LayerKind {
     /// The picture: radiance, premultiplied by coverage, and coverage. It is always there, so scenes do not name it.
     #[serde(skip)]
     Color,
-    /// Depth along the view axis (not ray length), or the distance from an environment camera, in world units; 1e10 where nothing was hit.
+    /// Depth along the view axis (not ray length), or the distance from an environment camera, in world units; 1e10
+    /// where nothing was hit.
     Z,
     /// Shading normal in world space; zero where nothing was hit.
     N,
@@ -95,7 +97,8 @@ pub enum LayerKind {
     /// Surface parameters; zero where nothing was hit.
     #[serde(rename = "uv")]
     Uv,
-    /// How far the surface moves in the picture from when the shutter opens to when it closes, in pixels to the right and down.
+    /// How far the surface moves in the picture from when the shutter opens to when it closes, in pixels to the right
+    /// and down.
     #[serde(rename = "motion")]
     Motion,
     /// Fraction of light scattered by the first surface.
@@ -125,16 +128,19 @@ pub enum LayerKind {
     /// Light from infinity that is seen directly.
     #[serde(rename = "background")]
     Background,
-    /// A layer `light_NAME` for each group of lights and `light_default` for lights in no group; they sum to the picture.
+    /// A layer `light_NAME` for each group of lights and `light_default` for lights in no group; they sum to the
+    /// picture.
     #[serde(rename = "light_groups")]
     LightGroups,
-    /// Variance of the picture's red, green and blue, that is, their expected squared error, as far as the samples show it.
+    /// Variance of the picture's red, green and blue, that is, their expected squared error, as far as the samples show
+    /// it.
     #[serde(rename = "variance")]
     Variance,
     /// Number of samples.
     #[serde(rename = "samples")]
     Samples,
-    /// Fraction of light scattered by the first surface that is no mirror and no clear glass: the albedo feature for denoisers.
+    /// Fraction of light scattered by the first surface that is no mirror and no clear glass: the albedo feature for
+    /// denoisers.
     #[serde(rename = "feature_albedo")]
     FeatureAlbedo,
     /// Mean shading normal of that surface in world space: the normal feature for denoisers.

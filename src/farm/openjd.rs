@@ -6,8 +6,9 @@ use serde_json::{Value, json};
 
 use super::job::{Job, quote};
 
-/// The template as JSON: a step of shards (and frames), and one that merges each frame when all shards are rendered. Whoever submits it may
-/// change the number of shards, the frames, the program, and the folder of shards and checkpoints.
+/// The template as JSON: a step of shards (and frames), and one that merges each frame when all shards are rendered.
+/// Whoever submits it may change the number of shards, the frames, the program, and the folder of shards and
+/// checkpoints.
 ///
 /// A task that is cancelled gets two minutes to write its checkpoint.
 pub fn openjd_template(job: &Job) -> Value {

@@ -68,8 +68,8 @@ impl ProgressFormat {
 /// What farms look for in a program's output, anywhere in a line.
 const MARKERS: [&str; 8] = ["openjd_", "Progress:", "PROGRESS:", "ALF_PROGRESS", "FRAME:", "ACTIVITY:", "[ PARSER", "Error:"];
 
-/// A message on one line in which no farm finds one of its own words, whatever names are in it: the word's first letter is written as JSON
-/// writes odd characters.
+/// A message on one line in which no farm finds one of its own words, whatever names are in it: the word's first letter
+/// is written as JSON writes odd characters.
 pub fn message_line(text: &str) -> String {
     without_markers(printable::line(text))
 }

@@ -102,8 +102,8 @@ fn is_at(file: &File, name: &Path) -> bool {
     matches!((file.metadata(), fs::symlink_metadata(name)), (Ok(a), Ok(b)) if id(&a) == id(&b))
 }
 
-/// The names for files on their way to `target`: the same ones in every run on a machine, and others on other machines, whose locks some
-/// network file systems do not show.
+/// The names for files on their way to `target`: the same ones in every run on a machine, and others on other machines,
+/// whose locks some network file systems do not show.
 fn names(target: &Path) -> impl Iterator<Item = PathBuf> {
     let host = fs::read("/proc/sys/kernel/hostname").unwrap_or_default();
     let mut hasher = blake3::Hasher::new();

@@ -1,4 +1,5 @@
-//! Pixels of EXR files, block by block: the memory is that of the channels that are kept and of the blocks being decoded.
+//! Pixels of EXR files, block by block: the memory is that of the channels that are kept and of the blocks being
+//! decoded.
 
 use std::collections::HashSet;
 use std::io::{Read, Seek};
@@ -93,9 +94,9 @@ fn out_of_memory(path: &Path, bytes: usize) -> Error {
     Error::OutOfMemory(format!("the pixels of {} need {} MiB", path.display(), bytes >> 20))
 }
 
-/// Reads the largest level of flat parts and gives each row of the channels `requested` to `keep`, in no particular order
-/// but each sample once. The parts without requested channels are decoded too, so that damage is found, if `every_part` is
-/// set. `headers` are those that the places come from.
+/// Reads the largest level of flat parts and gives each row of the channels `requested` to `keep`, in no particular
+/// order but each sample once. The parts without requested channels are decoded too, so that damage is found, if
+/// `every_part` is set. `headers` are those that the places come from.
 ///
 /// # Errors
 /// The library's, for files that are malformed, cut short, or use what it does not support.

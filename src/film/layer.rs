@@ -106,8 +106,8 @@ pub struct LayerInfo {
     pub kind: LayerKind,
     /// Its name in scene files and on the command line.
     pub name: &'static str,
-    /// Its channels' full names in a file, in the order of the pixel data; of groups of lights what follows their layers' names; none of
-    /// layers made from [coverage](LayerSource::Coverage).
+    /// Its channels' full names in a file, in the order of the pixel data; of groups of lights what follows their
+    /// layers' names; none of layers made from [coverage](LayerSource::Coverage).
     pub channels: &'static [&'static str],
     /// Stored as 32-bit floats whatever the pixel type: 16 bits would spoil it.
     pub always_float: bool,

@@ -38,7 +38,8 @@ impl<'a> Estimator<'a> {
         self.own = own;
         self.entries.clear();
         let Layout { border, cell_size: size, .. } = film.layout;
-        // Where cells differ in their samples, each counts by its own number; without a border, pixels are normalised by theirs.
+        // Where cells differ in their samples, each counts by its own number; without a border, pixels are normalised
+        // by theirs.
         let is_scaled = film.shape().block_size.is_some() && border > 0;
         let cells = |at: u32| at.saturating_sub(border) / size..=(at + border) / size;
         for row in cells(y) {

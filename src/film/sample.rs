@@ -126,7 +126,8 @@ impl LightAovRequest {
 pub struct LightAovRows {
     request: LightAovRequest,
     samples: usize,
-    /// By AOV: those of [`LightAov`], then those of groups of lights; each only if requested. Empty where all samples are black.
+    /// By AOV: those of [`LightAov`], then those of groups of lights; each only if requested. Empty where all samples
+    /// are black.
     rows: Vec<Vec<Rgb>>,
 }
 

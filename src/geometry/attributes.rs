@@ -24,7 +24,8 @@ impl Mesh {
         !self.attributes.is_empty()
     }
 
-    /// The attributes at barycentric coordinates `u`, `v` of a triangle's second and third vertex; `None` if there are none.
+    /// The attributes at barycentric coordinates `u`, `v` of a triangle's second and third vertex; `None` if there are
+    /// none.
     pub fn attributes_at(&self, prim: PrimId, u: f32, v: f32) -> Option<AttributePoint<'_>> {
         self.has_attributes().then(|| self.attribute_point(prim, [1.0 - u - v, u, v]))
     }

@@ -47,10 +47,12 @@ impl Instance {
         Some(Self { object, transform, motion })
     }
 
-    /// Whether the map stretches so unevenly that an inverse made in `f32` exceeds the bound of [`SurfaceInteraction::error`].
+    /// Whether the map stretches so unevenly that an inverse made in `f32` exceeds the bound of
+    /// [`SurfaceInteraction::error`].
     pub fn is_uneven(&self) -> bool {
         let squared_norm = |m: &DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
-        // The product is 9 for a rotation with a scale; the square of the limit is that of a stretch by about 8 along one axis.
+        // The product is 9 for a rotation with a scale; the square of the limit is that of a stretch by about 8 along
+        // one axis.
         let Transform { world_from_object, object_from_world, .. } = &self.transform;
         squared_norm(&world_from_object.matrix3) * squared_norm(&object_from_world.matrix3) > 9.0 * 16.0
     }
@@ -119,7 +121,8 @@ impl Instance {
         let n_s = t.normal(local.n_s.as_dvec3()).normalize().as_vec3();
         let p = t.point(local.p);
 
-        // The accelerator inverts the matrix and moves the ray in f32: 4 units of roundoff of each term, seen along the normal.
+        // The accelerator inverts the matrix and moves the ray in f32: 4 units of roundoff of each term, seen along the
+        // normal.
         let inverse = &t.object_from_world;
         let m = &inverse.matrix3;
         let moved = m.x_axis.abs() * p.x.abs() + m.y_axis.abs() * p.y.abs() + m.z_axis.abs() * p.z.abs() + inverse.translation.abs();

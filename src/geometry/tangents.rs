@@ -1,11 +1,13 @@
-//! Tangents of meshes as normal maps are baked for: MikkTSpace (Mikkelsen, "Simulation of Wrinkled Surfaces Revisited").
+//! Tangents of meshes as normal maps are baked for: MikkTSpace (Mikkelsen, "Simulation of Wrinkled Surfaces
+//! Revisited").
 
 use bevy_mikktspace::TangentSpace;
 
 use super::mesh::Mesh;
 use crate::math::Vec3;
 
-/// A unit tangent for each corner of a triangle, with the side of the bitangent: `w (n x t)`. All zero where the uv have no direction.
+/// A unit tangent for each corner of a triangle, with the side of the bitangent: `w (n x t)`. All zero where the uv
+/// have no direction.
 pub type CornerTangents = [[f32; 4]; 3];
 
 /// What the algorithm reads and writes.
@@ -67,7 +69,8 @@ pub(super) fn corner_tangents(
     Some(source.tangents)
 }
 
-/// The tangent interpolated over a triangle (not of unit length), and the side of the bitangent; `None` where there is no direction.
+/// The tangent interpolated over a triangle (not of unit length), and the side of the bitangent; `None` where there is
+/// no direction.
 #[inline]
 pub(super) fn interpolate(corners: &CornerTangents, weights: [f32; 3]) -> Option<(Vec3, f32)> {
     let at = |k: usize| Vec3::new(corners[k][0], corners[k][1], corners[k][2]) * weights[k];

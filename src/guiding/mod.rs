@@ -2,8 +2,8 @@
 //! Simulation", 2017, and "'Practical Path Guiding' in Production", 2019).
 //!
 //! For surfaces that face each of six sides, a binary tree divides space; each of its leaves has a distribution of
-//! directions, in proportion to the radiance that paths scattered there received from them. Paths record into
-//! sums of whole numbers, so what is learned does not depend on threads. From time to time leaves with many records are
+//! directions, in proportion to the radiance that paths scattered there received from them. Paths record into sums of
+//! whole numbers, so what is learned does not depend on threads. From time to time leaves with many records are
 //! divided, and the directions of each where the light is.
 
 mod quadtree;
@@ -77,7 +77,8 @@ struct Region {
 struct Leaf {
     records: DTreeBuilder,
     count: AtomicU64,
-    /// How much better each of [`OTHER_FRACTIONS`] is than half, as the mean logarithm of the density weighted by light.
+    /// How much better each of [`OTHER_FRACTIONS`] is than half, as the mean logarithm of the density weighted by
+    /// light.
     gains: [AtomicI64; 4],
 }
 
@@ -129,8 +130,8 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// An empty guide. `typical` is about the radiance of a typical record: records far below it are lost, far
-    /// above are cut. Without it (zero), only places are learned, not light.
+    /// An empty guide. `typical` is about the radiance of a typical record: records far below it are lost, far above
+    /// are cut. Without it (zero), only places are learned, not light.
     pub fn new(bounds: Aabb, typical: f32) -> Self {
         let mut guide = Self {
             corner: Vec3::ZERO,

@@ -11,11 +11,11 @@ use crate::assets::{Hash, file_hashes, files_of_obj, is_obj};
 use crate::desc::{FilmDesc, IntegratorDesc, SamplerDesc, SceneDesc};
 use crate::error::{Error, Result};
 
-/// Hashes of a scene, each as 64 hexadecimal digits. Two scenes of the same `whole` look the same under the same settings. Files that
-/// the world does not use do not count.
+/// Hashes of a scene, each as 64 hexadecimal digits. Two scenes of the same `whole` look the same under the same
+/// settings. Files that the world does not use do not count.
 ///
-/// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count, nor do the folder
-/// of the scene and the format it was read from.
+/// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count,
+/// nor do the folder of the scene and the format it was read from.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFingerprint {
@@ -23,7 +23,8 @@ pub struct SceneFingerprint {
     pub whole: String,
     /// Of the description.
     pub scene: String,
-    /// Of the files and assets that the scene names, by the names it uses; materials and images of OBJ files are among them.
+    /// Of the files and assets that the scene names, by the names it uses; materials and images of OBJ files are among
+    /// them.
     pub assets: BTreeMap<String, String>,
 }
 

@@ -23,7 +23,8 @@ impl World<'_> {
         self.covered(cone, ray.direction, at, self.scene.geometry.uv_density(ray, hit))
     }
 
-    /// The footprint in uv of a ray in `direction` at a point of this [density of uv](crate::geometry::Geometry::uv_density).
+    /// The footprint in uv of a ray in `direction` at a point of this
+    /// [density of uv](crate::geometry::Geometry::uv_density).
     #[inline]
     pub(super) fn covered(&self, cone: &RayCone, direction: Vec3, at: &SurfaceInteraction, uv_density: f32) -> Footprint<'_> {
         self.scene.with_attributes(at, Footprint::of_cone(at.uv, cone.width_at(at.t), direction.dot(at.n_g), uv_density))

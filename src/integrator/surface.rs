@@ -1,4 +1,5 @@
-//! What layers need of the first surface of a sample, and denoisers of the first one that is no mirror and no clear glass.
+//! What layers need of the first surface of a sample, and denoisers of the first one that is no mirror and no clear
+//! glass.
 
 use super::{PassContext, World};
 use crate::color::Rgb;
@@ -22,7 +23,8 @@ pub struct SurfaceAovs {
     pub features: bool,
 }
 
-/// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator found.
+/// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator
+/// found.
 pub(super) fn place_sample(pass: &PassContext, needs: SurfaceAovs, at: &SurfaceInteraction, hit: Option<&Hit>) -> SurfaceSample {
     let (world, mut sample) = (pass.world, SurfaceSample::default());
     if needs.geometry {

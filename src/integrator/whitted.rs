@@ -1,5 +1,5 @@
-//! Whitted's ray tracing: mirror reflection, refraction, direct light of every light and an ambient term ("An Improved Illumination Model
-//! for Shaded Display").
+//! Whitted's ray tracing: mirror reflection, refraction, direct light of every light and an ambient term ("An Improved
+//! Illumination Model for Shaded Display").
 
 use std::borrow::Cow;
 
@@ -19,9 +19,10 @@ use crate::medium::MediumStack;
 use crate::sampling::Sampler;
 use crate::texture::Footprint;
 
-/// Whitted's ray tracing. At every surface each light is sampled once, with a direction of its own for each camera sample: the mean over
-/// the samples of a pixel is the direct illumination, with hard shadows of point lights and soft ones of area lights and environments.
-/// Scattering that is neither mirror-like nor lit by a light contributes only through the ambient term.
+/// Whitted's ray tracing. At every surface each light is sampled once, with a direction of its own for each camera
+/// sample: the mean over the samples of a pixel is the direct illumination, with hard shadows of point lights and soft
+/// ones of area lights and environments. Scattering that is neither mirror-like nor lit by a light contributes only
+/// through the ambient term.
 pub struct Whitted {
     /// Largest number of segments from the camera.
     pub max_depth: u32,
@@ -208,7 +209,8 @@ impl Whitted {
             }
         }
 
-        // Both delta lobes, each without the division by its probability: u at either end of [0, 1) chooses reflection and refraction.
+        // Both delta lobes, each without the division by its probability: u at either end of [0, 1) chooses reflection
+        // and refraction.
         let lobe = |u: f32| vertex.bsdf.sample(vertex.wo, u, [0.5; 2]).filter(|s| s.is_delta);
         let first = lobe(0.0);
         let second = lobe(ONE_MINUS_EPSILON).filter(|s| Some(s.wi) != first.map(|f| f.wi));

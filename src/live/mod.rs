@@ -56,7 +56,8 @@ impl Live {
     /// Starts the threads of the viewers.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] if the page cannot be served at the requested address and port. A tev that is not running is no error.
+    /// [`crate::Error::Usage`] if the page cannot be served at the requested address and port. A tev that is not
+    /// running is no error.
     pub fn new(options: Options) -> Result<Self> {
         let statistics = Arc::new(Statistics::new(options.time_limit));
         let preview = options.preview.map(|preview| Preview::new(&preview, options.name.clone(), Arc::clone(&statistics))).transpose()?;

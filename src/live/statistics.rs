@@ -101,7 +101,8 @@ impl Statistics {
     }
 }
 
-/// Seconds left after `elapsed` seconds: what the samples missing will take, or what the time limit leaves if that is less.
+/// Seconds left after `elapsed` seconds: what the samples missing will take, or what the time limit leaves if that is
+/// less.
 fn left(samples: u64, total: u64, elapsed: f64, time_limit: Option<Duration>) -> Option<f64> {
     let of_samples = (samples > 0).then(|| elapsed * total.saturating_sub(samples) as f64 / samples as f64);
     let of_time = time_limit.map(|limit| (limit.as_secs_f64() - elapsed).max(0.0));

@@ -107,7 +107,8 @@ impl Transform {
         self.determinant
     }
 
-    /// By how much the map stretches area on a surface with the unit object normal `n`: dA_world / dA_object = |det M| |M^-T n|.
+    /// By how much the map stretches area on a surface with the unit object normal `n`: dA_world / dA_object = |det
+    /// M| |M^-T n|.
     #[inline]
     pub fn area_factor(&self, n: DVec3) -> f64 {
         self.determinant.abs() * self.normal(n).length()

@@ -18,9 +18,11 @@ use crate::output::check_output;
 /// The version of the format of recipes.
 const VERSION: u64 = 1;
 
-/// How a picture was made. Files keep it, with how they are written, as [`settings`](crate::output::RenderInfo::settings).
+/// How a picture was made. Files keep it, with how they are written, as
+/// [`settings`](crate::output::RenderInfo::settings).
 ///
-/// It is data: it names the scene and what the picture depends on, never a file to write, a library to load or an address to connect to.
+/// It is data: it names the scene and what the picture depends on, never a file to write, a library to load or an
+/// address to connect to.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RenderProvenance {
@@ -102,8 +104,8 @@ impl RenderProvenance {
         Self { frame: None, settings: Settings { seed, ..self.settings.clone() }, ..self.clone() }
     }
 
-    /// Differences from `expected`, whose file is written with the settings of `output`: settings by name, each
-    /// with both values. The command line, the folder and the version of the program do not count.
+    /// Differences from `expected`, whose file is written with the settings of `output`: settings by name, each with
+    /// both values. The command line, the folder and the version of the program do not count.
     pub fn differences(&self, expected: &Self, output: &OutputDesc) -> Vec<String> {
         let flat = |provenance: &Self, output: Option<&OutputDesc>| {
             let mut values = BTreeMap::new();
@@ -134,7 +136,8 @@ impl RenderProvenance {
     /// As a file has kept it.
     ///
     /// # Errors
-    /// [`Error::Malformed`] if it is of another version, has unknown keys or lacks some; [`Error::Scene`] if a number makes no sense.
+    /// [`Error::Malformed`] if it is of another version, has unknown keys or lacks some; [`Error::Scene`] if a number
+    /// makes no sense.
     pub fn from_value(value: Value, file: &Path) -> Result<Self> {
         let malformed = |message: String| Error::Malformed { file: file.to_owned(), message };
         match value.get("version").map(Value::as_u64) {
@@ -180,7 +183,8 @@ impl RenderProvenance {
         })
     }
 
-    /// The settings of this picture, to be written with the settings of [`output`](Self::output), with `threads` threads.
+    /// The settings of this picture, to be written with the settings of [`output`](Self::output), with `threads`
+    /// threads.
     pub fn settings(&self, threads: usize) -> Settings {
         let layers = self.output.iter().flat_map(|output| &output.layers).collect();
         let outputs = self.output.iter().cloned().collect();

@@ -26,8 +26,9 @@ const MAX_THREADS: usize = 4096;
 
 /// How a scene is rendered.
 ///
-/// Serialized, these are the settings that the picture depends on: EXR files keep them for [`RenderProvenance`](super::RenderProvenance),
-/// and a checkpoint or shard belongs to another picture if any differs. Only what can never change a pixel is skipped.
+/// Serialized, these are the settings that the picture depends on: EXR files keep them for
+/// [`RenderProvenance`](super::RenderProvenance), and a checkpoint or shard belongs to another picture if any differs.
+/// Only what can never change a pixel is skipped.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {

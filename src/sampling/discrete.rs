@@ -20,8 +20,8 @@ struct Bin {
     pmf: f32,
 }
 
-/// Chooses an index in proportion to its weight in constant time (Vose, "A Linear Algorithm for Generating Random Numbers with a Given
-/// Distribution").
+/// Chooses an index in proportion to its weight in constant time (Vose, "A Linear Algorithm for Generating Random
+/// Numbers with a Given Distribution").
 #[derive(Clone, Debug)]
 pub struct AliasTable {
     bins: Vec<Bin>,
@@ -82,7 +82,8 @@ impl AliasTable {
         if self.bins.len() == 1 {
             return DiscreteSample { index: 0, u };
         }
-        // `u` represents the 2^-24 wide interval that begins with it; the middle keeps the rounding of the bins' limits free of bias.
+        // `u` represents the 2^-24 wide interval that begins with it; the middle keeps the rounding of the bins' limits
+        // free of bias.
         let x = (f64::from(u) + 0.5 / f64::from(1 << 24)) * self.bins.len() as f64;
         let i = (x as usize).min(self.bins.len() - 1);
         let bin = self.bins[i];

@@ -39,8 +39,8 @@ pub fn stderr_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A process in a group of its own. When it is dropped, as in a test that fails, it and what it started are ended: by SIGTERM, which
-/// programs pass on to groups they made themselves, then by SIGKILL.
+/// A process in a group of its own. When it is dropped, as in a test that fails, it and what it started are ended: by
+/// SIGTERM, which programs pass on to groups they made themselves, then by SIGKILL.
 pub struct Running {
     /// `None` once its output is collected.
     child: Option<Child>,

@@ -37,7 +37,8 @@ pub(super) trait SimdIsa: Copy {
     /// The children that the ray may meet within `[t_min, t_max]` as bits, and where it enters each.
     fn enter(self, node: &WideNode, ray: &WideRay, t_min: f32, t_max: f32) -> (u32, [f32; WIDTH]);
 
-    /// [`TriangleRay::intersect`] for each triangle, with the very same operations; `None` if no lane passes the edge tests.
+    /// [`TriangleRay::intersect`] for each triangle, with the very same operations; `None` if no lane passes the edge
+    /// tests.
     fn intersect(self, block: &Block, ray: &TriangleRay) -> Option<BlockHits>;
 }
 

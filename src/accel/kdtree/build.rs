@@ -1,5 +1,6 @@
-//! Building by the surface area heuristic over bins, with the exact bounds of what is left of an item in a cell ("perfect splits": Havran,
-//! "Heuristic Ray Shooting Algorithms"; Wald and Havran, "On building fast kd-trees for ray tracing").
+//! Building by the surface area heuristic over bins, with the exact bounds of what is left of an item in a cell
+//! ("perfect splits": Havran, "Heuristic Ray Shooting Algorithms"; Wald and Havran, "On building fast kd-trees for ray
+//! tracing").
 
 use super::{KdTreeOptions, Node};
 use crate::accel::inspect::Item;
@@ -118,7 +119,8 @@ impl Builder<'_> {
             }
         }
         let total = lower.len() + upper.len();
-        // A half that keeps everything still pays where the other one is cut off with a few large parts, so only the sum of both is judged.
+        // A half that keeps everything still pays where the other one is cut off with a few large parts, so only the
+        // sum of both is judged.
         let is_bad = if self.median { lower.len().min(upper.len()) == count } else { plane.cost > leaf_cost };
         let bad_splits = cell.bad_splits + u32::from(is_bad);
         if bad_splits >= MAX_BAD_SPLITS || total as f64 > cell.budget {

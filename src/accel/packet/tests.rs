@@ -75,7 +75,8 @@ fn geometries(random: &mut Sequence) -> Vec<Geometry> {
     all
 }
 
-/// Rays of all kinds, among them some at corners and along edges, some that are traced alone, and some that are not valid.
+/// Rays of all kinds, among them some at corners and along edges, some that are traced alone, and some that are not
+/// valid.
 fn rays(random: &mut Sequence, geometry: &Geometry) -> Vec<Ray> {
     let corners: Vec<Vec3> = match &geometry.shapes[0] {
         Shape::Mesh(mesh) => mesh.positions().iter().map(|&p| Vec3::from_array(p)).collect(),

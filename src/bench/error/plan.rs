@@ -14,7 +14,8 @@ use crate::film::Image;
 use crate::render::{self, Settings, Silent};
 use crate::scene::Scene;
 
-/// A render may turn out this many times as fast as its first sample before the number of samples ends it and not the time.
+/// A render may turn out this many times as fast as its first sample before the number of samples ends it and not the
+/// time.
 const HEADROOM: f64 = 4.0;
 
 /// What a render may take.

@@ -95,7 +95,8 @@ pub struct Point {
 pub struct Bias {
     /// The ratio.
     pub ratio: f64,
-    /// Lower end of its 95 % confidence interval, from the differences of blocks of 8 x 8 pixels summed over the repeats.
+    /// Lower end of its 95 % confidence interval, from the differences of blocks of 8 x 8 pixels summed over the
+    /// repeats.
     pub low: f64,
     /// Upper end.
     pub high: f64,
@@ -139,8 +140,8 @@ pub struct Run {
 pub struct EqualError {
     /// The smallest that every variant reached.
     pub relmse: f64,
-    /// Seconds by variant, between the points measured on straight lines of the logarithms; where a variant was better from the start, what
-    /// follows from its first point with a slope of -1.
+    /// Seconds by variant, between the points measured on straight lines of the logarithms; where a variant was better
+    /// from the start, what follows from its first point with a slope of -1.
     pub seconds: Vec<Option<f64>>,
 }
 

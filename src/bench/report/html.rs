@@ -106,7 +106,8 @@ fn rates(scene: &SceneReport, kinds: &[RayKind]) -> Vec<Series> {
     series
 }
 
-/// Time to build and then trace a number of rays, on one thread each, with the numbers at which one accelerator overtakes another.
+/// Time to build and then trace a number of rays, on one thread each, with the numbers at which one accelerator
+/// overtakes another.
 fn break_even(scene: &SceneReport, kind: RayKind) -> Result<Option<(String, String)>> {
     let mut lines = Vec::new();
     for accel in &scene.accels {

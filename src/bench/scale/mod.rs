@@ -1,7 +1,7 @@
 //! Time and memory as scenes and pictures grow.
 //!
-//! Every case runs in a process of its own, so that its memory is not that of an earlier one; repeats go over all cases in turn, so that
-//! whatever else the machine does falls on all alike.
+//! Every case runs in a process of its own, so that its memory is not that of an earlier one; repeats go over all cases
+//! in turn, so that whatever else the machine does falls on all alike.
 
 mod plan;
 mod quantity;
@@ -20,8 +20,9 @@ use super::child::{self, Ended};
 use super::{Machine, Watch};
 use crate::error::{Error, Result};
 
-/// Measures all sweeps. `program` is started for each case with the case as JSON on its standard input, and answers with what [`run_case`]
-/// gives, as JSON. `after` is given what there is after each sweep of each repeat; a run that is ended early gives what there is.
+/// Measures all sweeps. `program` is started for each case with the case as JSON on its standard input, and answers
+/// with what [`run_case`] gives, as JSON. `after` is given what there is after each sweep of each repeat; a run that is
+/// ended early gives what there is.
 ///
 /// # Errors
 /// If a sweep does not exist, or the error of `after`. A case that fails is part of the report.

@@ -1,4 +1,5 @@
-//! One case: made, loaded, built, rendered. In a process of its own, for a process never forgets how much memory it once held.
+//! One case: made, loaded, built, rendered. In a process of its own, for a process never forgets how much memory it
+//! once held.
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;

@@ -160,8 +160,8 @@ impl Check {
     }
 }
 
-/// Runs checks one after the other, all but those in `kept`, whose results are reused; ends early if `watch` is stopped. `after` is given
-/// what there is after each.
+/// Runs checks one after the other, all but those in `kept`, whose results are reused; ends early if `watch` is
+/// stopped. `after` is given what there is after each.
 ///
 /// # Errors
 /// Those of `after`.

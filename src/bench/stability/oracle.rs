@@ -237,7 +237,8 @@ impl Case {
         }
     }
 
-    /// A point beside the silhouette as seen along `d`, inside by `depth`; `None` if there is none at a height chosen at random.
+    /// A point beside the silhouette as seen along `d`, inside by `depth`; `None` if there is none at a height chosen
+    /// at random.
     pub fn near_silhouette(&self, rng: &mut Rng, d: DVec3, depth: f64) -> Option<DVec3> {
         let target = self.sample(rng);
         let (rho, n_z) = (target.p.x.hypot(target.p.y), target.n.z);

@@ -61,7 +61,8 @@ pub struct Shot {
 }
 
 impl Shot {
-    /// The settings of this frame: its own files, and noise of its own, so that none stands still while the picture moves.
+    /// The settings of this frame: its own files, and noise of its own, so that none stands still while the picture
+    /// moves.
     pub fn adapt(&self, settings: &mut Settings) {
         let Some(frame) = self.frame else { return };
         settings.seed = settings.seed.wrapping_add_signed(frame);
@@ -75,7 +76,8 @@ impl Shot {
         self.frame.is_some() && !overwrite && settings.outputs.iter().all(|output| Path::new(&output.file).exists())
     }
 
-    /// The file of this frame of a sequence: its number goes where the name has a place for it, or before the extension.
+    /// The file of this frame of a sequence: its number goes where the name has a place for it, or before the
+    /// extension.
     pub fn file_of(&self, name: &Path) -> PathBuf {
         match (self.frame, name.to_str()) {
             (Some(frame), Some(text)) => file_of_frame(&with_frame_pattern(text), frame).into(),

@@ -1,5 +1,5 @@
-//! Signals. The first Ctrl-C or SIGTERM stops the render, and its state and the picture so far are written;
-//! the second ends the program at once. SIGUSR1 writes a checkpoint, and the render continues.
+//! Signals. The first Ctrl-C or SIGTERM stops the render, and its state and the picture so far are written; the second
+//! ends the program at once. SIGUSR1 writes a checkpoint, and the render continues.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -46,7 +46,8 @@ impl Interrupt {
     /// Starts to listen to signals to stop.
     pub fn listen_to_stop(&self) -> Result<()> {
         for (signal, code) in [(SIGINT, INTERRUPTED), (SIGTERM, TERMINATED)] {
-            // Actions run in the order of their registration: the first signal finds the flag down and only then raises it.
+            // Actions run in the order of their registration: the first signal finds the flag down and only then raises
+            // it.
             let registered = flag::register_conditional_shutdown(signal, i32::from(code), Arc::clone(&self.stop))
                 .and_then(|_| flag::register_usize(signal, Arc::clone(&self.code), usize::from(code)))
                 .and_then(|_| flag::register(signal, Arc::clone(&self.stop)));

@@ -102,7 +102,8 @@ pub fn start(arguments: &LogArgs, verbosity: Verbosity, default_format: LogForma
     Ok(())
 }
 
-/// Whether a file is empty or begins as logs do: with a time, or with an object in JSON. Any other may be one that somebody needs.
+/// Whether a file is empty or begins as logs do: with a time, or with an object in JSON. Any other may be one that
+/// somebody needs.
 fn is_log(path: &Path) -> std::io::Result<bool> {
     let mut start = Vec::new();
     steradian::file::open(path)?.take(64).read_to_end(&mut start)?;

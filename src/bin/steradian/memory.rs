@@ -142,7 +142,8 @@ fn end(code: c_int, message: std::fmt::Arguments) -> ! {
     } else {
         writeln!(line, "error: {message}")
     };
-    // SAFETY: stderr is open, or writing fails; it is never closed here. Its own writer might wait for a thread that waits above.
+    // SAFETY: stderr is open, or writing fails; it is never closed here. Its own writer might wait for a thread that
+    // waits above.
     let mut stderr = ManuallyDrop::new(unsafe { File::from_raw_fd(2) });
     let _ = stderr.write_all(&line.bytes[..line.length]);
     // SAFETY: the function may be called at any time.

@@ -59,7 +59,8 @@ struct State {
 }
 
 impl Reporter {
-    /// Reports progress in `format`, if that is given, in any case; else as fits where stderr goes, or not at all if `quiet`.
+    /// Reports progress in `format`, if that is given, in any case; else as fits where stderr goes, or not at all if
+    /// `quiet`.
     pub fn new(format: Option<&'static ProgressFormat>, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb");
         let human = format.is_none_or(|format| format.name == "human");

@@ -1,6 +1,7 @@
 //! Intel Open Image Denoise, opened at run time: a device on the processor, and its filter on pictures in memory.
 //!
-//! One of the two homes of `unsafe`. The library stays loaded until the process ends, since its threads outlive its devices.
+//! One of the two homes of `unsafe`. The library stays loaded until the process ends, since its threads outlive its
+//! devices.
 
 mod sys;
 
@@ -49,9 +50,11 @@ pub struct Device {
 pub struct Unusable(pub String);
 
 impl Device {
-    /// Opens a library by its path, or by its bare name where the system looks for libraries, with `threads` threads (0: all).
+    /// Opens a library by its path, or by its bare name where the system looks for libraries, with `threads` threads
+    /// (0: all).
     pub fn open(file: &Path, threads: usize) -> Result<Self, Unusable> {
-        // SAFETY: opening runs the library's initialisers. The file is named by the user, or has the name of a library known to be fit.
+        // SAFETY: opening runs the library's initialisers. The file is named by the user, or has the name of a library
+        // known to be fit.
         let library = unsafe { Library::new(file) }.map_err(|e| Unusable(loader_message(&e)))?;
         let library = ManuallyDrop::new(library);
         // SAFETY: the types are those of version 2, which is checked below before anything but the version is looked up
@@ -82,7 +85,8 @@ impl Device {
 
     fn commit(&self, threads: usize) -> Result<()> {
         let threads = c_int::try_from(threads).unwrap_or(c_int::MAX);
-        // SAFETY: the device is alive and the names end in NUL. Threads are not bound to cores: several renders share a machine.
+        // SAFETY: the device is alive and the names end in NUL. Threads are not bound to cores: several renders share a
+        // machine.
         unsafe {
             (self.functions.set_device_int)(self.handle.as_ptr(), c"numThreads".as_ptr(), threads);
             (self.functions.set_device_bool)(self.handle.as_ptr(), c"setAffinity".as_ptr(), false);
@@ -121,8 +125,9 @@ impl Device {
         let filter = Filter::new(self)?;
         let set = |name: &CStr, data: *const Triple| {
             let format = sys::FORMAT_FLOAT3;
-            // SAFETY: the filter is alive, the name ends in NUL, and the data are `width * height` triples that stay borrowed until the
-            // filter is released at the end of this function. Inputs are only read; the output is borrowed for writing.
+            // SAFETY: the filter is alive, the name ends in NUL, and the data are `width * height` triples that stay
+            // borrowed until the filter is released at the end of this function. Inputs are only read; the output is
+            // borrowed for writing.
             unsafe {
                 (self.functions.set_shared_filter_image)(
                     filter.handle.as_ptr(),

@@ -169,7 +169,8 @@ fn flattens(transform: &TransformDesc) -> bool {
     })
 }
 
-/// The next number of each name that was taken, by what it names: looking for it from the start would take the square of their count.
+/// The next number of each name that was taken, by what it names: looking for it from the start would take the square
+/// of their count.
 #[derive(Clone, Debug, Default)]
 struct Numbers(HashMap<(&'static str, String), u64>);
 

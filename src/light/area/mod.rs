@@ -64,17 +64,19 @@ impl Emission {
         self.texture.is_none() && self.opacity.is_none()
     }
 
-    /// The expected radiance of a point sampled on the surface: rays hit it with the probability of its opacity, so this is the mean over rays.
+    /// The expected radiance of a point sampled on the surface: rays hit it with the probability of its opacity, so
+    /// this is the mean over rays.
     fn expected(&self, textures: &[Texture], point: &Footprint) -> Rgb {
         let coverage = self.opacity.map_or(1.0, |id| textures[id.index()].scalar_over(point));
         self.at(textures, || *point) * coverage
     }
 }
 
-/// An emissive analytic shape, one triangle of an emissive mesh, or a mesh of two triangles that make up a parallelogram.
+/// An emissive analytic shape, one triangle of an emissive mesh, or a mesh of two triangles that make up a
+/// parallelogram.
 ///
-/// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by area. Quads with a
-/// texture or with holes are sampled by their brightness in half of the cases.
+/// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by
+/// area. Quads with a texture or with holes are sampled by their brightness in half of the cases.
 #[derive(Clone, Debug)]
 pub struct AreaLight {
     /// The shape.
@@ -115,7 +117,8 @@ struct EmitterSample {
 }
 
 impl EmitterSample {
-    /// The point `q` with the unit normal `n`, found with a density per area, as seen from `p`; `None` if it is seen edge-on.
+    /// The point `q` with the unit normal `n`, found with a density per area, as seen from `p`; `None` if it is seen
+    /// edge-on.
     #[inline]
     fn from_area(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> Option<Self> {
         let (wi, pdf) = Self::direction_and_pdf(p, q, n, pdf_area);
@@ -171,8 +174,8 @@ impl AreaLight {
         Self { shape, prim, emission, luminance, form }
     }
 
-    /// The lights of a shape that stands in the world: one for each triangle of a mesh in their order, or a single one for an analytic
-    /// shape and for a mesh of two triangles that make up a parallelogram (without a texture or holes).
+    /// The lights of a shape that stands in the world: one for each triangle of a mesh in their order, or a single one
+    /// for an analytic shape and for a mesh of two triangles that make up a parallelogram (without a texture or holes).
     ///
     /// The `single_light` of the scene's surface is to be set if there is only one.
     pub fn for_shape(shape: ShapeId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Vec<Self> {
@@ -214,7 +217,8 @@ impl AreaLight {
         Some(sample.with_radiance(radiance, error))
     }
 
-    /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where `p` sees the dark side.
+    /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where `p` sees
+    /// the dark side.
     #[inline(always)]
     fn sample_surface(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(EmitterSample, f32)> {
         let both = self.emission.two_sided;
@@ -261,8 +265,8 @@ impl AreaLight {
         }
     }
 
-    /// Density per solid angle with which [`sample`](Self::sample) from `p` would have chosen the direction of `ray` (unit), which starts
-    /// at `p` and hit this light at `at`; zero on the dark side.
+    /// Density per solid angle with which [`sample`](Self::sample) from `p` would have chosen the direction of `ray`
+    /// (unit), which starts at `p` and hit this light at `at`; zero on the dark side.
     #[inline]
     pub fn pdf(&self, geometry: &Geometry, p: DVec3, ray: &Ray, at: &SurfaceInteraction) -> f32 {
         if !self.emission.two_sided && at.n_g.dot(ray.direction) >= 0.0 {
@@ -344,7 +348,8 @@ impl Form {
         let (first, second) = (mesh.triangle_points(PrimId(0)), mesh.triangle_points(PrimId(1)));
         let (corners, others) = ([first.a, first.b, first.c], [second.a, second.b, second.c]);
 
-        // The corner that the second triangle does not have, and the shared edge, run in opposite orders if both look to the same side.
+        // The corner that the second triangle does not have, and the shared edge, run in opposite orders if both look
+        // to the same side.
         let lone = (0..3).find(|&i| !others.contains(&corners[i]))?;
         let (corner, next, last) = (corners[lone], corners[(lone + 1) % 3], corners[(lone + 2) % 3]);
         let back = (0..3).find(|&i| others[i] == last && others[(i + 1) % 3] == next)?;
@@ -371,7 +376,8 @@ fn flat_normal(shape: &Shape) -> Option<Vec3> {
     }
 }
 
-/// World area of any analytic shape: where the transform keeps angles that of the shape, else the mean of its inverse density.
+/// World area of any analytic shape: where the transform keeps angles that of the shape, else the mean of its inverse
+/// density.
 fn placed_area(placed: &TransformedShape) -> f64 {
     if let Some(scale) = placed.transform.uniform_scale() {
         return placed.shape.area() * scale * scale;

@@ -27,7 +27,8 @@ impl SphereEmitter {
         distance_squared > self.radius * self.radius * (1.0 + 8.0 * f64::EPSILON)
     }
 
-    /// The cone that the sphere fills at this squared distance from its centre, without cancellation however far that is.
+    /// The cone that the sphere fills at this squared distance from its centre, without cancellation however far that
+    /// is.
     #[inline(always)]
     fn cone(&self, distance_squared: f64) -> Cone {
         let radius_squared = self.radius * self.radius;

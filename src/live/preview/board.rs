@@ -101,7 +101,8 @@ impl Board {
         Shown { snapshot: state.snapshot.clone(), version: state.version, finished: state.finished }
     }
 
-    /// What there is to see, to be sent, which may take long; `None` if slow readers hold [`MOST_SENT`] older pictures already.
+    /// What there is to see, to be sent, which may take long; `None` if slow readers hold [`MOST_SENT`] older pictures
+    /// already.
     pub fn take(&self) -> Option<Shown> {
         let shown = self.current();
         let mut state = self.lock();

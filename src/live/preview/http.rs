@@ -98,7 +98,8 @@ impl Connection {
         Ok(Self { stream, patience, deadline: None, buffer: Vec::new() })
     }
 
-    /// The next request; `None` if there is none. Its head must arrive in time, and its host must be this machine or `host`.
+    /// The next request; `None` if there is none. Its head must arrive in time, and its host must be this machine or
+    /// `host`.
     pub fn request(&mut self, host: &str) -> io::Result<Option<Result<Request, HttpError>>> {
         let deadline = Instant::now() + self.patience.stall;
         loop {

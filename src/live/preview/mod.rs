@@ -1,8 +1,8 @@
 //! A small web page that shows the picture as it grows.
 //!
 //! The page and everything it needs are in the program. It requests the numbers a few times a second, fetches the layer
-//! it shows when there is a newer picture, and thereby requests the next one; without an open page no pictures are made,
-//! at no cost.
+//! it shows when there is a newer picture, and thereby requests the next one; without an open page no pictures are
+//! made, at no cost.
 
 mod board;
 mod http;
@@ -112,7 +112,8 @@ impl Preview {
         self.shared.board.show(snapshot, true);
     }
 
-    /// Waits until every page open has fetched the finished picture, no longer than until `deadline`; returns whether they have.
+    /// Waits until every page open has fetched the finished picture, no longer than until `deadline`; returns whether
+    /// they have.
     pub fn wait(&self, deadline: Instant) -> bool {
         self.shared.board.wait(deadline)
     }

@@ -3,8 +3,8 @@
 //! | path | response |
 //! |---|---|
 //! | `/` | the page |
-//! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and requests the next one, except with `idle=1` |
-//! | `/layer?index=I` | a layer: version, width, height, channels as little-endian u32, then 16-bit floats, row by row from the top |
+//! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and requests the next, not with `idle=1` |
+//! | `/layer?index=I` | a layer: version, width, height, channels (little-endian u32), then rows of 16-bit floats |
 //! | `/pixel?x=X&y=Y` | every layer's exact values at a pixel as JSON |
 
 use std::io;

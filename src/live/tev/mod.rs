@@ -52,7 +52,8 @@ pub struct Tev {
 }
 
 impl Tev {
-    /// Starts the thread that sends, or sends nothing where no thread can be had; in the viewer the picture is called `name`.
+    /// Starts the thread that sends, or sends nothing where no thread can be had; in the viewer the picture is called
+    /// `name`.
     pub fn new(options: TevOptions, name: &str) -> Self {
         let queue = Arc::new(Queue::new(options.update_period));
         let sender = Sender::new(options, name.replace('\0', "_"), Arc::clone(&queue));
@@ -80,7 +81,8 @@ impl Tev {
         self.queue.offer_final(snapshot);
     }
 
-    /// Waits until the last picture is sent, no longer than until `deadline`, and not at all without a connection; returns whether it was sent.
+    /// Waits until the last picture is sent, no longer than until `deadline`, and not at all without a connection;
+    /// returns whether it was sent.
     pub fn wait(&self, deadline: Instant) -> bool {
         self.queue.wait(deadline)
     }

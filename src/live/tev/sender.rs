@@ -145,7 +145,8 @@ fn tiles(size: [u32; 2]) -> impl Iterator<Item = Crop> {
     starts(size[1]).flat_map(move |y| starts(size[0]).map(move |x| tile(x, y).intersection(&full)))
 }
 
-/// The rows of a tile in the data of a layer with `channels` channels; `tile` counts from the corner of the part that layers hold.
+/// The rows of a tile in the data of a layer with `channels` channels; `tile` counts from the corner of the part that
+/// layers hold.
 fn rows(data: &[f32], width: u32, channels: usize, tile: Crop) -> impl Iterator<Item = &[f32]> {
     let start = move |y: u32| (y as usize * width as usize + tile.x as usize) * channels;
     (tile.y..tile.y + tile.height).map(move |y| &data[start(y)..start(y) + tile.width as usize * channels])

@@ -17,7 +17,8 @@ use crate::output::role::Role;
 pub struct ExrFile {
     pub path: PathBuf,
     pub headers: Vec<Header>,
-    /// The samples of channels of mattes; empty if the file is deep or of a compression that the library does not support.
+    /// The samples of channels of mattes; empty if the file is deep or of a compression that the library does not
+    /// support.
     planes: Vec<(Place, Vec<f32>)>,
 }
 

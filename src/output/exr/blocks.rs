@@ -114,7 +114,8 @@ impl Zip {
     }
 }
 
-/// The first bytes of all pairs and then the second ones, each less the one before it, plus 128. Blocks have an even number of bytes.
+/// The first bytes of all pairs and then the second ones, each less the one before it, plus 128. Blocks have an even
+/// number of bytes.
 fn predict(block: &[u8], out: &mut Vec<u8>) {
     out.resize(block.len(), 0);
     let pairs = block.as_chunks::<2>().0;

@@ -78,7 +78,8 @@ pub struct Common<'a> {
     pub original: Option<IntegerBounds>,
 }
 
-/// The attributes of a part: the first has those of the whole file, since some programs read no other; every part describes the mattes.
+/// The attributes of a part: the first has those of the whole file, since some programs read no other; every part
+/// describes the mattes.
 pub fn part_attributes(common: &Common, part: PartKind, first: bool, comments: &[&str]) -> LayerAttributes {
     let Common { output, info, .. } = common;
     let own = output.comments.iter().map(String::as_str).filter(|_| first);

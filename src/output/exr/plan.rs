@@ -46,7 +46,8 @@ pub struct OutputFault {
     pub message: String,
 }
 
-/// Checks that an EXR output makes sense: no lossy compression of data, no 16 bits where 32 are needed, an even number of ranks.
+/// Checks that an EXR output makes sense: no lossy compression of data, no 16 bits where 32 are needed, an even number
+/// of ranks.
 ///
 /// # Errors
 /// [`Error::Usage`] naming the output and the layer.

@@ -13,14 +13,16 @@ use crate::file::exr_blocks::{ChannelRow, Place, allocate, read_rows};
 use crate::file::exr_headers::read_headers;
 use crate::film::{Crop, Image, Layer, LayerKind};
 
-/// Reads the colour of any EXR file: bare channels R, G, B (in upper or lower case), else a layer with such channels (the one with the
-/// shortest name, a "Combined" first), else Y as gray. Alpha is that of the same layer, or 1. The picture is the data window; where that
-/// reaches beyond the display window, the data window is taken as the full picture.
+/// Reads the colour of any EXR file: bare channels R, G, B (in upper or lower case), else a layer with such channels
+/// (the one with the shortest name, a "Combined" first), else Y as gray. Alpha is that of the same layer, or 1. The
+/// picture is the data window; where that reaches beyond the display window, the data window is taken as the full
+/// picture.
 ///
 /// Only the channels of the colour are kept in memory.
 ///
 /// # Errors
-/// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no such picture or too large, [`Error::OutOfMemory`].
+/// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no such picture or too large,
+/// [`Error::OutOfMemory`].
 pub fn read_exr(path: &Path) -> Result<Image> {
     let source = file::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };

@@ -1,10 +1,10 @@
 //! Adaptive sampling: samples go where the picture's relative squared error needs them, until that is below a target.
 //!
 //! Blocks of 4 x 4 pixels get samples in groups of eight, a stretch of each pixel's own sequence. The means of a
-//! pixel's groups estimate their variance, which is that of well-spread samples (single ones would estimate that of independent
-//! samples, which is larger). With `v` a block's variance of a group over `color² + 0.01` and `n` its groups, the
-//! picture's error is the mean of `v / n`, and for a given cost it is least with `n` in proportion to `sqrt(v)`
-//! (Neyman).
+//! pixel's groups estimate their variance, which is that of well-spread samples (single ones would estimate that of
+//! independent samples, which is larger). With `v` a block's variance of a group over `color² + 0.01` and `n` its
+//! groups, the picture's error is the mean of `v / n`, and for a given cost it is least with `n` in proportion to
+//! `sqrt(v)` (Neyman).
 //!
 //! A block that met a bright path by luck must not get more samples for it, for that would take weight from the path:
 //! the picture would be too dark where such paths are rare. So what a block gets depends on the blocks around it alone.
@@ -250,7 +250,8 @@ impl PixelStatistics {
                 let count = block.area() as f64;
                 for ((x, y), (mean, variance)) in block.pixels().zip(statistics()) {
                     let weight = [0, 1, 2].map(|k| {
-                        // What makes a pixel uncertain may make it bright: the mean of the others of its block is the better estimate.
+                        // What makes a pixel uncertain may make it bright: the mean of the others of its block is the
+                        // better estimate.
                         let others = (totals[k] - mean[k]) / (count - 1.0).max(1.0);
                         let color = if count > 1.0 { mean[k].abs().min(others.abs()) } else { mean[k] };
                         1.0 / (color * color + FLOOR)

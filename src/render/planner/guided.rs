@@ -11,8 +11,8 @@ use crate::guiding::Guide;
 use crate::math::Aabb;
 use crate::render::TILE_SIZE;
 
-/// Iterations of at least this many samples decide whether guiding goes on: their variance times rays must be so much less
-/// than without.
+/// Iterations of at least this many samples decide whether guiding goes on: their variance times rays must be so much
+/// less than without.
 const MIN_GAINS: [(u32, f64); 2] = [(8, 1.2), (16, GUIDED_COST)];
 
 /// Time of a ray of a guided path over that of another, about, learning included: from 2.5 in a room seen through a

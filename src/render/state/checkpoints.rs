@@ -23,7 +23,8 @@ pub struct Checkpoints {
 }
 
 impl Checkpoints {
-    /// At least this often (`every`), and between the next two passes whenever `requested` becomes true (it becomes false again).
+    /// At least this often (`every`), and between the next two passes whenever `requested` becomes true (it becomes
+    /// false again).
     pub fn new(file: StateFile, header: Header, every: Duration, requested: Arc<AtomicBool>) -> Self {
         Self { file, header, every, requested, last: Instant::now(), cost: Duration::ZERO, failed: false }
     }

@@ -129,7 +129,8 @@ impl Header {
         self.settings.get("integrator.guiding").is_some_and(|value| value == "true")
     }
 
-    /// What of it makes no sense in itself, so that no render can have written it; `None` if all does. `bytes` are those behind the header.
+    /// What of it makes no sense in itself, so that no render can have written it; `None` if all does. `bytes` are
+    /// those behind the header.
     pub(super) fn fault(&self, bytes: u64) -> Option<String> {
         let Shard { index, count } = self.shard;
         let Crop { x, y, width, height } = self.film.crop;
@@ -159,7 +160,8 @@ impl Header {
         }
     }
 
-    /// In what it belongs to another picture than `other`, in words; empty if it does not. `these` and `those` name the two.
+    /// In what it belongs to another picture than `other`, in words; empty if it does not. `these` and `those` name the
+    /// two.
     pub fn differences(&self, other: &Self, these: &str, those: &str) -> Vec<String> {
         let mut found = Vec::new();
         if self.program != other.program {
@@ -182,7 +184,8 @@ impl Header {
     }
 }
 
-/// The settings that the picture depends on, by their names. More samples can be added, unless the others depend on their number.
+/// The settings that the picture depends on, by their names. More samples can be added, unless the others depend on
+/// their number.
 fn compared(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     put(&mut found, "", &serde_json::to_value(settings).unwrap_or_default());

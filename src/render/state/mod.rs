@@ -45,8 +45,8 @@ pub struct RenderState {
     pub done: u32,
     /// How many tiles, the first of the film, have one sample more.
     pub tiles_ahead: usize,
-    /// Whether a pass was cancelled: some tiles have samples that others lack, which no file can represent. The picture is
-    /// whole.
+    /// Whether a pass was cancelled: some tiles have samples that others lack, which no file can represent. The picture
+    /// is whole.
     pub torn: bool,
     /// Whether no sample is missing.
     pub complete: bool,

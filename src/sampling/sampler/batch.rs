@@ -82,8 +82,8 @@ fn draw<const SOBOL: bool>(requests: &SampleIdRows, count: usize, set: u32, numb
     }
 }
 
-/// Adds, to the points of the second to fourth dimension, the columns of the given bits of the index: what a loop does, laid out since
-/// loops within loops are not turned into vector code.
+/// Adds, to the points of the second to fourth dimension, the columns of the given bits of the index: what a loop does,
+/// laid out since loops within loops are not turned into vector code.
 macro_rules! add_columns {
     ($point:ident, $index:ident, $($bit:literal)*) => { $(
         let chosen = 0u32.wrapping_sub($index >> $bit & 1);

@@ -123,7 +123,8 @@ pub(super) fn f6_far_cameras(effort: Effort) -> Outcome {
         })
 }
 
-/// A ray along an axis or in a plane of two, from a point with coordinates of two vertices: in planes of the faces of boxes.
+/// A ray along an axis or in a plane of two, from a point with coordinates of two vertices: in planes of the faces of
+/// boxes.
 fn axis_parallel(rng: &mut Rng, mesh: &Mesh) -> Ray {
     let vertex = |rng: &mut Rng| Vec3::from(mesh.positions()[rng.below(mesh.positions().len())]);
     let zero = |rng: &mut Rng| if rng.unit() < 0.5 { 0.0 } else { -0.0 };

@@ -54,7 +54,8 @@ fn integral(filter: &Filter, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     (0..STEPS).map(|i| f(filter.evaluate(Vec2::new(at(i), 0.0))) * h).sum()
 }
 
-/// The largest difference between the weight of the samples in a half pixel and the filter's integral there, both over the whole.
+/// The largest difference between the weight of the samples in a half pixel and the filter's integral there, both over
+/// the whole.
 fn mass_error(filter: &Filter, draws: u32) -> f64 {
     let r = f64::from(filter.radius());
     let cells = (4.0 * r).ceil() as usize;

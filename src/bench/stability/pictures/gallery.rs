@@ -44,7 +44,8 @@ fn fireflies(image: &Image) -> Vec<bool> {
             around.extend(&light[row * width + x.saturating_sub(2)..row * width + (x + 3).min(width)]);
         }
         around.sort_by(f64::total_cmp);
-        // Of an odd number or the upper of both middle ones; a black surrounding has no fireflies but what is seen directly.
+        // Of an odd number or the upper of both middle ones; a black surrounding has no fireflies but what is seen
+        // directly.
         let median = around[around.len() / 2];
         median > 0.0 && light[i] > FIREFLY * median
     };

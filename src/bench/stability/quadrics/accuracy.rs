@@ -113,8 +113,8 @@ fn compensation(accel: &dyn accel::Accelerator, geometry: &Geometry, ray: &Ray) 
     closest(accel, geometry, ray).found.map(|at| (at.p, at.n_g))
 }
 
-/// Tallies of the shape alone, through Embree, and through Embree among others; there, of rays that pass the edge of the box so
-/// closely that the rounding of their origin is more, apart.
+/// Tallies of the shape alone, through Embree, and through Embree among others; there, of rays that pass the
+/// edge of the box so closely that the rounding of their origin is more, apart.
 #[derive(Clone, Copy, Default)]
 struct Tallies {
     alone: Tally,
@@ -251,7 +251,8 @@ pub(super) fn c1_hit_accuracy(effort: Effort) -> Outcome {
         .plot(error_plot("Error of hits by scale", "size of the shape", by_scale))
 }
 
-/// The largest error of the textbook's formulas in `f32`, in the units of [`Tally::error`]; of rays that they hit at all.
+/// The largest error of the textbook's formulas in `f32`, in the units of [`Tally::error`]; of rays that they hit at
+/// all.
 fn naive_error(rng: &mut Rng, case: &Case, setting: Setting, rays: usize) -> f64 {
     let mut worst = 0f64;
     for _ in 0..rays {

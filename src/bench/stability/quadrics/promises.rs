@@ -1,4 +1,5 @@
-//! Properties of every analytic shape: which root, derivatives, parameters, singular points, bounds, one answer for both queries.
+//! Properties of every analytic shape: which root, derivatives, parameters, singular points, bounds, one answer for
+//! both queries.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

@@ -121,8 +121,8 @@ fn d1_all_roots_are_found(effort: Effort) -> Outcome {
     KINDS.iter().zip(equal).fold(outcome, |outcome, (kind, equal)| outcome.at_least(*kind, equal as f64 / (4 * per_kind) as f64, 0.99))
 }
 
-/// The equation of D1 at a point of the surface: the squared distance of the surface from the axis less that of the ray at the same height,
-/// times the squared height of the unit direction.
+/// The equation of D1 at a point of the surface: the squared distance of the surface from the axis less that of the ray
+/// at the same height, times the squared height of the unit direction.
 fn equation(ray: &RayF64, p: DVec3) -> f64 {
     let (o, d) = (ray.origin, ray.direction.normalize());
     let (a, b, c) = (d.x * d.x + d.z * d.z, o.x * d.x + o.z * d.z, o.x * o.x + o.z * o.z);

@@ -6,8 +6,8 @@ use super::materials::{Material, direction, rough, smooth};
 use crate::bsdf::Bsdf;
 use crate::math::Vec3;
 
-/// How far each component of a direction may be from its exact value: it is the sum of a few products of numbers up to 2, each of which
-/// is rounded.
+/// How far each component of a direction may be from its exact value: it is the sum of a few products of numbers up to
+/// 2, each of which is rounded.
 const ROUNDING: f32 = 1.0 / (1 << 22) as f32;
 
 /// Relative difference of two numbers.

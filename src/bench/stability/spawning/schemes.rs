@@ -1,4 +1,5 @@
-//! Ways to start a ray at a surface, side by side: how often it finds its own face again, and how often it leaks out of a closed box.
+//! Ways to start a ray at a surface, side by side: how often it finds its own face again, and how often it leaks out of
+//! a closed box.
 
 use super::{Effort, Outcome, accelerators};
 use crate::accel::Accelerator;
@@ -16,8 +17,8 @@ enum Scheme {
     None,
     /// A smallest distance in scene units.
     FixedStart,
-    /// Some floats away along each axis; near zero, some scene units (Wächter and Binder, "A Fast and Robust Method for Avoiding
-    /// Self-Intersection").
+    /// Some floats away along each axis; near zero, some scene units (Wächter and Binder, "A Fast and Robust Method for
+    /// Avoiding Self-Intersection").
     Floats,
     /// Along the normal, in proportion to the largest coordinate and at least some scene units, as Mitsuba does.
     AlongNormal,

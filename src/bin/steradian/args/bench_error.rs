@@ -51,7 +51,8 @@ pub struct BenchErrorArgs {
     /// Repetitions, each with another seed
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
-    /// Also record all rays of a short render and trace them again by bare calls of Embree: how much of the time is tracing
+    /// Also record all rays of a short render and trace them again by bare calls of Embree: how much of the time is
+    /// tracing
     #[arg(long)]
     pub tax: bool,
 

@@ -41,9 +41,9 @@ pub struct OidnArgs {
 pub struct RenderDenoiseArgs {
     /// Denoise the picture with Intel Open Image Denoise; EXR files keep the original as layer noisy
     ///
-    /// The render also makes the layers feature_albedo and feature_normal, which are stored only if --layers names them. Light
-    /// groups are denoised so that they still sum to the picture. Shards are denoised when they are merged, by
-    /// `steradian denoise`.
+    /// The render also makes the layers feature_albedo and feature_normal, which are stored only if --layers names
+    /// them. Light groups are denoised so that they still sum to the picture. Shards are denoised when they are merged,
+    /// by `steradian denoise`.
     #[arg(long, conflicts_with = "shard", help_heading = "Picture")]
     pub denoise: bool,
     #[command(flatten)]

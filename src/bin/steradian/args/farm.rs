@@ -58,7 +58,8 @@ pub struct JobArgs {
     /// Samples per pixel, all shards together
     #[arg(long, value_name = "N")]
     pub spp: Option<u32>,
-    /// Folder for shards and checkpoints; has to be the same for all machines. Default: SCENE.farm in the working directory
+    /// Folder for shards and checkpoints; has to be the same for all machines. Default: SCENE.farm in the working
+    /// directory
     #[arg(long, value_name = "DIR")]
     pub dir: Option<PathBuf>,
     /// Seconds between checkpoints

@@ -97,8 +97,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Print what is in a scene
     ///
-    /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info without an error
-    /// renders without an error.
+    /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info
+    /// without an error renders without an error.
     Info(InfoArgs),
     /// Turn a scene of another renderer into one of ours, with its meshes and images beside it
     #[command(after_help = import::CONVERT_EXAMPLES)]
@@ -110,7 +110,8 @@ pub enum Command {
     Schema,
     /// Merge shards into the picture
     ///
-    /// Shards are what `render --shard` writes. All of them together are the picture of one run bit for bit, in every layer.
+    /// Shards are what `render --shard` writes. All of them together are the picture of one run bit for bit, in every
+    /// layer.
     #[command(after_help = MERGE_EXAMPLES)]
     Merge(MergeArgs),
     /// Check EXR files against what the programs that read them expect
@@ -126,9 +127,9 @@ pub enum Command {
     Rerender(RerenderArgs),
     /// Compare a picture with its reference
     ///
-    /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of (test - reference)² /
-    /// (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels, psnr relates mse to the
-    /// reference's peak, mean ratio is the test's mean over the reference's.
+    /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of
+    /// (test - reference)² / (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels,
+    /// psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
     #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
     Compare(CompareArgs),
     /// Write jobs for render farms
@@ -182,9 +183,10 @@ pub struct RenderArgs {
     pub spp: Option<u32>,
     /// Render until the picture's relative squared error is below this, with samples where they are needed
     ///
-    /// The error is the mean of (picture - truth)² / (truth² + 0.01) over pixels and channels, as far as the samples show it: 0.01 is a
-    /// rough picture, 0.001 a good one. The render ends when the error is below the target by two standard deviations; --spp is then the
-    /// most samples of a pixel. Store the layers "variance" and "samples" to see where they went.
+    /// The error is the mean of (picture - truth)² / (truth² + 0.01) over pixels and channels, as far as the samples
+    /// show it: 0.01 is a rough picture, 0.001 a good one. The render ends when the error is below the target by two
+    /// standard deviations; --spp is then the most samples of a pixel. Store the layers "variance" and "samples" to see
+    /// where they went.
     #[arg(long, value_name = "ERROR", help_heading = "Picture")]
     pub target_error: Option<f64>,
     /// Width and height in pixels, such as 1920x1080
@@ -193,7 +195,8 @@ pub struct RenderArgs {
     /// Render only this part, in pixels from the upper left corner
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_list::<u32, 4>, help_heading = "Picture")]
     pub crop: Option<[u32; 4]>,
-    /// Render this many pixels more on each side: EXR files hold them around the picture (their data window), PNG files do not
+    /// Render this many pixels more on each side: EXR files hold them around the picture (their data window), PNG files
+    /// do not
     #[arg(long, value_name = "PIXELS", help_heading = "Picture")]
     pub overscan: Option<u32>,
     /// EXR: layers (AOVs) to store beside the picture; `all` for every one
@@ -222,7 +225,8 @@ pub struct RenderArgs {
     /// How directions towards lights are found
     #[arg(long, value_name = "NAME", value_parser = names::plain::<StrategyDesc>(), help_heading = "Algorithm")]
     pub strategy: Option<StrategyDesc>,
-    /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default; inf for no limit
+    /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default;
+    /// inf for no limit
     #[arg(long, value_name = "LIMIT", help_heading = "Algorithm")]
     pub clamp: Option<f32>,
     /// Make surfaces that a path meets after a rough one at least as rough as this alpha, falling with the samples:

@@ -109,7 +109,8 @@ mod tests {
         }
     }
 
-    /// Whatever the bytes are, they are settings or an error with its line: damaged files, and those that fuzzing found.
+    /// Whatever the bytes are, they are settings or an error with its line: damaged files, and those that fuzzing
+    /// found.
     #[test]
     fn damaged_files_are_read_or_refused() {
         const TEXT: &str =

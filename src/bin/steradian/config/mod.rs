@@ -1,4 +1,5 @@
-//! Where the options of `render` come from: the command line, the environment, files of the project and of the user, the machine's limits.
+//! Where the options of `render` come from: the command line, the environment, files of the project and of the user,
+//! the machine's limits.
 
 mod files;
 mod show;
@@ -61,7 +62,8 @@ pub struct Parsed {
     pub files: Vec<PathBuf>,
 }
 
-/// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help with 0.
+/// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help
+/// with 0.
 pub fn parse() -> Result<Parsed> {
     let line: Vec<OsString> = std::env::args_os().collect();
     check_utf8(&line)?;
@@ -83,7 +85,8 @@ pub fn parse() -> Result<Parsed> {
     Ok(Parsed { cli: typed(&matches), warnings, added, files })
 }
 
-/// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals nor farms.
+/// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals
+/// nor farms.
 fn exit(error: &clap::Error) -> ! {
     let text = error.to_string();
     let harmless = message_lines(&text);

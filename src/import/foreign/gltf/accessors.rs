@@ -1,4 +1,5 @@
-//! Accessors: numbers in buffers, read element by element after one check of their bounds. Bytes need no alignment to be read.
+//! Accessors: numbers in buffers, read element by element after one check of their bounds. Bytes need no alignment to
+//! be read.
 
 use std::collections::BTreeMap;
 
@@ -43,7 +44,8 @@ impl Column<'_> {
         }
     }
 
-    /// The first numbers of an element as floats, whole ones in proportion if they are normalized; zero where there are none.
+    /// The first numbers of an element as floats, whole ones in proportion if they are normalized; zero where there are
+    /// none.
     pub fn floats<const N: usize>(&self, i: usize) -> [f32; N] {
         let element = self.element(i);
         std::array::from_fn(|k| if k < self.width { self.float(element, k) } else { 0.0 })

@@ -52,7 +52,8 @@ struct Builder<'a, 'b> {
     gives_light: bool,
 }
 
-/// Bytes of meshes for each byte of the file's buffers, and what any file may have: parts of buffers may be used more than once.
+/// Bytes of meshes for each byte of the file's buffers, and what any file may have: parts of buffers may be used more
+/// than once.
 const EXPANSION: usize = 64;
 const LEAST_BUDGET: usize = 1 << 28;
 

@@ -1,7 +1,8 @@
 //! glTF 2.0 scenes, `.gltf` and `.glb`.
 //!
-//! The JSON and the indices in it are checked by the crate `gltf`; buffers, images and extensions are read here. A path tracer
-//! shows both sides of every surface, whatever `doubleSided` is; only light is given off by one side of what is not double-sided.
+//! The JSON and the indices in it are checked by the crate `gltf`; buffers, images and extensions are read here. A path
+//! tracer shows both sides of every surface, whatever `doubleSided` is; only light is given off by one side of what is
+//! not double-sided.
 
 mod accessors;
 mod animation;
@@ -47,7 +48,8 @@ impl GltfSource<'_> {
 /// Reads a `.gltf` or `.glb` file.
 ///
 /// # Errors
-/// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for faults in it.
+/// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for faults in
+/// it.
 pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     let document = document::parse(path, &bytes)?;

@@ -53,7 +53,8 @@ impl TextureRef {
 }
 
 impl TextureSet {
-    /// Adds a texture: one channel of it, or its colour. `None` if there is no image that can be read, which is reported.
+    /// Adds a texture: one channel of it, or its colour. `None` if there is no image that can be read, which is
+    /// reported.
     pub fn add(
         &mut self,
         source: GltfSource,
@@ -168,8 +169,9 @@ fn lookup(sampler: &Sampler) -> (TextureFilterDesc, WrapDesc) {
 
 /// A transform of uv whose v runs down, for uv whose v runs up: offset, scale and rotation (radians).
 ///
-/// With v down the lookup is `offset + M (scale * uv)`, where M turns counter-clockwise as the image is seen: from u against v. Putting
-/// `1 - v` for v before and after turns that rotation into one from u towards v by the same angle and moves the offset.
+/// With v down the lookup is `offset + M (scale * uv)`, where M turns counter-clockwise as the image is seen: from u
+/// against v. Putting `1 - v` for v before and after turns that rotation into one from u towards v by the same angle
+/// and moves the offset.
 fn flipped(transform: &TextureTransform) -> ([f32; 2], [f32; 2], f64) {
     let rotation = f64::from(transform.rotation);
     let (sin, cos) = rotation.sin_cos();

@@ -7,7 +7,8 @@ use crate::import::foreign::report::PART_OF_IGNORED;
 use crate::import::{Draft, Outcome};
 use crate::math::DAffine3;
 
-/// A plugin while it is read. Parameters that are read count as mapped unless something else is reported; those never read are ignored.
+/// A plugin while it is read. Parameters that are read count as mapped unless something else is reported; those never
+/// read are ignored.
 #[derive(Debug)]
 pub(crate) struct Element<'a> {
     /// The plugin.

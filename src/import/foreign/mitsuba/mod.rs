@@ -1,8 +1,8 @@
 //! Mitsuba 3 scenes.
 //!
-//! What Mitsuba does when it renders in RGB is what is meant. Its surfaces are black from behind unless `twosided`, its images have their
-//! origin at the top left, its cameras look along +Z with +X to the left; light that rough surfaces scatter twice between their microfacets
-//! is lost.
+//! What Mitsuba does when it renders in RGB is what is meant. Its surfaces are black from behind unless `twosided`, its
+//! images have their origin at the top left, its cameras look along +Z with +X to the left; light that rough surfaces
+//! scatter twice between their microfacets is lost.
 
 mod bsdfs;
 mod element;

@@ -61,7 +61,8 @@ impl<'a> Reader<'a> {
         Ok((MaterialDesc::Principled(Box::new(desc)), is_opaque))
     }
 
-    /// The thin one: what is not `spec_trans` has no highlights in Mitsuba, so that it is a mix of a sheet without any and a pane.
+    /// The thin one: what is not `spec_trans` has no highlights in Mitsuba, so that it is a mix of a sheet without any
+    /// and a pane.
     pub(super) fn principled_thin(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<BsdfBinding> {
         let base = self.principled_base(element, uv)?;
         let sheet = PrincipledDesc {

@@ -1,4 +1,5 @@
-//! Mitsuba's serialized meshes: several of them in a file, each compressed by zlib, with a table of their offsets at the end.
+//! Mitsuba's serialized meshes: several of them in a file, each compressed by zlib, with a table of their offsets at
+//! the end.
 
 use std::io::{BufReader, Read};
 use std::path::Path;

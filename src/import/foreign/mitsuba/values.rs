@@ -95,7 +95,8 @@ pub fn rows(map: &DAffine3) -> [[f64; 4]; 4] {
     [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// A frame about a unit normal: Mitsuba's choice of two tangents (Duff et al., "Building an Orthonormal Basis, Revisited").
+/// A frame about a unit normal: Mitsuba's choice of two tangents (Duff et al., "Building an Orthonormal Basis,
+/// Revisited").
 pub fn tangents(n: DVec3) -> (DVec3, DVec3) {
     let sign = 1.0f64.copysign(n.z);
     let a = -1.0 / (sign + n.z);

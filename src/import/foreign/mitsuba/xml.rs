@@ -53,7 +53,8 @@ const MAX_TEXT: usize = 1 << 17;
 /// Reads a scene file and what it includes. `defines` replace defaults.
 ///
 /// # Errors
-/// [`Error::Missing`] if a file cannot be read, [`Error::Parse`] for faults in it, [`Error::Usage`] for a define that nothing uses.
+/// [`Error::Missing`] if a file cannot be read, [`Error::Parse`] for faults in it, [`Error::Usage`] for a define that
+/// nothing uses.
 pub fn read(path: &Path, defines: &[(String, String)]) -> Result<Document> {
     let mut parser = Parser {
         scene: path.into(),

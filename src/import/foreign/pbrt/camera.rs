@@ -18,7 +18,8 @@ pub struct CameraDirective {
     pub camera_from_world: Ctm,
 }
 
-/// The part of the film that the camera's rays go through: from `min` to `max`, where the shorter side of the picture goes from -1 to 1.
+/// The part of the film that the camera's rays go through: from `min` to `max`, where the shorter side of the picture
+/// goes from -1 to 1.
 #[derive(Clone, Copy, Debug)]
 struct Screen {
     min: [f64; 2],

@@ -198,7 +198,8 @@ mod tests {
             let (p, n) = (DVec3::from(p.map(f64::from)), DVec3::from(n.map(f64::from)));
             assert!(p.normalize().dot(n) > 0.9, "{p} {n}");
         }
-        // The limit at a corner of valence 4: gamma = 1 / (4 + 3 / (8 * 3 / 32)) = 1/8, so half of it and nothing of its neighbours.
+        // The limit at a corner of valence 4: gamma = 1 / (4 + 3 / (8 * 3 / 32)) = 1/8, so half of it and nothing of
+        // its neighbours.
         let corner = subdivide(&positions, &triangles, 0).unwrap().positions[0];
         assert!((corner[0] - 0.5).abs() < 1e-6 && corner[1].abs() < 1e-6, "{corner:?}");
     }

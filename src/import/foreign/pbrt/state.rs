@@ -161,8 +161,8 @@ pub fn matrix(map: &DAffine3) -> TransformDesc {
     TransformDesc(vec![TransformStepDesc::Matrix([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z), [0.0, 0.0, 0.0, 1.0]])])
 }
 
-/// The rotation nearest to a map that ought to be one, and its scale: x and y are turned least where they are not at right angles to z.
-/// `None` if it is singular.
+/// The rotation nearest to a map that ought to be one, and its scale: x and y are turned least where they are not at
+/// right angles to z. `None` if it is singular.
 pub fn rotation_and_scale(map: &DMat3) -> Option<(DMat3, f64)> {
     let z = map.z_axis.try_normalize()?;
     let y = (map.y_axis - z * map.y_axis.dot(z)).try_normalize()?;
