@@ -6,7 +6,7 @@ use std::process::Stdio;
 use serde_json::Value;
 use steradian::output;
 
-use crate::util::program::{Running, Signal, run, steradian, stderr_of};
+use crate::util::program::{Running, Signal, run, stderr_of, steradian};
 
 #[test]
 fn faults_have_their_exit_codes_and_one_line() {
@@ -41,7 +41,10 @@ fn without_outputs_the_files_are_named_after_the_scene() {
     let output = run(folder.path(), "render scene.json --layers Z --json stats.json --accel embree");
     assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
     let stderr = stderr_of(&output);
-    assert!(stderr.contains("wrote scene.exr\n") && stderr.contains("wrote scene.png\n") && stderr.ends_with("Progress: 100%\n"), "{stderr}");
+    assert!(
+        stderr.contains("wrote scene.exr\n") && stderr.contains("wrote scene.png\n") && stderr.ends_with("Progress: 100%\n"),
+        "{stderr}"
+    );
     assert!(folder.path().join("scene.png").exists());
     let image = output::read_exr(&folder.path().join("scene.exr")).unwrap();
     assert_eq!(image.size, [24, 16]);

@@ -160,8 +160,11 @@ fn the_result_does_not_depend_on_threads() {
 #[ignore = "needs Open Image Denoise: pip install pyoidn"]
 fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
     let denoiser = denoiser(2);
-    let kinds: Vec<&str> =
-        LayerInfo::ALL.iter().filter(|info| matches!(info.source, steradian::film::LayerSource::LightAov(_))).map(|info| info.name).collect();
+    let kinds: Vec<&str> = LayerInfo::ALL
+        .iter()
+        .filter(|info| matches!(info.source, steradian::film::LayerSource::LightAov(_)))
+        .map(|info| info.name)
+        .collect();
     let layers: Vec<&str> = ["feature_albedo", "feature_normal", "light_groups", "variance"].into_iter().chain(kinds).collect();
     let (reference, noisy) = (render(&room(4096, &["light_groups"])), render(&room(16, &layers)));
     let mut image = noisy.clone();

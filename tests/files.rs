@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::util::program::{Running, SCENE, Signal, run, steradian, stderr_of};
+use crate::util::program::{Running, SCENE, Signal, run, stderr_of, steradian};
 
 /// Runs a line of shell with the program's path in `$0`.
 fn shell(folder: &Path, line: &str) -> Output {
@@ -125,7 +125,12 @@ fn files_beyond_the_limit_are_errors_of_writing() {
     for output in ["-o a.exr --float", "-o a.png", "--shard 1/2"] {
         let output = shell(folder.path(), &format!("ulimit -f 1; exec \"$0\" render scene.json -q --size 128x128 --spp 2 {output}"));
         assert_eq!(output.status.code(), Some(5), "{:?} {}", output.status, stderr_of(&output));
-        assert_eq!((stderr_of(&output).matches("error: cannot write").count(), stderr_of(&output).lines().count()), (1, 1), "{}", stderr_of(&output));
+        assert_eq!(
+            (stderr_of(&output).matches("error: cannot write").count(), stderr_of(&output).lines().count()),
+            (1, 1),
+            "{}",
+            stderr_of(&output)
+        );
     }
     // A checkpoint that cannot be written is no reason to lose the picture.
     let output = shell(folder.path(), "ulimit -f 100; exec \"$0\" render scene.json --size 128x128 --spp 2 -o a.png --checkpoint a.state");

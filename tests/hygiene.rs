@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::util::program::{SCENE, run, steradian, stderr_of};
+use crate::util::program::{SCENE, run, stderr_of, steradian};
 
 #[test]
 fn every_format_has_whole_lines_and_ends_with_all() {

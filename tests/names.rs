@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::util::program::{SCENE, run, steradian, stderr_of};
+use crate::util::program::{SCENE, run, stderr_of, steradian};
 
 /// A small scene with changes.
 fn scene(change: impl FnOnce(&mut Value)) -> String {

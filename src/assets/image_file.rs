@@ -131,7 +131,8 @@ fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
     chosen.extend(find("A"));
     let requested: Vec<Place> = chosen.iter().map(|&channel| Place { part, channel }).collect();
     let (width, height, channels) = (size.width(), size.height(), chosen.len());
-    let read = |keep: &mut dyn FnMut(ChannelRow)| read_rows(Cursor::new(bytes), &headers, &requested, false, keep).map_err(|e| malformed(&e));
+    let read =
+        |keep: &mut dyn FnMut(ChannelRow)| read_rows(Cursor::new(bytes), &headers, &requested, false, keep).map_err(|e| malformed(&e));
     let samples = if chosen.iter().all(|&channel| all[channel].sample_type == SampleType::F16) {
         let mut out = vec![f16::ZERO; width * height * channels];
         read(&mut |row| row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), f16::from_f32))?;

@@ -22,7 +22,7 @@ pub use measure::{AccelReport, BuildReport, KindReport, Mode, Options, RateRepor
 pub use mesh::{bumpy_sphere, head};
 pub use naive::{MatrixLinear, NaiveBvh, NaiveKdTree, NaiveOctree};
 pub use record::{RayKind, RaySet, record};
-pub use reports::{Comparison, FrameTiming, ReportsOptions, ReportsReport, ComparisonRow, bench_reports};
+pub use reports::{Comparison, ComparisonRow, FrameTiming, ReportsOptions, ReportsReport, bench_reports};
 pub use scaling::{Fit, ScalingPoint, ScalingReport, bench_scaling, fit, fitted_slope};
 
 /// Receives the progress of a benchmark, and may end it.

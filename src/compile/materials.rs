@@ -92,7 +92,9 @@ impl MaterialTable {
             None => compiler.material(&path, &desc.materials[name])?,
         };
         let medium = match &desc.materials[name] {
-            MaterialDesc::Relief { material, .. } => self.names.get(material).and_then(|binding| self.medium_of.get(&binding.material)).copied(),
+            MaterialDesc::Relief { material, .. } => {
+                self.names.get(material).and_then(|binding| self.medium_of.get(&binding.material)).copied()
+            }
             plain => self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, plain)?),
         };
         let id = self.push(material);

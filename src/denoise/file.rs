@@ -101,7 +101,8 @@ impl Plan {
         }
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
         let groups: Vec<_> = layers.all_of(color).filter(|(name, _)| last(name).starts_with(LIGHT_GROUP)).collect();
-        let is_kind = |name: &str| LayerInfo::ALL.iter().any(|info| matches!(info.source, LayerSource::LightAov(_)) && info.name == last(name));
+        let is_kind =
+            |name: &str| LayerInfo::ALL.iter().any(|info| matches!(info.source, LayerSource::LightAov(_)) && info.name == last(name));
         let kinds: Vec<_> = layers.all_of(color).filter(|(name, _)| is_kind(name)).collect();
         let mut sets = Vec::new();
         for (set, what) in [(groups, "light groups"), (kinds, "kinds of light")].into_iter().filter(|(set, _)| !set.is_empty()) {

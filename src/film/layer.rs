@@ -118,7 +118,13 @@ pub struct LayerInfo {
 }
 
 impl LayerInfo {
-    const fn new(kind: LayerKind, name: &'static str, channels: &'static [&'static str], source: LayerSource, comment: &'static str) -> Self {
+    const fn new(
+        kind: LayerKind,
+        name: &'static str,
+        channels: &'static [&'static str],
+        source: LayerSource,
+        comment: &'static str,
+    ) -> Self {
         Self { kind, name, channels, always_float: false, comment, source }
     }
 

@@ -162,7 +162,9 @@ impl Film {
                 let out = &mut layer.data[start..];
                 match info.source {
                     LayerSource::Color => estimator.color(out),
-                    LayerSource::LightAov(_) | LayerSource::LightGroups | LayerSource::Surface(_, Filtering::Mean) => estimator.average(first, out),
+                    LayerSource::LightAov(_) | LayerSource::LightGroups | LayerSource::Surface(_, Filtering::Mean) => {
+                        estimator.average(first, out)
+                    }
                     LayerSource::Surface(_, Filtering::Nearest) => estimator.data(info, first, out),
                     LayerSource::Film if info.kind == LayerKind::Samples => out[0] = estimator.own.0.samples[estimator.own.1] as f32,
                     LayerSource::Film => out.copy_from_slice(&self.variance(&kernel, x, y).map(to_f32)),

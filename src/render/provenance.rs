@@ -201,8 +201,12 @@ mod tests {
         let desc = serde_json::from_str(r#"{ "camera": {}, "film": { "width": 40, "height": 30 } }"#).unwrap();
         let settings = Settings::new(&desc, &Overrides::default()).unwrap();
         let provenance = RenderProvenance::new(Path::new("s.json"), SceneFingerprint::default(), &settings, Vec::new());
-        RenderProvenance { output: Some(OutputDesc::new("a.exr")), frame: Some(SequenceFrame { number: 3, per_second: 24.0 }), ..provenance }
-            .to_value()
+        RenderProvenance {
+            output: Some(OutputDesc::new("a.exr")),
+            frame: Some(SequenceFrame { number: 3, per_second: 24.0 }),
+            ..provenance
+        }
+        .to_value()
     }
 
     fn refusal(value: Value) -> String {

@@ -1,6 +1,6 @@
 //! Spheres and other analytic shapes that many vertices sample at once, the same as each of them alone.
 
-use super::{AreaLight, Form, SphereEmitter, EmitterSample};
+use super::{AreaLight, EmitterSample, Form, SphereEmitter};
 use crate::geometry::{Geometry, PlacedSampleRows, Shape};
 use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSample};

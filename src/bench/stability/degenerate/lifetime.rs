@@ -61,7 +61,8 @@ fn disturbed(rng: &mut Rng) -> usize {
     let alone =
         geometries.each_ref().map(|g| rays.iter().map(|ray| build(AccelKind::EMBREE, g).intersect(ray)).take(50).collect::<Vec<_>>());
     let together = geometries.each_ref().map(|geometry| build(AccelKind::EMBREE, geometry));
-    let differing = |(i, ray): (usize, &Ray)| (0..3).filter(|&k| alone[k].get(i).is_some_and(|hit| *hit != together[k].intersect(ray))).count();
+    let differing =
+        |(i, ray): (usize, &Ray)| (0..3).filter(|&k| alone[k].get(i).is_some_and(|hit| *hit != together[k].intersect(ray))).count();
     rays.iter().enumerate().map(differing).sum()
 }
 

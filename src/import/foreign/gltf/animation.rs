@@ -7,7 +7,7 @@ use gltf::json::animation::{Interpolation, Property, Sampler};
 use gltf::json::validation::Checked;
 
 use super::GltfSource;
-use super::accessors::{Column, AccessorUse};
+use super::accessors::{AccessorUse, Column};
 use super::nodes::unit;
 use crate::error::Result;
 use crate::import::Draft;

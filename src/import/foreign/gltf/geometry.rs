@@ -6,7 +6,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, accessor};
 
 use super::GltfSource;
-use super::accessors::{Column, AccessorUse};
+use super::accessors::{AccessorUse, Column};
 use super::skins;
 use crate::assets::MeshData;
 use crate::error::Result;

@@ -7,7 +7,7 @@ use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mesh, Primitive, Semantic};
 
 use super::GltfSource;
-use super::accessors::{Column, AccessorUse};
+use super::accessors::{AccessorUse, Column};
 use super::extensions::Instancing;
 use super::geometry::{self, Deformation};
 use super::materials::MaterialSet;

@@ -82,9 +82,11 @@ impl<'a> Reader<'a> {
             "blendbsdf" => self.blend(&mut element, uv)?,
             "normalmap" | "bumpmap" => self.relief(&mut element, uv)?,
             "principledthin" => self.principled_thin(&mut element, uv)?,
-            "null" => {
-                BsdfBinding { opacity: Some(OpacityDesc::Number(0.0)), material: self.black(&element.place().to_string()), one_sided: false }
-            }
+            "null" => BsdfBinding {
+                opacity: Some(OpacityDesc::Number(0.0)),
+                material: self.black(&element.place().to_string()),
+                one_sided: false,
+            },
             _ => {
                 let (material, one_sided) = self.material(&mut element, uv)?;
                 self.add(&element, material, one_sided)

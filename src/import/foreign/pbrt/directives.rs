@@ -12,7 +12,7 @@ use super::materials::Materials;
 use super::options::{self, Typed};
 use super::params::{Params, Values};
 use super::shapes::Shapes;
-use super::state::{Ctm, Graphics, ShapeMaterial, MAX_DEPTH, Material, Times, World};
+use super::state::{Ctm, Graphics, MAX_DEPTH, Material, ShapeMaterial, Times, World};
 use super::textures::{TextureDirective, Textures};
 use super::tokens::{Lexer, Position, TokenKind};
 use super::transforms::{self, Change};
