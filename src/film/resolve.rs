@@ -163,7 +163,7 @@ impl Film {
                 match info.source {
                     LayerSource::Color => estimator.color(out),
                     LayerSource::LightAov(_) | LayerSource::LightGroups | LayerSource::Surface(_, Filtering::Mean) => {
-                        estimator.average(first, out)
+                        estimator.average(first, out);
                     }
                     LayerSource::Surface(_, Filtering::Nearest) => estimator.data(info, first, out),
                     LayerSource::Film if info.kind == LayerKind::Samples => out[0] = estimator.own.0.samples[estimator.own.1] as f32,
