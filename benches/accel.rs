@@ -1,5 +1,5 @@
-//! Rays per second of every accelerator, and of two other crates, on a lumpy mesh of 70,000 triangles and on scans where they are at hand. The
-//! answers are compared before anything is timed. One thread.
+//! Rays per second of every accelerator, and of two other crates, on a lumpy mesh of 70,000 triangles and on scans
+//! where they are at hand. The answers are compared before anything is timed. One thread.
 
 use std::hint::black_box;
 use std::time::Duration;

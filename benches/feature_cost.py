@@ -3,8 +3,8 @@
 
     benches/feature_cost.py [--only media,textures] [--json FILE] [--work FOLDER] [--check]
 
-The sources are copied to a work folder and the feature is taken out there: every place that decides whether a scene uses it is told that no scene
-does, so that the compiler removes what follows. A place that is no longer found ends the run: the list below then needs care. Program and
+The sources are copied to a work folder and the feature is taken out there: every place that decides whether a scene uses it is replaced by one where no scene
+does, so that the compiler removes what follows. A place that is no longer found ends the run: the list below is then to be updated. Program and
 variants are built alike (optimised, incrementally, so without LTO). Instructions are those of callgrind, one thread, 64 x 64 pixels, 8 samples
 less those with 2, so that starting, reading and building are not among them. The scene is benches/scenes/cornell.xml: triangles, diffuse surfaces, one rough
 metal, one lamp. Needs valgrind and `cargo xtask bench_scenes`. An hour or so; each variant takes a build.
@@ -30,7 +30,7 @@ NEVER = "unsafe { std::hint::unreachable_unchecked() }"
 UNNEEDED = {"bench", "bin"}
 
 # Renders a scene as the command line does and prints a digest of the picture.
-PROGRAM = """//! Renders SCENE with so many samples, on one thread.
+PROGRAM = """//! Renders SCENE with a number of samples, on one thread.
 use std::sync::atomic::AtomicBool;
 
 use steradian::render::{Overrides, Settings, Silent};
@@ -199,7 +199,7 @@ def instructions(program, scene, spp):
 
 
 def measure(program, scene):
-    """Instructions of the samples alone, and what tells the picture."""
+    """Instructions of the samples alone, and the hash of the picture."""
     (few, _), (many, picture) = [instructions(program, scene, spp) for spp in SAMPLES]
     return many - few, picture
 

@@ -4,7 +4,7 @@
     benches/layer_cost.py [--scene SCENE]... [--spp N] [--rounds N] [--binary FILE] [--only LAYERS]
 
 Rendering with a layer and without it take turns, and the ratio of each pair is taken; the table has the medians. Time is that of the render loop, in
-processor seconds of all threads (the program's `--json` says both); files are EXR, ZIP, with their default types. The last line has all layers.
+processor seconds of all threads (both from the program's `--json`); files are EXR, ZIP, with their default types. The last line has all layers.
 """
 
 import argparse
@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def layers_of(binary):
-    """The names that `--layers` knows."""
+    """The names of `--layers`."""
     text = subprocess.run([binary, "render", "--help"], capture_output=True, text=True, check=True).stdout
     part = text[text.index("--layers <LAYERS>"):]
     values = part[part.index("[possible values:") + len("[possible values:"):part.index("]")]

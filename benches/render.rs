@@ -1,4 +1,5 @@
-//! Samples per second of small renders of the project's scenes through every accelerator; the pictures are compared before anything is timed.
+//! Samples per second of small renders of the project's scenes through every accelerator; the pictures are compared
+//! before anything is timed.
 
 use std::hint::black_box;
 use std::path::Path;

@@ -1,6 +1,6 @@
-//! Nanoseconds per ray of analytic shapes: the test alone, through Embree as user geometry, and of a mesh of the same sphere through Embree.
-//! Answers are compared before anything is timed. One thread. At the end a table of surfaces of revolution by the number of their segments
-//! and the kind of ray, beside a sphere.
+//! Nanoseconds per ray of analytic shapes: the test alone, through Embree as user geometry, and of a mesh of the same
+//! sphere through Embree. Answers are compared before anything is timed. One thread. At the end a table of surfaces of
+//! revolution by the number of their segments and the kind of ray, beside a sphere.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -79,7 +79,7 @@ fn shape_tests(criterion: &mut Criterion) {
     }
 }
 
-/// A wavy column of so many cubic segments, as a B-spline.
+/// A wavy column of a number of cubic segments, as a B-spline.
 fn column(segments: usize) -> Analytic {
     let points: Vec<[f64; 2]> = (0..segments + 3)
         .map(|i| {

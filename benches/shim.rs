@@ -1,7 +1,9 @@
-//! Embree through this crate, on rays recorded in a file, for comparison with bare loops in C: see `bare_embree.sh`, which runs both.
+//! Embree through this crate, on rays recorded in a file, for comparison with bare loops in C: see `bare_embree.sh`,
+//! which runs both.
 //!
-//! `shim dump FOLDER RESOLUTION` writes a file for each model; `shim trace FILE PASSES` prints `set query ns_per_ray hits checksum` a line, timed
-//! as in C: the sum over blocks of rays of the smallest time of all passes, which other load on the machine hardly touches.
+//! `shim dump FOLDER RESOLUTION` writes a file for each model; `shim trace FILE PASSES` prints
+//! `set query ns_per_ray hits checksum` a line, timed as in C: the sum over blocks of rays of the smallest time of all
+//! passes, which other load on the machine hardly touches.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -108,7 +110,7 @@ fn trace(file: &Path, passes: usize) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What is asked of every ray.
+/// The query of every ray.
 #[derive(Clone, Copy)]
 enum Query {
     Closest(Option<Coherence>),
@@ -182,7 +184,8 @@ struct Found {
     occluded: Vec<[bool; BATCH]>,
 }
 
-/// Traces a block of rays from number `first` on: hits of single rays are taken into the answer at once, those of batches go to `found`.
+/// Traces a block of rays from number `first` on: hits of single rays are taken into the answer at once, those of
+/// batches go to `found`.
 #[inline(never)]
 fn run(query: Query, accel: &dyn Accelerator, (rays, rows): (&[Ray], &[RayRows]), first: usize, found: &mut Found, answer: &mut Answer) {
     match query {

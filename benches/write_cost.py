@@ -4,7 +4,7 @@
     benches/write_cost.py [--binary FILE]... [--scene SCENE] [--size WxH] [--spp N] [--rounds N] [--compression NAME]
 
 With several binaries they take turns too. The table has medians of processor seconds of all threads, of the program and of what it takes longer
-than with uncompressed files; what rendering itself varies by is in them, so that a simple scene with few samples tells the most. Files go to TMPDIR.
+than with uncompressed files; what rendering itself varies by is in them, so the figures of a simple scene with few samples have the least error. Files go to TMPDIR.
 """
 
 import argparse

@@ -86,7 +86,7 @@ fn read_scene(path: &Path) {
     }
 }
 
-/// Every buffer is as long as the reader says.
+/// Every buffer has the length that the reader requests.
 fn look_at(mesh: &MeshData) {
     let count = mesh.positions.len();
     assert!(mesh.normals.as_ref().is_none_or(|normals| normals.len() == count));

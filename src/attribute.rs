@@ -7,7 +7,8 @@ use crate::id::{AttributeId, PrimId};
 /// The name of the colours of vertices.
 pub const VERTEX_COLOR: &str = "vertex_color";
 
-/// Whether an attribute of this name has a value for each face; for each vertex otherwise. `None` if it is no name of an attribute.
+/// Whether an attribute of this name has a value for each face; for each vertex otherwise. `None` if it is no name of
+/// an attribute.
 pub fn is_of_faces(name: &str) -> Option<bool> {
     let of = |prefix: &str| name.strip_prefix(prefix).is_some_and(|rest| !rest.is_empty());
     if of("vertex_") { Some(false) } else { of("face_").then_some(true) }
@@ -110,7 +111,8 @@ pub struct AttributePoint<'a> {
 }
 
 impl AttributePoint<'_> {
-    /// The value of an attribute, between those of the vertices or that of the face; `None` if the mesh does not have it.
+    /// The value of an attribute, between those of the vertices or that of the face; `None` if the mesh does not have
+    /// it.
     pub fn value(&self, id: AttributeId) -> Option<[f32; 3]> {
         let attribute = self.attributes.iter().find(|attribute| attribute.id == id)?;
         if attribute.of_faces {

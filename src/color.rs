@@ -3,7 +3,7 @@
 use crate::math::rows::{BATCH, Element, Row};
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub};
 
-/// Linear Rec.709 red, green, blue; radiance, reflectance or throughput as the name at hand says.
+/// Linear Rec.709 red, green, blue; radiance, reflectance or throughput by the name of the variable.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Rgb {

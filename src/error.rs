@@ -1,4 +1,4 @@
-//! The one error type of the library. Every variant says where the fault is; nothing here prints or exits.
+//! The one error type of the library. Every variant names the place of the fault; nothing here prints or exits.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ pub enum ErrorKind {
     AssetMissing,
     /// An output cannot be written.
     Output,
-    /// A checkpoint or shard is damaged, or does not belong to what is asked for.
+    /// A checkpoint or shard is damaged, or does not belong to the render requested.
     Checkpoint,
     /// Memory ran out, or no more threads can be started.
     OutOfMemory,
@@ -39,7 +39,7 @@ pub enum Error {
         /// What is wrong, with the path inside the scene.
         message: String,
     },
-    /// A fault in what a scene says: `scene.json: shapes[3].material: no material named "gold"`.
+    /// A fault in a scene: `scene.json: shapes[3].material: no material named "gold"`.
     #[error("{}: {path}: {message}", file.display())]
     Scene {
         /// The scene file.
@@ -69,7 +69,7 @@ pub enum Error {
         /// Why it cannot be read, and where the scene names it.
         message: String,
     },
-    /// A file that is read (an image to compare, say) is malformed.
+    /// A file that is read (an image to compare, for example) is malformed.
     #[error("{}: {message}", file.display())]
     Malformed {
         /// The file.
@@ -85,7 +85,7 @@ pub enum Error {
         /// Why.
         message: String,
     },
-    /// A checkpoint or shard is damaged, or does not belong to what is asked for.
+    /// A checkpoint or shard is damaged, or does not belong to the render requested.
     #[error("{}: {message}", file.display())]
     Checkpoint {
         /// The checkpoint or shard.
@@ -99,7 +99,7 @@ pub enum Error {
     /// Memory ran out.
     #[error("out of memory: {0}")]
     OutOfMemory(String),
-    /// Threads cannot be started, for want of memory or by a limit of the system.
+    /// Threads cannot be started, for lack of memory or by a limit of the system.
     #[error("{count} threads cannot be started: {message} (ulimit -u limits processes and threads, ulimit -v memory)")]
     Threads {
         /// How many were to be started.

@@ -14,7 +14,8 @@ macro_rules! ids {
                 self.0 as usize
             }
 
-            /// The id of the item at `index`. Tables longer than `u32::MAX - 1` are rejected at compile, so nothing is cut off.
+            /// The id of the item at `index`. Tables longer than `u32::MAX - 1` are rejected at compile, so nothing is
+            /// cut off.
             #[inline]
             pub const fn new(index: usize) -> Self {
                 Self(index as u32)

@@ -24,7 +24,7 @@
 //! | 8 | `bench`, `farm`, `live` |
 //! | 9 | `bin/steradian` |
 
-// Checks of numerical stability look at parts that a render does not.
+// Checks of numerical stability use parts that a render does not.
 #![cfg_attr(not(feature = "bench"), allow(dead_code, unused_imports))]
 
 pub mod accel;

@@ -1,8 +1,9 @@
 //! Media that fill closed surfaces, and which of them a point is in.
 //!
-//! Surfaces of media may overlap. Of the media that contain a point, the one of the highest priority is there (Schmidt and Budge, "Simple
-//! Nested Dielectrics in Ray Traced Images"). What is there thus depends on the point alone, not on the way that light took to it: a
-//! boundary is where what is there changes, and light finds the same boundaries in either direction.
+//! Surfaces of media may overlap. Of the media that contain a point, the one of the highest priority is there (Schmidt
+//! and Budge, "Simple Nested Dielectrics in Ray Traced Images"). What is there thus depends on the point alone, not on
+//! the way that light took to it: a boundary is where what is there changes, and light finds the same boundaries in
+//! either direction.
 
 use std::cmp::Ordering;
 
@@ -27,8 +28,8 @@ pub struct Medium {
 }
 
 impl Medium {
-    /// The order in which media count where they overlap: by priority; at equal priorities the one of the higher index of refraction, then
-    /// the one that absorbs more. Media that are equal in all that are one medium.
+    /// The order in which media count where they overlap: by priority; at equal priorities the one of the higher index
+    /// of refraction, then the one that absorbs more. Media that are equal in all that are one medium.
     pub fn precedence(&self, other: &Self) -> Ordering {
         let key = |m: &Self| [m.ior[0], m.ior[1], m.ior[2], m.absorption.r, m.absorption.g, m.absorption.b];
         let ties = key(self).into_iter().zip(key(other)).map(|(a, b)| b.total_cmp(&a));
@@ -36,8 +37,8 @@ impl Medium {
     }
 }
 
-/// Indices of refraction for red, green and blue of glass with the index `ior` at the helium d line (587.56 nm) and the Abbe number `abbe`,
-/// by Cauchy's law `n = a + b / wavelength²`.
+/// Indices of refraction for red, green and blue of glass with the index `ior` at the helium d line (587.56 nm) and the
+/// Abbe number `abbe`, by Cauchy's law `n = a + b / wavelength²`.
 pub fn dispersed(ior: f32, abbe: f32) -> [f32; 3] {
     let inverse_square = |nanometres: f32| (1000.0 / nanometres).powi(2);
     // The F and C lines of hydrogen.
@@ -54,7 +55,8 @@ pub fn transmittance(absorption: Rgb, distance: f32) -> Rgb {
 /// Different media that may overlap at one point.
 const MOST: usize = 8;
 
-/// The media that contain a point, the one that is there first. Of more than eight, those that count least are forgotten.
+/// The media that contain a point, the one that is there first. Of more than eight, those that count least are
+/// forgotten.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MediumStack {
     /// Ascending by id; those with a count of 0 are unused and come last.
@@ -122,7 +124,7 @@ pub struct BoundaryMedia {
 
 impl BoundaryMedia {
     /// Of a surface of `medium` seen from a point within `here`, on the side of the normal if `is_front`. Where the
-    /// point is not known to be within the surface that it is about to leave, the surface is believed.
+    /// stack of the point does not hold the medium that it is about to leave, the side of the surface decides.
     pub fn new(current: MediumStack, medium: MediumId, is_front: bool) -> Self {
         let outside = if is_front { current } else { current.popped(medium) };
         Self { outside, inside: outside.pushed(medium) }
@@ -273,7 +275,8 @@ mod tests {
         // Flint glass SF10; its index at 587.56 nm lies between those of red and green light.
         let [red, green, blue] = dispersed(1.728_28, 28.53);
         assert!(red < 1.728_28 && 1.728_28 < green && green < blue, "{red} {green} {blue}");
-        // Measured (Schott): 1.7209 at 650 nm, 1.7342 at 550 nm, 1.7624 at 450 nm; Cauchy's law with two terms is not exact.
+        // Measured (Schott): 1.7209 at 650 nm, 1.7342 at 550 nm, 1.7624 at 450 nm; Cauchy's law with two terms is not
+        // exact.
         assert!((red - 1.7209).abs() < 3e-3 && (green - 1.7342).abs() < 3e-3 && (blue - 1.7624).abs() < 8e-3, "{red} {green} {blue}");
     }
 }

@@ -3,14 +3,14 @@
 /// Whose names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MetalNames {
-    /// Those of this program: the constants at 650, 550 and 450 nm (refractiveindex.info: Johnson and Christy for noble metals, iron,
-    /// chromium and titanium; Rakic for aluminium and tungsten; Querry for brass).
+    /// Those of this program: the constants at 650, 550 and 450 nm (refractiveindex.info: Johnson and Christy for noble
+    /// metals, iron, chromium and titanium; Rakic for aluminium and tungsten; Querry for brass).
     Steradian,
-    /// Mitsuba 3's, with the constants that it has when it renders in RGB: the spectra of the SOPRA database and of Palik's handbook, seen
-    /// under D65. Names with `_palik` that are not here are the same as those without.
+    /// Mitsuba 3's, with the constants that it has when it renders in RGB: the spectra of the SOPRA database and of
+    /// Palik's handbook, seen under D65. Names with `_palik` that are not here are the same as those without.
     Mitsuba,
-    /// pbrt's, without `metal-` and `-eta` or `-k`: constants under D65, with eta such that the reflectance ahead is that of the spectrum
-    /// (optical constants of luxpop.com, of which k is 0 within the accuracy for both oxides).
+    /// pbrt's, without `metal-` and `-eta` or `-k`: constants under D65, with eta such that the reflectance ahead is
+    /// that of the spectrum (optical constants of luxpop.com, of which k is 0 within the accuracy for both oxides).
     Pbrt,
 }
 

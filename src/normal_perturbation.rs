@@ -12,7 +12,8 @@ pub enum NormalPerturbation {
     NormalMap {
         /// The image.
         texture: TextureId,
-        /// The tilt along u and along v for tilts along red and green: turned and mirrored as the image is, times a strength.
+        /// The tilt along u and along v for tilts along red and green: turned and mirrored as the image is, times a
+        /// strength.
         axes: [Vec2; 2],
     },
     /// A texture of heights along the normal.
@@ -30,7 +31,8 @@ pub enum NormalPerturbation {
 const LEAST_COSINE: f32 = 0.01;
 
 impl NormalPerturbation {
-    /// A normal map; x and y of its normals are multiplied by `strength`. With `flip_y`, green grows downward in the image.
+    /// A normal map; x and y of its normals are multiplied by `strength`. With `flip_y`, green grows downward in the
+    /// image.
     pub fn normal_map(texture: TextureId, strength: f32, flip_y: bool, textures: &[Texture]) -> Self {
         let green = vec2(1.0, if flip_y { -1.0 } else { 1.0 });
         let axes = textures[texture.index()].axes().map(|axis| axis.normalize_or_zero() * green * strength);
@@ -71,7 +73,8 @@ impl NormalPerturbation {
     }
 }
 
-/// Tangent and bitangent that normal maps refer to. Those of meshes made for normal maps are as baked; others are unit and perpendicular.
+/// Tangent and bitangent that normal maps refer to. Those of meshes made for normal maps are as baked; others are unit
+/// and perpendicular.
 fn tangents(geometry: &Geometry, at: &SurfaceInteraction, dp_dv: Vec3) -> [Vec3; 2] {
     if let Shape::Mesh(mesh) = geometry.shape(at.shape)
         && mesh.has_tangents()

@@ -1,4 +1,4 @@
-//! Opacity: surfaces with holes, as a number or a texture says.
+//! Opacity: surfaces with holes, by a number or a texture.
 
 use crate::geometry::{AlphaMask, Hit, Mesh, Shape};
 use crate::id::{PrimId, ShapeId};
@@ -19,7 +19,8 @@ struct Holes {
     image: Option<ImageHoles>,
 }
 
-/// An image of opacity on a mesh: most hits are decided by what is kept of the triangle in one place, and two bits of the image.
+/// An image of opacity on a mesh: most hits are decided by what is kept of the triangle in one place, and two bits of
+/// the image.
 #[derive(Debug)]
 struct ImageHoles {
     table: SolidTable,
@@ -28,7 +29,8 @@ struct ImageHoles {
 }
 
 impl Opacity {
-    /// The opacity of each shape by [`ShapeId`], as the [number](Texture::scalar_over) of a texture from 0 to 1; `None` for all of it.
+    /// The opacity of each shape by [`ShapeId`], as the [number](Texture::scalar_over) of a texture from 0 to 1; `None`
+    /// for all of it.
     pub fn new(shapes: &[Shape], by_shape: Vec<Option<Texture>>) -> Self {
         let holes = |(shape, texture): (&Shape, Option<Texture>)| {
             let texture = texture?;

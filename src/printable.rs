@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-/// The text on one line: line breaks and all other characters that move the cursor, switch colours or turn the direction of writing are
-/// written out, as JSON has them.
+/// The text on one line: line breaks and all other characters that move the cursor, switch colours or turn the
+/// direction of writing are written out, as JSON has them.
 pub fn line(text: &str) -> String {
     escape(text, false)
 }

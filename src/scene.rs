@@ -1,4 +1,5 @@
-//! A scene ready to render: tables and ids, no paths, and no names but those of layers: light groups, objects, materials.
+//! A scene ready to render: tables and ids, no paths, and no names but those of layers: light groups, objects,
+//! materials.
 
 use std::borrow::Cow;
 
@@ -64,7 +65,7 @@ pub struct SceneFeatures {
     pub parameters: bool,
     /// Some material has only delta lobes.
     pub delta_materials: bool,
-    /// Some surface has a medium within it: paths know where they are.
+    /// Some surface has a medium within it: paths track their media.
     pub media: bool,
     /// Some material is anisotropic: shading frames follow the surface's u direction.
     pub anisotropic: bool,
@@ -159,7 +160,8 @@ impl Scene {
         found
     }
 
-    /// The part of a material that a ray meets, which consists of no others; `visit` learns of the parts on the way to it.
+    /// The part of a material that a ray meets, which consists of no others; `visit` learns of the parts on the way to
+    /// it.
     fn descend(&self, mut id: MaterialId, at: &SurfaceInteraction, direction: Vec3, mut visit: impl FnMut(MaterialId)) -> MaterialId {
         let is_front = direction.dot(at.n_g) < 0.0;
         loop {

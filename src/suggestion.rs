@@ -6,7 +6,8 @@ const MAX_NAME: usize = 128;
 /// Names that one is compared with, of those of about its length.
 const MAX_CANDIDATES: usize = 10_000;
 
-/// The end of a message about `name`: ` (did you mean NEAR?)` with the nearest candidate between `quotes`, or nothing if none is near.
+/// The end of a message about `name`: ` (did you mean NEAR?)` with the nearest candidate between `quotes`, or nothing
+/// if none is near.
 pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>, [open, close]: [&str; 2]) -> String {
     closest_name(name, candidates).map_or(String::new(), |near| format!(" (did you mean {open}{near}{close}?)"))
 }

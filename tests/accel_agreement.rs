@@ -28,7 +28,8 @@ fn any_hit_means_that_there_is_a_closest_hit() {
                     let cut = Ray { t_max, ..*ray };
                     assert_eq!(accel.occluded(&cut), accel.intersect(&cut).is_some(), "{name}: {cut:?}");
                 }
-                // On triangles the interval is closed at the very t that was reported; a shape's f64 distance may round below itself.
+                // On triangles the interval is closed at the very t that was reported; a shape's f64 distance may round
+                // below itself.
                 if matches!(geometry.shape(hit.shape), Shape::Mesh(_)) && accel.description() != "linear" {
                     assert!(accel.occluded(&Ray { t_max: hit.t, ..*ray }), "{name}: {ray:?}");
                 }
@@ -101,7 +102,7 @@ fn many_threads_get_the_answers_of_one() {
 }
 
 #[test]
-fn embree_tells_its_name_and_memory() {
+fn embree_reports_its_name_and_memory() {
     let info = EmbreeInfo::query().expect("a device");
     assert_eq!(info.version.split('.').count(), 3, "{info:?}");
     let geometry = meshes(vec![soup(&mut Rng::new(17), 10_000, 0.1)]);

@@ -1,4 +1,4 @@
-//! Adaptive sampling: pictures keep what they promise, are not biased, and take fewer samples.
+//! Adaptive sampling: pictures reach the target error, are not biased, and take fewer samples.
 
 use serde_json::{Value, json};
 use steradian::accel::{self, AccelKind};
@@ -63,8 +63,8 @@ fn even(spp: u32, seed: u64) -> Vec<[f64; 3]> {
     colors(&render(&room(), &Overrides { spp: Some(spp), seed: Some(seed), ..Overrides::default() }).image)
 }
 
-/// In 20 renders, the picture is as good as promised at least 19 times, its mean is that of a reference, and it took fewer samples than one
-/// that has as many everywhere.
+/// In 20 renders, the picture is as good as promised at least 19 times, its mean is that of a reference, and it took
+/// fewer samples than one that has as many everywhere.
 #[test]
 fn pictures_are_as_good_as_promised_with_fewer_samples_and_without_bias() {
     let (scene, target) = (room(), 0.0005);
@@ -103,25 +103,26 @@ fn the_picture_and_its_statistics_do_not_depend_on_threads() {
     assert_eq!((a.stats.samples, a.stats.estimated_error), (b.stats.samples, b.stats.estimated_error));
 }
 
-/// The variance layer is the variance of pictures with different seeds, and the layer of samples adds up to all of them.
+/// The variance layer is the variance of pictures with different seeds, and the layer of samples adds up to all of
+/// them.
 #[test]
-fn layers_tell_variance_and_samples() {
+fn layers_hold_variance_and_samples() {
     let mut scene = room();
     scene["sampler"] = json!({ "type": "independent", "spp": 16 });
     scene["outputs"] = json!([{ "file": "unused.exr", "layers": ["variance", "samples"] }]);
     let renders: Vec<_> = (0..40).map(|seed| render(&scene, &Overrides { seed: Some(seed), ..Overrides::default() }).image).collect();
     let pictures: Vec<_> = renders.iter().map(colors).collect();
-    let (mut told, mut seen) = (0.0, 0.0);
+    let (mut estimated, mut measured) = (0.0, 0.0);
     for pixel in 0..pictures[0].len() {
         let values: Vec<f64> = pictures.iter().map(|p| p[pixel][1]).collect();
         let mean = values.iter().sum::<f64>() / 40.0;
         // Relative, so that the brightest pixels do not decide alone.
         let scale = 1.0 / (mean * mean + 0.01);
-        seen += scale * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 39.0;
+        measured += scale * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 39.0;
         let layer = |image: &Image| f64::from(image.layer(LayerKind::Variance).unwrap().pixels().nth(pixel).unwrap()[1]);
-        told += scale * renders.iter().map(layer).sum::<f64>() / 40.0;
+        estimated += scale * renders.iter().map(layer).sum::<f64>() / 40.0;
     }
-    assert!((told / seen - 1.0).abs() < 0.1, "{told} told, {seen} seen");
+    assert!((estimated / measured - 1.0).abs() < 0.1, "{estimated} estimated, {measured} measured");
     let samples = |image: &Image| image.layer(LayerKind::Samples).unwrap().pixels().map(|p| f64::from(p[0])).collect::<Vec<_>>();
     assert!(samples(&renders[0]).iter().all(|n| *n == 16.0));
 
@@ -178,7 +179,7 @@ fn yard() -> Value {
     })
 }
 
-/// The promise by 200 renders each, with samples that pixels share.
+/// The error reached by 200 renders each, with samples that pixels share.
 #[test]
 #[ignore = "takes minutes: for changes to filters, their variance or adaptive sampling"]
 fn of_200_pictures_95_in_100_are_as_good_as_promised_with_every_filter() {

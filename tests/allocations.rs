@@ -20,7 +20,7 @@ static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are those of the same method.
+        // SAFETY: the caller's obligations are those of the same method.
         unsafe { System.alloc(layout) }
     }
 
@@ -30,7 +30,8 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Every kind of material that is evaluated at each hit: coats with textures, constant coats and coats over coats, some as parts of others.
+/// Every kind of material that is evaluated at each hit: coats with textures, constant coats and coats over coats, some
+/// as parts of others.
 fn scene(integrator: &Value) -> Value {
     let tiles = json!({ "texture": "tiles" });
     json!({
@@ -82,8 +83,8 @@ fn samples_allocate_nothing() {
         json!({ "type": "path", "max_depth": 6, "regularize": 0.3 }),
         json!({ "type": "whitted", "max_depth": 6 }),
     ] {
-        // The first render also makes what lasts as long as the program. With more samples, more hits may need memory at the same time:
-        // a few allocations more, where one for each hit would be tens of thousands.
+        // The first render also makes what lasts as long as the program. With more samples, more hits may need memory
+        // at the same time: a few allocations more, where one for each hit would be tens of thousands.
         let [_, few, many] = [64, 8, 64].map(|spp| allocations(&integrator, spp));
         assert!(many <= few + 64, "{integrator}: {few} allocations at 8 samples a pixel, {many} at 64");
     }

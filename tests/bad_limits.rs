@@ -1,4 +1,4 @@
-//! What a scene asks for beyond what can be rendered or written: an error with its place, in bounded time and memory.
+//! Scenes beyond what can be rendered or written: an error with its place, in bounded time and memory.
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;

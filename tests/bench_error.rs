@@ -54,7 +54,8 @@ fn reports_compare_variants_and_programs_in_one_run() {
         assert!(errors[0] > 4.0 * errors[1] && errors[1] > 0.0, "{variant}");
         assert!(variant["slope_of_spp"].as_f64().unwrap() < -0.5, "{variant}");
         for point in points {
-            // A mean over 384 pixels and two repeats; the interval is one of 95 %, and the false-alarm rate must be far smaller.
+            // A mean over 384 pixels and two repeats; the interval is one of 95 %, and the false-alarm rate must be far
+            // smaller.
             let bias = |key: &str| point["bias"][key].as_f64().unwrap();
             assert!((bias("ratio") - 1.0).abs() < 4.0 * (bias("high") - bias("low")), "{point}");
             assert_eq!((point["not_finite"].as_u64(), point["runs"].as_array().unwrap().len()), (Some(0), 2));

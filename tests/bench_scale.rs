@@ -71,7 +71,7 @@ fn every_sweep_has_its_costs_and_their_slopes() {
         assert!(points.len() < 3 || slopes.iter().all(|s| s["standard_error"].is_f64()), "{sweep}");
     }
 
-    // The scenes are what their sweep says.
+    // The scenes match their sweep.
     let counted = |name: &str, what: &str| -> Vec<u64> { points(name).iter().map(|p| p["runs"][0][what].as_u64().unwrap()).collect() };
     assert_eq!(counted("triangles", "triangles"), [1_000, 10_000, 20_000]);
     assert_eq!(counted("instances", "instances"), [1, 10, 30]);
@@ -79,7 +79,7 @@ fn every_sweep_has_its_costs_and_their_slopes() {
     assert_eq!(counted("lights", "lights"), [1, 10, 40]);
     assert_eq!(counted("resolution", "samples"), [64, 256, 1024, 4096, 16384]);
     assert_eq!(counted("spp", "samples"), [64, 256, 1024, 4096]);
-    // In a closed room a path of so many segments has a ray and a shadow ray for each but the last, nearly always.
+    // In a closed room a path of `n` segments has a ray and a shadow ray for each but the last, nearly always.
     let rays: Vec<f64> = points("depth").iter().map(|p| value(p, "rays a sample")).collect();
     assert!(rays[0] == 1.0 && rays[5] > 45.0 && rays.windows(2).all(|pair| pair[0] < pair[1]), "{rays:?}");
 

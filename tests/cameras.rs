@@ -6,7 +6,7 @@ use steradian::film::{Crop, Image, LayerKind};
 use crate::util::folder::Folder;
 use crate::util::render::{merge, pixels, render};
 
-/// A picture of a box whose faces are told apart by their normals, at depths from 4 to 6.
+/// A picture of a box whose faces are distinguished by their normals, at depths from 4 to 6.
 fn scene(camera: Value) -> Value {
     let mut scene = json!({
         "film": { "width": 32, "height": 16, "filter": { "type": "box", "radius": 1e-3 } },
@@ -93,7 +93,8 @@ fn a_shifted_picture_is_the_crop_of_a_larger_one() {
 
 #[test]
 fn wide_pixels_show_as_much_in_fewer_columns() {
-    // Every other column of a picture of narrow pixels is centred in none of the wide ones: those are centred on column edges.
+    // Every other column of a picture of narrow pixels is centred in none of the wide ones: those are centred on column
+    // edges.
     let wide = render(&scene(json!({ "vertical_fov_degrees": 30, "pixel_aspect": 3 })));
     let mut narrow = scene(json!({ "vertical_fov_degrees": 30 }));
     narrow["film"]["width"] = json!(96);
@@ -181,7 +182,8 @@ fn a_moving_camera_sees_what_a_camera_at_rest_sees_move_the_other_way() {
 
 #[test]
 fn depth_is_that_at_the_time_of_the_ray() {
-    // Towards a wall at z = 0 from z = 5 to 4, evenly: the mean depth is 4.5. That from where the camera stood first is 5.
+    // Towards a wall at z = 0 from z = 5 to 4, evenly: the mean depth is 4.5. That from where the camera stood first is
+    // 5.
     let mut scene = scene(json!({ "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "translate": [0, 0, -1] }] }] }));
     scene["shapes"] = json!([{ "type": "quad", "transform": [{ "scale": 100 }] }]);
     scene["integrator"]["type"] = json!("depth");

@@ -125,7 +125,7 @@ fn a_resumed_render_has_the_bits_of_one_run() {
     }
 }
 
-/// Stops a render after so many tiles.
+/// Stops a render after a number of tiles.
 pub struct StopAfter<'a> {
     pub tiles: AtomicU32,
     pub stop: &'a AtomicBool,
@@ -180,27 +180,27 @@ fn a_state_of_another_render_is_refused_and_named() {
         error.to_string()
     };
     let cases: [(&str, Overrides); 5] = [
-        ("seed: 0 in the checkpoint, 3 asked for", Overrides { seed: Some(3), ..spp(4) }),
-        ("size: 41,37 in the checkpoint, 40,37 asked for", Overrides { size: Some([40, 37]), ..spp(4) }),
-        ("crop: 0,0,41,37 in the checkpoint, 1,2,3,4 asked for", Overrides { crop: Some([1, 2, 3, 4]), ..spp(4) }),
-        ("integrator.max_depth: 5 in the checkpoint, 6 asked for", Overrides { max_depth: Some(6), ..spp(4) }),
-        ("pixels have 4 samples already, 3 asked for", spp(3)),
+        ("seed: 0 in the checkpoint, 3 requested", Overrides { seed: Some(3), ..spp(4) }),
+        ("size: 41,37 in the checkpoint, 40,37 requested", Overrides { size: Some([40, 37]), ..spp(4) }),
+        ("crop: 0,0,41,37 in the checkpoint, 1,2,3,4 requested", Overrides { crop: Some([1, 2, 3, 4]), ..spp(4) }),
+        ("integrator.max_depth: 5 in the checkpoint, 6 requested", Overrides { max_depth: Some(6), ..spp(4) }),
+        ("pixels have 4 samples already, 3 requested", spp(3)),
     ];
     for (message, overrides) in cases {
         let refused = refusal(&scene("box"), &overrides, |_| {});
         assert!(refused.contains(message) && refused.contains("a.state: "), "{refused}");
     }
     let refused = refusal(&scene("tent"), &spp(4), |_| {});
-    assert!(refused.contains("filter.type: box in the checkpoint, tent asked for"), "{refused}");
+    assert!(refused.contains("filter.type: box in the checkpoint, tent requested"), "{refused}");
     let refused = refusal(&scene("box"), &spp(4), |header| {
         header.scene.whole = "of another".into();
         header.scene.assets.insert("bunny.ply".into(), "0".into());
     });
     assert!(refused.contains("scene: not the same bunny.ply"), "{refused}");
     let refused = refusal(&scene("box"), &spp(4), |header| header.program = "steradian 99".into());
-    assert!(refused.contains(", steradian 99 asked for"), "{refused}");
+    assert!(refused.contains(", steradian 99 requested"), "{refused}");
     let refused = refusal(&scene("box"), &spp(4), |header| header.shard = Shard { index: 1, count: 2 });
-    assert!(refused.contains("shard: 1/1 in the checkpoint, 1/2 asked for"), "{refused}");
+    assert!(refused.contains("shard: 1/1 in the checkpoint, 1/2 requested"), "{refused}");
 }
 
 /// Other values for a serialized field, some of which its type takes.
@@ -218,7 +218,7 @@ fn others(value: &Value) -> Vec<Value> {
     }
 }
 
-/// Every way to change one field of serialized settings, with the field's name: whatever is added to them is found here.
+/// Every way to change one field of serialized settings, with the field's name: new fields are included.
 fn changed_settings(settings: &Value) -> Vec<(String, Value)> {
     let mut changed = Vec::new();
     for (name, value) in settings.as_object().unwrap() {
@@ -242,7 +242,8 @@ fn changed_settings(settings: &Value) -> Vec<(String, Value)> {
     changed
 }
 
-/// Whatever setting the picture depends on differs: neither is a checkpoint continued nor are shards merged, and the setting is named.
+/// Whatever setting the picture depends on differs: neither is a checkpoint continued nor are shards merged, and the
+/// setting is named.
 #[test]
 fn every_setting_that_differs_is_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -289,7 +290,7 @@ fn more_samples_are_refused_where_textures_depend_on_their_number() {
     let more = filtered(4);
     let read = RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings);
     let refused = read.unwrap_err().to_string();
-    assert!(refused.contains("that textures are filtered for: 2 in the checkpoint, 4 asked for"), "{refused}");
+    assert!(refused.contains("that textures are filtered for: 2 in the checkpoint, 4 requested"), "{refused}");
 }
 
 /// Copies the first checkpoint, once it is there.
@@ -343,7 +344,7 @@ impl Progress for Warnings {
 }
 
 #[test]
-fn a_checkpoint_that_cannot_be_written_is_told_and_ends_nothing() {
+fn a_checkpoint_that_cannot_be_written_is_reported_and_ends_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let inner = folder.path().join("inner");
     std::fs::create_dir(&inner).unwrap();
@@ -450,12 +451,12 @@ fn signals_are_answered() {
         wait_for(&folder.join(".a.state.lock"), None);
         child.signal(Signal::USR1);
         wait_for(&folder.join("a.state"), there);
-        let asked = done();
-        assert!(asked > before);
+        let requested = done();
+        assert!(requested > before);
         child.signal(signal);
         assert_code(&child.output(), code, "");
         before = done();
-        assert!(before >= asked && folder.join("a.exr").exists());
+        assert!(before >= requested && folder.join("a.exr").exists());
     }
 }
 
@@ -474,7 +475,7 @@ fn faults_of_checkpoints_have_their_codes() {
         ("scene.json --resume", 2, "scene.json (the scene) and scene.json (--checkpoint)"),
         ("missing/a.state", 5, "there is no folder missing"),
         ("/proc/a.state", 5, "no file can be created"),
-        ("a.state --resume --spp 2 --seed 4", 6, "seed: 0 in the checkpoint, 4 asked for"),
+        ("a.state --resume --spp 2 --seed 4", 6, "seed: 0 in the checkpoint, 4 requested"),
         ("a.state --resume --spp 1", 6, "2 samples already"),
         ("a.state --every x", 2, "--every"),
     ];

@@ -6,7 +6,7 @@ use std::process::Stdio;
 use serde_json::Value;
 use steradian::output;
 
-use crate::util::program::{Running, Signal, run, steradian, told};
+use crate::util::program::{Running, Signal, run, stderr_of, steradian};
 
 #[test]
 fn faults_have_their_exit_codes_and_one_line() {
@@ -27,8 +27,8 @@ fn faults_have_their_exit_codes_and_one_line() {
     ];
     for (arguments, code) in cases {
         let output = run(folder.path(), arguments);
-        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", told(&output));
-        assert_eq!(told(&output).matches("error:").count(), usize::from(code != 0), "{arguments}");
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", stderr_of(&output));
+        assert_eq!(stderr_of(&output).matches("error:").count(), usize::from(code != 0), "{arguments}");
         assert_eq!(output.stdout.is_empty(), code != 0, "{arguments}");
     }
     // Nothing was left behind.
@@ -39,9 +39,12 @@ fn faults_have_their_exit_codes_and_one_line() {
 fn without_outputs_the_files_are_named_after_the_scene() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), "render scene.json --layers Z --json stats.json --accel embree");
-    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
-    let told = told(&output);
-    assert!(told.contains("wrote scene.exr\n") && told.contains("wrote scene.png\n") && told.ends_with("Progress: 100%\n"), "{told}");
+    assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
+    let stderr = stderr_of(&output);
+    assert!(
+        stderr.contains("wrote scene.exr\n") && stderr.contains("wrote scene.png\n") && stderr.ends_with("Progress: 100%\n"),
+        "{stderr}"
+    );
     assert!(folder.path().join("scene.png").exists());
     let image = output::read_exr(&folder.path().join("scene.exr")).unwrap();
     assert_eq!(image.size, [24, 16]);
@@ -72,7 +75,7 @@ fn without_outputs_the_files_are_named_after_the_scene() {
 fn quiet_runs_say_nothing_and_statistics_go_to_stdout() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), "render scene.json -q -o a.exr --json -");
-    assert_eq!((output.status.code(), told(&output).as_str()), (Some(0), ""));
+    assert_eq!((output.status.code(), stderr_of(&output).as_str()), (Some(0), ""));
     let stats: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(stats["outputs"], serde_json::json!(["a.exr"]));
 

@@ -1,4 +1,4 @@
-//! Scenes written anew are the same scenes.
+//! Scenes written again are the same scenes.
 
 use std::path::Path;
 

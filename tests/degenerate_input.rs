@@ -139,7 +139,8 @@ fn imported_scenes_are_rendered_without_what_has_no_area() {
     }
 }
 
-/// A ray whose numbers have random signs and exponents, among them zeros and denormals, so often that lanes of a packet disagree in all.
+/// A ray whose numbers have random signs and exponents, among them zeros and denormals, so often that lanes of a packet
+/// disagree in all.
 fn wild_ray(rng: &mut Rng) -> Ray {
     let mut number = |low: f64, high: f64| {
         let magnitude = match rng.below(8) {
@@ -167,7 +168,8 @@ fn no_valid_ray_ends_the_process() {
         let rays: Vec<Ray> = (0..64_000).map(|_| wild_ray(&mut rng)).collect();
         assert!(rays.iter().filter(|ray| ray.is_valid()).count() > 50_000);
         let answers = all_answers(&accel, &rays);
-        // A tiny component in one lane misleads no other. At distances above 1e20 single rays themselves are lost now and then.
+        // A tiny component in one lane misleads no other. At distances above 1e20 single rays themselves are lost now
+        // and then.
         for packets in &answers[1..] {
             let differing = answers[0].0.iter().zip(&packets.0).filter(|(a, b)| a.is_some() != b.is_some()).count();
             let shadows = answers[0].1.iter().zip(&packets.1).filter(|(a, b)| a != b).count();

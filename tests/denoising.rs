@@ -1,4 +1,4 @@
-//! Denoising. Tests that need Intel Open Image Denoise are ignored unless asked for: `cargo test -- --include-ignored`.
+//! Denoising. Tests that need Intel Open Image Denoise are ignored by default: `cargo test -- --include-ignored`.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -160,8 +160,11 @@ fn the_result_does_not_depend_on_threads() {
 #[ignore = "needs Open Image Denoise: pip install pyoidn"]
 fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
     let denoiser = denoiser(2);
-    let kinds: Vec<&str> =
-        LayerInfo::ALL.iter().filter(|info| matches!(info.source, steradian::film::Source::LightAov(_))).map(|info| info.name).collect();
+    let kinds: Vec<&str> = LayerInfo::ALL
+        .iter()
+        .filter(|info| matches!(info.source, steradian::film::LayerSource::LightAov(_)))
+        .map(|info| info.name)
+        .collect();
     let layers: Vec<&str> = ["feature_albedo", "feature_normal", "light_groups", "variance"].into_iter().chain(kinds).collect();
     let (reference, noisy) = (render(&room(4096, &["light_groups"])), render(&room(16, &layers)));
     let mut image = noisy.clone();
@@ -177,7 +180,7 @@ fn the_error_of_a_room_halves_and_more_and_groups_still_sum() {
         assert_eq!(image.layer(kind), noisy.layer(kind));
     }
     let is_group = |layer: &&Layer| layer.kind == LayerKind::LightGroups;
-    let is_part = |layer: &&Layer| matches!(LayerInfo::of(layer.kind).source, steradian::film::Source::LightAov(_));
+    let is_part = |layer: &&Layer| matches!(LayerInfo::of(layer.kind).source, steradian::film::LayerSource::LightAov(_));
     let sums = [image.layers.iter().filter(is_group).collect::<Vec<_>>(), image.layers.iter().filter(is_part).collect()];
     assert_eq!(sums.each_ref().map(Vec::len), [3, 8]);
     assert_eq!(report.layers.len(), 12);
@@ -322,8 +325,8 @@ fn the_program_denoises_renders_and_files() {
     assert!(run(root, "render room.json --float --layers feature_albedo,feature_normal,light_groups -o n.0003.exr").status.success());
     let done = run(root, "denoise n.####.exr d.####.exr -o d.####.png --json");
     assert!(done.status.success() && root.join("d.0003.png").exists(), "{}", stderr(&done));
-    let told: Value = serde_json::from_slice(&done.stdout).unwrap();
-    assert_eq!(told["layers"], json!(["color", "light_cool", "light_default", "light_warm"]));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(report["layers"], json!(["color", "light_cool", "light_default", "light_warm"]));
     let [one, two] = ["one.exr", "d.0003.exr"].map(|name| output::read_exr(&root.join(name)).unwrap());
     assert!(one.layers[0].data == two.layers[0].data);
 }

@@ -1,5 +1,5 @@
-//! EXR files as users get them: every profile from the command line, read back by other programs where these are installed, checked, and
-//! rendered again.
+//! EXR files as users get them: every profile from the command line, read back by other programs where these are
+//! installed, checked, and rendered again.
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,4 +1,5 @@
-//! Jobs for farms: their scripts are run here with stand-ins for Slurm's commands and for the render, and a shard's options are checked.
+//! Jobs for farms: their scripts are run here with stand-ins for Slurm's commands and for the render, and a shard's
+//! options are checked.
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
@@ -9,7 +10,7 @@ use serde_json::Value;
 
 use crate::util::program::{Running, Signal};
 
-/// A render that does as the file `behaviour` says: `sleep`, or an exit code; 0 writes the shard that `-o` names.
+/// A render that does what is in the file `behaviour`: `sleep`, or an exit code; 0 writes the shard that `-o` names.
 const RENDER: &str = r#"#!/bin/bash
 echo "$@" >>calls
 trap 'echo terminated >>calls; kill "$sleeper"; exit 143' TERM
@@ -88,8 +89,8 @@ impl Farm {
 #[test]
 fn a_job_is_submitted_as_arrays_and_the_merges_that_wait_for_them() {
     let farm = Farm::new();
-    let told = farm.job("--shards 3 --frames 7-8 -o out.exr --submit -- --spp 5");
-    assert_eq!(told, "frame 7: array 41, merge 42\nframe 8: array 43, merge 44\n");
+    let printed = farm.job("--shards 3 --frames 7-8 -o out.exr --submit -- --spp 5");
+    assert_eq!(printed, "frame 7: array 41, merge 42\nframe 8: array 43, merge 44\n");
     let (folder, calls) = (farm.path().display().to_string(), farm.calls());
     let lines: Vec<&str> = calls.lines().collect();
     assert_eq!(lines[0], format!("sbatch --parsable --array=1-3 {folder}/room.farm/render.sh 7"));

@@ -1,4 +1,5 @@
-//! No command overwrites a file that it reads, or writes two things to one file: usage errors that name both uses, before anything is written.
+//! No command overwrites a file that it reads, or writes two things to one file: usage errors that name both uses,
+//! before anything is written.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,7 +7,7 @@ use std::path::{Path, PathBuf};
 use steradian::film::Image;
 use steradian::output;
 
-use crate::util::program::{SCENE, run, told};
+use crate::util::program::{SCENE, run, stderr_of};
 
 /// Every file below a folder with what it holds.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -63,7 +64,7 @@ fn assert_refused(dir: &Path, arguments: &str, uses: [&str; 2]) {
     // The helper writes scene.json first.
     let before = contents(dir);
     let output = run(dir, arguments);
-    let text = told(&output);
+    let text = stderr_of(&output);
     assert_eq!(output.status.code(), Some(2), "{arguments}: {text}");
     assert!(uses.iter().all(|part| text.contains(part)) && text.contains("choose another name"), "{arguments}: {text}");
     let changed: Vec<_> = contents(dir).into_iter().filter(|(path, bytes)| before.get(path) != Some(bytes)).map(|(path, _)| path).collect();
@@ -96,7 +97,7 @@ fn renders_overwrite_nothing_that_they_read() {
     }
     // What is written is at its place all the same.
     let output = run(dir, "render studio.json -q -o sub/studio.exr --json sub/m.obj");
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", stderr_of(&output));
 }
 
 #[test]
@@ -143,7 +144,7 @@ fn sequences_are_checked_before_their_first_frame() {
         assert_refused(dir, arguments, uses);
     }
     let output = run(dir, "render scene.json -q --frames 1-2 --spp 1 -o a.####.exr --json one.json");
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", stderr_of(&output));
 }
 
 #[test]
@@ -184,7 +185,7 @@ fn other_commands_overwrite_nothing_that_they_read() {
     assert_refused(dir, "denoise f.####.exr f.0###.exr", ["f.0001.exr (a noisy picture)", "f.0001.exr (a denoised picture)"]);
 }
 
-/// Files that a conversion brings beside the scene are compared before the first is written.
+/// Files that a conversion copies beside the scene are compared before the first is written.
 #[test]
 fn conversions_overwrite_no_file_that_they_copy() {
     let folder = tempfile::tempdir().unwrap();
@@ -216,13 +217,13 @@ fn messages_are_added_to_logs_alone() {
         let before = contents(dir);
         let output = run(dir, &format!("render studio.json -o a.exr --log-file {name}"));
         assert_eq!(output.status.code(), Some(2), "{name}");
-        assert!(told(&output).contains("--log-file") && told(&output).contains(name), "{}", told(&output));
+        assert!(stderr_of(&output).contains("--log-file") && stderr_of(&output).contains(name), "{}", stderr_of(&output));
         assert_eq!(contents(dir)[&dir.join(name)], before[&dir.join(name)]);
     }
     for format in ["text", "json"] {
         for _ in 0..3 {
             let output = run(dir, &format!("render scene.json -q -o n.exr --log-file {format}.log --log-format {format}"));
-            assert!(output.status.success(), "{}", told(&output));
+            assert!(output.status.success(), "{}", stderr_of(&output));
         }
     }
 }

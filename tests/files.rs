@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::util::program::{Running, SCENE, Signal, run, steradian, told};
+use crate::util::program::{Running, SCENE, Signal, run, stderr_of, steradian};
 
 /// Runs a line of shell with the program's path in `$0`.
 fn shell(folder: &Path, line: &str) -> Output {
@@ -32,29 +32,29 @@ fn statistics_go_to_devices_pipes_and_open_files() {
     let is_statistics = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).is_ok_and(|value| value["spp"] == 2);
     for (json, after) in [("/dev/stdout", "| cat"), ("/dev/stdout", ""), ("/dev/fd/3", "3>&1"), ("/proc/self/fd/3", "3>&1 | cat")] {
         let output = shell(folder.path(), &format!("\"$0\" render scene.json -q -o a.exr --json {json} {after}"));
-        assert!(is_statistics(&output.stdout), "{json} {after}: {}", told(&output));
+        assert!(is_statistics(&output.stdout), "{json} {after}: {}", stderr_of(&output));
     }
     let output = shell(folder.path(), "\"$0\" render scene.json -q -o a.exr --json /dev/stderr");
-    assert!(is_statistics(&output.stderr), "{}", told(&output));
+    assert!(is_statistics(&output.stderr), "{}", stderr_of(&output));
     // What is redirected to a file comes between what else goes there.
     let output = shell(folder.path(), "{ echo before; \"$0\" render scene.json -q -o a.exr --json /dev/stdout; echo after; } >out.txt");
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", stderr_of(&output));
     let text = std::fs::read_to_string(folder.path().join("out.txt")).unwrap();
     assert!(text.starts_with("before\n{") && text.ends_with("}\nafter\n"), "{text}");
     let output = shell(
         folder.path(),
         "mkfifo p.exr p.json; cat p.exr >b.exr & cat p.json >b.json & \"$0\" render scene.json -q -o p.exr --json p.json && wait",
     );
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", stderr_of(&output));
     assert!(is_statistics(&std::fs::read(folder.path().join("b.json")).unwrap()));
     assert_eq!(steradian::output::read_exr(&folder.path().join("b.exr")).unwrap().size, [24, 16]);
     for device in ["--json /dev/null", "--log-file /dev/null", "--report /dev/null"] {
         let output = run(folder.path(), &format!("render scene.json -q -o a.exr {device}"));
-        assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+        assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
     }
     assert!(std::fs::symlink_metadata("/dev/null").unwrap().file_type().is_char_device());
     let output = run(folder.path(), "render scene.json -q -o a.exr --json /dev/full");
-    assert_eq!(output.status.code(), Some(5), "{}", told(&output));
+    assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
     assert!(hidden(folder.path()).is_empty());
 }
 
@@ -86,17 +86,17 @@ fn what_never_ends_is_not_read() {
         for scene in scenes {
             std::fs::write(folder.path().join("s.json"), format!("{{ \"camera\": {{}}, {} }}", scene.replace("FILE", file))).unwrap();
             let output = run(folder.path(), "render s.json -o a.exr");
-            assert!(matches!(output.status.code(), Some(3 | 4)), "{scene}: {:?} {}", output.status, told(&output));
+            assert!(matches!(output.status.code(), Some(3 | 4)), "{scene}: {:?} {}", output.status, stderr_of(&output));
         }
         for (command, code) in commands {
             let output = run(folder.path(), &command.replace("FILE", file));
-            assert_eq!(output.status.code(), Some(code), "{command} {file}: {}", told(&output));
+            assert_eq!(output.status.code(), Some(code), "{command} {file}: {}", stderr_of(&output));
         }
     }
     assert_eq!(run(folder.path(), "render /dev/zero -o a.exr").status.code(), Some(4));
     // But a scene may come through a pipe.
     let output = shell(folder.path(), "cat scene.json | \"$0\" render /dev/stdin -q -o a.exr && \"$0\" info <(cat scene.json)");
-    assert!(output.status.success() && folder.path().join("a.exr").exists(), "{}", told(&output));
+    assert!(output.status.success() && folder.path().join("a.exr").exists(), "{}", stderr_of(&output));
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn killed_writers_leave_nothing_behind() {
     assert!(killed > 4, "{killed}");
     let output =
         run(folder.path(), &arguments.replace("--spp 400", "--spp 2 --seed 9").replace("--resume", "").replace("a.state", "b.state"));
-    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
 }
 
 #[test]
@@ -124,12 +124,17 @@ fn files_beyond_the_limit_are_errors_of_writing() {
     let folder = tempfile::tempdir().unwrap();
     for output in ["-o a.exr --float", "-o a.png", "--shard 1/2"] {
         let output = shell(folder.path(), &format!("ulimit -f 1; exec \"$0\" render scene.json -q --size 128x128 --spp 2 {output}"));
-        assert_eq!(output.status.code(), Some(5), "{:?} {}", output.status, told(&output));
-        assert_eq!((told(&output).matches("error: cannot write").count(), told(&output).lines().count()), (1, 1), "{}", told(&output));
+        assert_eq!(output.status.code(), Some(5), "{:?} {}", output.status, stderr_of(&output));
+        assert_eq!(
+            (stderr_of(&output).matches("error: cannot write").count(), stderr_of(&output).lines().count()),
+            (1, 1),
+            "{}",
+            stderr_of(&output)
+        );
     }
     // A checkpoint that cannot be written is no reason to lose the picture.
     let output = shell(folder.path(), "ulimit -f 100; exec \"$0\" render scene.json --size 128x128 --spp 2 -o a.png --checkpoint a.state");
-    assert!(output.status.success() && told(&output).contains("warning: cannot write a.state: "), "{}", told(&output));
+    assert!(output.status.success() && stderr_of(&output).contains("warning: cannot write a.state: "), "{}", stderr_of(&output));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 
@@ -153,7 +158,7 @@ fn memory_that_runs_out_is_one_error() {
             let line = format!("ulimit -c 0; ulimit -v {megabytes}000; exec \"$0\" render m.json -q -o a.png --accel {accel} --threads 3");
             let start = Instant::now();
             let output = shell(folder.path(), &line);
-            let (code, text) = (output.status.code(), told(&output));
+            let (code, text) = (output.status.code(), stderr_of(&output));
             assert!(matches!(code, Some(0 | 33)), "{accel} {megabytes} MB: {:?} {text}", output.status);
             if code == Some(33) {
                 // glibc has a line of its own where it cannot register the destructor of a thread's variable.
@@ -166,8 +171,8 @@ fn memory_that_runs_out_is_one_error() {
     }
     assert!(codes.iter().filter(|code| **code == Some(33)).count() >= 5, "{codes:?}");
     let output = shell(folder.path(), "ulimit -v 300000; exec \"$0\" render scene.json --size 8000x8000 -o a.png --log-format json");
-    assert_eq!(output.status.code(), Some(33), "{}", told(&output));
-    assert!(serde_json::from_str::<Value>(told(&output).trim()).is_ok_and(|line| line["level"] == "error"), "{}", told(&output));
+    assert_eq!(output.status.code(), Some(33), "{}", stderr_of(&output));
+    assert!(serde_json::from_str::<Value>(stderr_of(&output).trim()).is_ok_and(|line| line["level"] == "error"), "{}", stderr_of(&output));
 }
 
 /// Only aborts without memory are errors of memory.
@@ -185,18 +190,19 @@ fn threads_that_cannot_be_started_are_one_error() {
     use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o777)).unwrap();
-    // The limit does not hold for root, and other users may not reach the program where it was built. The copy is made by another process:
-    // a file that this one had open for writing could be inherited by the child of another test, and would not start ("text file busy").
+    // The limit does not hold for root, and other users may not reach the program where it was built. The copy is made
+    // by another process: a file that this one had open for writing could be inherited by the child of another test,
+    // and would not start ("text file busy").
     let user = "[ $(id -u) != 0 ] || user='setpriv --reuid 64321 --regid 64321 --clear-groups'; $user true";
     let line = format!("cp \"$0\" steradian && {user} && $user ./steradian --version");
     let output = shell(folder.path(), &line);
-    assert!(output.status.success(), "{:?} {}", output.status, told(&output));
+    assert!(output.status.success(), "{:?} {}", output.status, stderr_of(&output));
     for (accel, limit) in [("embree", 1), ("embree", 2), ("embree", 3), ("embree", 4), ("bvh", 3), ("bvh", 5)] {
         let line = format!(
             "ulimit -c 0; {user} >/dev/null; exec $user bash -c 'ulimit -u {limit}; exec ./steradian render scene.json -q -o a.png --threads 7 --accel {accel}'"
         );
         let output = shell(folder.path(), &line);
-        let text = told(&output);
+        let text = stderr_of(&output);
         assert_eq!(output.status.code(), Some(33), "{accel} {limit}: {:?} {text}", output.status);
         assert!(text.starts_with("error: ") && text.lines().count() == 1 && !text.contains("bug"), "{accel} {limit}: {text}");
     }
@@ -227,6 +233,6 @@ fn large_exr_files_are_read_channel_by_channel() {
     for (command, part) in [("compare large.exr large.exr", "512x128"), ("check-exr large.exr", "large.exr: ")] {
         let line = format!("ulimit -c 0; ulimit -v {}000; exec taskset -c 0 \"$0\" {command}", least + 25);
         let output = shell(folder.path(), &line);
-        assert!(String::from_utf8_lossy(&output.stdout).contains(part), "{command}: {:?} {}", output.status, told(&output));
+        assert!(String::from_utf8_lossy(&output.stdout).contains(part), "{command}: {:?} {}", output.status, stderr_of(&output));
     }
 }

@@ -5,7 +5,8 @@ use steradian::film::Image;
 
 use crate::util::render::{pixels, render};
 
-/// A scene that is the same from left to right, from top to bottom, and along its diagonals: a bright square in the middle.
+/// A scene that is the same from left to right, from top to bottom, and along its diagonals: a bright square in the
+/// middle.
 fn symmetric(size: [u32; 2], filter: Value) -> Value {
     json!({
         "film": { "width": size[0], "height": size[1], "filter": filter },
@@ -35,7 +36,7 @@ fn centroid(image: &Image) -> [f64; 2] {
 
 #[test]
 fn the_tent_filter_does_not_shift_the_picture_by_a_quarter_pixel() {
-    // An offset that lacks half a pixel moves the picture by 1/4; the centroid of the symmetric scene tells.
+    // An offset that lacks half a pixel moves the picture by 1/4; the centroid of the symmetric scene shows it.
     for filter in [json!({ "type": "tent" }), json!({ "type": "box" }), json!({ "type": "gaussian" }), json!({ "type": "mitchell" })] {
         let [x, y] = centroid(&render(&symmetric([16, 16], filter.clone())));
         assert!((x - 8.0).abs() < 5e-3 && (y - 8.0).abs() < 5e-3, "{filter}: {x} {y}");
@@ -69,7 +70,8 @@ fn pictures_that_are_not_square_are_not_stretched_by_one_angle_for_both_axes() {
 
 #[test]
 fn the_lens_is_sampled_by_area_and_not_by_radius() {
-    // A small light out of focus is drawn as an even disk. A radius of u R makes the inner half twice as bright as it should be.
+    // A small light out of focus is drawn as an even disk. A radius of u R makes the inner half twice as bright as it
+    // should be.
     let scene = json!({
         "film": { "width": 32, "height": 32, "filter": { "type": "box" } },
         "sampler": { "spp": 1024 },
@@ -90,7 +92,8 @@ fn the_lens_is_sampled_by_area_and_not_by_radius() {
 
 #[test]
 fn samples_stay_in_the_row_of_their_pixel() {
-    // The square's upper edge lies between rows 7 and 8. A jitter that reaches a row too far brightens row 7 and darkens row 8.
+    // The square's upper edge lies between rows 7 and 8. A jitter that reaches a row too far brightens row 7 and
+    // darkens row 8.
     let mut scene = symmetric([16, 16], json!({ "type": "box" }));
     scene["shapes"][0]["origin"] = json!([-9, -18, 0]);
     scene["shapes"][0]["edge_u"] = json!([18, 0, 0]);
@@ -103,7 +106,8 @@ fn samples_stay_in_the_row_of_their_pixel() {
 
 #[test]
 fn the_samples_of_a_pixel_are_stratified_and_repeatable() {
-    // Along an edge through the pixels' middles, 64 independent samples err by 0.06; stratified ones by less than half as much.
+    // Along an edge through the pixels' middles, 64 independent samples err by 0.06; stratified ones by less than half
+    // as much.
     let mut scene = symmetric([16, 16], json!({ "type": "box" }));
     scene["sampler"]["spp"] = json!(64);
     scene["shapes"][0]["origin"] = json!([0, -9, 0]);

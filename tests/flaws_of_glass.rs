@@ -47,7 +47,8 @@ fn lamp(shape: Value, radiance: f64) -> Value {
 
 #[test]
 fn roots_behind_the_ray_are_not_hits() {
-    // Of a sphere by the absolute value of its distance, of a turned profile by Newton's method from wherever it started.
+    // Of a sphere by the absolute value of its distance, of a turned profile by Newton's method from wherever it
+    // started.
     let mut rng = Rng::new(61);
     for (name, shape) in all_analytic_shapes() {
         let shape = placed(shape);
@@ -61,7 +62,8 @@ fn roots_behind_the_ray_are_not_hits() {
 
 #[test]
 fn a_surface_of_revolution_hides_only_what_is_behind_it() {
-    // Three lamps one behind the other, listed in every order: always the nearest is seen, the turned one first, in the middle and last.
+    // Three lamps one behind the other, listed in every order: always the nearest is seen, the turned one first, in the
+    // middle and last.
     let revolution = lamp(json!({ "type": "revolution", "profile": { "bezier": BALL } }), 1.0);
     let quad = |z: f64, radiance: f64| lamp(json!({ "type": "quad", "transform": [{ "scale": 3 }, { "translate": [0, 0, z] }] }), radiance);
     let camera = json!({ "position": [0, 0, 9], "look_at": [0, 0, 0], "vertical_fov_degrees": 1 });
@@ -89,7 +91,8 @@ fn level_rays_meet_a_surface_of_revolution_on_both_sides() {
 
 #[test]
 fn a_b_spline_is_there_between_its_ends_and_nowhere_else() {
-    // Four control points on a line: of y from 0 to 3 the curve reaches from 1 to 2. A parameter out of its domain shows more or less.
+    // Four control points on a line: of y from 0 to 3 the curve reaches from 1 to 2. A parameter out of its domain
+    // shows more or less.
     let spline = Revolution::new(&Profile::b_spline(&[[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0]]).unwrap(), TAU).unwrap();
     for i in 0..=300 {
         let y = 0.01 * f64::from(i) + 0.005;
@@ -104,7 +107,8 @@ fn a_b_spline_is_there_between_its_ends_and_nowhere_else() {
 
 #[test]
 fn exact_zeros_of_a_profile_are_hits() {
-    // At the poles, at the joint and in the middle of a segment; a test for normal numbers rejects a parameter or a distance of 0.
+    // At the poles, at the joint and in the middle of a segment; a test for normal numbers rejects a parameter or a
+    // distance of 0.
     let ball = ball();
     for direction in [DVec3::Y, -DVec3::Y, DVec3::X, -DVec3::Z] {
         let outside = ball.intersect(&endless(-2.0 * direction, direction)).unwrap();
@@ -133,8 +137,9 @@ fn glass_ball(shape: Value) -> Image {
 }
 
 #[test]
-fn glass_of_revolution_knows_its_inside() {
-    // The same ball as a sphere and as a turned profile; one that always reports its outside would never let light out as it came in.
+fn glass_of_revolution_has_a_consistent_inside() {
+    // The same ball as a sphere and as a turned profile; one that always reports its outside would never let light out
+    // as it came in.
     let sphere = glass_ball(json!({ "type": "sphere" }));
     let turned = glass_ball(json!({ "type": "revolution", "profile": { "bezier": BALL } }));
     let mut difference = 0.0;
@@ -163,10 +168,11 @@ fn whitteds_glass_divides_light_by_fresnels_equations_and_loses_none() {
     // Refraction alone would lose what is reflected.
     let camera = json!({ "position": [0.7, 1.9, 6], "look_at": [0, 0, 0], "vertical_fov_degrees": 16 });
     let sphere = scene(camera, json!({ "type": "sphere", "material": "glass", "radius": 0.9 }));
-    // After 12 segments 1 - (1 - R) R¹⁰ has come back, at least 0.9649 (where R = 10 / 11, near the rim) and all of it in the middle.
+    // After 12 segments 1 - (1 - R) R¹⁰ has come back, at least 0.9649 (where R = 10 / 11, near the rim) and all of it
+    // in the middle.
     assert!(pixels(&sphere).all(|p| p[1] > 0.9649 && p[1] < 1.0 + 1e-5) && (sphere.rgb(6, 6).unwrap()[1] - 1.0).abs() < 1e-5);
-    // Square onto one leg of a prism of 45 degrees: light is reflected totally at its back, which must not be black, and leaves by the
-    // other leg. What goes round more than twice is below R⁴.
+    // Square onto one leg of a prism of 45 degrees: light is reflected totally at its back, which must not be black,
+    // and leaves by the other leg. What goes round more than twice is below R⁴.
     let prism = json!({ "type": "mesh", "material": "glass",
         "positions": [[0, -1, 0], [1, -1, 0], [0, -1, -1], [0, 1, 0], [1, 1, 0], [0, 1, -1]],
         "triangles": [[0, 1, 4], [0, 4, 3], [0, 3, 5], [0, 5, 2], [1, 2, 5], [1, 5, 4], [0, 2, 1], [3, 4, 5]] });
@@ -272,7 +278,8 @@ fn normals_under_an_uneven_scale_stay_perpendicular() {
 
 #[test]
 fn paths_between_facing_mirrors_end() {
-    // 1 + 2 + ... + the lamp's light after as many reflections as the depth allows; a loop without an end never returns.
+    // 1 + 2 + ... + the lamp's light after as many reflections as the depth allows; a loop without an end never
+    // returns.
     for (integrator, depth) in [("whitted", 12), ("path", 64)] {
         let image = render(&json!({
             "film": { "width": 4, "height": 4, "filter": { "type": "box" } },

@@ -66,7 +66,8 @@ fn a_point_light_falls_with_the_square_of_distance() {
 
 #[test]
 fn no_light_is_found_by_a_tolerance_that_depends_on_the_scale() {
-    // The same room a thousand times smaller and larger: a light that counts as reached within 0.1 units is everywhere or nowhere.
+    // The same room a thousand times smaller and larger: a light that counts as reached within 0.1 units is everywhere
+    // or nowhere.
     for scale in [1e-3, 1.0, 1e3] {
         let mut lamp = sphere([0.0, 2.0 * scale, 0.0], 0.5 * scale);
         lamp["name"] = json!("without any geometry beside it");
@@ -118,14 +119,16 @@ fn a_light_below_the_surface_or_turned_away_gives_nothing() {
 
 #[test]
 fn a_light_across_the_horizon_is_cut_there_and_never_negative() {
-    // A wall from 1 below to 1 above the floor's plane at distance 2: only the upper half gives light (Lambert's polygon, clipped).
+    // A wall from 1 below to 1 above the floor's plane at distance 2: only the upper half gives light (Lambert's
+    // polygon, clipped).
     let wall = json!({ "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [2, -1, -1.5], "edge_u": [0, 0, 3], "edge_v": [0, 2, 0] });
     let mut scene = floor_probe([0.0; 3], json!([wall]));
     // Without the floor in front of the wall nothing else would cut it.
     scene["shapes"][0] =
         json!({ "type": "disk", "radius": 0.05, "material": "white", "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }] });
     let strip = |height: f64| (1.5 / (4.0f64 + height * height).sqrt()).atan() / (4.0 + height * height).sqrt() * 2.0;
-    // Irradiance of a vertical strip seen along its normal: E = (atan(w/d) - d / sqrt(d² + h²) atan(w / sqrt(d² + h²))) for half-width w.
+    // Irradiance of a vertical strip seen along its normal: E = (atan(w/d) - d / sqrt(d² + h²) atan(w / sqrt(d² + h²)))
+    // for half-width w.
     let expected = (1.5f64 / 2.0).atan() - strip(1.0);
     assert_irradiance(&scene, expected, "wall");
     assert!(pixels(&render(&scene)).all(|p| p[0] >= 0.0));
@@ -135,7 +138,8 @@ fn a_light_across_the_horizon_is_cut_there_and_never_negative() {
 fn each_area_light_has_an_area_of_its_own() {
     // A small and a large quad at once: one that is sampled with the other's area is wrong by their ratio.
     let quad = |half: f64, x: f64| json!({ "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [x - half, 1, -half], "edge_u": [2.0 * half, 0, 0], "edge_v": [0, 0, 2.0 * half] });
-    // Above the corner of a rectangle a x b at height 1: E = 1/2 (a/sqrt(1+a²) atan(b/sqrt(1+a²)) + b/sqrt(1+b²) atan(a/sqrt(1+b²))).
+    // Above the corner of a rectangle a x b at height 1: E = 1/2 (a/sqrt(1+a²) atan(b/sqrt(1+a²)) + b/sqrt(1+b²)
+    // atan(a/sqrt(1+b²))).
     let corner = |a: f64, b: f64| {
         let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
         0.5 * (a / ra * (b / ra).atan() + b / rb * (a / rb).atan())
@@ -147,7 +151,8 @@ fn each_area_light_has_an_area_of_its_own() {
 
 #[test]
 fn environments_of_several_sizes_are_right_at_the_pole_and_across_the_seam() {
-    // Rows at the pole where the sine is 0, a width shared between lights, and a seam that clamps: each is wrong by a lot here.
+    // Rows at the pole where the sine is 0, a width shared between lights, and a seam that clamps: each is wrong by a
+    // lot here.
     let folder = Folder::new();
     let write = |name: &str, size: [usize; 2], texel: &(dyn Fn(usize, usize) -> f32 + Sync)| {
         let path = folder.write(name, "");
@@ -234,7 +239,8 @@ fn light_met_after_a_bounce_carries_the_paths_throughput() {
 
 #[test]
 fn roulette_gives_the_survivors_the_weight_of_the_dead_on_every_material_and_from_its_own_depth_on() {
-    // A factor that is forgotten on glossy surfaces, or applied before roulette has begun, changes the mean with the depth.
+    // A factor that is forgotten on glossy surfaces, or applied before roulette has begun, changes the mean with the
+    // depth.
     for material in [
         json!({ "type": "diffuse", "albedo": 0.5 }),
         json!({ "type": "conductor", "metal": "copper", "alpha": 0.4 }),

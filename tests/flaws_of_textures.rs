@@ -66,7 +66,8 @@ fn the_base_colour_is_linearised_and_roughness_is_not() {
     assert!((a - b).to_array().iter().all(|d| d.abs() < 1e-5 * b.r), "{a:?} {b:?}");
 }
 
-/// A triangle that has a material of its own, or a sphere whose material hides that of its class, ignores what the scene says.
+/// A triangle that has a material of its own, or a sphere whose material hides that of its class, ignores the scene's
+/// value.
 #[test]
 fn triangles_spheres_and_instances_keep_the_type_of_their_material() {
     type Is = fn(&Bsdf) -> bool;

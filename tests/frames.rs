@@ -33,7 +33,7 @@ fn run(folder: &Path, arguments: &str) -> Output {
     steradian(folder, arguments).output().unwrap()
 }
 
-fn told(output: &Output) -> String {
+fn stderr_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -45,7 +45,7 @@ fn folder_with(scenes: &[(&str, Value)]) -> tempfile::TempDir {
     folder
 }
 
-/// Everything that a file says of its pixels.
+/// The header of a file and its pixels.
 fn pixels(path: &Path) -> Vec<u32> {
     let image = output::read_exr(path).unwrap();
     image.layers.iter().flat_map(|layer| layer.data.iter().map(|value| value.to_bits())).collect()
@@ -57,7 +57,7 @@ fn a_frame_is_the_scene_with_its_shutter_moved() {
     later["camera"]["shutter"] = json!([2, 2.5]);
     let folder = folder_with(&[("a.json", scene()), ("later.json", later)]);
     let output = run(folder.path(), "render a.json --frames 0-2 -o a.####.exr -o small_%02d.png --float --layers Z");
-    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
     for (arguments, frame) in [("render a.json", "a.0000.exr"), ("render later.json --seed 2", "a.0002.exr")] {
         assert!(run(folder.path(), &format!("{arguments} -o single.exr --float --layers Z")).status.success());
         assert_eq!(pixels(&folder.path().join("single.exr")), pixels(&folder.path().join(frame)), "{frame}");
@@ -69,17 +69,18 @@ fn a_frame_is_the_scene_with_its_shutter_moved() {
 #[test]
 fn frames_that_are_there_are_skipped_unless_they_are_to_be_overwritten() {
     let folder = folder_with(&[("a.json", scene())]);
-    // Without a place for the number there is one before the extension; of a half-finished frame the other half is rendered.
+    // Without a place for the number there is one before the extension; of a half-finished frame the other half is
+    // rendered.
     std::fs::write(folder.path().join("a.0002.exr"), "stays").unwrap();
     std::fs::write(folder.path().join("a.0002.png"), "stays").unwrap();
     std::fs::write(folder.path().join("a.0003.exr"), "goes").unwrap();
     let output = run(folder.path(), "render a.json --frames 1-3 -o a.exr -o a.png");
-    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
-    assert!(told(&output).contains("1 frame exists and is skipped"), "{}", told(&output));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
+    assert!(stderr_of(&output).contains("1 frame exists and is skipped"), "{}", stderr_of(&output));
     let size = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().len();
     assert!(size("a.0001.exr") > 5 && size("a.0002.exr") == 5 && size("a.0003.exr") > 5);
     let again = run(folder.path(), "render a.json --frames 1-3 -o a.exr -o a.png");
-    assert!(told(&again).contains("3 frames exist") && told(&again).ends_with("Progress: 100%\n"), "{}", told(&again));
+    assert!(stderr_of(&again).contains("3 frames exist") && stderr_of(&again).ends_with("Progress: 100%\n"), "{}", stderr_of(&again));
     assert!(run(folder.path(), "render a.json --frames 2 -o a.exr -o a.png --overwrite").status.success());
     assert!(size("a.0002.exr") > 5);
 }
@@ -87,7 +88,7 @@ fn frames_that_are_there_are_skipped_unless_they_are_to_be_overwritten() {
 #[test]
 fn frames_that_are_skipped_are_compared_with_this_render() {
     let folder = folder_with(&[("a.json", scene())]);
-    let render = |arguments: &str| told(&run(folder.path(), &format!("render a.json -o a.exr {arguments}")));
+    let render = |arguments: &str| stderr_of(&run(folder.path(), &format!("render a.json -o a.exr {arguments}")));
     assert!(!render("--frames 1-3").contains("warning"));
     // The same again is no mixture, whatever frame comes first.
     let same = render("--frames 2-4");
@@ -109,19 +110,19 @@ fn frames_that_are_skipped_are_compared_with_this_render() {
     // Names that the scene has.
     changed["outputs"] = json!([{ "file": "a.exr" }]);
     std::fs::write(folder.path().join("b.json"), changed.to_string()).unwrap();
-    let other = told(&run(folder.path(), "render b.json --frames 5"));
+    let other = stderr_of(&run(folder.path(), "render b.json --frames 5"));
     assert!(other.contains("frame 5: ") && other.contains("spp: 8 in the file, 4 for the rest"), "{other}");
-    assert!(!told(&run(folder.path(), "render a.json -o a.exr --frames 1-3 --overwrite")).contains("warning"));
+    assert!(!stderr_of(&run(folder.path(), "render a.json -o a.exr --frames 1-3 --overwrite")).contains("warning"));
 }
 
 #[test]
-fn a_scene_for_each_frame_is_read_for_each_and_a_failure_stops_unless_told_otherwise() {
+fn a_scene_for_each_frame_is_read_for_each_and_a_failure_stops_by_default() {
     let mut bright = scene();
     bright["lights"][0]["radiance"] = json!([4, 4, 4]);
     let folder = folder_with(&[("s.0001.json", scene()), ("s.0003.json", bright)]);
     let output = run(folder.path(), "render s.####.json --frames 1-3 -o o.exr");
-    assert_eq!(output.status.code(), Some(4), "{}", told(&output));
-    assert!(told(&output).contains("error: frame 2: s.0002.json"), "{}", told(&output));
+    assert_eq!(output.status.code(), Some(4), "{}", stderr_of(&output));
+    assert!(stderr_of(&output).contains("error: frame 2: s.0002.json"), "{}", stderr_of(&output));
     assert!(folder.path().join("o.0001.exr").exists() && !folder.path().join("o.0003.exr").exists());
 
     let output = run(folder.path(), "render s.####.json --frames 1-3 -o o.exr --keep-going");
@@ -134,17 +135,17 @@ fn a_scene_for_each_frame_is_read_for_each_and_a_failure_stops_unless_told_other
 fn progress_is_that_of_the_sequence_and_complete_only_at_its_end() {
     let folder = folder_with(&[("a.json", scene())]);
     let output = run(folder.path(), "render a.json --frames 1-4 -o a.exr --progress alf -q");
-    let lines: Vec<String> = told(&output).lines().map(str::to_owned).collect();
+    let lines: Vec<String> = stderr_of(&output).lines().map(str::to_owned).collect();
     let percents: Vec<u32> =
         lines.iter().map(|l| l.strip_prefix("ALF_PROGRESS ").unwrap().strip_suffix('%').unwrap().parse().unwrap()).collect();
     assert!(percents.is_sorted() && percents.last() == Some(&100), "{lines:?}");
     assert_eq!(percents.iter().filter(|percent| **percent == 100).count(), 1);
 
     let output = run(folder.path(), "render a.json --frames 7,9 -o b.exr --progress afanasy -q");
-    let told = told(&output);
-    let counted: Vec<&str> = told.lines().filter(|line| line.starts_with("FRAME: ")).collect();
+    let stderr = stderr_of(&output);
+    let counted: Vec<&str> = stderr.lines().filter(|line| line.starts_with("FRAME: ")).collect();
     assert_eq!(counted, ["FRAME: 7", "FRAME: 9"]);
-    assert!(told.ends_with("PROGRESS: 100%\n[ PARSER FINISHED SUCCESS ]\n"), "{told}");
+    assert!(stderr.ends_with("PROGRESS: 100%\n[ PARSER FINISHED SUCCESS ]\n"), "{stderr}");
 }
 
 #[test]

@@ -32,7 +32,7 @@ fn closed_profiles() -> Vec<(String, Profile)> {
     found
 }
 
-/// Lines between points of a profile, so many on each segment.
+/// Lines between points of a profile, a number on each segment.
 fn polyline(profile: &Profile, per_segment: usize) -> Vec<DVec2> {
     (0..=profile.segments().len() * per_segment).map(|i| profile.point(i as f64 / per_segment as f64)).collect()
 }
@@ -140,7 +140,8 @@ fn crossings_are_those_of_a_fine_tessellation() {
                 worst = found.iter().zip(&expected).map(|(f, e)| (f - e).abs()).fold(worst, f64::max);
                 continue;
             }
-            // Only a line that touches the surface may miss its chords: two hits that nearly coincide are one more or less.
+            // Only a line that touches the surface may miss its chords: two hits that nearly coincide are one more or
+            // less.
             let more = if found.len() > expected.len() { &found } else { &expected };
             assert!(more.windows(2).any(|pair| pair[1] - pair[0] < 0.02), "{name}: {found:?}, expected {expected:?}");
             touching += 1;
@@ -174,7 +175,7 @@ fn clear_glassware_vanishes_in_a_white_environment() {
         "shapes": shapes,
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
     }));
-    // Every path brings exactly 1 unless it is still caught in a wall after 1024 segments.
+    // Every path contributes exactly 1 unless it is still caught in a wall after 1024 segments.
     let mean = Estimate::of(&image, 1).mean;
     assert!((mean - 1.0).abs() < 5e-4, "{mean}");
     let worst = pixels(&image).map(|p| (p[1] - 1.0).abs()).fold(0.0, f32::max);

@@ -16,7 +16,8 @@ const GREEN: [u8; 4] = [0, 255, 0, 255];
 const BLUE: [u8; 4] = [0, 0, 255, 255];
 const GONE: [u8; 4] = [255, 255, 255, 0];
 
-/// A square of two units about the origin, facing +Z, its image (`map.png`) upright, seen by a camera that shows just it; a dim light is there.
+/// A square of two units about the origin, facing +Z, its image (`map.png`) upright, seen by a camera that shows just
+/// it; a dim light is there.
 fn square(material: Value) -> Value {
     let floats: [f32; 20] = [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0, -1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
     let bytes = floats.iter().flat_map(|x| x.to_le_bytes()).chain([0, 1, 2, 0, 2, 3]);
@@ -87,7 +88,7 @@ fn images_stand_upright() {
 }
 
 #[test]
-fn transforms_move_images_as_the_extension_says() {
+fn transforms_move_images_by_the_extension() {
     let map = [RED, GREEN, BLUE, [255, 255, 255, 255]];
     let white = map[3];
     let moved = |transform: Value, expected: [[u8; 4]; 4]| {
@@ -98,7 +99,8 @@ fn transforms_move_images_as_the_extension_says() {
     moved(json!({ "offset": [0, 0.5] }), [BLUE, white, RED, GREEN]);
     moved(json!({ "scale": [0.5, 1] }), [RED, RED, BLUE, BLUE]);
     moved(json!({ "scale": [1, 0.5], "offset": [0, 0.5] }), [BLUE, white, BLUE, white]);
-    // uv turned counter-clockwise by a quarter about its origin, the upper left corner: u' = v, v' = -u. So the image turns clockwise.
+    // uv turned counter-clockwise by a quarter about its origin, the upper left corner: u' = v, v' = -u. So the image
+    // turns clockwise.
     moved(json!({ "rotation": std::f64::consts::FRAC_PI_2 }), [BLUE, RED, white, GREEN]);
     moved(json!({ "rotation": std::f64::consts::FRAC_PI_2, "offset": [0, 0.5] }), [RED, BLUE, GREEN, white]);
 }

@@ -45,7 +45,8 @@ fn room() -> Value {
     })
 }
 
-/// A room with a lamp at the bottom of a shaft, which lights nothing but a spot of the ceiling: only paths that happen to meet it bring light.
+/// A room with a lamp at the bottom of a shaft, which lights nothing but a spot of the ceiling: only paths that happen
+/// to meet it contribute.
 fn room_with_shaft() -> Value {
     let (bottom, height, half) = (0.4, 1.1, 0.15);
     let wall = |x: f64, z: f64, along: [f64; 3]| quad("black", [x, bottom, z], along, [0.0, height, 0.0]);
@@ -143,7 +144,7 @@ fn crops_limits_and_layers_hold() {
     assert!(guided.layer(LayerKind::Variance).unwrap().data.iter().all(|v| v.is_finite() && *v >= 0.0));
 }
 
-/// Under an even sky there is nothing to learn, and guiding is given up: later samples are those of other renders.
+/// Under an even sky there is nothing to learn, and guiding ends: later samples are those of other renders.
 #[test]
 fn scenes_without_lamps_stay_what_they_are() {
     let mut open = room();
@@ -185,7 +186,7 @@ fn part(kit: &Kit, state: RenderState, tiles: usize, file: &StateFile) -> Render
     kit.kept(&kit.go_on(state, &progress, &stop), file)
 }
 
-/// Interrupted while the guide learns, at the ends of iterations and within them, and after guiding was given up.
+/// Interrupted while the guide learns, at the ends of iterations and within them, and after guiding has ended.
 #[test]
 fn a_resumed_guided_render_has_the_bits_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -211,7 +212,8 @@ fn a_resumed_guided_render_has_the_bits_of_one_run() {
     }
 }
 
-/// What is there of a guided render is a picture of the same brightness, from its checkpoint too; the number of samples is part of what it is.
+/// What is there of a guided render is a picture of the same brightness, from its checkpoint too; the number of samples
+/// is part of what it is.
 #[test]
 fn an_interrupted_guided_render_has_a_picture() {
     let folder = tempfile::tempdir().unwrap();
@@ -231,7 +233,7 @@ fn an_interrupted_guided_render_has_a_picture() {
 
     let more = self::kit(&room(), 65);
     let refused = RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings).unwrap_err();
-    assert!(refused.to_string().contains("spp: 64 in the checkpoint, 65 asked for"), "{refused}");
+    assert!(refused.to_string().contains("spp: 64 in the checkpoint, 65 requested"), "{refused}");
 }
 
 /// The last block of a state, which has the guide.

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::util::program::{SCENE, run, steradian, told};
+use crate::util::program::{SCENE, run, stderr_of, steradian};
 
 #[test]
 fn every_format_has_whole_lines_and_ends_with_all() {
@@ -16,44 +16,44 @@ fn every_format_has_whole_lines_and_ends_with_all() {
         ("afanasy", "PROGRESS: 100%", "[ PARSER FINISHED SUCCESS ]\n"),
     ] {
         let output = run(folder.path(), &format!("render scene.json -o a.exr --spp 64 --target-error 0.01 --progress {format}"));
-        let text = told(&output);
+        let text = stderr_of(&output);
         assert_eq!(output.status.code(), Some(0), "{text}");
         assert!(text.ends_with(&format!("\n{all}\n{last}")) && !text.contains(['\r', '\x1b']), "{format}: {text:?}");
         assert!(!text.contains("Error"), "{text}");
-        // The files are told of before all is done.
+        // The files are printed before all is done.
         let place = |what: &str| text.find(what).unwrap_or(usize::MAX);
         assert!(place("wrote a.exr") < place(all), "{text}");
         assert!(output.stdout.is_empty());
     }
     let output = run(folder.path(), "render scene.json -o a.exr -q --progress alf");
-    assert_eq!(told(&output), "ALF_PROGRESS 100%\n");
-    assert_eq!(told(&run(folder.path(), "render scene.json -o a.exr -q")), "");
+    assert_eq!(stderr_of(&output), "ALF_PROGRESS 100%\n");
+    assert_eq!(stderr_of(&run(folder.path(), "render scene.json -o a.exr -q")), "");
 }
 
 #[test]
-fn failures_are_told_in_the_farms_words() {
+fn failures_are_reported_in_the_farms_words() {
     let folder = tempfile::tempdir().unwrap();
     for (format, line) in
         [("deadline", "Error: missing.json: "), ("openjd", "openjd_fail: missing.json: "), ("afanasy", "[ PARSER ERROR ] missing.json: ")]
     {
         let output = run(folder.path(), &format!("render missing.json --progress {format}"));
         assert_eq!(output.status.code(), Some(4));
-        assert!(told(&output).lines().any(|l| l.starts_with(line)) && !told(&output).contains("100%"), "{}", told(&output));
+        assert!(stderr_of(&output).lines().any(|l| l.starts_with(line)) && !stderr_of(&output).contains("100%"), "{}", stderr_of(&output));
     }
 }
 
 #[test]
-fn messages_are_json_and_go_to_files_if_asked() {
+fn messages_are_json_and_go_to_files_by_option() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), "render scene.json -o a.exr --progress json --log-file log.txt");
-    let values: Vec<Value> = told(&output).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let values: Vec<Value> = stderr_of(&output).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert!(values.iter().any(|v| v["message"] == "wrote a.exr" && v["level"] == "note" && v["time"].is_string()), "{values:?}");
     let progress: Vec<&Value> = values.iter().filter(|v| v["event"] == "progress").collect();
     assert_eq!(progress.last().unwrap()["percent"], 100.0);
     assert_eq!(values.last().unwrap()["event"], "success");
 
-    // Another run adds to the file, whatever it says on stderr; each line has its time, level and text.
-    assert_eq!(told(&run(folder.path(), "render scene.json -o b.exr -q --log-format text --log-file log.txt")), "");
+    // Another run adds to the file, whatever it prints to stderr; each line has its time, level and text.
+    assert_eq!(stderr_of(&run(folder.path(), "render scene.json -o b.exr -q --log-format text --log-file log.txt")), "");
     let log = std::fs::read_to_string(folder.path().join("log.txt")).unwrap();
     let lines: Vec<&str> = log.lines().collect();
     assert!(lines.iter().any(|line| line.contains("wrote a.exr")));
@@ -64,7 +64,7 @@ fn messages_are_json_and_go_to_files_if_asked() {
     );
 
     let output = run(folder.path(), "render missing.json --log-format json");
-    let value: Value = serde_json::from_str(told(&output).trim()).unwrap();
+    let value: Value = serde_json::from_str(stderr_of(&output).trim()).unwrap();
     assert_eq!((&value["level"], output.status.code()), (&Value::from("error"), Some(4)));
     assert_eq!(run(folder.path(), "render scene.json --log-file missing/log.txt").status.code(), Some(5));
 }
@@ -74,7 +74,7 @@ fn colours_are_shown_only_where_they_are_wanted() {
     let folder = tempfile::tempdir().unwrap();
     let colored = |arguments: &str, variable: Option<(&str, &str)>| {
         let mut command = steradian(folder.path(), arguments);
-        told(&command.envs(variable).output().unwrap()).contains('\x1b')
+        stderr_of(&command.envs(variable).output().unwrap()).contains('\x1b')
     };
     for arguments in ["render missing.json", "render --nonsense"] {
         assert!(!colored(arguments, None), "{arguments}");
@@ -84,7 +84,7 @@ fn colours_are_shown_only_where_they_are_wanted() {
     }
 }
 
-/// Flag, environment, project, user, scene, built-in: each speaks where those before it are silent.
+/// Flag, environment, project, user, scene, built-in: each applies where those before it have no value.
 #[test]
 fn options_come_from_the_strongest_place() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,7 +128,7 @@ fn unknown_keys_are_errors_with_file_and_line() {
     for command in ["render scene.json", "config show scene.json"] {
         let output = run(folder.path(), command);
         assert_eq!(output.status.code(), Some(2));
-        let text = told(&output);
+        let text = stderr_of(&output);
         assert!(text.contains("steradian.toml:3: \"thread\" is no option of render (did you mean \"threads\"?)"), "{text}");
     }
 }
@@ -142,7 +142,7 @@ fn farms_say_how_many_processors_a_task_has() {
         let mut command = steradian(folder.path(), &format!("render scene.json -o a.exr --json - -v {arguments}"));
         let output = command.env(variable, "3").output().unwrap();
         assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["threads"], threads, "{variable}");
-        assert_eq!(told(&output).contains(&format!("threads = 3 (environment: {variable})")), threads == 3, "{}", told(&output));
+        assert_eq!(stderr_of(&output).contains(&format!("threads = 3 (environment: {variable})")), threads == 3, "{}", stderr_of(&output));
     }
 }
 

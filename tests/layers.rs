@@ -50,8 +50,9 @@ fn groups(image: &Image) -> Vec<&Layer> {
     image.layers.iter().filter(|layer| layer.kind == LayerKind::LightGroups).collect()
 }
 
-/// Asserts that layers sum to the picture. A sample adds up its light and each of its parts in 32 bits, some dozens of terms in different
-/// orders, each with a rounding of 6e-8 of what it has so far: 1e-5 of all that the pixel's parts have is ten times what was found.
+/// Asserts that layers sum to the picture. A sample adds up its light and each of its parts in 32 bits, some dozens of
+/// terms in different orders, each with a rounding of 6e-8 of what it has so far: 1e-5 of all that the pixel's parts
+/// have is ten times what was found.
 #[track_caller]
 fn assert_sum(image: &Image, layers: &[&Layer], what: &str) {
     let color = image.layer(LayerKind::Color).unwrap();
@@ -155,7 +156,8 @@ const ALBEDO: [f64; 3] = [0.8, 0.5, 0.2];
 
 #[test]
 fn a_furnace_parts_light_by_bounces() {
-    // Within a sphere of albedo a and radiance 1: 1 is seen, a is scattered once, a² + a³ more often on at most 4 segments.
+    // Within a sphere of albedo a and radiance 1: 1 is seen, a is scattered once, a² + a³ more often on at most 4
+    // segments.
     let shapes = json!([{ "type": "sphere", "radius": 10, "material": "m", "reverse_normal": true, "emission": { "radiance": [1, 1, 1], "group": "walls" } }]);
     for strategy in ["mis", "bsdf"] {
         let scene = room(json!({ "integrator": { "strategy": strategy }, "shapes": shapes }));
@@ -202,7 +204,8 @@ fn a_pane_parts_reflection_from_transmission() {
 
 #[test]
 fn highlights_and_what_is_below_are_parted_by_their_lobes() {
-    // A flat floor under a white sky: each lobe gives what it scatters of all directions, which the same floor without base shows alone.
+    // A flat floor under a white sky: each lobe gives what it scatters of all directions, which the same floor without
+    // base shows alone.
     for material in [
         json!({ "type": "plastic", "albedo": [0.8, 0.5, 0.2], "roughness": 0.4 }),
         json!({ "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20 }),
@@ -257,7 +260,7 @@ fn two_lamps(names: &[&str], integrator: Value) -> Value {
 
 #[test]
 fn groups_show_what_their_lights_alone_give() {
-    // Whitted's method asks every light: the very sums.
+    // Whitted's method samples every light: the very sums.
     let whitted = || json!({ "type": "whitted", "max_depth": 4, "rr_depth": null });
     let of = |names: &[&str]| {
         let mut scene = two_lamps(names, whitted());

@@ -1,4 +1,5 @@
-//! Integrators against furnaces and the depth law, and the three strategies against each other; more is in the catalogue of stability, group I.
+//! Integrators against furnaces and the depth law, and the three strategies against each other; more is in the
+//! catalogue of stability, group I.
 
 use serde_json::{Value, json};
 
@@ -108,7 +109,8 @@ fn the_strategies_agree_on_three_scenes() {
 
 #[test]
 fn next_event_estimation_does_not_count_light_twice() {
-    // A diffuse floor under an emissive sphere: twice the light if emission were added at every hit besides light sampling.
+    // A diffuse floor under an emissive sphere: twice the light if emission were added at every hit besides light
+    // sampling.
     let sphere = json!({ "type": "sphere", "radius": 0.5, "material": "black", "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": [0, 2, 0] }] });
     let scene = floor_probe([0.0, 0.0, 0.0], json!([sphere]));
     Estimate::of(&render(&scene), 0).assert_is(0.25 / 4.0, "sphere overhead");

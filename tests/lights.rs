@@ -14,7 +14,7 @@ use crate::util::render::{AssertIs, Estimate, assert_irradiance, floor_probe, me
 const LAMP: &str = "IESNA:LM-63-2002\n[TEST] none\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10 6 0\n";
 
 #[test]
-fn a_measured_light_shines_as_its_file_says() {
+fn a_measured_light_has_the_intensity_of_its_file() {
     let folder = Folder::new();
     let file = folder.write("lamp.ies", LAMP);
     let lamp = |turned: f64| json!([{ "type": "ies", "file": file, "position": [0, 1, 0], "intensity": [0.5, 0.5, 0.5], "rotation_degrees": turned }]);
@@ -28,11 +28,13 @@ fn a_measured_light_shines_as_its_file_says() {
     }
 }
 
-/// A checker of two pairs of squares along each side: 0.25 where both of u and v lie in the same halves of their quarters, else 0.75.
+/// A checker of two pairs of squares along each side: 0.25 where both of u and v lie in the same halves of their
+/// quarters, else 0.75.
 #[test]
 fn projectors_and_textured_spots_throw_pictures() {
     let textures = json!({ "board": { "type": "checker", "color0": [0.25, 0.25, 0.25], "color1": [0.75, 0.75, 0.75], "scale": [2, 2] } });
-    // Above the floor at height 1, looking down with -Z up: u grows with x and v against z, over 2 x 1 of the floor for the projector.
+    // Above the floor at height 1, looking down with -Z up: u grows with x and v against z, over 2 x 1 of the floor for
+    // the projector.
     let lights = [
         json!({ "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "irradiance": [2, 2, 2], "texture": "board",
             "vertical_fov_degrees": 2.0 * 0.5f64.atan().to_degrees(), "aspect": 2 }),
@@ -330,7 +332,8 @@ fn wrong_cameras_are_refused_with_their_place() {
 
 #[test]
 fn a_hidden_lamp_shows_what_is_behind_it() {
-    // A lamp before a wall under a grey sky. With the lamp hidden the wall looks as through a near plane behind the lamp, and there is no sky.
+    // A lamp before a wall under a grey sky. With the lamp hidden the wall looks as through a near plane behind the
+    // lamp, and there is no sky.
     for kind in ["path", "whitted"] {
         for turned in [false, true] {
             let picture = |hide: bool, near: f64| {

@@ -99,8 +99,8 @@ fn layers_are_served_in_16_bits_and_pixels_exactly() {
     }
 
     let pixel = client.get("/pixel?x=2&y=1").json();
-    let told: Vec<f32> = pixel["layers"][0]["values"].as_array().unwrap().iter().map(|v| v.to_string().parse().unwrap()).collect();
-    assert_eq!((told, &pixel["layers"][1]), (image.layers[0].data[20..].to_vec(), &json!({ "channels": ["Z"], "values": [0.0] })));
+    let shown: Vec<f32> = pixel["layers"][0]["values"].as_array().unwrap().iter().map(|v| v.to_string().parse().unwrap()).collect();
+    assert_eq!((shown, &pixel["layers"][1]), (image.layers[0].data[20..].to_vec(), &json!({ "channels": ["Z"], "values": [0.0] })));
     let depths: Vec<Value> =
         [(1, 0), (2, 0), (0, 1)].map(|(x, y)| client.get(&format!("/pixel?x={x}&y={y}")).json()["layers"][1]["values"][0].clone()).into();
     assert_eq!(depths, [json!(1e10), json!("NaN"), json!("-inf")]);
@@ -167,7 +167,7 @@ fn a_reader_that_takes_nothing_keeps_neither_the_render_nor_others_waiting() {
         preview.show(&Arc::new(Snapshot::new(&image(), version)));
         assert_eq!(others.get("/state?page=1&have=0").json()["version"], version);
     }
-    // The slow ones are served what they asked for.
+    // The slow ones are served what they requested.
     drop(others);
     let mut body = Vec::new();
     slow[0].set_read_timeout(Some(Duration::from_secs(60))).unwrap();
@@ -243,27 +243,27 @@ fn pictures_are_made_only_for_those_who_look() {
     let fan = Fan::new([&live as &dyn Progress]);
     let mut client = Client::new(address(&live.preview_url().unwrap()));
     let mut version = |target: &str| client.get(target).json()["version"].as_u64().unwrap();
-    assert_eq!((fan.wants_picture(), version("/state")), (false, 0));
+    assert_eq!((fan.needs_picture(), version("/state")), (false, 0));
     // Somebody who only reads the numbers is no reason to make pictures.
-    assert!(!fan.wants_picture());
+    assert!(!fan.needs_picture());
     version("/state?page=5&have=0&idle=1");
-    assert!(!fan.wants_picture());
+    assert!(!fan.needs_picture());
     version("/state?page=5&have=0");
-    assert!(fan.wants_picture());
+    assert!(fan.needs_picture());
     fan.picture(&image(), 1);
-    assert_eq!((fan.wants_picture(), version("/state?page=5&have=0")), (false, 1));
-    // Not wanted, not shown.
+    assert_eq!((fan.needs_picture(), version("/state?page=5&have=0")), (false, 1));
+    // Not requested, not shown.
     fan.picture(&image(), 2);
     assert_eq!(version("/state"), 1);
     let start = Instant::now();
-    while !fan.wants_picture() {
+    while !fan.needs_picture() {
         assert!(start.elapsed() < Duration::from_secs(60));
         version("/state?page=5&have=1");
         thread::sleep(Duration::from_millis(10));
     }
-    // A page that is gone wants nothing.
+    // A page that is gone requests nothing.
     thread::sleep(Duration::from_secs(3));
-    assert!(!fan.wants_picture());
+    assert!(!fan.needs_picture());
     // And nobody waits for it at the end.
     live.show_final(&image(), 3);
     assert_eq!(version("/state"), 2);
@@ -340,8 +340,8 @@ fn a_held_page_shows_the_picture_of_the_file() {
     for (x, y) in [(0, 0), (12, 8), (23, 15)] {
         let pixel = client.get(&format!("/pixel?x={x}&y={y}")).json();
         let values = pixel["layers"][0]["values"].as_array().unwrap();
-        let told: Vec<f32> = values.iter().map(|value| value.to_string().parse().unwrap()).collect();
-        assert_eq!(told, image.pixel(LayerKind::Color, x, y).unwrap());
+        let shown: Vec<f32> = values.iter().map(|value| value.to_string().parse().unwrap()).collect();
+        assert_eq!(shown, image.pixel(LayerKind::Color, x, y).unwrap());
     }
     running.child.signal(Signal::INT);
     assert_eq!(running.end(), Some(0));
@@ -360,7 +360,7 @@ fn a_port_in_use_ends_the_program_before_the_render() {
     .unwrap();
     let line = format!("render ball.json --preview {}", address.port());
     let output = Command::new(env!("CARGO_BIN_EXE_steradian")).current_dir(&folder).args(line.split_whitespace()).output().unwrap();
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("--preview") && told.contains(&address.to_string()), "{told}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("--preview") && stderr.contains(&address.to_string()), "{stderr}");
 }

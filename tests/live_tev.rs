@@ -1,4 +1,4 @@
-//! A viewer of our own that speaks tev's protocol, with and without manners.
+//! A viewer of our own with tev's protocol, well behaved or not.
 
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
@@ -21,7 +21,7 @@ struct Picture {
     channels: BTreeMap<String, Vec<u32>>,
 }
 
-/// What the viewer was told, one word for each packet, and what it shows.
+/// What the viewer received, one word for each packet, and what it shows.
 #[derive(Default)]
 struct Viewer {
     packets: Vec<String>,
@@ -128,7 +128,7 @@ fn viewer(listener: TcpListener) -> thread::JoinHandle<Viewer> {
     })
 }
 
-/// A free port of an address where no other test asks for one.
+/// A free port of an address that no other test uses.
 fn listen() -> (TcpListener, String) {
     let listener = TcpListener::bind("127.0.83.7:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -166,7 +166,7 @@ fn expected(image: &Image) -> Picture {
     Picture { size: image.size.map(|side| side as usize), channels: channels.collect() }
 }
 
-/// Waits for what another thread is to bring about.
+/// Waits for a condition set by another thread.
 fn eventually(what: &str, mut is_so: impl FnMut() -> bool) {
     let start = Instant::now();
     while !is_so() {
@@ -226,7 +226,7 @@ fn only_what_has_changed_is_sent() {
     let mut second = first.clone();
     let changed = (150 * 300 + 290) * 3;
     second.layers[1].data[changed] = -second.layers[1].data[changed];
-    eventually("connected", || tev.wants_picture());
+    eventually("connected", || tev.needs_picture());
     tev.offer(&snapshot(&first));
     eventually("first", || tev.counters().sent == 1);
     tev.offer(&snapshot(&second));
@@ -245,14 +245,14 @@ fn updates_keep_their_distance_and_the_newest_picture_wins() {
     let (listener, address) = listen();
     let viewer = viewer(listener);
     let tev = Tev::new(TevOptions { update_period: HOUR, ..options(&address) }, "a");
-    eventually("connected", || tev.wants_picture());
+    eventually("connected", || tev.needs_picture());
     tev.offer(&snapshot(&image([40, 30], 0)));
     eventually("first", || tev.counters().sent == 1);
     // An hour is to pass before the second: it waits, and is replaced by the third.
-    assert!(!tev.wants_picture());
+    assert!(!tev.needs_picture());
     tev.offer(&snapshot(&image([40, 30], 1)));
     tev.offer(&snapshot(&image([40, 30], 2)));
-    assert!(!tev.wants_picture());
+    assert!(!tev.needs_picture());
     // The last picture waits for nothing.
     let last = image([40, 30], 3);
     tev.offer_final(&snapshot(&last));
@@ -276,7 +276,7 @@ fn a_viewer_that_never_reads_holds_nothing_up() {
         let counters = tev.counters();
         // The sender is stuck with the first; of the others one waits and the rest are gone.
         assert_eq!((counters.offered, counters.taken, counters.sent, counters.replaced), (offered, 1, 0, offered - 2));
-        assert!(!tev.wants_picture());
+        assert!(!tev.needs_picture());
     }
     tev.offer_final(&picture);
     assert!(!tev.wait(Instant::now()));
@@ -297,7 +297,7 @@ fn a_viewer_that_dies_and_comes_back_gets_everything_again() {
     drop((stream, listener));
     eventually("lost", || !tev.is_connected());
     tev.offer(&snapshot(&second));
-    assert!(!tev.wants_picture());
+    assert!(!tev.needs_picture());
 
     let listener = TcpListener::bind(&address).unwrap();
     let viewer = viewer(listener);
@@ -316,7 +316,7 @@ fn nobody_there_means_no_pictures_and_no_wait() {
     let (listener, address) = listen();
     drop(listener);
     let tev = Tev::new(options(&address), "a");
-    assert!(!tev.wants_picture());
+    assert!(!tev.needs_picture());
     tev.offer_final(&snapshot(&image([8, 8], 0)));
     // Returns at once: the deadline is an hour away.
     assert!(!tev.wait(deadline()));

@@ -141,8 +141,8 @@ fn see_tiled(material: &Value) -> Estimate {
 
 #[test]
 fn a_coat_with_textures_looks_as_the_constant_one() {
-    // The constant coat is integrated, the other looked up in a table: their albedos agree to half a hundredth, as do those of a smooth
-    // coat and of one whose index has changed.
+    // The constant coat is integrated, the other looked up in a table: their albedos agree to half a hundredth, as do
+    // those of a smooth coat and of one whose index has changed.
     let half = json!({ "texture": "tiles" });
     let range = json!({ "texture": "tiles", "range": [1.2, 1.8] });
     for (kind, base) in [("plastic", json!({ "albedo": [0.1, 0.7, 0.3] })), ("coated", json!({ "base": "base" }))] {
@@ -182,7 +182,8 @@ fn indices_of_refraction_can_be_textures() {
 
 #[test]
 fn a_coat_over_what_consists_of_others_coats_the_parts() {
-    // Under a white sky the coat reflects its albedo, and what is left goes to the parts: the same as the mix of the coated parts.
+    // Under a white sky the coat reflects its albedo, and what is left goes to the parts: the same as the mix of the
+    // coated parts.
     let parts = json!({
         "dark": { "type": "diffuse", "albedo": 0.2 }, "light": { "type": "mirror", "reflectance": 0.9 },
         "mix": { "type": "mix", "materials": ["dark", "light"], "amount": 0.25 },
@@ -245,7 +246,8 @@ fn each_axis_of_a_roughness_can_be_a_texture() {
 
 #[test]
 fn a_metal_with_beckmanns_microfacets_has_their_density() {
-    // Against GGX of the same alpha, the ratio of density and masking for the one half vector; Beckmann masks nothing at these angles.
+    // Against GGX of the same alpha, the ratio of density and masking for the one half vector; Beckmann masks nothing
+    // at these angles.
     let lit = |distribution: &str| {
         lit_from_the_right(&json!({
             "type": "conductor", "eta": [1e-6, 1e-6, 1e-6], "k": [1, 1, 1], "alpha": 0.3, "distribution": distribution, "multiscatter": false

@@ -193,8 +193,8 @@ fn overlapping_media_look_like_boundaries_modelled_one_by_one() {
         if roughness > 0.0 {
             continue;
         }
-        // Hollow glass: water reaches into the wall of hollow glass, which counts there. (With the other side as its front a rough surface
-        // takes other samples.)
+        // Hollow glass: water reaches into the wall of hollow glass, which counts there. (With the other side as its
+        // front a rough surface takes other samples.)
         let hollow = balls(
             json!({ "glass": medium(1.5, 2), "water": medium(1.33, 1) }),
             json!([sphere("glass", 1.0, false), sphere("glass", 0.8, true), sphere("water", 0.9, false)]),
@@ -322,8 +322,9 @@ fn a_lamp_in_a_medium_is_as_bright_by_every_strategy() {
 }
 
 #[test]
-fn a_camera_knows_the_media_it_stands_in() {
-    // Indices of 1: the sky is as bright as what is left on the way out. One sphere in another and a camera in both, in a gap, in one.
+fn a_camera_starts_in_the_media_around_it() {
+    // Indices of 1: the sky is as bright as what is left on the way out. One sphere in another and a camera in both, in
+    // a gap, in one.
     let materials = json!({
         "a": { "type": "dielectric", "ior": 1, "absorption": { "color": RED } },
         "b": { "type": "dielectric", "ior": 1, "absorption": { "color": BLUE }, "priority": 1 },
@@ -384,7 +385,7 @@ fn a_relief_leaves_the_medium_within() {
 }
 
 #[test]
-fn a_prism_parts_colours_as_snells_law_says() {
+fn a_prism_parts_colours_by_snells_law() {
     // A ray meets a wedge of 30 degrees: each colour leaves it by its own angle, and lamps wait where red and blue go.
     let (ior, abbe) = (1.6f64, 10.0f64);
     let inverse_square = |nm: f64| (1000.0 / nm).powi(2);
@@ -393,7 +394,8 @@ fn a_prism_parts_colours_as_snells_law_says() {
     for (channel, nm) in [(0, 650.0), (1, 550.0), (2, 450.0)] {
         let n = ior + b * (inverse_square(nm) - inverse_square(587.56));
         let turned = (n * tilt.sin()).asin() - tilt;
-        // The ray goes along -z through the flat face at z = 1 and leaves the tilted one at the origin, bent towards -x.
+        // The ray goes along -z through the flat face at z = 1 and leaves the tilted one at the origin, bent towards
+        // -x.
         let far = 50.0;
         let lamp = json!({ "type": "sphere", "radius": 0.25, "emission": { "radiance": [1, 1, 1] }, "material": "black",
             "transform": [{ "translate": [-far * turned.sin(), 0, -far * turned.cos()] }] });
@@ -419,8 +421,8 @@ fn a_prism_parts_colours_as_snells_law_says() {
         let rp = ((ci - n * ct) / (ci + n * ct)).powi(2);
         let expected = first * (1.0 - 0.5 * (rs + rp));
         for c in 0..3 {
-            let wanted = if c == channel { expected } else { 0.0 };
-            Estimate::of(&image, c).assert_is(wanted, &format!("lamp at {nm} nm, channel {c}"));
+            let expected = if c == channel { expected } else { 0.0 };
+            Estimate::of(&image, c).assert_is(expected, &format!("lamp at {nm} nm, channel {c}"));
         }
     }
 }

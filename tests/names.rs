@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::util::program::{SCENE, run, steradian, told};
+use crate::util::program::{SCENE, run, stderr_of, steradian};
 
 /// A small scene with changes.
 fn scene(change: impl FnOnce(&mut Value)) -> String {
@@ -44,7 +44,7 @@ fn names_steer_neither_farms_nor_terminals() {
         ] {
             let command = format!("{} --log-file log.txt", command.replace("FILE", file));
             let output = run(folder.path(), &command);
-            let printed = format!("{}{}", String::from_utf8_lossy(&output.stdout), told(&output));
+            let printed = format!("{}{}", String::from_utf8_lossy(&output.stdout), stderr_of(&output));
             let progress = |line: &&str| !line.starts_with("openjd_progress: ") && !line.starts_with("Progress: ");
             let printed: String = printed.lines().filter(progress).flat_map(|line| [line, "\n"]).collect();
             assert!(is_harmless(&printed), "{command}: {printed:?}");
@@ -54,14 +54,14 @@ fn names_steer_neither_farms_nor_terminals() {
     assert!(log.lines().count() > 3 && log.lines().all(|line| line.starts_with("20")) && is_harmless(&log), "{log}");
     // On the command line and in a file of a project, too.
     std::fs::write(folder.path().join("steradian.toml"), "\"a\\u001b[2J\" = 1\n").unwrap();
-    assert!(is_harmless(&told(&run(folder.path(), "render scene.json -o a.exr"))));
+    assert!(is_harmless(&stderr_of(&run(folder.path(), "render scene.json -o a.exr"))));
     std::fs::remove_file(folder.path().join("steradian.toml")).unwrap();
     let mut command = steradian(folder.path(), "render scene.json");
     let output = command.args(["--spp", "\u{1b}[2J\nopenjd_env: a"]).output().unwrap();
-    assert!(output.status.code() == Some(2) && is_harmless(&told(&output)), "{}", told(&output));
+    assert!(output.status.code() == Some(2) && is_harmless(&stderr_of(&output)), "{}", stderr_of(&output));
 }
 
-/// A light in a group whose name has so many letters.
+/// A light in a group whose name has a number of letters.
 fn grouped(letters: usize) -> String {
     scene(|scene| {
         scene["lights"] = json!([{ "type": "point", "position": [0, 0, 4], "intensity": [9, 9, 9], "group": "g".repeat(letters) }]);
@@ -77,7 +77,7 @@ fn long_names_are_marked_in_files_or_refused() {
         std::fs::write(at("s.json"), grouped(letters)).unwrap();
         for (profile, is_long) in [("nuke", is_long), ("multipart", is_long), ("blender", is_long)] {
             let output = run(folder.path(), &format!("render s.json -q --exr-profile {profile}"));
-            assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+            assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
             let bytes = std::fs::read(at("a.exr")).unwrap();
             assert_eq!(bytes[5] & 4 != 0, is_long, "{letters} {profile}");
             assert_eq!(steradian::output::read_exr(&at("a.exr")).unwrap().size, [24, 16]);
@@ -86,7 +86,7 @@ fn long_names_are_marked_in_files_or_refused() {
     std::fs::write(at("s.json"), grouped(249)).unwrap();
     for command in ["render s.json", "info s.json"] {
         let output = run(folder.path(), command);
-        assert!(output.status.code() == Some(3) && told(&output).contains("s.json: lights[0].group: "), "{}", told(&output));
+        assert!(output.status.code() == Some(3) && stderr_of(&output).contains("s.json: lights[0].group: "), "{}", stderr_of(&output));
     }
 }
 
@@ -95,11 +95,11 @@ fn places_for_frame_numbers_need_frames() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["y.####.exr", "y.%04d.png"] {
         let output = run(folder.path(), &format!("render scene.json -o {name}"));
-        assert!(output.status.code() == Some(2) && told(&output).contains("--frames"), "{}", told(&output));
+        assert!(output.status.code() == Some(2) && stderr_of(&output).contains("--frames"), "{}", stderr_of(&output));
     }
     std::fs::create_dir(folder.path().join("shot#3")).unwrap();
     let output = run(folder.path(), "render scene.json -q -o shot#3/y.exr --frames 7");
-    assert!(output.status.success() && folder.path().join("shot#3/y.0007.exr").exists(), "{}", told(&output));
+    assert!(output.status.success() && folder.path().join("shot#3/y.0007.exr").exists(), "{}", stderr_of(&output));
     assert!(run(folder.path(), "render scene.json -q -o shot#3/y#.exr").status.success());
 }
 
@@ -110,8 +110,8 @@ fn names_that_are_not_utf8_are_refused() {
     for arguments in [["render", "A"], ["info", "A"], ["check-exr", "A"]] {
         let mut command = steradian(folder.path(), arguments[0]);
         let output = command.arg(OsStr::from_bytes(b"a\xff.json")).output().unwrap();
-        assert_eq!(output.status.code(), Some(2), "{}", told(&output));
-        assert!(told(&output).contains("is not UTF-8") && told(&output).lines().count() == 1, "{}", told(&output));
+        assert_eq!(output.status.code(), Some(2), "{}", stderr_of(&output));
+        assert!(stderr_of(&output).contains("is not UTF-8") && stderr_of(&output).lines().count() == 1, "{}", stderr_of(&output));
     }
 }
 
@@ -130,10 +130,10 @@ fn only_files_of_their_kind_are_copied() {
     for library in ["secret", "a.mtl", "/etc/passwd"] {
         std::fs::write(at("m.obj"), obj(library)).unwrap();
         let output = convert(json!({ "type": "mesh", "file": "m.obj" }));
-        assert!(output.status.code() == Some(3) && told(&output).contains("is not copied"), "{library}: {}", told(&output));
+        assert!(output.status.code() == Some(3) && stderr_of(&output).contains("is not copied"), "{library}: {}", stderr_of(&output));
     }
     let output = convert(json!({ "type": "mesh", "file": "secret" }));
-    assert_eq!(output.status.code(), Some(3), "{}", told(&output));
+    assert_eq!(output.status.code(), Some(3), "{}", stderr_of(&output));
     let has_secret = |path: &Path| std::fs::read(path).is_ok_and(|bytes| bytes.starts_with(b"root:"));
     let mut folders = vec![at("out")];
     while let Some(folder) = folders.pop() {
@@ -145,5 +145,5 @@ fn only_files_of_their_kind_are_copied() {
     std::fs::write(at("a.mtl"), "# a\nnewmtl a\nKd 1 0 0\n").unwrap();
     std::fs::write(at("m.obj"), obj("a.mtl")).unwrap();
     let output = convert(json!({ "type": "mesh", "file": "m.obj" }));
-    assert!(output.status.success() && at("out/s_files/m/a.mtl").exists(), "{}", told(&output));
+    assert!(output.status.success() && at("out/s_files/m/a.mtl").exists(), "{}", stderr_of(&output));
 }

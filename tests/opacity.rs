@@ -1,4 +1,4 @@
-//! Opacity: leaves cut out by images, veils by numbers, and what an MTL says of it.
+//! Opacity: leaves cut out by images, veils by numbers, and by an MTL.
 
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
 
@@ -81,7 +81,8 @@ fn a_leaf_card_is_seen_and_casts_a_shadow_only_where_the_leaf_is() {
         let image = folder.render(&scene);
         let at = |x: f32| image.rgb((16.5 + x / 2.5 * 16.5) as u32, 16).unwrap();
         let lit = 3.0 * FRAC_1_SQRT_2 / PI;
-        // Light passes the hole on its way to x = -1.5, the leaf stops it on its way to x = -0.5, which the camera sees through the hole.
+        // Light passes the hole on its way to x = -1.5, the leaf stops it on its way to x = -0.5, which the camera sees
+        // through the hole.
         for (x, expected) in [(-1.5, [0.5 * lit; 3]), (-0.5, [0.0; 3]), (0.5, [lit, 0.0, 0.0]), (1.5, [0.5 * lit; 3])] {
             assert!(at(x).iter().zip(expected).all(|(s, e)| (s - e).abs() < 1e-4), "{x}: {:?} {expected:?}", at(x));
         }
@@ -114,7 +115,8 @@ fn a_threshold_makes_all_or_nothing_of_an_opacity_for_every_accelerator() {
         let expected: Vec<bool> = (0..200).map(|i| i >= first).collect();
         assert_eq!(solid(part(threshold), "nearest"), expected, "{threshold}");
     }
-    // Of the filtered texture: it is a half in the middle between the second texel and the third, and 0.45 a quarter of a texel before.
+    // Of the filtered texture: it is a half in the middle between the second texel and the third, and 0.45 a quarter of
+    // a texel before.
     for (threshold, first) in [(0.5, 100), (0.45, 88)] {
         let found = solid(part(threshold), "bilinear");
         assert!(found.iter().enumerate().all(|(i, hit)| *hit == (i >= first) || i.abs_diff(first) <= 1), "{threshold}: {found:?}");
@@ -184,11 +186,12 @@ fn an_image_of_floats_beyond_1_is_no_opacity() {
     assert!(message.contains("shapes[1].opacity.texture: ") && message.contains("from 2 to 2"), "{message}");
 }
 
-/// A square light with its left half cut out, half of a veil, and a sphere whose inside shines through its outside, by every strategy: points
-/// chosen on the light must count as often as rays meet it.
+/// A square light with its left half cut out, half of a veil, and a sphere whose inside shines through its outside, by
+/// every strategy: points chosen on the light must count as often as rays meet it.
 #[test]
 fn light_comes_from_what_is_there_of_a_shape_with_holes() {
-    // Textures with u below 1/2 cut out; a point below the middle of a square sees a quarter of it in the fraction f of all directions.
+    // Textures with u below 1/2 cut out; a point below the middle of a square sees a quarter of it in the fraction f of
+    // all directions.
     let textures = json!({ "half": { "type": "checker", "color0": [0, 0, 0], "color1": [1, 1, 1], "scale": [1, 0] },
         "dim": { "type": "checker", "color0": [0.4, 0.4, 0.4], "color1": [0.6, 0.6, 0.6], "scale": [1, 0] } });
     let f = FRAC_1_SQRT_2 * FRAC_1_SQRT_2.atan() / PI;

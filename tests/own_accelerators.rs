@@ -161,7 +161,8 @@ fn visits(geometry: &Geometry, rays: &[Ray], most: &[(&str, f64)]) {
     }
 }
 
-/// A mesh alone, and small on a large floor, which trees that halve space or want every half to be smaller do not get through.
+/// A mesh alone, and small on a large floor, which trees that halve space or require every half to be smaller do not
+/// get through.
 #[test]
 fn a_ray_visits_few_nodes_and_primitives() {
     let floor = || grid(DVec3::new(-20.0, -20.0, -1.5), 40.0 * DVec3::X, 40.0 * DVec3::Y, 1, |_, _| 0.0);
@@ -220,7 +221,8 @@ fn garbage_ends_in_bounded_trees() {
             assert!(stats.references <= 32 * count as u64 + 1024, "{name}, {accel_name}: {stats:?}");
             let rays = [ray(DVec3::new(0.2, 0.2, -3.0), DVec3::Z), ray(DVec3::new(-3.0, 0.3, 0.05), DVec3::X)];
             if name == "shrinking" || name == "huge and tiny" {
-                // From 2^50 times its size away a triangle is a point even in f64, and may be hit falsely where no box lets it be tested.
+                // From 2^50 times its size away a triangle is a point even in f64, and may be hit falsely where no box
+                // lets it be tested.
                 assert!(rays.iter().all(|ray| accel.occluded(ray) == accel.intersect(ray).is_some()), "{name}, {accel_name}");
             } else {
                 assert_equal(name, &geometry, &[(accel_name, accel)], &rays);
@@ -229,7 +231,7 @@ fn garbage_ends_in_bounded_trees() {
     }
 }
 
-/// What is in a leaf twice must be met once: nothing a hit says depends on how often its primitive was tested.
+/// What is in a leaf twice must be met once: nothing of a hit depends on how often its primitive was tested.
 #[test]
 fn a_hit_does_not_depend_on_the_order_of_tests() {
     let long: Vec<_> = (0..200).map(|i| 0.01 * f64::from(i)).collect();

@@ -105,7 +105,8 @@ fn normal_maps_tilt_along_u_and_v_of_every_shape_wherever_it_stands() {
                     }
                     let compiled = folder.compile(&scene).unwrap();
                     let (at, dp_dv) = meet(&compiled, &Ray::new(vec3(0.31, 0.17, 5.0), -Vec3::Z)).unwrap_or_else(|| panic!("{scene}"));
-                    // The part of the derivative across the other one: what grows u without changing v, seen in the surface.
+                    // The part of the derivative across the other one: what grows u without changing v, seen in the
+                    // surface.
                     let (t, b) = (at.dp_du - at.n_g * at.n_g.dot(at.dp_du), dp_dv - at.n_g * at.n_g.dot(dp_dv));
                     let expected = if along_v { at.n_g.cross(t).normalize() * at.n_g.cross(t).dot(b).signum() } else { t.normalize() };
                     let cos = at.n_s.dot(expected);
@@ -168,7 +169,8 @@ fn bump_maps_have_the_slopes_of_their_heights() {
                 scene["shapes"] = json!([shape]);
             }
             let at = look(&folder.compile(&scene).unwrap(), vec3(0.1, 0.2, 5.0), vec3(0.0, 0.0, -1.0));
-            // A height h over the width w: the slope is h / w, times 256 / 255 since the ramp reaches its ends half a texel early.
+            // A height h over the width w: the slope is h / w, times 256 / 255 since the ramp reaches its ends half a
+            // texel early.
             let slope = height / size[0] * 256.0 / 255.0;
             let expected = vec3(-slope as f32, 0.0, 1.0).normalize();
             assert!((at.n_s - expected).length() < 1e-4, "{height} {size:?}: {} {expected}", at.n_s);
@@ -284,7 +286,8 @@ fn lit(shape: Value) -> Value {
     scene
 }
 
-/// The largest difference between neighbouring pixels of the inner part of a ball's picture, where `counts` is true of both.
+/// The largest difference between neighbouring pixels of the inner part of a ball's picture, where `counts` is true of
+/// both.
 fn largest_step(image: &steradian::film::Image, counts: impl Fn(u32, u32) -> bool) -> f32 {
     let at = |x: u32, y: u32| image.rgb(x, y).unwrap()[1];
     let inside = |x: u32, y: u32| (x as f32 - 48.0).hypot(y as f32 - 48.0) < 34.0 && counts(x, y);
@@ -306,7 +309,8 @@ fn a_coarse_smooth_ball_is_shaded_like_a_round_one() {
     let round = folder.render(&lit(json!({ "type": "sphere", "material": "plain" })));
     let smooth = folder.render(&lit(ball(12, "smooth")));
     let flat = folder.render(&lit(ball(12, "flat")));
-    // The outline of the coarse ball lies up to 2 % within the round one of 47 pixels: only where both are is shading compared.
+    // The outline of the coarse ball lies up to 2 % within the round one of 47 pixels: only where both are is shading
+    // compared.
     let mean = |image: &steradian::film::Image| {
         let inside = |x: u32, y: u32| (x as f32 + 0.5 - 48.0).hypot(y as f32 + 0.5 - 48.0) < 45.0;
         let values = (0..96 * 96).map(|i| (i % 96, i / 96)).filter(|&(x, y)| inside(x, y)).map(|(x, y)| image.rgb(x, y).unwrap()[1]);
@@ -314,12 +318,14 @@ fn a_coarse_smooth_ball_is_shaded_like_a_round_one() {
     };
     let ratio = mean(&smooth) / mean(&round);
     assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
-    // Where all facets face the light, smooth shading has the slopes of the round ball, flat shading its steps from facet to facet.
+    // Where all facets face the light, smooth shading has the slopes of the round ball, flat shading its steps from
+    // facet to facet.
     let full_light = 0.8 * 3.0 / std::f32::consts::PI;
     let bright = |x: u32, y: u32| round.rgb(x, y).unwrap()[1] > 0.37 * full_light;
     let [of_round, of_smooth, of_flat] = [&round, &smooth, &flat].map(|image| largest_step(image, bright));
     assert!(of_smooth < 1.8 * of_round && of_flat > 3.0 * of_round, "{of_round} {of_smooth} {of_flat}");
-    // At the terminator a facet that turns away is dark: a step of what the normal at its corner still sees, which shrinks with the facets.
+    // At the terminator a facet that turns away is dark: a step of what the normal at its corner still sees, which
+    // shrinks with the facets.
     for n in [12u8, 96] {
         let image = folder.render(&lit(ball(n.into(), "smooth")));
         let half_facet = (0.5 * 2f32.sqrt() * 180.0 / f32::from(n)).to_radians();
@@ -358,9 +364,10 @@ fn creases_are_edges_and_what_is_flatter_is_smooth() {
     assert!(normal(&given).z < 0.85);
 }
 
-/// Which part of a mix a ray meets and whose normals it sees are one choice, on two-sided surfaces and in mixes of mixes too.
+/// Which part of a mix a ray meets and whose normals it sees are one choice, on two-sided surfaces and in mixes of
+/// mixes too.
 #[test]
-fn a_part_of_a_mix_brings_its_relief_along() {
+fn a_part_of_a_mix_keeps_its_relief() {
     let folder = Folder::new();
     save_normal(&folder, [0.6, 0.0, 0.8]);
     let materials = json!({

@@ -1,4 +1,5 @@
-//! Scenes far too small, too large or too far away for 32-bit coordinates: the same picture, layers in the scene's own units, or an error.
+//! Scenes far too small, too large or too far away for 32-bit coordinates: the same picture, layers in the scene's own
+//! units, or an error.
 
 use serde_json::{Value, json};
 use steradian::ErrorKind;
@@ -6,7 +7,7 @@ use steradian::film::{Image, LayerKind};
 
 use crate::bad_input::assert_error;
 use crate::util::folder::Folder;
-use crate::util::program::{run, told};
+use crate::util::program::{run, stderr_of};
 
 /// A scene of everything with lengths, `s` times as large and moved by `offset`.
 fn scene(s: f64, offset: [f64; 3]) -> Value {
@@ -192,7 +193,8 @@ fn coincident_faces_of_an_emitter_are_one() {
     assert_eq!(picture(json!([[0, 3, 1], [0, 1, 2]])), picture(json!([[0, 3, 1]])));
 }
 
-/// One warning with the number and the first two shapes where another accelerator may meet another surface; none where it does not matter.
+/// One warning with the number and the first two shapes where another accelerator may meet another surface; none where
+/// it does not matter.
 #[test]
 fn coincident_faces_that_differ_are_one_warning() {
     let folder = tempfile::tempdir().unwrap();
@@ -213,8 +215,8 @@ fn coincident_faces_that_differ_are_one_warning() {
         });
         std::fs::write(folder.path().join("faces.json"), scene.to_string()).unwrap();
         let output = run(folder.path(), "info faces.json");
-        assert!(output.status.success(), "{}", told(&output));
-        told(&output).lines().filter(|line| line.contains("coincide")).map(str::to_owned).collect::<Vec<_>>()
+        assert!(output.status.success(), "{}", stderr_of(&output));
+        stderr_of(&output).lines().filter(|line| line.contains("coincide")).map(str::to_owned).collect::<Vec<_>>()
     };
     let elsewhere = json!({ "type": "sphere", "radius": 0.1 });
     let two = |a: Value, b: Value| warnings(vec![elsewhere.clone(), a, b], vec![elsewhere.clone()]);

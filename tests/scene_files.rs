@@ -1,4 +1,4 @@
-//! What scene files say reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
+//! The content of scene files reaches the compiled scene: schema, transforms, meshes, materials, instances, lights.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
@@ -207,7 +207,7 @@ fn the_same_mesh_in_every_format_is_the_same() {
 }
 
 #[test]
-fn an_obj_brings_its_materials_and_lights_unless_one_is_given() {
+fn an_obj_has_its_materials_and_lights_unless_one_is_given() {
     let folder = Folder::new();
     folder.write("m.mtl", "newmtl wall\nKd 0.2 0.4 0.6\nnewmtl lamp\nKd 0 0 0\nKe 3 2 1\n");
     folder.write("m.obj", format!("mtllib m.mtl\n{}usemtl lamp\nf 1 2 3\nusemtl wall\nf 1 3 4\ng more\nf 2 3 5\n", pyramid_obj()));

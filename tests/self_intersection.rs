@@ -1,4 +1,5 @@
-//! Rays that leave a triangle do not find it again, however large or small it is; more of it is in group B of the stability catalogue.
+//! Rays that leave a triangle do not find it again, however large or small it is; more of it is in group B of the
+//! stability catalogue.
 
 use steradian::accel::EmbreeAccel;
 use steradian::id::PrimId;

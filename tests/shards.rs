@@ -1,4 +1,5 @@
-//! Shards: put together they are the picture of one run bit for bit, in every layer, and whatever does not belong together is refused by name.
+//! Shards: put together they are the picture of one run bit for bit, in every layer, and whatever does not belong
+//! together is refused by name.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -9,7 +10,7 @@ use steradian::render::{self, Overrides, Shard, StateFile};
 
 use crate::checkpoints::{Kit, channels, scene};
 
-/// Writes shards, and says where.
+/// Writes shards, and returns their files.
 fn written(kit: &Kit, folder: &Path, shards: impl IntoIterator<Item = Shard>) -> Vec<PathBuf> {
     let write = |shard: Shard| {
         let path = folder.join(format!("{}-of-{}.shard", shard.index, shard.count));
@@ -151,7 +152,8 @@ fn tiles_take_only_their_own_bytes() {
     }
 }
 
-/// Numbers of single precision over so many decades, split and added up again in any order: of one sign or of both, and in pairs that cancel.
+/// Numbers of single precision over a number of decades, split and added up again in any order: of one sign or of both,
+/// and in pairs that cancel.
 #[test]
 fn sums_do_not_depend_on_how_their_terms_are_split() {
     let mut rng = Rng::new(4);

@@ -1,4 +1,5 @@
-//! Where a coarse smooth mesh turns away from a light: shadow as soft as that of the surface it stands for, and no leaks instead.
+//! Where a coarse smooth mesh turns away from a light: shadow as soft as that of the surface it approximates, and no
+//! leaks instead.
 
 use serde_json::{Value, json};
 use steradian::film::Image;
@@ -6,7 +7,8 @@ use steradian::film::Image;
 use crate::util::geometry::Rng;
 use crate::util::render::{Estimate, merge, pixels, render};
 
-/// An octahedron whose triangles are divided into four so many times, on the unit sphere, with the sphere's normals.
+/// An octahedron whose triangles are divided into four a number of times, on the unit sphere, with the sphere's
+/// normals.
 fn ball(divisions: u32) -> Value {
     let signs = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0]];
     let octant = |s: [f64; 3]| [[s[0], 0.0, 0.0], [0.0, s[1], 0.0], [0.0, 0.0, s[2]]];
@@ -47,7 +49,8 @@ fn lit(shapes: Value, changes: Value) -> Value {
     scene
 }
 
-/// Relative squared error of a picture against that of the round ball, over the zone where the round ball's cosine to the light is below 0.35.
+/// Relative squared error of a picture against that of the round ball, over the zone where the round ball's cosine to
+/// the light is below 0.35.
 fn error_at_terminator(round: &Image, image: &Image) -> f64 {
     let pixel = 9.0 * 7f64.to_radians().tan() / 48.0;
     let (mut sum, mut count) = (0.0, 0);
@@ -67,7 +70,8 @@ fn error_at_terminator(round: &Image, image: &Image) -> f64 {
 #[test]
 fn a_coarse_smooth_ball_turns_away_from_light_like_a_round_one() {
     let round = render(&lit(json!([{ "type": "sphere", "material": "m" }]), json!({})));
-    // Dark facets give 0.28 for 32 triangles and 6e-3 for 128, and so does darkening by the factor for normal maps, or worse.
+    // Dark facets give 0.28 for 32 triangles and 6e-3 for 128, and so does darkening by the factor for normal maps, or
+    // worse.
     for (divisions, most) in [(1, 6e-3), (2, 6e-4)] {
         for integrator in ["path", "whitted"] {
             let image = render(&lit(json!([ball(divisions)]), json!({ "integrator": { "type": integrator } })));
@@ -85,8 +89,8 @@ fn a_coarse_smooth_ball_turns_away_from_light_like_a_round_one() {
     assert!(error < 6e-4, "{error}");
 }
 
-/// Rays to a light and rays that find it start in the same place: either way of finding a wide sun gives the same picture. Of independent
-/// differences over 2,304 pixels the mean is beyond 5.5 of its standard errors once in 2e7.
+/// Rays to a light and rays that find it start in the same place: either way of finding a wide sun gives the same
+/// picture. Of independent differences over 2,304 pixels the mean is beyond 5.5 of its standard errors once in 2e7.
 #[test]
 fn light_beyond_the_facet_is_the_same_sought_or_found() {
     let picture = |strategy: &str, seed: u64| {

@@ -5,7 +5,7 @@ mod accel_agreement;
 mod adaptive;
 /// Whatever a user gets wrong ends in one error with file and place.
 mod bad_input;
-/// Scenes that ask for more than can be rendered or written.
+/// Scenes beyond what can be rendered or written.
 mod bad_limits;
 /// The same for materials of several parts or many parameters.
 mod bad_materials;
@@ -21,9 +21,9 @@ mod bench_stability;
 mod cameras;
 /// Renders that go on where they were stopped.
 mod checkpoints;
-/// The program as a user runs it: exit codes, what it writes, what it says.
+/// The program as a user runs it: exit codes, files, messages.
 mod cli;
-/// Scenes written anew.
+/// Scenes written again.
 mod conversion;
 /// Surfaces with holes, the same ones for every accelerator and every kind of query.
 mod cutouts;
@@ -47,7 +47,8 @@ mod flaws_of_camera;
 mod flaws_of_glass;
 /// Known flaws of renderers in lights and light transport: each test fails on the flawed formula.
 mod flaws_of_light;
-/// Known flaws of renderers in textures and surfaces, beyond those of [`textures`] and [`relief`]: each test fails on the flawed formula.
+/// Known flaws of renderers in textures and surfaces, beyond those of [`textures`] and [`relief`]: each test fails on
+/// the flawed formula.
 mod flaws_of_textures;
 /// Sequences of frames from the command line.
 mod frames;
@@ -100,7 +101,7 @@ mod scene_files;
 mod self_intersection;
 /// Renders in parts, put together.
 mod shards;
-/// Shadow as soft on coarse smooth meshes as on what they stand for, without leaks.
+/// Shadow as soft on coarse smooth meshes as on the surfaces they approximate, without leaks.
 mod terminator;
 /// Images smaller in the picture than they are.
 mod texture_filtering;
@@ -114,5 +115,5 @@ mod trust;
 mod util;
 /// Colours of vertices: in pictures, from every kind of file, and what is refused.
 mod vertex_colors;
-/// What the command line says of how a picture is shown and focused.
+/// Options of the command line for view and focus.
 mod views;

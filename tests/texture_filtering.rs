@@ -23,8 +23,8 @@ fn folder() -> Folder {
     folder
 }
 
-/// A floor with the noise to the horizon. Its light comes from everywhere and is found by following the BSDF, so that nothing but the
-/// texture is noisy.
+/// A floor with the noise to the horizon. Its light comes from everywhere and is found by following the BSDF, so that
+/// nothing but the texture is noisy.
 fn floor(filter: &str, spp: u32, rest: Value) -> Value {
     let mut scene = json!({
         "film": { "width": 48, "height": 32, "filter": { "type": "box" } },

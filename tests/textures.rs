@@ -167,7 +167,8 @@ fn uv_are_numbers_at_poles_axes_and_origins() {
     }
 }
 
-/// A v that jumps from 1 to 0 at poles tears images; u from -1/4 to 3/4 with clamped images smears a quarter of the sphere.
+/// A v that jumps from 1 to 0 at poles tears images; u from -1/4 to 3/4 with clamped images smears a quarter of the
+/// sphere.
 #[test]
 fn u_runs_from_0_to_1_once_around_every_shape_and_v_once_along_it() {
     let folder = Folder::new();
@@ -309,7 +310,7 @@ fn images_of_any_size_and_number_of_channels_are_textures() {
     }
 }
 
-/// A uv of 100 does not stand for "no uv"; uv projected to a plane would be 0/0 for triangles upright to it.
+/// A uv of 100 does not mean "no uv"; uv projected to a plane would be 0/0 for triangles upright to it.
 #[test]
 fn triangles_show_their_part_of_the_image_however_they_stand() {
     let folder = Folder::new();

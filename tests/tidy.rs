@@ -83,7 +83,8 @@ fn sources(folders: &[&str]) -> Vec<Source> {
         .collect()
 }
 
-/// Modules with their layers, from the table at the top of `src/lib.rs`: a module imports only from lower layers, never sideways.
+/// Modules with their layers, from the table at the top of `src/lib.rs`: a module imports only from lower layers, never
+/// sideways.
 fn layers() -> HashMap<&'static str, u32> {
     let rows = include_str!("../src/lib.rs").lines().filter_map(|line| {
         let (layer, modules) = line.strip_prefix("//! | ")?.trim_end_matches(" |").split_once(" | ")?;
@@ -144,7 +145,7 @@ fn comments_fit_on_their_lines() {
 }
 
 #[test]
-fn unsafe_stays_in_its_home_and_says_why() {
+fn unsafe_stays_in_its_home_with_a_reason() {
     let mut faults = Vec::new();
     for source in sources(&["src"]) {
         let lines: Vec<&str> = source.text.lines().collect();

@@ -1,4 +1,5 @@
-//! What files may do: scenes, EXR files and project configuration set what a picture is; they load, overwrite and connect to nothing.
+//! What files may do: scenes, EXR files and project configuration set what a picture is; they load, overwrite and
+//! connect to nothing.
 
 use std::collections::BTreeSet;
 use std::net::TcpListener;
@@ -9,12 +10,12 @@ use steradian::desc::OutputDesc;
 use steradian::film::Image;
 use steradian::output::{self, RenderInfo};
 
-use crate::util::program::{SCENE, run, told};
+use crate::util::program::{SCENE, run, stderr_of};
 
 #[track_caller]
 fn assert_code(folder: &Path, arguments: &str, code: i32, parts: &[&str]) {
     let output = run(folder, arguments);
-    let text = told(&output);
+    let text = stderr_of(&output);
     assert_eq!(output.status.code(), Some(code), "{arguments}: {text}");
     for part in parts {
         assert!(text.contains(part), "{arguments}: {part} is not in: {text}");
@@ -88,7 +89,7 @@ fn forged_and_old_recipes_are_refused() {
 }
 
 #[test]
-fn rerender_writes_only_where_the_command_line_says() {
+fn rerender_writes_only_the_files_of_the_command_line() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     assert_code(dir, "render scene.json -q -o a.exr --threads 1", 0, &[]);
@@ -103,7 +104,8 @@ fn rerender_writes_only_where_the_command_line_says() {
     assert_code(dir, "rerender denoised.exr -o b.exr --oidn-library none.so", 4, &["none.so", "--oidn-library"]);
 }
 
-/// What else the picture depends on is in the recipe: definitions, and the frame of one scene or of a scene for each frame.
+/// What else the picture depends on is in the recipe: definitions, and the frame of one scene or of a scene for each
+/// frame.
 #[test]
 fn a_recipe_holds_how_the_scene_was_read() {
     let folder = tempfile::tempdir().unwrap();

@@ -62,10 +62,10 @@ fn a_square_shows_the_colours_between_its_corners() {
         let (x, y) = ((i % 16) as f32 / 8.0 + 1.0 / 16.0, 2.0 - ((i / 16) as f32 / 8.0 + 1.0 / 16.0));
         let (u, v) = (0.5 * x, 0.5 * y);
         // Both triangles have the diagonal from a to c.
-        let wanted = if u > v { a * (1.0 - u) + b * (u - v) + c * v } else { a * (1.0 - v) + c * u + d * (v - u) };
+        let expected = if u > v { a * (1.0 - u) + b * (u - v) + c * v } else { a * (1.0 - v) + c * u + d * (v - u) };
         // A pixel on the diagonal is a mean over both sides; elsewhere samples are spread evenly over it.
         let bound = if (u - v).abs() < 0.01 { 0.05 } else { 0.01 };
-        assert!((Vec3::from(found) - wanted).abs().max_element() < bound, "{i}: {found:?} for {wanted}");
+        assert!((Vec3::from(found) - expected).abs().max_element() < bound, "{i}: {found:?} for {expected}");
     }
 }
 
@@ -90,8 +90,8 @@ fn every_kind_of_file_gives_the_same_picture() {
     set(&mut scene, "instances", json!([{ "object": "o" }]));
     set(&mut scene, "textures.half", json!({ "type": "product", "factors": [{ "texture": "colors" }, 0.5] }));
     set(&mut scene, "materials.m.albedo", json!({ "texture": "half" }));
-    for (found, wanted) in pixels(&folder.render(&scene)).zip(&expected) {
-        assert!((2.0 * Vec3::from(found) - Vec3::from(*wanted)).abs().max_element() < 1e-4, "{found:?} for {wanted:?}");
+    for (found, expected) in pixels(&folder.render(&scene)).zip(&expected) {
+        assert!((2.0 * Vec3::from(found) - Vec3::from(*expected)).abs().max_element() < 1e-4, "{found:?} for {expected:?}");
     }
 }
 
@@ -174,12 +174,13 @@ fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
         scene
     };
     let shown = |scene: &Value| -> Vec<[f32; 3]> { pixels(&folder.render(scene)).collect() };
-    // Right and below the diagonal the first triangle with an area, else the second: the one without is left out with its values.
+    // Right and below the diagonal the first triangle with an area, else the second: the one without is left out with
+    // its values.
     let corners = |image: &[[f32; 3]]| [image[16 * 15 + 15], image[0]];
     let none = || json!({});
-    let is_near = |found: [[f32; 3]; 2], wanted: [[f32; 3]; 2], bound: f32| {
-        let near = found.as_flattened().iter().zip(wanted.as_flattened()).all(|(a, b)| (a - b).abs() < bound);
-        assert!(near, "{found:?} for {wanted:?}");
+    let is_near = |found: [[f32; 3]; 2], expected: [[f32; 3]; 2], bound: f32| {
+        let near = found.as_flattened().iter().zip(expected.as_flattened()).all(|(a, b)| (a - b).abs() < bound);
+        assert!(near, "{found:?} for {expected:?}");
     };
     is_near(corners(&shown(&scene("face_tint", none(), none()))), [[1.0, 0.0, 0.5], [0.0, 1.0, 0.5]], 1e-5);
     is_near(corners(&shown(&scene("face_b", none(), none()))), [[0.25; 3], [0.75; 3]], 1e-5);
@@ -201,12 +202,12 @@ fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
     set(&mut holes, "materials.m.albedo", json!(1));
     set(&mut holes, "sampler", json!({ "type": "independent", "spp": 64 }));
     let image = shown(&holes);
-    for (wanted, is_first) in [(0.25f32, true), (0.75, false)] {
+    for (expected, is_first) in [(0.25f32, true), (0.75, false)] {
         let of_half = |i: usize| (i % 16 > i / 16) == is_first && i % 16 != i / 16;
         let alike: Vec<f32> = (0..256).filter(|&i| of_half(16 * (15 - i / 16) + i % 16)).map(|i| image[i][0]).collect();
         let mean = alike.iter().sum::<f32>() / alike.len() as f32;
-        let deviation = (wanted * (1.0 - wanted) / (alike.len() * 64) as f32).sqrt();
-        assert!((mean - wanted).abs() < 5.5 * deviation, "{mean} for {wanted}");
+        let deviation = (expected * (1.0 - expected) / (alike.len() * 64) as f32).sqrt();
+        assert!((mean - expected).abs() < 5.5 * deviation, "{mean} for {expected}");
     }
 }
 

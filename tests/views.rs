@@ -1,4 +1,4 @@
-//! What the command line says of how a picture is shown and focused.
+//! Options of the command line for view and focus.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use steradian::color::srgb_from_linear;
 use steradian::film::LayerKind;
 use steradian::output::read_exr;
 
-use crate::util::program::{run, told};
+use crate::util::program::{run, stderr_of};
 
 fn run_ok(folder: &Path, arguments: &str) {
     let output = run(folder, arguments);
-    assert_eq!(output.status.code(), Some(0), "{arguments}: {}", told(&output));
+    assert_eq!(output.status.code(), Some(0), "{arguments}: {}", stderr_of(&output));
 }
 
 fn colors(file: &Path) -> Vec<f32> {
@@ -84,5 +84,5 @@ fn without_depth_of_field_a_lens_is_a_pinhole_and_the_file_remembers() {
     run_ok(dir, "render view.json -q --shard 1/2 -o 1.shard");
     run_ok(dir, "render view.json -q --shard 2/2 -o 2.shard --no-depth-of-field");
     let merged = run(dir, "merge 1.shard 2.shard -o p.exr");
-    assert!(merged.status.code() == Some(6) && told(&merged).contains("depth_of_field"), "{}", told(&merged));
+    assert!(merged.status.code() == Some(6) && stderr_of(&merged).contains("depth_of_field"), "{}", stderr_of(&merged));
 }

@@ -21,7 +21,7 @@ LAYERS = (
     "material_id,instance_id,crypto_object,crypto_material,crypto_asset"
 )
 PROFILES = ["default", "nuke", "blender", "multipart"]
-# Passes that a Blender file is to bring, and the kinds of their sockets.
+# Passes that a Blender file has to hold, and the kinds of their sockets.
 PASSES = {
     "Combined": "RGBA", "Alpha": "VALUE", "Depth": "VALUE", "Normal": "VECTOR", "Position": "VECTOR", "UV": "VECTOR",
     "Diffuse Direct": "RGBA", "Diffuse Indirect": "RGBA", "Glossy Direct": "RGBA", "Glossy Indirect": "RGBA",

@@ -4,7 +4,7 @@
     tools/kill_test.py [--kills 200] [--every 0.2] [--seed 1] [--binary target/release/steradian] [--scene scenes/cornell.json] [OPTION...]
 
 A render is started, killed with SIGKILL after a random time, and started again with --resume, until it ends; then comes the next one, until
-there were so many kills. Reported are
+that number of kills is reached. Reported are
 
 * lost: kills whose checkpoint was older than one interval (and the time of the start, if there was none in this run);
 * wrong: renders whose last state differs in any bit from that of a render that nobody killed (the blocks of the file: every sum, count and

@@ -20,7 +20,7 @@ def xyz(path):
 
 
 def samples(scene):
-    """Samples per pixel that the scene or a file it includes asks for."""
+    """Samples per pixel of the scene or a file it includes."""
     text = open(scene).read()
     for include in re.findall(r'<include filename="([^"]+)"', text):
         text += open(os.path.join(os.path.dirname(scene), include)).read()

@@ -4,7 +4,7 @@ zoom, pixel values, numbers, several tabs, and what is left when the program has
 
     tools/preview_test.py [STERADIAN] [--pictures FOLDER]
 
-Needs chromium and chromedriver (Debian: chromium, chromium-driver); without them it says so and ends with exit code 77."""
+Needs chromium and chromedriver (Debian: chromium, chromium-driver); without them it prints a message and ends with exit code 77."""
 
 import argparse
 import base64
@@ -143,7 +143,7 @@ def encoded(value, stops):
 
 
 def agx(light, stops):
-    """The byte that AgX makes of a colour's red, green and blue after so many stops, by the definition in src/output/view.rs."""
+    """The byte that AgX makes of a colour's red, green and blue after a number of stops, by the definition in src/output/view.rs."""
     shares = [0.2119946, 0.3921508, 0.3958546]
     light = [half(v) * 2**stops for v in light]
 
@@ -356,7 +356,7 @@ def main():
             render = Render(program, folder, "--spp", "100000", "--target-error", "1e-9", "--preview-hold", "--time-limit", "5")
             browser.open(render.url)
             eventually("the finished picture", lambda: status() == "finished" and version(browser) > 0)
-            assert float(number(browser, "Error")) >= 0 and float(number(browser, "Asked for")) == 1e-9
+            assert float(number(browser, "Error")) >= 0 and float(number(browser, "Target")) == 1e-9
             check_pixel(browser, render)
             render.process.kill()
             render.process.communicate()

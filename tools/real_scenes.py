@@ -55,7 +55,7 @@ def plain(xml, folder):
     text = re.sub(r'(name="filename"\s+value=")([^"/][^"]*)"', lambda m: m[1] + os.path.join(here, m[2]) + '"', text)
     text = text.replace('type="roughconductor"', 'type="conductor"').replace('name="diffuse_reflectance"', 'name="reflectance"')
     text = re.sub(r'type="(rough)?plastic"', 'type="diffuse"', text)
-    # What the new types do not know would be errors in Mitsuba.
+    # Parameters unknown to the new types would be errors in Mitsuba.
     text = re.sub(r'<(float|string|boolean|rgb) name="(alpha|distribution|nonlinear|int_ior|ext_ior|specular_reflectance)"[^>]*/>', "", text)
     out = os.path.join(folder, "plain.xml")
     open(out, "w").write(text)

@@ -40,7 +40,8 @@ impl Model {
     }
 }
 
-/// A lumpy body with two ears in 8 `cells`² triangles of about one size, as scans have: an octahedron divided and blown up.
+/// A lumpy body with two ears in 8 `cells`² triangles of about one size, as scans have: an octahedron divided and blown
+/// up.
 pub fn hare(cells: u32) -> Model {
     let surface = |d: Vec3| {
         let ear = |at: Vec3| 0.7 * (-60.0 * (1.0 - d.dot(at.normalize()))).exp();
@@ -87,8 +88,8 @@ pub fn hills(cells: u32) -> Model {
     Model::new("hills", positions, triangles)
 }
 
-/// The scans `bunny.ply` and `dragon_res2.ply`, those of them that are in the folder `STERADIAN_SCANS` (default: `scenes/scans`, which
-/// `scenes/get_scans.sh` fills).
+/// The scans `bunny.ply` and `dragon_res2.ply`, those of them that are in the folder `STERADIAN_SCANS` (default:
+/// `scenes/scans`, which `scenes/get_scans.sh` fills).
 pub fn scans() -> Vec<Model> {
     let default = || concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/scans").into();
     let folder: PathBuf = std::env::var_os("STERADIAN_SCANS").map_or_else(default, PathBuf::from);

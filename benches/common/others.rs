@@ -10,7 +10,7 @@ use obvhs::ray::RayHit;
 use steradian::geometry::Mesh;
 use steradian::math::Ray;
 
-/// Answers what the benchmarks ask.
+/// Traces the rays of the benchmarks.
 pub trait Other {
     /// The triangle hit first, and its distance.
     fn closest(&self, ray: &Ray) -> Option<(u32, f32)>;
@@ -62,7 +62,7 @@ impl BvhCrate {
 
     fn distance(ray: &Ray, of: &bvh::ray::Ray<f32, 3>, triangle: &BvhTriangle, scale: f32) -> Option<f32> {
         let [a, b, c] = &triangle.corners;
-        // Its test culls one side, so both orders are asked; its rays are normalised.
+        // Its test culls one side, so both orders are traced; its rays are normalised.
         let t = of.intersects_triangle(a, b, c).distance.min(of.intersects_triangle(a, c, b).distance) * scale;
         (t.is_finite() && t >= ray.t_min && t <= ray.t_max).then_some(t)
     }

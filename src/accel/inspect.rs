@@ -1,4 +1,4 @@
-//! What can be said of an accelerator beside its answers: its structure, and the work a ray costs.
+//! Statistics of an accelerator: its structure, and the work per ray.
 
 use crate::geometry::Hit;
 use crate::id::{InstanceId, PrimId, ShapeId};
@@ -72,10 +72,10 @@ pub trait Inspect {
     /// Calls `visit` for every node, parents before children, children of one node in order.
     fn visit_nodes(&self, visit: &mut dyn FnMut(&NodeInfo));
 
-    /// [`intersect`](super::Accelerator::intersect) with the same answer, adding its work to `counts`.
+    /// [`intersect`](super::Accelerator::intersect) with the same result, adding its work to `counts`.
     fn intersect_counted(&self, ray: &Ray, counts: &mut TraversalCounts) -> Option<Hit>;
 
-    /// [`occluded`](super::Accelerator::occluded) with the same answer, adding its work to `counts`.
+    /// [`occluded`](super::Accelerator::occluded) with the same result, adding its work to `counts`.
     fn occluded_counted(&self, ray: &Ray, counts: &mut TraversalCounts) -> bool;
 }
 
@@ -100,9 +100,9 @@ pub struct StructureStats {
     pub references: u64,
     /// The most items in one leaf.
     pub max_leaf: u64,
-    /// Expected work of a random line that meets the first tree's root: the sum over its nodes of area over the root's area, times
-    /// [`SAH_NODE_COST`], plus for each item of a leaf [`SAH_PRIM_COST`] (Goldsmith and Salmon, "Automatic Creation of
-    /// Object Hierarchies for Ray Tracing").
+    /// Expected work of a random line that meets the first tree's root: the sum over its nodes of area over the root's
+    /// area, times [`SAH_NODE_COST`], plus for each item of a leaf [`SAH_PRIM_COST`] (Goldsmith and Salmon, "Automatic
+    /// Creation of Object Hierarchies for Ray Tracing").
     pub sah_cost: f64,
 }
 

@@ -13,7 +13,8 @@ use super::{Accelerator, EmbreeAccel, EmbreeOptions, EmbreeQuality, LinearAccel,
 use crate::error::Result;
 use crate::geometry::Geometry;
 
-/// An accelerator with its options. Its name, also when serialized, is `KIND` or `KIND:OPTION+OPTION`; [`AccelKind::CHOICES`] lists both.
+/// An accelerator with its options. Its name, also when serialized, is `KIND` or `KIND:OPTION+OPTION`;
+/// [`AccelKind::CHOICES`] lists both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum AccelKind {

@@ -1,4 +1,5 @@
-//! Every primitive of every shape for every ray: slow, and right by inspection. The other accelerators are tested against it.
+//! Every primitive of every shape for every ray: slow, and right by inspection. The other accelerators are tested
+//! against it.
 
 use super::Accelerator;
 use crate::geometry::{Geometry, Hit, Shape, TriangleHit, TriangleRay};
@@ -62,7 +63,8 @@ impl Accelerator for LinearAccel<'_> {
             let mut triangle_ray = TriangleRay::from(&local);
             for &id in ids {
                 for prim in self.prims(id) {
-                    // One float beyond the best hit, so that a hit which rounds to the same distance takes part in the tie.
+                    // One float beyond the best hit, so that a hit which rounds to the same distance is compared as a
+                    // tie.
                     local.t_max = closest.map_or(ray.t_max, |best| best.t.next_up().min(ray.t_max));
                     triangle_ray.t_max = f64::from(local.t_max);
                     let Some(hit) = self.test(&local, &triangle_ray, key, Primitive { id, prim, instance }) else { continue };

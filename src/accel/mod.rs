@@ -1,4 +1,4 @@
-//! Accelerators: which primitive does a ray meet first, and does it meet any? They know bounds, counts and ids, nothing of materials.
+//! Accelerators: closest-hit and any-hit queries. They work on bounds, counts and ids, without materials.
 
 mod bvh;
 mod embree;
@@ -28,18 +28,18 @@ use inspect::Inspect;
 /// Which rays of a batch belong together, so that an accelerator may trace them side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {
-    /// Every run of 16 rays starts at nearly one point and points nearly one way: camera rays of a pixel block, or shadow rays from there
-    /// to a small light. A wrong promise costs more than it saves.
+    /// Every run of 16 rays starts at nearly one point and points nearly one way: camera rays of a pixel block, or
+    /// shadow rays from there to a small light. A wrong hint costs more than it saves.
     Coherent,
     /// Nothing is known.
     Incoherent,
 }
 
-/// Answers ray queries on a fixed geometry.
+/// Ray queries on a fixed geometry.
 ///
-/// All entry points accept any ray: one that is not [valid](Ray::is_valid) hits nothing. The answer to a ray of a batch may depend, within
-/// rounding, on the other rays of its run of 16 (such as which of two triangles a ray through their common edge hits); that of a single ray
-/// depends on nothing else.
+/// All entry points accept any ray: one that is not [valid](Ray::is_valid) hits nothing. The result for a ray of a
+/// batch may depend, within rounding, on the other rays of its run of 16 (such as which of two triangles a ray through
+/// their common edge hits); that of a single ray depends on nothing else.
 pub trait Accelerator: Send + Sync {
     /// The closest hit within the ray's interval.
     fn intersect(&self, ray: &Ray) -> Option<Hit>;

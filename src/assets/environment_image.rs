@@ -8,7 +8,7 @@ use std::path::Path;
 use exr::meta::header::Header;
 
 use super::AssetError;
-use crate::file::exr_blocks::{Place, Row, pixel_count, read_rows};
+use crate::file::exr_blocks::{ChannelRow, Place, pixel_count, read_rows};
 use crate::file::exr_headers::read_headers;
 
 /// Pixels row by row from the top, linear RGB.
@@ -46,12 +46,12 @@ fn read_exr(path: &Path) -> Result<RgbImage, AssetError> {
         Some([r?, g?, b?].map(|channel| Place { part, channel }))
     };
     let flat = headers.iter().enumerate().filter(|(_, header)| !header.deep);
-    let wanted = flat.filter_map(choose).next().ok_or_else(|| malformed(&"there are no channels R, G and B"))?;
-    let header = &headers[wanted[0].part];
-    // The size is believed only after a look: memory is asked for before any pixel is read.
+    let requested = flat.filter_map(choose).next().ok_or_else(|| malformed(&"there are no channels R, G and B"))?;
+    let header = &headers[requested[0].part];
+    // The size is checked first: memory is allocated before any pixel is read.
     let mut pixels = vec![[0.0; 3]; pixel_count(header).map_err(|e| malformed(&e))?];
-    let keep = |row: Row| row.write(pixels[row.start..].iter_mut().map(|pixel| &mut pixel[row.wanted]), |v| v);
-    read_rows(BufReader::new(source), &headers, &wanted, false, keep).map_err(|e| malformed(&e))?;
+    let keep = |row: ChannelRow| row.write(pixels[row.start..].iter_mut().map(|pixel| &mut pixel[row.requested]), |v| v);
+    read_rows(BufReader::new(source), &headers, &requested, false, keep).map_err(|e| malformed(&e))?;
     Ok(RgbImage { width: header.layer_size.width(), height: header.layer_size.height(), pixels })
 }
 

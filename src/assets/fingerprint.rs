@@ -45,7 +45,7 @@ pub fn files_of_obj(path: &Path) -> Result<BTreeSet<PathBuf>, AssetError> {
             continue;
         }
         let text = read(&mtl)?;
-        // A malformed one is refused when the scene is compiled.
+        // A malformed one is rejected when the scene is compiled.
         let maps = take_maps(&String::from_utf8_lossy(&text), mtl.parent().unwrap_or(Path::new(""))).map(|(_, maps)| maps);
         for maps in maps.unwrap_or_default().into_values() {
             let all = [maps.diffuse, maps.bump, maps.normal, maps.opacity, maps.specular, maps.emission];

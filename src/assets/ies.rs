@@ -9,9 +9,11 @@ use super::AssetError;
 pub struct IesData {
     /// Angles from the nadir in degrees, at least two, strictly increasing within `[0, 180]`.
     pub vertical: Vec<f32>,
-    /// Angles of planes about the nadir in degrees, strictly increasing: a single 0, from 0 to 90, 180 or 360, or from 90 to 270.
+    /// Angles of planes about the nadir in degrees, strictly increasing: a single 0, from 0 to 90, 180 or 360, or from
+    /// 90 to 270.
     pub horizontal: Vec<f32>,
-    /// Candela, all multipliers applied, finite and not negative: for each horizontal angle, one for each vertical angle.
+    /// Candela, all multipliers applied, finite and not negative: for each horizontal angle, one for each vertical
+    /// angle.
     pub candela: Vec<f32>,
 }
 
@@ -139,7 +141,7 @@ fn parse(text: &str) -> Result<IesData, String> {
         candela.push(value);
     }
     if let Some((line, word)) = numbers.words.next() {
-        return Err(format!("line {line}: \"{word}\" is more than the angles ask for"));
+        return Err(format!("line {line}: \"{word}\" is beyond the number of values that the angles require"));
     }
     Ok(IesData { vertical, horizontal, candela })
 }

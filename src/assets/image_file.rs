@@ -10,14 +10,14 @@ use image::{DynamicImage, ImageFormat, ImageReader};
 
 use super::AssetError;
 use super::jpeg_check::is_whole_jpeg;
-use crate::file::exr_blocks::{Place, Row, read_rows};
+use crate::file::exr_blocks::{ChannelRow, Place, read_rows};
 use crate::file::exr_headers::check_claims;
 use crate::image_data::{ImageData, Samples};
 
 /// More pixels than any texture has; a header that claims more is damaged, or means harm.
 pub(super) const MAX_PIXELS: u64 = 1 << 28;
 
-/// Reads an image file, of the kind that its first bytes say (TGA, which has no mark: that its name says).
+/// Reads an image file, of the format of its first bytes (TGA, which has no magic number: of its extension).
 ///
 /// # Errors
 /// If the file is missing, malformed, cut short, of another kind, or has more than 2^28 pixels or none.
@@ -47,7 +47,7 @@ fn read_bytes(bytes: &[u8], is_tga: bool) -> Result<ImageData, AssetError> {
     }
 }
 
-/// Refuses sizes that no image has, before memory is asked for.
+/// Rejects sizes that no image has, before memory is allocated.
 pub(super) fn check_size(width: usize, height: usize) -> Result<(), String> {
     let pixels = (width as u64).saturating_mul(height as u64);
     match pixels {
@@ -57,7 +57,8 @@ pub(super) fn check_size(width: usize, height: usize) -> Result<(), String> {
     }
 }
 
-/// The most pixels that a byte of a file can encode, where the format has a bound: a header alone never leads to a large allocation.
+/// The most pixels that a byte of a file can encode, where the format has a bound: a header alone never leads to a
+/// large allocation.
 fn pixels_per_byte(format: ImageFormat) -> u64 {
     match format {
         // Deflate makes at most 1,032 bytes of one, and a byte may hold eight pixels.
@@ -128,16 +129,17 @@ fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
         _ => return Err(AssetError::Malformed("the EXR image has several channels, but neither R, G and B nor Y".into())),
     };
     chosen.extend(find("A"));
-    let wanted: Vec<Place> = chosen.iter().map(|&channel| Place { part, channel }).collect();
+    let requested: Vec<Place> = chosen.iter().map(|&channel| Place { part, channel }).collect();
     let (width, height, channels) = (size.width(), size.height(), chosen.len());
-    let read = |keep: &mut dyn FnMut(Row)| read_rows(Cursor::new(bytes), &headers, &wanted, false, keep).map_err(|e| malformed(&e));
+    let read =
+        |keep: &mut dyn FnMut(ChannelRow)| read_rows(Cursor::new(bytes), &headers, &requested, false, keep).map_err(|e| malformed(&e));
     let samples = if chosen.iter().all(|&channel| all[channel].sample_type == SampleType::F16) {
         let mut out = vec![f16::ZERO; width * height * channels];
-        read(&mut |row| row.write(out[channels * row.start + row.wanted..].iter_mut().step_by(channels), f16::from_f32))?;
+        read(&mut |row| row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), f16::from_f32))?;
         Samples::F16(out)
     } else {
         let mut out = vec![0.0; width * height * channels];
-        read(&mut |row| row.write(out[channels * row.start + row.wanted..].iter_mut().step_by(channels), |v| v))?;
+        read(&mut |row| row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), |v| v))?;
         in_half_if_exact(out)
     };
     Ok(ImageData { width, height, channels, samples })

@@ -1,10 +1,11 @@
-//! Whether a JPEG file is whole: decoders fill what is missing with grey and say nothing.
+//! Whether a JPEG file is whole: decoders silently fill what is missing with grey.
 
 /// Whether the segments of a JPEG file (ISO/IEC 10918-1, annex B) lead to its end mark.
 pub fn is_whole_jpeg(bytes: &[u8]) -> bool {
     let mut at = 2;
     loop {
-        // A mark is one or more bytes 0xff, then its code. Within entropy-coded data, 0 and the restart marks D0 to D7 are no segments.
+        // A mark is one or more bytes 0xff, then its code. Within entropy-coded data, 0 and the restart marks D0 to D7
+        // are no segments.
         let Some(mark) = bytes.get(at..).and_then(|rest| rest.windows(2).position(is_segment)) else {
             return false;
         };

@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::Error;
 
-/// Why an asset cannot be used; the caller knows where the scene names it.
+/// Why an asset cannot be used; the caller adds the place in the scene.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
     /// The file does not exist or cannot be read.

@@ -109,7 +109,8 @@ fn parse_map(words: SplitWhitespace, line: &str, folder: &Path) -> Result<ObjMap
         }
     }
     let first = words.next().ok_or("no file is named")?;
-    // A word of the rest may also stand among the options: the name starts at its last occurrence that the rest of the words follow.
+    // A word of the rest may also stand among the options: the name starts at its last occurrence that the rest of the
+    // words follow.
     let rest: Vec<&str> = std::iter::once(first).chain(words).collect();
     let start = line.rmatch_indices(first).map(|(at, _)| at).find(|&at| line[at..].split_whitespace().eq(rest.iter().copied()));
     let name = line[start.unwrap_or(0)..].trim().replace('\\', "/");
@@ -130,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn files_and_options_are_told_apart() {
+    fn files_and_options_are_distinguished() {
         let plain = maps("  map_Kd wall.png").diffuse.unwrap();
         assert_eq!((plain.file, plain.scale, plain.clamp), ("textures/wall.png".into(), [1.0; 2], false));
         let all = maps("map_Kd -blendu on -s 2 3 1 -o 0.5 -clamp on -imfchan r -mm 0 1 old\\my wall.png").diffuse.unwrap();

@@ -1,4 +1,5 @@
-//! OBJ files with their MTL: one mesh for each material. Colours behind the positions of vertices are sRGB, as exporters write them.
+//! OBJ files with their MTL: one mesh for each material. Colours behind the positions of vertices are sRGB, as
+//! exporters write them.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -11,7 +12,7 @@ use super::{AssetError, MeshData};
 use crate::color::linear_from_srgb;
 use crate::file;
 
-/// What an MTL says of a material that is used here.
+/// The parameters of an MTL material that are supported.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjMaterial {
     /// Name.
@@ -43,8 +44,8 @@ pub struct ObjMesh {
     pub material: Option<ObjMaterial>,
 }
 
-/// Reads an OBJ file; with `materials`, also the MTL files it names. Polygons become fans; points and lines are left out. Of a file with
-/// vertices and no faces the result is one mesh without triangles.
+/// Reads an OBJ file; with `materials`, also the MTL files it names. Polygons become fans; points and lines are left
+/// out. Of a file with vertices and no faces the result is one mesh without triangles.
 ///
 /// # Errors
 /// If a file is missing or malformed, a face refers to what does not exist, or there are neither vertices nor faces.

@@ -1,4 +1,4 @@
-//! What must be known of OBJ and MTL text before it is parsed: the parser trusts indices and counts of numbers.
+//! Checks of OBJ and MTL text before it is parsed: the parser does not check indices and counts of numbers.
 
 use std::str::SplitWhitespace;
 

@@ -17,7 +17,8 @@ use super::{AssetError, MeshData};
 use crate::attribute::{AttributeValues, VERTEX_COLOR};
 use crate::color::linear_from_srgb;
 
-/// Reads a PLY file with all of its attributes. One with no faces, such as a cloud of points, is a mesh without triangles.
+/// Reads a PLY file with all of its attributes. One with no faces, such as a cloud of points, is a mesh without
+/// triangles.
 ///
 /// # Errors
 /// If the file is missing, malformed, ends early, or has no element `vertex`, or faces without a list `vertex_indices`.
@@ -29,9 +30,9 @@ pub fn read_ply(path: &Path) -> Result<MeshData, AssetError> {
 ///
 /// # Errors
 /// As of [`read_ply`].
-pub fn read_ply_attributes(path: &Path, wanted: Option<&BTreeSet<String>>) -> Result<MeshData, AssetError> {
+pub fn read_ply_attributes(path: &Path, requested: Option<&BTreeSet<String>>) -> Result<MeshData, AssetError> {
     let file = crate::file::open(path).map_err(|e| AssetError::missing(path, &e))?;
-    parse_with(BufReader::with_capacity(1 << 20, file), wanted)
+    parse_with(BufReader::with_capacity(1 << 20, file), requested)
 }
 
 /// Names of the list of a face's vertices.
@@ -53,7 +54,7 @@ fn read_vertices(
     reader: &mut Reader<impl BufRead>,
     header: &Header,
     element: &ElementDef,
-    wanted: Option<&BTreeSet<String>>,
+    requested: Option<&BTreeSet<String>>,
     mesh: &mut MeshData,
 ) -> Result<Vec<[f64; 3]>, AssetError> {
     let mut wide = Vec::new();
@@ -61,8 +62,8 @@ fn read_vertices(
         return Err(AssetError::Malformed(format!("the vertices have no property {axis}")));
     }
     let is_wide = is_wide(element);
-    let (marked, mut columns) = columns(element, "vertex_", wanted);
-    let mut colors = colors(element, VERTEX_COLOR, wanted);
+    let (marked, mut columns) = columns(element, "vertex_", requested);
+    let mut colors = colors(element, VERTEX_COLOR, requested);
     read_elements(reader, &marked, header, |_, vertices: Vec<Vertex>| {
         if is_wide {
             wide.extend(vertices.iter().map(|v| v.position));
@@ -82,12 +83,12 @@ fn read_faces(
     reader: &mut Reader<impl BufRead>,
     header: &Header,
     element: &ElementDef,
-    wanted: Option<&BTreeSet<String>>,
+    requested: Option<&BTreeSet<String>>,
     mesh: &mut MeshData,
 ) -> Result<(), AssetError> {
     let mut negative = None;
-    let (marked, mut columns) = columns(element, "face_", wanted);
-    let mut colors = colors(element, FACE_COLOR, wanted);
+    let (marked, mut columns) = columns(element, "face_", requested);
+    let mut colors = colors(element, FACE_COLOR, requested);
     read_elements(reader, &marked, header, |first, faces: Vec<Face>| {
         for (i, face) in faces.iter().enumerate() {
             negative = negative.or(face.negative.map(|bad| (first + i, bad)));
@@ -105,7 +106,7 @@ fn read_faces(
     Ok(())
 }
 
-fn parse_with(source: impl BufRead, wanted: Option<&BTreeSet<String>>) -> Result<MeshData, AssetError> {
+fn parse_with(source: impl BufRead, requested: Option<&BTreeSet<String>>) -> Result<MeshData, AssetError> {
     let mut reader = Reader::new(crate::file::skip_mark(source).map_err(|e| malformed("", &e))?);
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(|e| malformed("", &e))?;
     let mut mesh = MeshData::default();
@@ -116,8 +117,8 @@ fn parse_with(source: impl BufRead, wanted: Option<&BTreeSet<String>>) -> Result
             continue;
         }
         match name.as_str() {
-            "vertex" => wide = read_vertices(&mut reader, &header, element, wanted, &mut mesh)?,
-            "face" => read_faces(&mut reader, &header, element, wanted, &mut mesh)?,
+            "vertex" => wide = read_vertices(&mut reader, &header, element, requested, &mut mesh)?,
+            "face" => read_faces(&mut reader, &header, element, requested, &mut mesh)?,
             _ => read_elements(&mut reader, element, &header, |_, _: Vec<DefaultElement>| ())?,
         }
     }
@@ -182,16 +183,16 @@ fn take_vertices(mesh: &mut MeshData, vertices: &[Vertex], element: &ElementDef)
 }
 
 /// The attributes of an element, and the element with their properties marked.
-fn columns(element: &ElementDef, prefix: &str, wanted: Option<&BTreeSet<String>>) -> (ElementDef, Vec<(Column, AttributeValues)>) {
-    let columns = ply_attributes::columns(element, prefix, wanted);
+fn columns(element: &ElementDef, prefix: &str, requested: Option<&BTreeSet<String>>) -> (ElementDef, Vec<(Column, AttributeValues)>) {
+    let columns = ply_attributes::columns(element, prefix, requested);
     (ply_attributes::marked(element, &columns), columns.into_iter().map(|column| (column.clone(), column.values())).collect())
 }
 
-/// A list for the colours of an element, if it has any and they are wanted.
-fn colors(element: &ElementDef, name: &str, wanted: Option<&BTreeSet<String>>) -> Option<Vec<[f32; 3]>> {
+/// A list for the colours of an element, if it has any and `requested` includes them.
+fn colors(element: &ElementDef, name: &str, requested: Option<&BTreeSet<String>>) -> Option<Vec<[f32; 3]>> {
     let has = |names: [&str; 3]| names.iter().all(|name| element.properties.contains_key(*name));
-    let is_wanted = wanted.is_none_or(|wanted| wanted.contains(name));
-    (is_wanted && (has(["red", "green", "blue"]) || has(["r", "g", "b"]))).then(Vec::new)
+    let is_requested = requested.is_none_or(|requested| requested.contains(name));
+    (is_requested && (has(["red", "green", "blue"]) || has(["r", "g", "b"]))).then(Vec::new)
 }
 
 /// Adds attributes to a mesh. Colours come before others of their name.

@@ -32,9 +32,9 @@ impl Column {
     }
 }
 
-/// The attributes of an element, those in `wanted` or (without it) all: consecutive numbers whose names differ in a last letter behind an
-/// underscore, one or three of them. Of several with the same name, the first.
-pub fn columns(element: &ElementDef, prefix: &str, wanted: Option<&BTreeSet<String>>) -> Vec<Column> {
+/// The attributes of an element, those in `requested` or (without it) all: consecutive numbers whose names differ in a
+/// last letter behind an underscore, one or three of them. Of several with the same name, the first.
+pub fn columns(element: &ElementDef, prefix: &str, requested: Option<&BTreeSet<String>>) -> Vec<Column> {
     struct Group<'a> {
         stem: &'a str,
         endings: &'static str,
@@ -67,7 +67,7 @@ pub fn columns(element: &ElementDef, prefix: &str, wanted: Option<&BTreeSet<Stri
     };
     let mut found: Vec<Column> = Vec::new();
     for column in groups.into_iter().filter(|group| matches!(group.properties.len(), 1 | 3)).map(column) {
-        if wanted.is_none_or(|wanted| wanted.contains(&column.name)) && !found.iter().any(|other| other.name == column.name) {
+        if requested.is_none_or(|requested| requested.contains(&column.name)) && !found.iter().any(|other| other.name == column.name) {
             found.push(column);
         }
     }
@@ -99,7 +99,8 @@ pub fn is_marked(name: &str) -> bool {
     name.starts_with(MARK)
 }
 
-/// Adds the numbers of one vertex or face, in the order of the file, to the values of the attributes; those that are missing are 0.
+/// Adds the numbers of one vertex or face, in the order of the file, to the values of the attributes; those that are
+/// missing are 0.
 pub fn push(columns: &mut [(Column, AttributeValues)], numbers: &[f32], times: usize) {
     let mut numbers = numbers.iter().copied();
     let mut next = || numbers.next().unwrap_or_default();

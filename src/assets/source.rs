@@ -13,7 +13,7 @@ pub struct SceneSource {
     pub file: PathBuf,
     /// What is named like a file and has none.
     pub assets: Arc<Assets>,
-    /// Where the file of another renderer says what became `shapes[0]` and so on.
+    /// The places in the file of another renderer that became `shapes[0]` and so on.
     pub places: Arc<BTreeMap<String, String>>,
 }
 

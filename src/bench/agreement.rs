@@ -33,9 +33,9 @@ pub struct Agreement {
 pub struct Disagreement {
     /// For `--ray`: origin, direction, `t_min`, `t_max`, time.
     pub ray: String,
-    /// What the oracle says.
+    /// The oracle's hit.
     pub expected: String,
-    /// What the accelerator says.
+    /// The accelerator's hit.
     pub found: String,
 }
 
@@ -131,9 +131,9 @@ fn classify(geometry: &Geometry, ray: &Ray, a: Option<&Hit>, b: Option<&Hit>) ->
     }
 }
 
-/// Whether two hits of `ray` lie at the same distance within rounding. A triangle test in `f32` subtracts the origin from the corners: 4
-/// roundoffs of the largest of these differences, seen along the normal, so over the cosine with it; and each `t` is rounded itself, 16
-/// roundoffs in all. Through an instance the origin is rounded on its way.
+/// Whether two hits of `ray` lie at the same distance within rounding. A triangle test in `f32` subtracts the origin
+/// from the corners: 4 roundoffs of the largest of these differences, seen along the normal, so over the cosine with
+/// it; and each `t` is rounded itself, 16 roundoffs in all. Through an instance the origin is rounded on its way.
 pub fn within_bound(geometry: &Geometry, ray: &Ray, a: &Hit, b: &Hit) -> bool {
     let length = f64::from(ray.direction.length());
     let slack = |hit: &Hit| {
@@ -145,7 +145,8 @@ pub fn within_bound(geometry: &Geometry, ray: &Ray, a: &Hit, b: &Hit) -> bool {
     (f64::from(a.t) - f64::from(b.t)).abs() <= slack(a) + slack(b)
 }
 
-/// The largest distance along an axis from the ray's origin to a corner of the triangle hit, in its own space; zero on analytic shapes.
+/// The largest distance along an axis from the ray's origin to a corner of the triangle hit, in its own space; zero on
+/// analytic shapes.
 fn reach(geometry: &Geometry, ray: &Ray, hit: &Hit) -> f64 {
     let Shape::Mesh(mesh) = geometry.shape(hit.shape) else { return 0.0 };
     let points = mesh.triangle_points_at(hit.prim, ray.time);
@@ -154,7 +155,7 @@ fn reach(geometry: &Geometry, ray: &Ray, hit: &Hit) -> f64 {
     f64::from(far[0].max(far[1]).max(far[2]))
 }
 
-/// What an answer says, for people.
+/// A hit as text.
 pub fn describe(hit: Option<&Hit>) -> String {
     let Some(hit) = hit else { return "no hit".into() };
     let instance = if hit.instance == Hit::NO_INSTANCE { String::new() } else { format!(" instance {}", hit.instance.0) };

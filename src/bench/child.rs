@@ -22,22 +22,22 @@ pub struct Ended {
     /// Seconds from its start to its end.
     pub seconds: f64,
     /// What it wrote to standard output.
-    pub said: String,
+    pub stdout: String,
     /// The end of what it wrote to standard error, in one line.
-    pub complained: String,
+    pub stderr: String,
 }
 
 /// Runs a command, with a text on its standard input; `None` if `stop` came first, after which nothing of it runs.
 pub fn run(command: &mut Command, input: Option<&str>, stop: &AtomicBool) -> Result<Option<Ended>, String> {
     let folder = tempfile::tempdir().map_err(|e| format!("no folder for its files: {e}"))?;
-    let [asked, said, complained] = ["stdin", "stdout", "stderr"].map(|name| folder.path().join(name));
+    let [input_file, output_file, error_file] = ["stdin", "stdout", "stderr"].map(|name| folder.path().join(name));
     let fault = |path: &Path, e: std::io::Error| format!("{}: {e}", path.display());
     let create = |path: &Path| File::create(path).map_err(|e| fault(path, e));
     let stdin = match input {
         None => Stdio::null(),
         Some(text) => {
-            create(&asked)?.write_all(text.as_bytes()).map_err(|e| fault(&asked, e))?;
-            File::open(&asked).map_err(|e| fault(&asked, e))?.into()
+            create(&input_file)?.write_all(text.as_bytes()).map_err(|e| fault(&input_file, e))?;
+            File::open(&input_file).map_err(|e| fault(&input_file, e))?.into()
         }
     };
     let start = Instant::now();
@@ -45,14 +45,14 @@ pub fn run(command: &mut Command, input: Option<&str>, stop: &AtomicBool) -> Res
         // Of its own, so that all of it can be ended.
         .process_group(0)
         .stdin(stdin)
-        .stdout(create(&said)?)
-        .stderr(create(&complained)?)
+        .stdout(create(&output_file)?)
+        .stderr(create(&error_file)?)
         .spawn()
         .map_err(|e| format!("it cannot be started: {e}"))?;
     let Some(status) = wait(&mut child, stop).map_err(|e| e.to_string())? else { return Ok(None) };
     let seconds = start.elapsed().as_secs_f64();
     let text = |path: &Path| String::from_utf8_lossy(&std::fs::read(path).unwrap_or_default()).into_owned();
-    Ok(Some(Ended { status, seconds, said: text(&said), complained: tail(&text(&complained)) }))
+    Ok(Some(Ended { status, seconds, stdout: text(&output_file), stderr: tail(&text(&error_file)) }))
 }
 
 /// Waits for the end; `None` if `stop` came first.
@@ -85,10 +85,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_command_reads_its_input_and_tells_how_it_ended() {
+    fn a_command_reads_its_input_and_returns_its_status() {
         let ended = run(Command::new("sh").args(["-c", "cat; echo no >&2; exit 3"]), Some("a text"), &AtomicBool::new(false));
         let ended = ended.unwrap().unwrap();
-        assert_eq!((ended.status.code(), ended.said.as_str(), ended.complained.as_str()), (Some(3), "a text", "no"));
+        assert_eq!((ended.status.code(), ended.stdout.as_str(), ended.stderr.as_str()), (Some(3), "a text", "no"));
         assert_eq!(tail(&"ab ".repeat(1000)).chars().count(), TAIL);
     }
 

@@ -1,4 +1,5 @@
-//! End-point overlap of a bounding volume hierarchy (Aila, Karras, Laine, "On Quality Metrics of Bounding Volume Hierarchies").
+//! End-point overlap of a bounding volume hierarchy (Aila, Karras, Laine, "On Quality Metrics of Bounding Volume
+//! Hierarchies").
 
 use std::collections::HashMap;
 
@@ -18,8 +19,8 @@ struct Node {
     next: usize,
 }
 
-/// The sum over all nodes of the area of the surfaces that lie in the node's box but not in its subtree, over the area of all surfaces,
-/// times the node's cost. `None` unless the scene is one level of triangles, each in one leaf.
+/// The sum over all nodes of the area of the surfaces that lie in the node's box but not in its subtree, over the area
+/// of all surfaces, times the node's cost. `None` unless the scene is one level of triangles, each in one leaf.
 pub fn end_point_overlap(geometry: &Geometry, accel: &dyn Inspect) -> Option<f64> {
     let is_mesh = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if !mesh.is_deforming());
     let count: usize = geometry.shapes.iter().map(Shape::prim_count).sum();

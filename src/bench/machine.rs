@@ -57,7 +57,8 @@ fn instruction_set() -> &'static str {
     std::env::consts::ARCH
 }
 
-/// Forgets the highest memory use so far, so that [`memory_in_use`] tells that since now. False where the system cannot.
+/// Forgets the highest memory use so far, so that [`memory_in_use`] gives the highest since now. False where the system
+/// cannot.
 pub fn reset_peak_memory() -> bool {
     fs::write("/proc/self/clear_refs", "5").is_ok()
 }

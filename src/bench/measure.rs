@@ -15,7 +15,7 @@ use crate::geometry::Geometry;
 use crate::math::rows::BATCH;
 use crate::math::{Ray, RayRows};
 
-/// What is asked of a benchmark.
+/// Options of a benchmark.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The accelerators.
@@ -63,7 +63,7 @@ pub struct SceneReport {
 pub struct AccelReport {
     /// Its name with options.
     pub name: String,
-    /// What it says of itself.
+    /// Its own description.
     pub description: String,
     /// Builds, for each number of threads.
     pub builds: Vec<BuildReport>,
@@ -107,8 +107,8 @@ pub struct StructureReport {
     pub max_leaf: u64,
     /// Cost by the surface area heuristic: 1 for a node, 1 for a primitive.
     pub sah_cost: f64,
-    /// End-point overlap, of hierarchies whose items are in one leaf each: expected nodes and primitives opened in vain around a point of a
-    /// surface.
+    /// End-point overlap, of hierarchies whose items are in one leaf each: expected nodes and primitives opened in vain
+    /// around a point of a surface.
     pub epo: Option<f64>,
 }
 
@@ -137,7 +137,7 @@ pub enum Mode {
     Single,
     /// In batches of which nothing is known.
     Batch,
-    /// In batches that promise coherence; camera rays only.
+    /// In batches with the coherence hint; camera rays only.
     CoherentBatch,
 }
 
@@ -266,7 +266,8 @@ fn build<'g>(kind: AccelKind, geometry: &'g Geometry, primitives: usize, options
     Ok((report, accel))
 }
 
-/// The accelerator that stands in for the oracle on rays that would take the oracle too long: one of ours, which is checked against it.
+/// The accelerator that stands in for the oracle on rays that would take the oracle too long: one of ours, which is
+/// checked against it.
 fn choose_oracle(accels: &[Measured]) -> Option<usize> {
     accels.iter().position(|(report, accel)| accel.inspect().is_some() && report.name.starts_with("bvh"))
 }
@@ -289,7 +290,7 @@ struct Replay<'a> {
 }
 
 impl Replay<'_> {
-    /// The number of rays of a set that take so many primitive tests one by one.
+    /// The number of rays of a set that a linear loop traces with `tests` primitive tests.
     fn affordable(&self, set: &RaySet, tests: u64) -> usize {
         ((tests / self.primitives.max(1) as u64) as usize).clamp(16, set.rays.len().max(16)).min(set.rays.len())
     }
@@ -380,7 +381,7 @@ fn work_per_ray(inspect: &dyn Inspect, rays: &[Ray], any_hit: bool) -> [f64; 2] 
     [work.nodes, work.prims].map(|n| n as f64 / rays.len().max(1) as f64)
 }
 
-/// How an accelerator can be asked. Only Embree traces the rays of a batch side by side.
+/// The queries of an accelerator. Only Embree traces the rays of a batch in packets.
 fn modes(kind: RayKind, accel: &str) -> &'static [Mode] {
     match (accel.starts_with("embree"), kind) {
         (true, RayKind::Camera) => &[Mode::Single, Mode::Batch, Mode::CoherentBatch],

@@ -7,8 +7,8 @@ use crate::geometry::{Geometry, Mesh, Shape};
 use crate::id::ShapeId;
 use crate::math::DVec3;
 
-/// A sphere of radius about 1 with bumps of several sizes, of `triangles` triangles if that number is even and has a factor near its square
-/// root, else of about as many.
+/// A sphere of radius about 1 with bumps of several sizes, of `triangles` triangles if that number is even and has a
+/// factor near its square root, else of about as many.
 pub fn bumpy_sphere(triangles: usize) -> Mesh {
     checked(bumpy_sphere_data(triangles))
 }
@@ -88,7 +88,8 @@ fn checked(data: MeshData) -> Mesh {
     Mesh::new(data.positions, data.triangles, None, None).unwrap_or_else(|e| unreachable!("{e}"))
 }
 
-/// Slices and bands with `2 * slices * bands` equal or near to `triangles`, the first no more than four times the second.
+/// Slices and bands with `2 * slices * bands` equal or near to `triangles`, the first no more than four times the
+/// second.
 fn slices_and_bands(triangles: usize) -> [usize; 2] {
     let cells = (triangles / 2).max(9);
     let root = cells.isqrt();
@@ -103,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn meshes_have_the_number_of_triangles_that_was_asked_for() {
+    fn meshes_have_the_requested_number_of_triangles() {
         for count in [968, 1_000, 10_000, 70_000, 100_000] {
             assert_eq!(bumpy_sphere(count).triangles().len(), count);
         }

@@ -1,4 +1,5 @@
-//! Accelerators compared on the same rays: record, replay, check, report; error against time; cost as scenes grow; and numerical stability.
+//! Accelerators compared on the same rays: record, replay, check, report; error against time; cost as scenes grow; and
+//! numerical stability.
 
 pub mod agreement;
 mod child;
@@ -21,10 +22,10 @@ pub use measure::{AccelReport, BuildReport, KindReport, Mode, Options, RateRepor
 pub use mesh::{bumpy_sphere, head};
 pub use naive::{MatrixLinear, NaiveBvh, NaiveKdTree, NaiveOctree};
 pub use record::{RayKind, RaySet, record};
-pub use reports::{Comparison, FrameTiming, ReportsOptions, ReportsReport, Row, bench_reports};
+pub use reports::{Comparison, ComparisonRow, FrameTiming, ReportsOptions, ReportsReport, bench_reports};
 pub use scaling::{Fit, ScalingPoint, ScalingReport, bench_scaling, fit, fitted_slope};
 
-/// Is told what a benchmark is doing, and may end it.
+/// Receives the progress of a benchmark, and may end it.
 pub trait Watch: Sync {
     /// A step begins.
     fn step(&self, what: &str);
@@ -33,7 +34,7 @@ pub trait Watch: Sync {
     fn is_stopped(&self) -> bool;
 }
 
-/// Tells nobody and never ends a benchmark.
+/// Ignores progress and never ends a benchmark.
 #[cfg(test)]
 struct Unwatched;
 

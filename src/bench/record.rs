@@ -63,14 +63,15 @@ pub struct RaySet {
     pub rays: Vec<Ray>,
 }
 
-/// Renders the scene with one sample a pixel on one thread and keeps up to about `count` rays of each kind, taken evenly in runs of 16 from
-/// the whole picture. Kinds that do not occur are left out. The rays depend on the scene and on `count` alone.
+/// Renders the scene with one sample a pixel on one thread and keeps up to about `count` rays of each kind, taken
+/// evenly in runs of 16 from the whole picture. Kinds that do not occur are left out. The rays depend on the scene and
+/// on `count` alone.
 ///
 /// # Errors
 /// As a render.
 pub fn record(scene: &Scene, accel: &dyn Accelerator, settings: &Settings, count: usize) -> Result<Vec<RaySet>> {
     let [width, height] = settings.size.map(f64::from);
-    // About as many pixels as rays are wanted, in the picture's own shape.
+    // About as many pixels as rays are requested, with the picture's aspect ratio.
     let scale = (count as f64 / (width * height)).sqrt();
     let size = [width, height].map(|side| ((side * scale).round() as u32).clamp(1, 1 << 15));
     let mut settings = Settings {
@@ -110,8 +111,8 @@ fn thin(rays: &[Ray], count: usize) -> Vec<Ray> {
     if rays.len() <= count {
         return rays.to_vec();
     }
-    let (runs, wanted) = (rays.len() / RUN, (count / RUN).max(1));
-    (0..wanted).flat_map(|i| rays[i * runs / wanted * RUN..].iter().take(RUN)).copied().collect()
+    let (runs, selected) = (rays.len() / RUN, (count / RUN).max(1));
+    (0..selected).flat_map(|i| rays[i * runs / selected * RUN..].iter().take(RUN)).copied().collect()
 }
 
 /// Keeps a copy of the rays. One thread at a time: which bounce a batch belongs to follows from the batches before it.

@@ -22,7 +22,8 @@ pub struct ReportsOptions {
     pub size: [u32; 2],
     /// Frames of each accelerator, in turn.
     pub rounds: usize,
-    /// Triangle tests that one frame may cost; where every triangle is tested, smaller frames are measured and their times scaled up.
+    /// Triangle tests that one frame may cost; where every triangle is tested, smaller frames are measured and their
+    /// times scaled up.
     pub tests: u64,
 }
 
@@ -39,19 +40,19 @@ pub struct Comparison {
     pub title: &'static str,
     /// Triangles of the mesh.
     pub triangles: usize,
-    /// What the report says.
+    /// The figures of the report.
     pub claim: &'static str,
     /// Where the figures and the setting are from, or that they are inferred.
     pub sources: Vec<String>,
     /// Accelerators in the order of the table.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ComparisonRow>,
     /// Why the ratios are what they are.
     pub reasons: Vec<String>,
 }
 
 /// One accelerator.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct ComparisonRow {
     /// Its name.
     pub name: String,
     /// The figure of the report, if it has one.
@@ -242,7 +243,7 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
         "Inferred: 1200x800 pixels, as in the first comparison; the report names no size, and a ratio per sample does not depend on it.".into(),
     ];
     if let [linear, wrong, right, _, ours, _] = &comparison.rows[..] {
-        let tests = |row: &Row| row.tests_per_ray.unwrap_or(f64::NAN);
+        let tests = |row: &ComparisonRow| row.tests_per_ray.unwrap_or(f64::NAN);
         comparison.reasons = vec![
             format!(
                 "The report's leaves exchange first and count, so a leaf of n triangles from place i tests i triangles from place n on: {:.0} \
@@ -274,7 +275,7 @@ fn compare(title: &'static str, mesh: &Mesh, entries: &[Entry], options: &Report
     let benchmark = FrameBenchmark { title, mesh, entries, options, watch };
     let [normals, paths] = [Kind::Normals, Kind::Paths].map(|kind| measure(benchmark, kind));
     let (normals, paths) = (normals?, paths?);
-    let rows = entries.iter().zip(normals).zip(paths).map(|((Entry(name, reported, ..), of_normals), of_paths)| Row {
+    let rows = entries.iter().zip(normals).zip(paths).map(|((Entry(name, reported, ..), of_normals), of_paths)| ComparisonRow {
         name: (*name).to_owned(),
         reported: *reported,
         build_milliseconds: of_normals.build_milliseconds,

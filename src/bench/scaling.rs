@@ -148,7 +148,8 @@ mod tests {
         assert!(fitted_slope(&points[..1]).is_none());
         let exact = fit(&points).unwrap().standard_error.unwrap();
         assert!(exact < 1e-12 && fit(&points[..2]).unwrap().standard_error.is_none());
-        // Three logarithms off a line by 1, -2 and 1 times ln 2: the sum of squares is 6 (ln 2)², that of x is 2 (ln 10)².
+        // Three logarithms off a line by 1, -2 and 1 times ln 2: the sum of squares is 6 (ln 2)², that of x is 2 (ln
+        // 10)².
         let off: Vec<_> = points.iter().zip([2.0, 0.25, 2.0]).map(|((x, y), factor)| (*x, y * factor)).collect();
         let expected = 3f64.sqrt() * 2f64.ln() / 10f64.ln();
         assert!((fit(&off).unwrap().standard_error.unwrap() - expected).abs() < 1e-12);

@@ -50,8 +50,8 @@ impl Blades {
     }
 }
 
-/// The third of `1 / focal_length = 1 / sensor_distance + 1 / focus_distance` from the focal length and one of the distances; `None` if
-/// nothing is in focus: the distance given is not above the focal length.
+/// The third of `1 / focal_length = 1 / sensor_distance + 1 / focus_distance` from the focal length and one of the
+/// distances; `None` if nothing is in focus: the distance given is not above the focal length.
 pub fn lens_equation(focal_length: f64, distance: f64) -> Option<f64> {
     (distance > focal_length).then(|| focal_length * distance / (distance - focal_length))
 }

@@ -28,8 +28,8 @@ pub enum Projection {
         /// Half the picture's height in world units, above 0.
         half_height: f64,
     },
-    /// Every direction: columns are the azimuth about +Y, rows the angle from +Y, laid out as in environment lights (the middle of the
-    /// picture is -Z, +X lies at three quarters of the width).
+    /// Every direction: columns are the azimuth about +Y, rows the angle from +Y, laid out as in environment lights
+    /// (the middle of the picture is -Z, +X lies at three quarters of the width).
     Environment,
 }
 
@@ -38,7 +38,8 @@ pub enum Projection {
 pub struct Framing {
     /// Width of a pixel over its height, above 0.
     pub pixel_aspect: f64,
-    /// By how much of its width and height the picture is moved to the right and up, as by a lens that is moved against its film.
+    /// By how much of its width and height the picture is moved to the right and up, as by a lens that is moved against
+    /// its film.
     pub shift: [f64; 2],
 }
 
@@ -48,8 +49,9 @@ impl Default for Framing {
     }
 }
 
-/// A camera that looks along its local -Z with +Y up. It is placed in the scene's [render space](RenderSpace), which is the world unless
-/// [`in_render_space`](Self::in_render_space) made it another; there are its rays and the points it is given.
+/// A camera that looks along its local -Z with +Y up. It is placed in the scene's [render space](RenderSpace), which is
+/// the world unless [`in_render_space`](Self::in_render_space) made it another; there are its rays and the points it is
+/// given.
 #[derive(Clone, Debug)]
 pub struct Camera {
     /// At the opening of the shutter, if the camera moves.
@@ -83,7 +85,8 @@ impl Camera {
         Self { framing, ..self }
     }
 
-    /// This camera, which does not see what is nearer than `near`: in depth along the view axis, or in distance for an environment camera.
+    /// This camera, which does not see what is nearer than `near`: in depth along the view axis, or in distance for an
+    /// environment camera.
     #[must_use]
     pub fn with_near(self, near: f64) -> Self {
         Self { near, ..self }
@@ -185,8 +188,8 @@ impl Camera {
         }
     }
 
-    /// The ray through `film`, in pixels from the upper left corner of a picture of `size` pixels, from the point of the lens that `lens_u`
-    /// (in the unit square) chooses, at a [time](Self::time). The direction is unit.
+    /// The ray through `film`, in pixels from the upper left corner of a picture of `size` pixels, from the point of
+    /// the lens that `lens_u` (in the unit square) chooses, at a [time](Self::time). The direction is unit.
     #[inline]
     pub fn ray(&self, film: Vec2, size: [u32; 2], lens_u: [f32; 2], time: f32) -> Ray {
         let (mut origin, direction) = match &self.projection {
@@ -255,7 +258,8 @@ impl Camera {
         DVec3::new(x, y, -1.0)
     }
 
-    /// Depth of a point in world units at the [time of a ray](Ray::time): along the view axis, or the distance from an environment camera.
+    /// Depth of a point in world units at the [time of a ray](Ray::time): along the view axis, or the distance from an
+    /// environment camera.
     #[inline]
     pub fn depth(&self, p: DVec3, time: f32) -> f32 {
         let local = match &self.motion {
@@ -287,7 +291,8 @@ fn moved(motion: &Motion, time: f32, point: DVec3, vector: DVec3) -> (DVec3, DVe
     (map.transform_point3(point), map.transform_vector3(vector))
 }
 
-/// The unit direction of a point of a lat-long picture. Above the upper edge the picture goes on over the pole, as filters need it.
+/// The unit direction of a point of a lat-long picture. Above the upper edge the picture goes on over the pole, as
+/// filters need it.
 #[inline(never)]
 fn everywhere(film: Vec2, size: [u32; 2]) -> DVec3 {
     let azimuth = TAU * (f64::from(film.x) / f64::from(size[0]) - 0.5);

@@ -6,13 +6,15 @@ use super::{Camera, Projection};
 use crate::math::{DAffine3, DVec2, DVec3, Vec2};
 
 impl Camera {
-    /// The point of a picture of `size` pixels, in pixels from its upper left corner, where the camera shows the world point `p` at the
-    /// [time of a ray](crate::math::Ray::time); with a lens, the middle of where it does. `None` for what is not in front of the camera.
+    /// The point of a picture of `size` pixels, in pixels from its upper left corner, where the camera shows the world
+    /// point `p` at the [time of a ray](crate::math::Ray::time); with a lens, the middle of where it does. `None` for
+    /// what is not in front of the camera.
     pub fn film_point(&self, p: DVec3, size: [u32; 2], time: f32) -> Option<DVec2> {
         self.film_of(self.camera_from_world(time).transform_point3(p), size)
     }
 
-    /// [`film_point`](Self::film_point) of what lies infinitely far away in a direction; `None` for an orthographic camera too.
+    /// [`film_point`](Self::film_point) of what lies infinitely far away in a direction; `None` for an orthographic
+    /// camera too.
     pub fn film_direction(&self, direction: DVec3, size: [u32; 2], time: f32) -> Option<DVec2> {
         match self.projection {
             Projection::Orthographic { .. } => None,

@@ -25,7 +25,8 @@ fn corners_of_a_wide_picture_span_the_field_of_view() {
 
 #[test]
 fn pictures_that_are_not_square_are_not_stretched() {
-    // Steps of a pixel to the right and down are equally long on the picture; one angle on both axes makes them differ by the aspect.
+    // Steps of a pixel to the right and down are equally long on the picture; one angle on both axes makes them differ
+    // by the aspect.
     let on_picture = |x: f32, y: f32| {
         let d = direction(&camera(None), x, y);
         d / -d.z

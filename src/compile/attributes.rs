@@ -24,20 +24,20 @@ struct Taken {
 impl MaterialTable {
     /// What textures of a surface take. `material` is what the scene calls its material.
     fn taken(&self, surface: &PreparedSurface, material: Option<&str>) -> Vec<Taken> {
-        let PreparedSurface { look, emission, .. } = surface;
+        let PreparedSurface { binding, emission, .. } = surface;
         let of = |id: TextureId, by: &str, largest: f32| {
             let taken = move |(id, scale)| Taken { by: by.to_owned(), id, scale, largest };
             self.textures.get(id).attributes().into_iter().map(taken).collect::<Vec<_>>()
         };
         let found = RefCell::new(Vec::new());
         let by = format!("the material \"{}\"", material.unwrap_or_default());
-        self.any_part(look.material, &|id| {
+        self.any_part(binding.material, &|id| {
             let textures = self.materials[id.index()].textures();
             found.borrow_mut().extend(textures.into_iter().flat_map(|texture| of(texture, &by, 1.0)));
             false
         });
         let mut found = found.into_inner();
-        found.extend(look.opacity.into_iter().flat_map(|id| of(id, "the opacity", 1.0)));
+        found.extend(binding.opacity.into_iter().flat_map(|id| of(id, "the opacity", 1.0)));
         // Products with the radiance stay finite.
         let largest = |radiance: Rgb| f32::MAX / radiance.max_channel().max(1.0);
         found.extend(emission.iter().flat_map(|PreparedEmission { emission, .. }| {
@@ -48,7 +48,7 @@ impl MaterialTable {
 }
 
 impl Builder {
-    /// Refuses a surface that takes attributes which its shape does not have, or with values that make no sense; drops
+    /// Rejects a surface that takes attributes which its shape does not have, or with values that make no sense; drops
     /// those that it does not take.
     pub(super) fn check_attributes(
         &self,
@@ -84,7 +84,7 @@ impl Builder {
     }
 }
 
-/// Refuses attributes with more or fewer values than vertices or triangles.
+/// Rejects attributes with more or fewer values than vertices or triangles.
 pub fn check_counts(attributes: &BTreeMap<String, AttributeValues>, vertices: usize, triangles: usize) -> std::result::Result<(), String> {
     for (name, values) in attributes {
         let (count, what) = if is_of_faces(name) == Some(true) { (triangles, "triangles") } else { (vertices, "vertices") };

@@ -9,7 +9,7 @@ use crate::math::{DAffine3, DMat3, DVec3, Motion, RenderSpace, Transform};
 
 const DEFAULT_FOV_DEGREES: f64 = 40.0;
 
-/// Blades beyond this number cannot be told from a disk.
+/// Blades beyond this number cannot be distinguished from a disk.
 const MAX_BLADES: u32 = 64;
 
 /// The camera, placed by a rotation and a translation.
@@ -230,7 +230,8 @@ mod tests {
         // Not 2 f / N, which is four times as large.
         let given = lens(r#"{ "f_number": 2, "focal_length": 0.05, "focus_distance": 4 }"#);
         assert!((given.radius - 0.0125).abs() < 1e-15);
-        // The focal length of the lens that the picture is taken with: 90 degrees on a sensor 0.1 high are 0.05 from sensor to lens.
+        // The focal length of the lens that the picture is taken with: 90 degrees on a sensor 0.1 high are 0.05 from
+        // sensor to lens.
         let derived = lens(r#"{ "f_number": 2, "sensor_height": 0.1, "focus_distance": 4 }"#);
         let f = 1.0 / (1.0 / 0.05 + 1.0 / 4.0);
         assert!((derived.radius - f / 4.0).abs() < 1e-15 && derived.focus_distance == 4.0);

@@ -33,7 +33,7 @@ impl CompileContext {
         if within { Ok(point) } else { Err(self.error(path, format!("{value:?}: coordinates are at most {most:e}"))) }
     }
 
-    /// Refuses a world point that is too far away to be placed beside the scene's shapes.
+    /// Rejects a world point that is too far away to be placed beside the scene's shapes.
     pub(super) fn reachable(&self, path: &str, world: DVec3, space: &RenderSpace) -> Result<()> {
         if space.point(world).abs().max_element() <= FARTHEST {
             return Ok(());

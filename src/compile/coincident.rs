@@ -1,4 +1,4 @@
-//! Triangles of different looks in one place: which of them a ray meets is left to the accelerator.
+//! Triangles of different materials in one place: which of them a ray meets is left to the accelerator.
 
 use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelExtend, ParallelIterator};
 
@@ -20,7 +20,7 @@ struct Coincident {
 }
 
 impl Builder {
-    /// One warning of all triangles that lie exactly where others do and differ from them in orientation or look.
+    /// One warning of all triangles that lie exactly where others do and differ from them in orientation or material.
     pub(super) fn warn_of_coincident(&self) {
         let materials = &self.materials.materials;
         let look_alike = |a: ShapeId, b: ShapeId| {
@@ -141,7 +141,7 @@ struct Marks {
 }
 
 impl Marks {
-    /// For so many keys, with so many bits for each.
+    /// For a number of keys, with a number of bits for each.
     fn new(keys: usize, bits: usize) -> Self {
         let log = (keys * bits).next_power_of_two().trailing_zeros().clamp(6, 32);
         Self { words: vec![0; 1 << (log - 6)], shift: 32 - log }

@@ -95,7 +95,8 @@ impl MaterialTable {
         self.add(compiler, desc, part, outer)
     }
 
-    /// A material below a coat: one that consists of others becomes one that consists of coated others, each coated once.
+    /// A material below a coat: one that consists of others becomes one that consists of coated others, each coated
+    /// once.
     fn coated(&mut self, id: MaterialId, coating: &Coating, done: &mut HashMap<MaterialId, MaterialId>) -> Material {
         match self.materials[id.index()].clone() {
             Material::Mix { first, second, amount } => {
@@ -127,7 +128,7 @@ impl MaterialTable {
 
     /// That neither a material nor a part of it has a relief.
     fn check_no_relief(&self, compiler: &Compiler, place: &str, name: &str, id: MaterialId) -> Result<()> {
-        if self.any_part(id, &|id| self.relief_of(id).is_some()) {
+        if self.any_part(id, &|id| self.normal_perturbation_of(id).is_some()) {
             return Err(compiler.files.error(place, format!("\"{name}\" has a relief of its own")));
         }
         Ok(())
@@ -135,7 +136,7 @@ impl MaterialTable {
 
     /// Whether something is true of a material or of a part of it.
     pub(super) fn any_part(&self, id: MaterialId, is: &impl Fn(MaterialId) -> bool) -> bool {
-        // Parts of several parts are looked at once.
+        // Parts of several parts are visited once.
         let (mut open, mut seen) = (vec![id], HashSet::from([id]));
         while let Some(id) = open.pop() {
             if is(id) {

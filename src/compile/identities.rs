@@ -62,7 +62,7 @@ impl IdentityTable {
     pub fn shape(&mut self, files: &CompileContext, number: usize, desc: &ShapeDesc) -> ShapeIdentity {
         let common = desc.common();
         let stem = match desc {
-            // Data in place of a file has no name that users know.
+            // Inline data in place of a file has no name in the scene.
             ShapeDesc::Mesh(mesh) => mesh.file.as_deref().filter(|file| !files.source.assets.meshes.contains_key(*file)),
             _ => None,
         };

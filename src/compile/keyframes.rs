@@ -64,7 +64,8 @@ impl CompileContext {
         Ok(Motion::keyframed(&times.iter().copied().zip(maps).collect::<Vec<_>>()))
     }
 
-    /// The point that the steps before the first rotation move to the origin: the centre of rotation. The origin if keyframes disagree.
+    /// The point that the steps before the first rotation move to the origin: the centre of rotation. The origin if
+    /// keyframes disagree.
     fn pivot(&self, path: &str, lists: &[&TransformDesc]) -> Result<DVec3> {
         let mut pivot: Option<DVec3> = None;
         for list in lists {
@@ -109,8 +110,8 @@ fn angles(column: &Column) -> Option<Angles> {
     found.map(|axis| Angles { axis, degrees })
 }
 
-/// The steps of all lists side by side, if they are of the same kinds in the same order. A rotation or a scale that a list lacks changes
-/// nothing there.
+/// The steps of all lists side by side, if they are of the same kinds in the same order. A rotation or a scale that a
+/// list lacks changes nothing there.
 fn columns<'a>(lists: &[&'a TransformDesc]) -> Option<Vec<Column<'a>>> {
     let longest = lists.iter().max_by_key(|list| list.0.len())?;
     let mut columns: Vec<Column> = vec![Vec::with_capacity(lists.len()); longest.0.len()];

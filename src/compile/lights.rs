@@ -16,7 +16,8 @@ use crate::light::{
 use crate::math::{DAffine3, DMat3, DVec3, RenderSpace, Vec2};
 use crate::texture::Texture;
 
-/// The most letters of a group's name: names of channels have at most 255 in OpenEXR, of which `light_` and the channel take some.
+/// The most letters of a group's name: names of channels have at most 255 in OpenEXR, of which `light_` and the channel
+/// take some.
 const MOST_LETTERS: usize = 240;
 
 /// All lights so far, with their groups.

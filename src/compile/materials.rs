@@ -34,7 +34,7 @@ pub struct MaterialTable {
     pub(super) medium_of: HashMap<MaterialId, Medium>,
 }
 
-/// How a shape looks: what a material of the scene file comes to.
+/// The compiled material of a shape.
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialBinding {
     pub material: MaterialId,
@@ -83,8 +83,8 @@ impl MaterialTable {
         name: &'a str,
         outer: &mut Vec<&'a str>,
     ) -> Result<MaterialId> {
-        if let Some(look) = self.names.get(name) {
-            return Ok(look.material);
+        if let Some(binding) = self.names.get(name) {
+            return Ok(binding.material);
         }
         let path = format!("materials.{name}");
         let material = match self.composite(compiler, desc, name, outer)? {
@@ -92,14 +92,16 @@ impl MaterialTable {
             None => compiler.material(&path, &desc.materials[name])?,
         };
         let medium = match &desc.materials[name] {
-            MaterialDesc::Relief { material, .. } => self.names.get(material).and_then(|look| self.medium_of.get(&look.material)).copied(),
+            MaterialDesc::Relief { material, .. } => {
+                self.names.get(material).and_then(|binding| self.medium_of.get(&binding.material)).copied()
+            }
             plain => self.medium_within(compiler.files, &path, &material)?.or(compiler.medium(&path, plain)?),
         };
         let id = self.push(material);
         self.medium_of.extend(medium.map(|medium| (id, medium)));
         let normal_perturbation = compiler
             .normal_perturbation(desc, &path, &desc.materials[name])?
-            .map(|normal_perturbation| self.push_relief(normal_perturbation));
+            .map(|normal_perturbation| self.push_normal_perturbation(normal_perturbation));
         self.by_material.extend(normal_perturbation.map(|normal_perturbation| (id, normal_perturbation)));
         self.names.insert(name.to_owned(), MaterialBinding { normal_perturbation, ..MaterialBinding::plain(id) });
         Ok(id)
@@ -111,11 +113,11 @@ impl MaterialTable {
         MaterialId::new(self.materials.len() - 1)
     }
 
-    /// Whether a surface without uv cannot look so.
-    pub fn needs_uv(&self, look: &MaterialBinding) -> bool {
-        let cut_out = look.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
-        let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.relief_of(id).is_some();
-        cut_out || look.normal_perturbation.is_some() || self.any_part(look.material, &needs)
+    /// Whether a surface with it needs uv.
+    pub fn needs_uv(&self, binding: &MaterialBinding) -> bool {
+        let cut_out = binding.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
+        let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.normal_perturbation_of(id).is_some();
+        cut_out || binding.normal_perturbation.is_some() || self.any_part(binding.material, &needs)
     }
 
     fn has_texture(&self, id: MaterialId, is: impl Fn(&Texture) -> bool) -> bool {
@@ -123,11 +125,11 @@ impl MaterialTable {
     }
 
     /// Whether a surface's normals come from a normal map.
-    pub fn has_normal_map(&self, look: &MaterialBinding) -> bool {
+    pub fn has_normal_map(&self, binding: &MaterialBinding) -> bool {
         let is_map = |normal_perturbation: Option<NormalPerturbationId>| {
             normal_perturbation.is_some_and(|id| matches!(self.normal_perturbations[id.index()], NormalPerturbation::NormalMap { .. }))
         };
-        is_map(look.normal_perturbation) || self.any_part(look.material, &|id| is_map(self.relief_of(id)))
+        is_map(binding.normal_perturbation) || self.any_part(binding.material, &|id| is_map(self.normal_perturbation_of(id)))
     }
 
     /// The material of a name, or the default.
@@ -275,7 +277,7 @@ impl Compiler<'_> {
         })
     }
 
-    /// Two colours that do not exceed 1 together; of textures only the lookup can tell.
+    /// Two colours that do not exceed 1 together; textures are checked only when they are looked up.
     fn sum_to_one(&self, path: &str, [a, b]: [&str; 2], [x, y]: [&ColorDesc; 2]) -> Result<[ColorInput; 2]> {
         let inputs = [self.color(&format!("{path}.{a}"), x)?, self.color(&format!("{path}.{b}"), y)?];
         if let [ColorInput::Constant(x), ColorInput::Constant(y)] = inputs
@@ -375,11 +377,11 @@ pub struct MtlSurface {
     pub radiance: Option<Rgb>,
 }
 
-/// The nearest material for what an MTL says: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
-/// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic otherwise; everything else
-/// is diffuse with Kd.
+/// The nearest material for an MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
+/// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic
+/// otherwise; everything else is diffuse with Kd.
 ///
-/// The error says which number makes no sense.
+/// The error names the invalid number.
 pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
     let fault = |key: &str, value: &dyn Debug, must: &str| Err(format!("material \"{}\": {key} {value:?} must be {must}", mtl.name));
     for (key, color) in [("Kd", mtl.diffuse), ("Ks", mtl.specular)] {

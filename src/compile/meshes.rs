@@ -167,8 +167,8 @@ pub fn refusal(files: &CompileContext, path: &str, file: Option<&str>, message: 
     }
 }
 
-/// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the front. Triangles
-/// without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
+/// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the
+/// front. Triangles without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
 pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<MeshData>, placement: Placement) -> Result<Option<Mesh>> {
     let refuse = |error: MeshError| refusal(files, path, placement.file, error.to_string());
     let count = data.positions.len();
@@ -227,8 +227,8 @@ pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<Mesh
     Ok(Some(mesh))
 }
 
-/// Gives a placed mesh the normals of its shading, at each of its times; splits vertices where there are creases, and then
-/// says what each was.
+/// Gives a placed mesh the normals of its shading, at each of its times; splits vertices at creases, and then returns
+/// the original index of each.
 fn find_normals(steps: &mut [MeshStep], triangles: &mut Vec<[u32; 3]>, placement: Placement) -> Option<Vec<u32>> {
     let given = steps.iter().all(|step| step.normals.is_some());
     let computed = match placement.shading {
@@ -299,8 +299,8 @@ impl Faces {
         !self.triangles.is_empty()
     }
 
-    /// Of triangles of an emitter that are in one place, keeps the first, with a warning: which of them a ray meets, and
-    /// so which side shines, is otherwise left to the accelerator.
+    /// Of triangles of an emitter that are in one place, keeps the first, with a warning: which of them a ray meets,
+    /// and so which side shines, is otherwise left to the accelerator.
     fn drop_coincident(&mut self, files: &CompileContext, path: &str, positions: &[[f32; 3]]) {
         let before = self.triangles.len();
         let mut places = HashSet::with_capacity(before);
@@ -327,7 +327,7 @@ fn out_of_range(data: &MeshData) -> Option<(usize, u32)> {
     data.triangles.iter().enumerate().find_map(bad)
 }
 
-/// Whether three corners span an area; NaN counts as area, so that the mesh is refused for it and not merely thinned.
+/// Whether three corners span an area; NaN counts as area, so that the mesh is rejected for it and not merely thinned.
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
     (b - a).cross(c - a) != DVec3::ZERO
@@ -337,7 +337,7 @@ fn place_normals(mut normals: Vec<[f32; 3]>, transform: &Transform, reverse: boo
     let sign = if reverse { -1.0 } else { 1.0 };
     for n in &mut normals {
         let moved = transform.normal(DVec3::from(n.map(f64::from))) * sign;
-        // Zero and NaN stay as they are; the first falls back to the flat normal, the second is refused.
+        // Zero and NaN stay as they are; the first falls back to the flat normal, the second is rejected.
         *n = if moved.length_squared() > 0.0 { moved.normalize().as_vec3().to_array() } else { *n };
     }
     normals

@@ -1,5 +1,5 @@
-//! What the user wrote to a scene ready to render: names become ids, meshes are loaded and placed, and whatever makes no sense is refused
-//! with its place. The only module that sees both [`SceneDesc`] and [`Scene`].
+//! What the user wrote to a scene ready to render: names become ids, meshes are loaded and placed, and whatever is
+//! invalid is rejected with its place. The only module that sees both [`SceneDesc`] and [`Scene`].
 
 mod attributes;
 mod camera;

@@ -16,26 +16,26 @@ use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
 
 /// What a material of an MTL comes to.
 pub struct MtlBinding {
-    pub look: MaterialBinding,
+    pub binding: MaterialBinding,
     /// Light given off, if not black.
     pub emission: Option<Emission>,
 }
 
 impl Builder {
-    /// What the faces with a material of an OBJ file look like; maps need uv. `path` is the shape, `file` the OBJ.
-    pub(super) fn mtl_look(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlBinding> {
+    /// The material of the faces with a material of an OBJ file; maps need uv. `path` is the shape, `file` the OBJ.
+    pub(super) fn mtl_binding(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlBinding> {
         let maps = &mtl.maps;
         let every = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity, &maps.specular, &maps.emission];
         let has_maps = every.iter().any(|map| map.is_some());
         if has_maps && !has_uvs {
             tracing::warn!("{}: {path}: material \"{}\": faces without uv have no maps", self.files.source.file.display(), mtl.name);
         }
-        let wanted = |map: &Option<ObjMap>| map.clone().filter(|_| has_uvs);
-        let (diffuse, opacity) = (wanted(&maps.diffuse), wanted(&maps.opacity));
-        let (specular, emission) = (wanted(&maps.specular), wanted(&maps.emission));
+        let with_uvs = |map: &Option<ObjMap>| map.clone().filter(|_| has_uvs);
+        let (diffuse, opacity) = (with_uvs(&maps.diffuse), with_uvs(&maps.opacity));
+        let (specular, emission) = (with_uvs(&maps.specular), with_uvs(&maps.emission));
 
         let mut plain = mtl.clone();
-        // Exporters leave a colour black, or out, where a map says it all.
+        // Exporters leave a colour black, or out, where a map gives all of it.
         for (color, map) in [(&mut plain.diffuse, &diffuse), (&mut plain.specular, &specular), (&mut plain.emissive, &emission)] {
             if map.is_some() {
                 *color = Some(color.filter(|color| color.iter().any(|&c| c != 0.0)).unwrap_or([1.0; 3]));
@@ -59,25 +59,25 @@ impl Builder {
         if !unused.is_empty() {
             tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.source.file.display(), mtl.name, unused.join(", "));
         }
-        let mut look = MaterialBinding::plain(self.materials.push(material));
+        let mut binding = MaterialBinding::plain(self.materials.push(material));
         // Glass lets through what it does not reflect.
         if !is_glass {
-            look.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
+            binding.opacity = self.mtl_opacity(path, mtl.opacity, opacity.as_ref(), diffuse.as_ref())?;
         }
-        let normal_perturbation = match (wanted(&maps.normal), wanted(&maps.bump)) {
-            (Some(map), _) => Some(self.relief_map(path, &map, true)?),
-            (None, Some(map)) => Some(self.relief_map(path, &map, false)?),
+        let normal_perturbation = match (with_uvs(&maps.normal), with_uvs(&maps.bump)) {
+            (Some(map), _) => Some(self.normal_or_bump_map(path, &map, true)?),
+            (None, Some(map)) => Some(self.normal_or_bump_map(path, &map, false)?),
             (None, None) => None,
         };
-        look.normal_perturbation = normal_perturbation.map(|normal_perturbation| self.materials.push_relief(normal_perturbation));
+        binding.normal_perturbation = normal_perturbation.map(|map| self.materials.push_normal_perturbation(map));
         let texture = emission.map(|map| self.emission_map(path, &map)).transpose()?;
         let emission = surface.radiance.map(|radiance| Emission { texture, ..Emission::constant(radiance) });
-        Ok(MtlBinding { look, emission })
+        Ok(MtlBinding { binding, emission })
     }
 
-    fn map_texture(&mut self, path: &str, map: &ObjMap, wanted: TextureUse) -> Result<Bitmap> {
+    fn map_texture(&mut self, path: &str, map: &ObjMap, texture_use: TextureUse) -> Result<Bitmap> {
         let image = self.materials.textures.image(&self.files, &format!("{path}.file"), &map.file)?;
-        let decoding = if wanted == TextureUse::Color { Decoding::Srgb } else { Decoding::Linear };
+        let decoding = if texture_use == TextureUse::Color { Decoding::Srgb } else { Decoding::Linear };
         Ok(Bitmap {
             wrap: [if map.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2],
             transform: UvTransform::new(Vec2::from(map.scale), 0.0, Vec2::from(map.offset)),
@@ -105,7 +105,8 @@ impl Builder {
         Ok(id)
     }
 
-    /// `d` times `map_d` (the channel it says, or the image's alpha, or else its luminance), or times the alpha of `map_Kd`.
+    /// `d` times `map_d` (the channel it names, or the image's alpha, or else its luminance), or times the alpha of
+    /// `map_Kd`.
     fn mtl_opacity(&mut self, path: &str, d: Option<f32>, map: Option<&ObjMap>, diffuse: Option<&ObjMap>) -> Result<Option<TextureId>> {
         let bitmap = match (map, diffuse) {
             (Some(map), _) => {
@@ -121,7 +122,7 @@ impl Builder {
         };
         let constant = d.filter(|&d| d < 1.0).map(|d| Texture::Constant(Rgb::splat(d)));
         let texture = match (bitmap.map(Texture::Bitmap), constant) {
-            // Exporters leave d at 0 where a map says it all.
+            // Exporters leave d at 0 where a map gives all of it.
             (Some(bitmap), Some(factor)) if d != Some(0.0) => Texture::Product([bitmap, factor].into()),
             (Some(bitmap), _) => bitmap,
             (None, Some(constant)) => constant,
@@ -131,7 +132,7 @@ impl Builder {
     }
 
     /// A normal map, which `bump` may name too: then it is one with colours.
-    fn relief_map(&mut self, path: &str, map: &ObjMap, is_normal_map: bool) -> Result<NormalPerturbation> {
+    fn normal_or_bump_map(&mut self, path: &str, map: &ObjMap, is_normal_map: bool) -> Result<NormalPerturbation> {
         let bitmap = self.map_texture(path, map, TextureUse::Data)?;
         let holds_normals = is_normal_map || (map.channel.is_none() && !bitmap.image.is_grey());
         let bitmap = if holds_normals { Bitmap { channel: None, ..bitmap } } else { bitmap };
@@ -145,7 +146,8 @@ impl Builder {
     }
 }
 
-/// The colour that a map multiplies where a material's reflection has one: of mirrors, and of metals, which have the colour themselves.
+/// The colour that a map multiplies where a material's reflection has one: of mirrors, and of metals, which have the
+/// colour themselves.
 fn specular_tint(material: &Material) -> Option<Rgb> {
     match material {
         Material::Constant(Bsdf::Mirror(mirror)) => Some(mirror.reflectance),

@@ -1,4 +1,5 @@
-//! Which objects contain which: unknown names and cycles are found before anything is placed, and how much will be placed is counted.
+//! Which objects contain which: unknown names and cycles are found before anything is placed, and how much will be
+//! placed is counted.
 
 use std::collections::HashMap;
 
@@ -6,7 +7,7 @@ use super::CompileContext;
 use crate::desc::{InstanceDesc, SceneDesc};
 use crate::error::Result;
 
-/// More instances than memory holds are refused before they are made.
+/// More instances than memory holds are rejected before they are made.
 const MAX_PLACED: u64 = 1 << 24;
 
 /// Objects are nested at most this deep.

@@ -1,4 +1,4 @@
-//! Materials with relief: normal maps and bump maps.
+//! Normal maps and bump maps: materials of the type `relief`.
 
 use super::materials::{Compiler, MaterialTable};
 use super::textures::TextureUse;
@@ -9,29 +9,29 @@ use crate::material::Material;
 use crate::normal_perturbation::NormalPerturbation;
 
 impl MaterialTable {
-    /// Adds a relief.
-    pub(super) fn push_relief(&mut self, normal_perturbation: NormalPerturbation) -> NormalPerturbationId {
+    /// Adds a normal or bump map.
+    pub(super) fn push_normal_perturbation(&mut self, normal_perturbation: NormalPerturbation) -> NormalPerturbationId {
         self.normal_perturbations.push(normal_perturbation);
         NormalPerturbationId::new(self.normal_perturbations.len() - 1)
     }
 
-    /// The relief of a material by itself.
-    pub(super) fn relief_of(&self, id: MaterialId) -> Option<NormalPerturbationId> {
+    /// The normal or bump map of a material by itself.
+    pub(super) fn normal_perturbation_of(&self, id: MaterialId) -> Option<NormalPerturbationId> {
         self.by_material.get(&id).copied()
     }
 
-    /// Reliefs by material if some material consists of one with relief; none otherwise.
+    /// Normal and bump maps by material if some material has a part with one; none otherwise.
     pub(super) fn part_normal_perturbations(&self) -> Vec<Option<NormalPerturbationId>> {
         let mut parts = self.materials.iter().filter_map(Material::parts).flatten();
-        if !parts.any(|part| self.relief_of(part).is_some()) {
+        if !parts.any(|part| self.normal_perturbation_of(part).is_some()) {
             return Vec::new();
         }
-        (0..self.materials.len()).map(|i| self.relief_of(MaterialId::new(i))).collect()
+        (0..self.materials.len()).map(|i| self.normal_perturbation_of(MaterialId::new(i))).collect()
     }
 }
 
 impl Compiler<'_> {
-    /// The relief that a material says, if it is one with relief.
+    /// The normal or bump map of a material of the type `relief`.
     pub(super) fn normal_perturbation(&self, desc: &SceneDesc, path: &str, material: &MaterialDesc) -> Result<Option<NormalPerturbation>> {
         let MaterialDesc::Relief { normal_map, bump_map, .. } = material else { return Ok(None) };
         Ok(Some(match (normal_map, bump_map) {

@@ -139,7 +139,8 @@ mod tests {
 
     #[test]
     fn weights_say_how_much_each_triangle_counts() {
-        // About the origin: a right angle in the plane z = 0, of area 2, and half a right angle in the plane x = 0, of area 1/2.
+        // About the origin: a right angle in the plane z = 0, of area 2, and half a right angle in the plane x = 0, of
+        // area 1/2.
         let positions = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0]];
         let triangles = [[0, 1, 2], [0, 3, 4]];
         for (weight, [of_z, of_x]) in

@@ -128,7 +128,7 @@ impl Builder {
         Ok(())
     }
 
-    /// Bounds within the range of coordinates; what is not finite is refused where it is placed.
+    /// Bounds within the range of coordinates; what is not finite is rejected where it is placed.
     fn checked_bounds(&self, path: &str, bounds: Bounds) -> Result<Bounds> {
         let (reach, most) = (bounds.min.abs().max(bounds.max.abs()).max_element(), RenderSpace::EXTENTS[1]);
         if reach.is_finite() && reach > most && !bounds.is_empty() {

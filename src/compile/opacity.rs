@@ -1,4 +1,4 @@
-//! Opacity: from the key of shapes to what accelerators ask.
+//! Opacity: from the key of shapes to the test of accelerators.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::opacity::Opacity;
 use crate::texture::{Bitmap, Channel, Texture};
 
 impl Builder {
-    /// What a shape's own key says, if the shape has holes at all.
+    /// The value of a shape's own key, if the shape has holes at all.
     pub(super) fn opacity(&mut self, path: &str, common: &ShapeCommon) -> Result<Option<TextureId>> {
         let Some(desc) = common.opacity else {
             return Ok(None);

@@ -16,7 +16,7 @@ use crate::material::ColorInput;
 use crate::math::{Bounds, DAffine3, Motion, RenderSpace, Transform};
 use crate::scene::Surface;
 
-/// A shape that knows everything but its final place.
+/// A shape complete but for its final transform.
 #[derive(Clone, Debug)]
 pub struct PreparedShape {
     form: ShapeSource,
@@ -33,7 +33,7 @@ pub struct PreparedShape {
 /// The surface of a shape.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedSurface {
-    pub look: MaterialBinding,
+    pub binding: MaterialBinding,
     /// Light that it gives off, not black.
     pub emission: Option<PreparedEmission>,
     /// What it is called.
@@ -101,22 +101,22 @@ impl PreparedShape {
 }
 
 impl Builder {
-    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may contain several.
-    /// Where it is not used, its files are not read.
+    /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may contain
+    /// several. Where it is not used, its files are not read.
     pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc, is_used: bool) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
         let identity = self.identities.shape(&self.files, number, desc);
-        let mut look = self.materials.find(&self.files, path, common.material)?;
+        let mut binding = self.materials.find(&self.files, path, common.material)?;
         let place = format!("{path}.transform");
         let map = self.files.transform(&place, common.transform, &DAffine3::IDENTITY)?.world_from_object;
         let motion = self.files.motion(&format!("{path}.motion"), common.motion, &map, self.shutter)?;
         let (map, motion) = motion.as_constant().map_or((map, Some(motion)), |rest| (rest, None));
         let emission = self.emission(path, &common)?;
-        look.opacity = self.opacity(path, &common)?;
+        binding.opacity = self.opacity(path, &common)?;
         if motion.is_some() && emission.is_some() {
             return Err(self.files.error(&format!("{path}.motion"), "a shape that gives off light cannot move"));
         }
-        let surface = PreparedSurface { look, emission, identity };
+        let surface = PreparedSurface { binding, emission, identity };
         if !matches!(desc, ShapeDesc::Mesh(_)) {
             self.check_attributes(path, None, &surface, common.material, None)?;
         }
@@ -159,17 +159,17 @@ impl Builder {
         let mut prepared = Vec::new();
         for mut loaded in self.meshes.take(&self.files, path, desc)? {
             let moves = motion.is_some() || !loaded.later.is_empty();
-            let PreparedSurface { mut look, mut emission, mut identity } = surface;
+            let PreparedSurface { mut binding, mut emission, mut identity } = surface;
             let has_uvs = loaded.data.uvs.is_some();
             if let Some(mtl) = &loaded.material {
                 identity.material = self.identities.name(&mtl.name);
-                let from_mtl = self.mtl_look(path, desc.file.as_deref(), mtl, has_uvs)?;
-                // What the scene says of the shape counts.
-                let given = if desc.opacity.is_some() { look.opacity } else { from_mtl.look.opacity };
-                look = MaterialBinding { opacity: given, ..from_mtl.look };
+                let from_mtl = self.mtl_binding(path, desc.file.as_deref(), mtl, has_uvs)?;
+                // The shape's own keys override the MTL.
+                let given = if desc.opacity.is_some() { binding.opacity } else { from_mtl.binding.opacity };
+                binding = MaterialBinding { opacity: given, ..from_mtl.binding };
                 emission = emission.or(from_mtl.emission.map(|emission| PreparedEmission { emission, group: None }));
             }
-            if !has_uvs && self.materials.needs_uv(&look) {
+            if !has_uvs && self.materials.needs_uv(&binding) {
                 return Err(meshes::refusal(
                     &self.files,
                     path,
@@ -177,7 +177,7 @@ impl Builder {
                     "the material or the opacity has textures, but the mesh has no uv".into(),
                 ));
             }
-            let surface = PreparedSurface { look, emission, identity };
+            let surface = PreparedSurface { binding, emission, identity };
             let attributes = &mut loaded.data.attributes;
             self.check_attributes(path, desc.file.as_deref(), &surface, desc.material.as_deref(), Some(attributes))?;
             if moves && emission.is_some() {
@@ -230,7 +230,7 @@ impl Builder {
         Ok((!radiance.is_black()).then_some(PreparedEmission { emission, group }))
     }
 
-    /// Refuses a placed shape that is too large or too small for `f32`.
+    /// Rejects a placed shape that is too large or too small for `f32`.
     fn check_size(&self, path: &str, shape: &Shape, space: &RenderSpace) -> Result<()> {
         let bounds = shape.bounds();
         if !bounds.min.is_finite() || !bounds.max.is_finite() {
@@ -248,7 +248,7 @@ impl Builder {
     /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`; `None` if it is a mesh of
     /// which nothing has an area. One that emits must end up in the world's.
     pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3, space: &RenderSpace) -> Result<Option<ShapeId>> {
-        let PreparedShape { form, map, motion, reverse_normal, surface: PreparedSurface { look, emission, identity }, path } = prepared;
+        let PreparedShape { form, map, motion, reverse_normal, surface: PreparedSurface { binding, emission, identity }, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform =
@@ -277,20 +277,20 @@ impl Builder {
                 let Some(mesh) = meshes::place(&self.files, &path, data, later, placement)? else {
                     return Ok(None);
                 };
-                Shape::Mesh(if self.materials.has_normal_map(&look) { mesh.with_tangents() } else { mesh })
+                Shape::Mesh(if self.materials.has_normal_map(&binding) { mesh.with_tangents() } else { mesh })
             }
         };
         self.check_size(&path, &shape, space)?;
         self.geometry.shapes.push(shape);
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
-        let medium = self.materials.medium(look.material);
+        let medium = self.materials.medium(binding.material);
         if medium.is_some() && emission.is_some() {
             return Err(self.files.error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
         }
-        let (material, normal_perturbation) = (look.material, look.normal_perturbation);
+        let (material, normal_perturbation) = (binding.material, binding.normal_perturbation);
         let mut surface = Surface { material, normal_perturbation, medium, first_light: None, single_light: false };
         if let Some(PreparedEmission { emission, group }) = emission {
-            let emission = Emission { opacity: look.opacity, ..emission };
+            let emission = Emission { opacity: binding.opacity, ..emission };
             let lights = AreaLight::for_shape(id, emission, &self.geometry, &self.materials.textures.textures);
             if lights.iter().any(|light| light.area() > 0.0) {
                 surface.single_light = lights.len() == 1;
@@ -301,7 +301,7 @@ impl Builder {
         }
         self.surfaces.push(surface);
         self.identities.add_shape(identity);
-        self.opacities.push(look.opacity);
+        self.opacities.push(binding.opacity);
         self.paths.push(path);
         Ok(Some(id))
     }

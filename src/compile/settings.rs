@@ -1,4 +1,4 @@
-//! Checks of what says how to render: film, sampler, camera, integrator and outputs.
+//! Checks of the render settings: film, sampler, camera, integrator and outputs.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::film::Crop;
 use crate::output::find_output_fault;
 
-/// Checks the numbers that say how to render.
+/// Checks the numbers of the render settings.
 ///
 /// # Errors
 /// [`Error::Scene`](crate::Error::Scene) with the key of the first number that makes no sense.

@@ -26,7 +26,7 @@ pub struct Summary {
     pub instances: usize,
     /// Lights by kind; each emissive triangle counts.
     pub lights: BTreeMap<&'static str, usize>,
-    /// How a light is chosen among them: by its power, or by a tree that knows where lights are and where they shine.
+    /// How a light is chosen among them: by its power, or by a light tree over positions and emission directions.
     pub light_selection: &'static str,
     /// Names of light groups.
     pub light_groups: Vec<String>,

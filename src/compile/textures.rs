@@ -21,15 +21,16 @@ use crate::texture::{Bitmap, Channel, Checker, Decoding, Texture, TextureFilter,
 /// Products of textures are nested at most this deep.
 const MAX_DEPTH: usize = 64;
 
-/// Textures and colours that a product has at most, those of the products in it counted: each is looked up at every point.
+/// Textures and colours that a product has at most, those of the products in it counted: each is looked up at every
+/// point.
 const MAX_LOOKUPS: usize = 256;
 
 /// What a texture is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
-    /// A colour: whole numbers are sRGB unless the texture says otherwise.
+    /// A colour: whole numbers are sRGB unless the texture specifies otherwise.
     Color,
-    /// Roughness, normals, heights, opacity: numbers are linear unless the texture says otherwise.
+    /// Roughness, normals, heights, opacity: numbers are linear unless the texture specifies otherwise.
     Data,
 }
 
@@ -89,17 +90,17 @@ impl TextureTable {
     }
 
     /// The texture that `path` names.
-    pub fn find(&self, files: &CompileContext, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
+    pub fn find(&self, files: &CompileContext, path: &str, name: &str, texture_use: TextureUse) -> Result<TextureId> {
         let entry = self.names.get(name).ok_or_else(|| files.unknown(path, "texture", name, self.names.keys().map(String::as_str)))?;
-        Ok(match wanted {
+        Ok(match texture_use {
             TextureUse::Color => entry.color,
             TextureUse::Data => entry.data,
         })
     }
 
-    /// The texture that `path` names, for something that knows nothing of a surface but uv.
-    pub fn find_by_uv(&self, files: &CompileContext, path: &str, name: &str, wanted: TextureUse) -> Result<TextureId> {
-        let id = self.find(files, path, name, wanted)?;
+    /// The texture that `path` names, for a use where uv is all there is of a surface.
+    pub fn find_by_uv(&self, files: &CompileContext, path: &str, name: &str, texture_use: TextureUse) -> Result<TextureId> {
+        let id = self.find(files, path, name, texture_use)?;
         if !self.get(id).attributes().is_empty() {
             let message = format!(
                 "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and emission of shapes can"
@@ -143,7 +144,7 @@ impl TextureTable {
         Ok(id)
     }
 
-    /// Refuses a texture with colours that a surface cannot reflect; the error says what it does.
+    /// Rejects a texture with colours that a surface cannot reflect; the error names the fault.
     pub fn check_reflectance(&self, id: TextureId) -> Result<(), String> {
         let [min, max] = self.get(id).range();
         if min >= 0.0 && max <= 1.0 {
@@ -152,7 +153,8 @@ impl TextureTable {
         Err(format!("reaches from {min} to {max}: a surface can only reflect from 0 to 1"))
     }
 
-    /// The image in a file that is no texture of the scene's own, read unless it has been; `place` is where the scene leads to it.
+    /// The image in a file that is no texture of the scene's own, read unless it has been; `place` is where the scene
+    /// leads to it.
     pub fn image(&mut self, files: &CompileContext, place: &str, asset: &Path) -> Result<Arc<TextureImage>> {
         load_image(&mut self.images, files, place, asset)
     }
@@ -182,8 +184,8 @@ struct Made {
 
 impl Loader<'_> {
     /// The texture that `place` names, made at its first use.
-    fn named(&mut self, place: &str, name: &str, wanted: TextureUse) -> Result<Made> {
-        let key = (name.to_owned(), wanted);
+    fn named(&mut self, place: &str, name: &str, texture_use: TextureUse) -> Result<Made> {
+        let key = (name.to_owned(), texture_use);
         if let Some(made) = self.made.get(&key) {
             return Ok(made.clone());
         }
@@ -197,7 +199,7 @@ impl Loader<'_> {
             return Err(self.files.error(place, format!("products of textures are nested more than {MAX_DEPTH} deep")));
         }
         self.open.push(name.to_owned());
-        let made = self.texture(name, desc, wanted);
+        let made = self.texture(name, desc, texture_use);
         self.open.pop();
         let made = made?;
         self.made.insert(key, made.clone());
@@ -225,7 +227,7 @@ impl Loader<'_> {
     }
 
     /// The product of these factors.
-    fn product(&mut self, path: &str, factors: &[ColorDesc], wanted: TextureUse) -> Result<Made> {
+    fn product(&mut self, path: &str, factors: &[ColorDesc], texture_use: TextureUse) -> Result<Made> {
         let files = self.files;
         let place = format!("{path}.factors");
         if factors.is_empty() {
@@ -240,7 +242,7 @@ impl Loader<'_> {
                 ColorDesc::Grey(v) => constant([*v; 3])?,
                 ColorDesc::Rgb(v) => constant(*v)?,
                 ColorDesc::Texture { texture } => {
-                    let factor = self.named(&key, texture, wanted)?;
+                    let factor = self.named(&key, texture, texture_use)?;
                     made.depth = made.depth.max(factor.depth + 1);
                     made.lookups += factor.lookups - 1;
                     made.depends_on_use |= factor.depends_on_use;
@@ -260,7 +262,7 @@ impl Loader<'_> {
         Ok(Made { texture: Texture::Product(product.into()), ..made })
     }
 
-    fn texture(&mut self, name: &str, desc: &TextureDesc, wanted: TextureUse) -> Result<Made> {
+    fn texture(&mut self, name: &str, desc: &TextureDesc, texture_use: TextureUse) -> Result<Made> {
         let (files, path) = (self.files, &format!("textures.{name}"));
         let color = |key: &str, value: [f32; 3]| files.reflectance(&format!("{path}.{key}"), value).map(Rgb::from);
         let depends_on_use = matches!(desc, TextureDesc::Image { color_space: ColorSpaceDesc::Auto, .. });
@@ -272,7 +274,7 @@ impl Loader<'_> {
             }
             TextureDesc::VertexColor => Texture::Attribute(self.attribute(VERTEX_COLOR), 1.0),
             TextureDesc::MeshAttribute { name, scale } => self.mesh_attribute(path, name, *scale)?,
-            TextureDesc::Product { factors } => return self.product(path, factors, wanted),
+            TextureDesc::Product { factors } => return self.product(path, factors, texture_use),
             TextureDesc::Image { file, color_space, filter, wrap, scale, rotation_degrees, offset, channel, invert } => {
                 let scale = files.uv(&format!("{path}.scale"), *scale)?;
                 let offset = files.uv(&format!("{path}.offset"), *offset)?;
@@ -289,7 +291,7 @@ impl Loader<'_> {
                     return Err(files.error(&format!("{path}.color_space"), "the image has floats, which are linear"));
                 }
                 Texture::Bitmap(Bitmap {
-                    decoding: match (color_space, wanted) {
+                    decoding: match (color_space, texture_use) {
                         (ColorSpaceDesc::Srgb, _) | (ColorSpaceDesc::Auto, TextureUse::Color) => Decoding::Srgb,
                         (ColorSpaceDesc::Linear, _) | (ColorSpaceDesc::Auto, TextureUse::Data) => Decoding::Linear,
                     },
@@ -331,7 +333,7 @@ fn blank() -> ImageData {
     ImageData { width: 1, height: 1, channels: 1, samples: Samples::U8(vec![0]) }
 }
 
-/// The images of all used files that can be read, in parallel; what is wrong with the others is found when they are asked for.
+/// The images of all used files that can be read, in parallel; the others are reported when they are used.
 fn read_all(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> HashMap<PathBuf, Arc<TextureImage>> {
     let file = |texture: &TextureDesc| match texture {
         TextureDesc::Image { file, .. } if !files.source.assets.images.contains_key(file) => files.source.asset(file).canonicalize().ok(),
@@ -346,7 +348,7 @@ fn read_all(files: &CompileContext, desc: &SceneDesc, used: &UsedNames) -> HashM
     names.into_par_iter().filter_map(read).collect()
 }
 
-/// An image that has no file, from `images` if it has been asked for before.
+/// An image that has no file, from `images` if it has been used before.
 fn kept_image(
     images: &mut HashMap<PathBuf, Arc<TextureImage>>,
     files: &CompileContext,

@@ -38,7 +38,7 @@ impl CompileContext {
         Ok(map)
     }
 
-    /// [`Self::affine`] after `outer`, refused if it cannot be inverted.
+    /// [`Self::affine`] after `outer`, rejected if it cannot be inverted.
     pub(super) fn transform(&self, path: &str, desc: &TransformDesc, outer: &DAffine3) -> Result<Transform> {
         let map = *outer * self.affine(path, desc)?;
         Transform::new(map).ok_or_else(|| self.error(path, super::SINGULAR))

@@ -158,7 +158,7 @@ mod tests {
             ("spp = 2\noutput = 1979-05-27", "s.toml:2: \"output\" is not for a project's file"),
         ] {
             let error = parse(Path::new("s.toml"), Trust::Project, text).unwrap_err();
-            assert!(matches!(&error, Error::Usage(told) if told.starts_with(message)), "{error}");
+            assert!(matches!(&error, Error::Usage(found) if found.starts_with(message)), "{error}");
         }
     }
 

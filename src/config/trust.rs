@@ -5,7 +5,8 @@
 pub enum Trust {
     /// A project's file, which may be anybody's: what the picture is, and how much work it is.
     Project,
-    /// The user, by the environment or the user's own file: what is loaded, written, overwritten or connected to, and how messages look.
+    /// The user, by the environment or the user's own file: what is loaded, written, overwritten or connected to, and
+    /// how messages look.
     User,
     /// Nobody else: options of a single run.
     CommandLine,

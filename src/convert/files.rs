@@ -13,8 +13,8 @@ use crate::image_data::{ImageData, Samples};
 use crate::import::Imported;
 use crate::output::FileUses;
 
-/// Brings files to the folder beside a scene.
-pub struct Files<'a> {
+/// Copies files to the folder beside a scene.
+pub struct AssetCopier<'a> {
     assets: &'a Assets,
     source: &'a Path,
     target_folder: PathBuf,
@@ -22,14 +22,14 @@ pub struct Files<'a> {
     folder: String,
     originals: Originals,
     /// The name in the target for a name of the source.
-    brought: BTreeMap<String, String>,
+    copied: BTreeMap<String, String>,
     /// Files in the folder beside the scene.
     count: usize,
     /// If there are any, files are only compared with these: nothing is written.
     uses: Option<FileUses>,
 }
 
-impl<'a> Files<'a> {
+impl<'a> AssetCopier<'a> {
     pub fn new(imported: &'a Imported, source: &'a Path, target: &Path, originals: Originals) -> Self {
         let stem = target.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy().into_owned());
         Self {
@@ -38,7 +38,7 @@ impl<'a> Files<'a> {
             target_folder: folder_of(target),
             folder: format!("{stem}_files"),
             originals,
-            brought: BTreeMap::new(),
+            copied: BTreeMap::new(),
             count: 0,
             uses: None,
         }
@@ -59,9 +59,9 @@ impl<'a> Files<'a> {
         self.assets.contains(name) || folder_of(self.source).join(name).is_file()
     }
 
-    /// Brings a file; the result is its name relative to the target. `path` is where the scene names it.
-    pub fn bring(&mut self, path: &str, name: &str) -> Result<String> {
-        if let Some(done) = self.brought.get(name) {
+    /// Copies a file; the result is its name relative to the target. `path` is where the scene names it.
+    pub fn add(&mut self, path: &str, name: &str) -> Result<String> {
+        if let Some(done) = self.copied.get(name) {
             return Ok(done.clone());
         }
         let new = if self.assets.contains(name) {
@@ -91,16 +91,17 @@ impl<'a> Files<'a> {
                 }
             }
         };
-        self.brought.insert(name.to_owned(), new.clone());
+        self.copied.insert(name.to_owned(), new.clone());
         Ok(new)
     }
 
-    /// A name in the folder beside the scene that nothing else has. An OBJ, which names further files, has a folder of its own.
+    /// A name in the folder beside the scene that nothing else has. An OBJ, which names further files, has a folder of
+    /// its own.
     fn free_name(&self, original: &Path) -> String {
         let is_obj = is_obj(original);
         let file = original.file_name().map_or("file".into(), |name| name.to_string_lossy().into_owned());
         let (stem, extension) = file.rsplit_once('.').unwrap_or((&file, ""));
-        let taken = |name: &String| self.brought.values().any(|other| other == name);
+        let taken = |name: &String| self.copied.values().any(|other| other == name);
         let name = |n: usize| match (is_obj, n) {
             (true, 1) => format!("{}/{stem}/{file}", self.folder),
             (true, n) => format!("{}/{stem}_{n}/{file}", self.folder),
@@ -215,7 +216,8 @@ impl<'a> Files<'a> {
 /// Bytes at the start of a file that its type is detected from.
 const START: u64 = 1 << 16;
 
-/// Refuses to copy what is not what its name says: a scene of a stranger could name any file, and who gets the copy would have it.
+/// Rejects files whose content does not match their extension: a scene of a stranger could name any file, and the copy
+/// would disclose it.
 fn check_kind(path: &Path, start: &[u8]) -> Result<()> {
     let kind = path.extension().map(|e| e.to_string_lossy().to_uppercase()).unwrap_or_default();
     let start = start.strip_prefix(MARK).unwrap_or(start);

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::import::Imported;
 use crate::output::{FileUses, check_creatable, write_atomically};
 
-use files::Files;
+use files::AssetCopier;
 
 /// What is done with the files that a scene names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,10 +24,11 @@ pub enum Originals {
     Link,
 }
 
-/// Writes a scene that was read from `source` as `target`, a file of our format. Meshes and images without files, and with
-/// [`Originals::Copy`] all others, come into the folder `NAME_files` beside it. The scene itself is written last, so that it never names
-/// what is not there. The result is the number of files beside the scene. Files that are not there and that the world does not use keep
-/// their names, with a warning. `uses` are files of the caller, which are not overwritten either.
+/// Writes a scene that was read from `source` as `target`, a file of our format. Meshes and images without files, and
+/// with [`Originals::Copy`] all others, come into the folder `NAME_files` beside it. The scene itself is written last,
+/// so that it never names what is not there. The result is the number of files beside the scene. Files that are not
+/// there and that the world does not use keep their names, with a warning. `uses` are files of the caller, which are
+/// not overwritten either.
 ///
 /// # Errors
 /// [`Error::Usage`] if a file would be overwritten that is read, before any is written, [`Error::Missing`] if a file
@@ -40,25 +41,25 @@ pub fn write_scene(imported: &Imported, source: &Path, target: &Path, originals:
     uses.read(source, "the scene")?;
     uses.write(target, "the converted scene")?;
     imported.files.iter().try_for_each(|file| uses.read(file, "a file of the scene"))?;
-    bring_all(imported, &mut Files::new(imported, source, target, originals).with_uses(uses))?;
-    let mut files = Files::new(imported, source, target, originals);
+    copy_all(imported, &mut AssetCopier::new(imported, source, target, originals).with_uses(uses))?;
+    let mut files = AssetCopier::new(imported, source, target, originals);
     for NamedFile { path, name, is_used } in imported.desc.clone().files_mut() {
         if !is_used && !files.is_there(name) {
             tracing::warn!("{}: {path}: there is no file {name}; nothing uses it", source.display());
         }
     }
-    let desc = bring_all(imported, &mut files)?;
+    let desc = copy_all(imported, &mut files)?;
     let text = json::scene_text(&desc)?;
     write_atomically(target, |out| std::io::Write::write_all(out, text.as_bytes()).map_err(|e| e.to_string()))?;
     Ok(files.count())
 }
 
-/// Brings all files of a scene; the result is the scene with their names.
-fn bring_all(imported: &Imported, files: &mut Files) -> Result<SceneDesc> {
+/// Copies all files of a scene; the result is the scene with their names.
+fn copy_all(imported: &Imported, files: &mut AssetCopier) -> Result<SceneDesc> {
     let mut desc = imported.desc.clone();
     for NamedFile { path, name, is_used } in desc.files_mut() {
         if is_used || files.is_there(name) {
-            *name = files.bring(&path, name)?;
+            *name = files.add(&path, name)?;
         }
     }
     Ok(desc)

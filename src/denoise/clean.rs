@@ -2,9 +2,9 @@
 
 use super::oidn::Triple;
 
-/// Replaces every pixel with a channel that is not finite by the mean of its finite neighbours of the eight around it; where there are
-/// none, by that of those that were replaced before, from the rim inwards. A picture without a finite pixel becomes 0. The result is the
-/// number of pixels replaced.
+/// Replaces every pixel with a channel that is not finite by the mean of its finite neighbours of the eight around it;
+/// where there are none, by that of those that were replaced before, from the rim inwards. A picture without a finite
+/// pixel becomes 0. The result is the number of pixels replaced.
 pub fn replace_non_finite(pixels: &mut [Triple], width: usize) -> u64 {
     let mut bad: Vec<bool> = pixels.iter().map(|pixel| !pixel.iter().all(|v| v.is_finite())).collect();
     let mut left: Vec<usize> = (0..pixels.len()).filter(|i| bad[*i]).collect();

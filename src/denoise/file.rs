@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::file::exr_blocks::{Place, check_memory};
 use crate::file::exr_headers::read_headers;
 use crate::file::{self, write_atomically};
-use crate::film::{LayerInfo, Source};
+use crate::film::{LayerInfo, LayerSource};
 use crate::output::write_image;
 
 /// Names of layers that hold albedo, in lower case, the best first: ours, then those of Blender, pbrt, Mitsuba.
@@ -25,10 +25,12 @@ const NORMAL: [&str; 7] = ["feature_normal", "denoising normal", "ns", "n", "nor
 /// How names of layers of light groups begin.
 const LIGHT_GROUP: &str = "light_";
 
-/// How far the parts' sum may be from the picture for them to be taken for its parts, of the picture's sum: 16-bit numbers round.
+/// How far the parts' sum may be from the picture for them to be taken for its parts, of the picture's sum: 16-bit
+/// numbers round.
 const SUM_TOLERANCE: f64 = 0.01;
 
-/// Bytes a pixel for denoising beside the file: albedo, normals, colour before and after, and the original colour, of three floats each.
+/// Bytes a pixel for denoising beside the file: albedo, normals, colour before and after, and the original colour, of
+/// three floats each.
 const WORK_BYTES: usize = 5 * 12;
 
 /// What to do with a file.
@@ -42,13 +44,14 @@ pub struct FileOptions {
     pub without_features: bool,
 }
 
-/// Denoises the colour of an EXR file and writes all of the file to `output`, with the original colour as layer `noisy`. Layers of light
-/// groups (`light_NAME`) and of kinds of light (`diffuse_direct` and so on) that add up to the colour are denoised so that they still do;
-/// all other layers and attributes stay as they are.
+/// Denoises the colour of an EXR file and writes all of the file to `output`, with the original colour as layer
+/// `noisy`. Layers of light groups (`light_NAME`) and of kinds of light (`diffuse_direct` and so on) that add up to the
+/// colour are denoised so that they still do; all other layers and attributes stay as they are.
 ///
 /// # Errors
-/// [`Error::Missing`] if the file cannot be read; [`Error::Malformed`] if it has no colour or not the layers named, is denoised already, or
-/// cannot be kept whole (deep data); [`Error::Output`] if `output` cannot be written; [`Error::OutOfMemory`].
+/// [`Error::Missing`] if the file cannot be read; [`Error::Malformed`] if it has no colour or not the layers named, is
+/// denoised already, or cannot be kept whole (deep data); [`Error::Output`] if `output` cannot be written;
+/// [`Error::OutOfMemory`].
 pub fn denoise_file(denoiser: &Denoiser, input: &Path, output: &Path, options: &FileOptions) -> Result<Report> {
     let source = file::open(input).map_err(|e| Error::Missing { file: input.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: input.to_owned(), message };
@@ -98,7 +101,8 @@ impl Plan {
         }
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_lowercase();
         let groups: Vec<_> = layers.all_of(color).filter(|(name, _)| last(name).starts_with(LIGHT_GROUP)).collect();
-        let is_kind = |name: &str| LayerInfo::ALL.iter().any(|info| matches!(info.source, Source::LightAov(_)) && info.name == last(name));
+        let is_kind =
+            |name: &str| LayerInfo::ALL.iter().any(|info| matches!(info.source, LayerSource::LightAov(_)) && info.name == last(name));
         let kinds: Vec<_> = layers.all_of(color).filter(|(name, _)| is_kind(name)).collect();
         let mut sets = Vec::new();
         for (set, what) in [(groups, "light groups"), (kinds, "kinds of light")].into_iter().filter(|(set, _)| !set.is_empty()) {

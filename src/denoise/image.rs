@@ -4,17 +4,19 @@ use super::oidn::Triple;
 use super::prepared::Prepared;
 use super::{Denoiser, Report};
 use crate::error::Result;
-use crate::film::{Image, Layer, LayerInfo, LayerKind, LayerSet, Source};
+use crate::film::{Image, Layer, LayerInfo, LayerKind, LayerSet, LayerSource};
 
 /// The layers that help to denoise a picture.
 pub const FEATURE_LAYERS: [LayerKind; 2] = [LayerKind::FeatureAlbedo, LayerKind::FeatureNormal];
 
-/// Denoises a picture's colour and alpha with the help of those of [`FEATURE_LAYERS`] that it has, and keeps them as they were as
-/// [`LayerKind::Noisy`]. Light groups, and kinds of light if all eight are there, are denoised so that they sum to the colour, to the
-/// rounding of `f32`; all other layers stay as they are. On an error the picture is unchanged.
+/// Denoises a picture's colour and alpha with the help of those of [`FEATURE_LAYERS`] that it has, and keeps them as
+/// they were as [`LayerKind::Noisy`]. Light groups, and kinds of light if all eight are there, are denoised so that
+/// they sum to the colour, to the rounding of `f32`; all other layers stay as they are. On an error the picture is
+/// unchanged.
 ///
 /// # Errors
-/// [`Error::OutOfMemory`](crate::Error::OutOfMemory), or [`Error::Internal`](crate::Error::Internal) with what the library says.
+/// [`Error::OutOfMemory`](crate::Error::OutOfMemory), or [`Error::Internal`](crate::Error::Internal) with the library's
+/// message.
 pub fn denoise_image(denoiser: &Denoiser, image: &mut Image) -> Result<Report> {
     let size = [image.crop.width as usize, image.crop.height as usize];
     let [albedo, normal] = FEATURE_LAYERS.map(|kind| image.layer(kind).map(triples));
@@ -61,7 +63,7 @@ fn kinds_of_light(image: &Image) -> Vec<usize> {
 }
 
 fn is_kind_of_light(kind: LayerKind) -> bool {
-    matches!(LayerInfo::of(kind).source, Source::LightAov(_))
+    matches!(LayerInfo::of(kind).source, LayerSource::LightAov(_))
 }
 
 /// A layer's name in a file.

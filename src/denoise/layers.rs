@@ -43,8 +43,8 @@ impl<'f> Layers<'f> {
         Self { file, triples }
     }
 
-    /// The picture and what its channels' names begin with, the dot included: bare channels, else a layer "Combined", else the first with
-    /// the shortest name; parts and layers with a name among `others` are something else.
+    /// The picture and what its channels' names begin with, the dot included: bare channels, else a layer "Combined",
+    /// else the first with the shortest name; parts and layers with a name among `others` are something else.
     pub fn picture(&self, others: &[&str]) -> Result<(String, Rgb), String> {
         let is_other = |name: &str| others.iter().any(|other| ends_with_layer(&name.to_lowercase(), other));
         let is_color = |rgb: &Rgb| !matches!(self.letter(rgb[0]).as_str(), "x");
@@ -80,17 +80,17 @@ impl<'f> Layers<'f> {
         self.triples.iter().filter(move |(_, rgb)| rgb[0].part == color[0].part && *rgb != color).cloned()
     }
 
-    /// The layer with the first of these names, in lower case, that there is: of channels, or of a part with bare channels. A name may
-    /// follow others and a dot.
+    /// The layer with the first of these names, in lower case, that there is: of channels, or of a part with bare
+    /// channels. A name may follow others and a dot.
     ///
     /// # Errors
     /// If its window is not that of the picture.
     pub fn named(&self, names: &[&str], color: Rgb) -> Result<Option<Rgb>, String> {
         let full = |name: &str, rgb: &Rgb| if name.is_empty() { self.part_name(rgb[0].part) } else { name.to_owned() };
-        let matches = |wanted: &str| {
-            self.triples.iter().find(|(name, rgb)| *rgb != color && ends_with_layer(&full(name, rgb).to_lowercase(), wanted))
+        let matches = |requested: &str| {
+            self.triples.iter().find(|(name, rgb)| *rgb != color && ends_with_layer(&full(name, rgb).to_lowercase(), requested))
         };
-        let Some((name, rgb)) = names.iter().find_map(|wanted| matches(wanted)) else { return Ok(None) };
+        let Some((name, rgb)) = names.iter().find_map(|requested| matches(requested)) else { return Ok(None) };
         let [own, picture] = [rgb[0].part, color[0].part].map(|part| &self.file.layer_data[part]);
         if own.size != picture.size || own.attributes.layer_position != picture.attributes.layer_position {
             return Err(format!("layer {} has another data window than the picture", full(name, rgb)));
@@ -99,7 +99,7 @@ impl<'f> Layers<'f> {
         if subsampled { Err(format!("layer {} is subsampled", full(name, rgb))) } else { Ok(Some(*rgb)) }
     }
 
-    /// What is said of a layer that is not there.
+    /// The message for a layer that is not there.
     pub fn no_layer(&self, name: &str) -> String {
         format!("there is no layer {name} with channels R, G, B or X, Y, Z; it has {}", self.channel_names())
     }

@@ -41,7 +41,8 @@ impl ProcessEnvironment {
         }
     }
 
-    /// The folders in which Python's packages may be: of the active environment, of every `python3` on `PATH`, and the user's own.
+    /// The folders in which Python's packages may be: of the active environment, of every `python3` on `PATH`, and the
+    /// user's own.
     fn site_packages(&self) -> Vec<PathBuf> {
         let mut prefixes: Vec<PathBuf> = self.virtual_env.iter().cloned().collect();
         for python in self.path.iter().map(|folder| folder.join("python3")).filter(|file| file.is_file()) {
@@ -86,11 +87,13 @@ fn inside(folder: &Path) -> Option<PathBuf> {
     folders.flat_map(|folder| INSIDE.map(|below| folder.join(below).join(FILE_NAME))).find(|file| file.is_file())
 }
 
-/// Opens the library with `open`: the file or folder that the user names, else the one that the environment variable names, else the
-/// system's, else that of Python's package `pyoidn`. What is named is used or refused; what is found is passed over if unusable.
+/// Opens the library with `open`: the file or folder that the user names, else the one that the environment variable
+/// names, else the system's, else that of Python's package `pyoidn`. What is named is used or rejected; what is found
+/// is passed over if unusable.
 ///
 /// # Errors
-/// [`Error::Missing`] if what is named is not there or not the library, or if none is found: with where was looked and how to get it.
+/// [`Error::Missing`] if what is named is not there or not the library, or if none is found: with where was looked and
+/// how to get it.
 pub fn open_first<T>(
     named: Option<&Path>,
     environment: &ProcessEnvironment,
@@ -121,7 +124,7 @@ pub fn open_first<T>(
         looked.push("in Python's packages, of which there are none".to_owned());
     }
     let message = format!(
-        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` brings it, and --oidn-library or {VARIABLE} name its file or folder; looked {}",
+        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` installs it, and --oidn-library or {VARIABLE} name its file or folder; looked {}",
         looked.join(", ")
     );
     Err(Error::Missing { file: FILE_NAME.into(), message })
@@ -130,12 +133,12 @@ pub fn open_first<T>(
 fn open_named<T>(path: &Path, by: &str, open: &mut impl FnMut(&Path) -> std::result::Result<T, Unusable>) -> Result<T> {
     let missing = |file: &Path, message: String| Error::Missing { file: file.to_owned(), message: format!("{message} (named by {by})") };
     let file = if path.is_dir() {
-        inside(path).ok_or_else(|| missing(path, format!("there is no {FILE_NAME} in the folder; `pip install pyoidn` brings it")))?
+        inside(path).ok_or_else(|| missing(path, format!("there is no {FILE_NAME} in the folder; `pip install pyoidn` installs it")))?
     } else if path.is_file() {
         // A bare name would be looked for among the system's libraries.
         path.canonicalize().map_err(|e| missing(path, e.to_string()))?
     } else {
-        return Err(missing(path, "there is no such file or folder; `pip install pyoidn` brings the library".to_owned()));
+        return Err(missing(path, "there is no such file or folder; `pip install pyoidn` installs the library".to_owned()));
     };
     open(&file).map_err(|Unusable(why)| missing(&file, format!("it cannot serve as Open Image Denoise: {why}")))
 }
@@ -222,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn without_python_the_message_says_so() {
+    fn without_python_the_message_names_it() {
         let text = message(open_first(None, &ProcessEnvironment::default(), refuse(&mut Vec::new())));
         assert!(text.contains("where the system keeps libraries, in Python's packages, of which there are none"), "{text}");
     }

@@ -1,8 +1,8 @@
-//! Denoising with Intel Open Image Denoise, a library that is opened at run time if it is asked for.
+//! Denoising with Intel Open Image Denoise, a library that is loaded at run time if it is needed.
 //!
-//! Albedo and normals are denoised first, each by a filter of its own; the picture is denoised with the help of both, linear and without a
-//! limit; alpha and parts of the picture (light groups, kinds of light) go through filters of their own with the same two. See
-//! `docs/denoise.md`.
+//! Albedo and normals are denoised first, each by a filter of its own; the picture is denoised with the help of both,
+//! linear and without a limit; alpha and parts of the picture (light groups, kinds of light) go through filters of
+//! their own with the same two. See `docs/denoise.md`.
 
 mod clean;
 mod file;
@@ -32,7 +32,8 @@ impl Denoiser {
     /// else the system's, else that of Python's package `pyoidn`. Works with `threads` threads; 0 means all.
     ///
     /// # Errors
-    /// [`Error::Missing`](crate::Error::Missing) if there is no library that can be used: where was looked, and how to get it.
+    /// [`Error::Missing`](crate::Error::Missing) if there is no library that can be used: where was looked, and how to
+    /// get it.
     pub fn open(named: Option<&Path>, threads: usize) -> Result<Self> {
         let device = locate::open_first(named, &ProcessEnvironment::of_process(), |file| Device::open(file, threads))?;
         Ok(Self { device })
@@ -81,7 +82,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// The attribute of EXR files that says how they were denoised.
+    /// The attribute of EXR files with the parameters of their denoising.
     pub const ATTRIBUTE: &str = "steradian/denoised";
 
     /// The value of [`Report::ATTRIBUTE`], such as `OIDN 2.5.1, albedo and normal prefiltered`.

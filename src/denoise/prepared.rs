@@ -19,19 +19,20 @@ pub struct Prepared<'d> {
 }
 
 impl<'d> Prepared<'d> {
-    /// Denoises the features of a picture of `size` (width, height) pixels, row by row. Albedo is cut to 0..1, normals to -1..1. Features
-    /// that are 0 everywhere say nothing and are left out, as are normals without albedo, which the library has no use for.
+    /// Denoises the features of a picture of `size` (width, height) pixels, row by row. Albedo is cut to 0..1, normals
+    /// to -1..1. Features that are 0 everywhere hold no information and are left out, as are normals without albedo,
+    /// which the library has no use for.
     pub fn new(denoiser: &'d Denoiser, size: [usize; 2], albedo: Option<Vec<Triple>>, normal: Option<Vec<Triple>>) -> Result<Self> {
         let report = Report { version: denoiser.version(), ..Report::default() };
         let mut prepared = Self { denoiser, size, albedo: None, normal: None, report, start: Instant::now() };
-        let says_something = |pixels: &Vec<Triple>| pixels.as_flattened().iter().any(|v| *v != 0.0);
-        let Some(mut albedo) = albedo.filter(says_something) else { return Ok(prepared) };
+        let is_not_black = |pixels: &Vec<Triple>| pixels.as_flattened().iter().any(|v| *v != 0.0);
+        let Some(mut albedo) = albedo.filter(is_not_black) else { return Ok(prepared) };
         prepared.clean(&mut albedo);
         albedo.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
         prepared.albedo = Some(prepared.filter(Inputs { albedo: Some(&albedo), ..Inputs::default() })?);
         prepared.report.features = Features::Albedo;
         drop(albedo);
-        if let Some(mut normal) = normal.filter(says_something) {
+        if let Some(mut normal) = normal.filter(is_not_black) {
             prepared.clean(&mut normal);
             normal.as_flattened_mut().iter_mut().for_each(|v| *v = v.clamp(-1.0, 1.0));
             prepared.normal = Some(prepared.filter(Inputs { normal: Some(&normal), ..Inputs::default() })?);
@@ -48,7 +49,8 @@ impl<'d> Prepared<'d> {
         self.color(&color)
     }
 
-    /// Denoises layers that add up to the picture, and scales them so that they add up to `total`, the picture denoised.
+    /// Denoises layers that add up to the picture, and scales them so that they add up to `total`, the picture
+    /// denoised.
     pub fn parts(&mut self, total: &[Triple], names: &[String], parts: Vec<Vec<Triple>>) -> Result<Vec<Vec<Triple>>> {
         let mut denoised = Vec::with_capacity(parts.len());
         for mut part in parts {
@@ -60,7 +62,8 @@ impl<'d> Prepared<'d> {
         Ok(denoised)
     }
 
-    /// Denoises alpha, unless it has no value but 0 and 1. Pixels that are 0 like all around them stay 0, those that are 1 stay 1.
+    /// Denoises alpha, unless it has no value but 0 and 1. Pixels that are 0 like all around them stay 0, those that
+    /// are 1 stay 1.
     pub fn alpha(&mut self, alpha: &[f32]) -> Result<Vec<f32>> {
         let mut noisy: Vec<Triple> = alpha.iter().map(|&a| [a; 3]).collect();
         self.clean(&mut noisy);

@@ -2,8 +2,9 @@
 
 use super::oidn::Triple;
 
-/// Scales `groups` so that they add up to `total`, each channel of each pixel in proportion: a group keeps its share. All numbers are at
-/// least 0. Where every group is 0 and the total is not, the shares are those of the whole picture, or equal ones if that is 0, too.
+/// Scales `groups` so that they add up to `total`, each channel of each pixel in proportion: a group keeps its share.
+/// All numbers are at least 0. Where every group is 0 and the total is not, the shares are those of the whole picture,
+/// or equal ones if that is 0, too.
 pub fn scale_to_sum(total: &[Triple], groups: &mut [&mut [Triple]]) {
     if groups.is_empty() {
         return;

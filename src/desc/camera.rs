@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{KeyframeDesc, TransformDesc};
 
-/// A camera. Placed either by `position`, `look_at` and `up`, or by `transform`, which maps camera space (looking along -Z, +Y up) to the
-/// world.
+/// A camera. Placed either by `position`, `look_at` and `up`, or by `transform`, which maps camera space (looking along
+/// -Z, +Y up) to the world.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraDesc {
@@ -28,29 +28,31 @@ pub struct CameraDesc {
     /// Full vertical angle of view of a perspective camera in degrees, above 0 and below 180. Default: 40.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vertical_fov_degrees: Option<f64>,
-    /// What an orthographic camera shows from the lower to the upper edge of the picture, in world units, above 0; needed there.
+    /// What an orthographic camera shows from the lower to the upper edge of the picture, in world units, above 0;
+    /// needed there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view_height: Option<f64>,
     /// A thin lens for a perspective camera; without it everything is in focus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<LensDesc>,
-    /// Moves the picture to the right and up by these shares of its width and height, as a lens does that is moved against its film:
-    /// verticals stay parallel. From -10 to 10; not for an environment camera. Default: [0, 0].
+    /// Moves the picture to the right and up by these shares of its width and height, as a lens does that is moved
+    /// against its film: verticals stay parallel. From -10 to 10; not for an environment camera. Default: [0, 0].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shift: Option<[f64; 2]>,
-    /// Width of a pixel over its height, from 0.01 to 100: 2 for a picture that will be shown at twice its width. Not for an environment
-    /// camera. Default: 1.
+    /// Width of a pixel over its height, from 0.01 to 100: 2 for a picture that will be shown at twice its width. Not
+    /// for an environment camera. Default: 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pixel_aspect: Option<f64>,
-    /// What is nearer is not seen: depth along the view axis (distance from an environment camera) in world units, not negative. Shadows,
-    /// reflections and light are not cut. Default: 0.
+    /// What is nearer is not seen: depth along the view axis (distance from an environment camera) in world units, not
+    /// negative. Shadows, reflections and light are not cut. Default: 0.
     #[serde(default)]
     pub near: f64,
-    /// When the shutter opens and closes, in the time of the keyframes of all `motion`: finite, the second not below the first. Where both
-    /// are the same, the picture shows that moment without blur. Default: [0, 1].
+    /// When the shutter opens and closes, in the time of the keyframes of all `motion`: finite, the second not below
+    /// the first. Where both are the same, the picture shows that moment without blur. Default: [0, 1].
     #[serde(default = "default_shutter")]
     pub shutter: [f64; 2],
-    /// How the camera moves: what its placement is followed by at each time, rotations and translations. Default: not at all.
+    /// How the camera moves: what its placement is followed by at each time, rotations and translations. Default: not
+    /// at all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub motion: Vec<KeyframeDesc>,
 }
@@ -64,8 +66,8 @@ pub enum CameraKindDesc {
     Perspective,
     /// All rays are parallel.
     Orthographic,
-    /// Every direction in one picture (best twice as wide as high): columns are the angle about +Y, rows that from +Y, laid out as the
-    /// images of environment lights are. The middle of the picture is the direction looked at.
+    /// Every direction in one picture (best twice as wide as high): columns are the angle about +Y, rows that from +Y,
+    /// laid out as the images of environment lights are. The middle of the picture is the direction looked at.
     Environment,
 }
 
@@ -95,11 +97,11 @@ fn default_shutter() -> [f64; 2] {
 
 /// A thin lens: an aperture and a focus.
 ///
-/// The aperture is a `radius`, or an `f_number`, which needs the focal length. The focus is a `focus_distance` or a `focus_point`; or it
-/// follows from `focal_length` and the distance of the sensor by the lens equation 1 / f = 1 / a + 1 / b (f the focal length, a the
-/// distance from the lens to the sensor, b that to the plane in focus). Where the focus and the sensor are given but no `focal_length`, the
-/// same equation gives it. The sensor is given by `sensor_distance`, or by `sensor_height`, from which the angle of
-/// view gives its distance.
+/// The aperture is a `radius`, or an `f_number`, which needs the focal length. The focus is a `focus_distance` or a
+/// `focus_point`; or it follows from `focal_length` and the distance of the sensor by the lens equation 1 / f = 1 / a +
+/// 1 / b (f the focal length, a the distance from the lens to the sensor, b that to the plane in focus). Where the
+/// focus and the sensor are given but no `focal_length`, the same equation gives it. The sensor is given by
+/// `sensor_distance`, or by `sensor_height`, from which the angle of view gives its distance.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LensDesc {

@@ -45,12 +45,14 @@ pub struct PointLightDesc {
     pub position: [f64; 3],
     /// Radiant intensity (power per solid angle), linear RGB.
     pub intensity: [f32; 3],
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
+    /// AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
 
-/// A spot light: full intensity within `beam_angle_degrees`, none outside `cutoff_angle_degrees`, a smooth fall between.
+/// A spot light: full intensity within `beam_angle_degrees`, none outside `cutoff_angle_degrees`, a smooth fall
+/// between.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpotLightDesc {
@@ -73,7 +75,8 @@ pub struct SpotLightDesc {
     /// For the texture: a direction that is up, not that of the axis. Default: +Y (-Z if the axis lies along Y).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<[f64; 3]>,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
+    /// AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -101,7 +104,8 @@ pub struct ProjectorLightDesc {
     /// Width over height, above 0. Default: that of the image, if the texture is one; else 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aspect: Option<f64>,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
+    /// AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -110,26 +114,28 @@ fn default_cutoff() -> f64 {
     20.0
 }
 
-/// A light as measured: a photometric file (IES LM-63, type C) gives the intensity by direction, bilinear between its angles, nothing
-/// beyond them.
+/// A light as measured: a photometric file (IES LM-63, type C) gives the intensity by direction, bilinear between its
+/// angles, nothing beyond them.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IesLightDesc {
-    /// The `.ies` file, relative to the scene file. Its multipliers and ballast factors are applied; tables for a tilted lamp are not.
+    /// The `.ies` file, relative to the scene file. Its multipliers and ballast factors are applied; tables for a
+    /// tilted lamp are not.
     pub file: String,
     /// Where the light stands.
     pub position: [f64; 3],
     /// A point that the file's nadir (vertical angle 0) is turned to. Default: straight down, along -Y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub look_at: Option<[f64; 3]>,
-    /// Turn about the nadir in degrees, counter-clockwise seen along it (from above, if the light hangs). Without a turn, the file's
-    /// horizontal angle 0 points towards +X (+Y, if the nadir lies along X). Default: 0.
+    /// Turn about the nadir in degrees, counter-clockwise seen along it (from above, if the light hangs). Without a
+    /// turn, the file's horizontal angle 0 points towards +X (+Y, if the nadir lies along X). Default: 0.
     #[serde(default)]
     pub rotation_degrees: f64,
     /// Radiant intensity for each candela of the file, linear RGB. Default: [1, 1, 1].
     #[serde(default = "white")]
     pub intensity: [f32; 3],
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
+    /// AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -146,11 +152,12 @@ pub struct DirectionalLightDesc {
     pub direction: [f64; 3],
     /// Irradiance on a surface perpendicular to the direction, linear RGB.
     pub irradiance: [f32; 3],
-    /// Full angle in degrees that the light subtends, from 0 (a perfectly sharp shadow) to below 180; the sun has 0.53. A light with an
-    /// angle is visible to rays that leave the scene. Default: 0.
+    /// Full angle in degrees that the light subtends, from 0 (a perfectly sharp shadow) to below 180; the sun has 0.53.
+    /// A light with an angle is visible to rays that leave the scene. Default: 0.
     #[serde(default)]
     pub angular_diameter_degrees: f64,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
+    /// AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -162,8 +169,8 @@ pub struct EnvironmentLightDesc {
     /// Constant radiance, linear RGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radiance: Option<[f32; 3]>,
-    /// A lat-long image (EXR or HDR), relative to the scene file. The image's top is +Y; its middle column is -Z, and +X lies at three
-    /// quarters of the width.
+    /// A lat-long image (EXR or HDR), relative to the scene file. The image's top is +Y; its middle column is -Z, and
+    /// +X lies at three quarters of the width.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
     /// Factor on the radiance. Default: 1.
@@ -172,7 +179,8 @@ pub struct EnvironmentLightDesc {
     /// Rotation of the environment (translations are ignored; scales are an error).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transform: Option<TransformDesc>,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
+    /// AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }

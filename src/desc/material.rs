@@ -33,8 +33,8 @@ pub enum ScalarDesc {
     },
 }
 
-/// A number, or `{ "texture": "name", "range": [low, high] }`: the number is `low` where the luminance of the texture's colour, clamped to
-/// `[0, 1]`, is 0, and `high` where it is 1.
+/// A number, or `{ "texture": "name", "range": [low, high] }`: the number is `low` where the luminance of the texture's
+/// colour, clamped to `[0, 1]`, is 0, and `high` where it is 1.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields, expecting = "expected a number, or { \"texture\": name, \"range\": [low, high] }")]
 pub enum RangedDesc {
@@ -112,12 +112,13 @@ impl DistributionDesc {
     }
 }
 
-/// A material. All are two-sided unless composed by `two_sided`; a dielectric's inside is the side against the normal. Colours are within
-/// `[0, 1]`, those of textures too; the numbers of textures are clamped to it.
+/// A material. All are two-sided unless composed by `two_sided`; a dielectric's inside is the side against the normal.
+/// Colours are within `[0, 1]`, those of textures too; the numbers of textures are clamped to it.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum MaterialDesc {
-    /// Diffuse reflection: ideal, or rough as of plaster and clay (the EON model, an Oren-Nayar model that loses no light).
+    /// Diffuse reflection: ideal, or rough as of plaster and clay (the EON model, an Oren-Nayar model that loses no
+    /// light).
     Diffuse {
         /// Fraction of light reflected, each channel within `[0, 1]`. Default: 0.5.
         #[serde(default = "half")]
@@ -143,7 +144,8 @@ pub enum MaterialDesc {
     },
     /// A metal: give `metal`, or `eta` and `k`. Smooth unless `roughness` or `alpha` is given.
     Conductor {
-        /// A metal by name: `gold`, `silver`, `copper`, `aluminium`, `iron`, `chromium`, `titanium`, `tungsten`, `brass`.
+        /// A metal by name: `gold`, `silver`, `copper`, `aluminium`, `iron`, `chromium`, `titanium`, `tungsten`,
+        /// `brass`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         metal: Option<String>,
         /// Real part of the index of refraction for red, green, blue; no texture, which `tint` can be.
@@ -190,7 +192,8 @@ pub enum MaterialDesc {
     Coated {
         /// The material below, by name: opaque, and without relief.
         base: String,
-        /// Index of refraction of the coat over that of the outside, from 1, which leaves the base alone, to 10. Default: 1.5.
+        /// Index of refraction of the coat over that of the outside, from 1, which leaves the base alone, to 10.
+        /// Default: 1.5.
         #[serde(default = "glass_ior")]
         ior: RangedDesc,
         /// GGX roughness of the coat within `[0, 1]`; alpha is its square.
@@ -199,8 +202,8 @@ pub enum MaterialDesc {
         /// GGX alpha itself, in place of `roughness`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         alpha: Option<RoughnessDesc>,
-        /// What light keeps, in each channel, that crosses the coat twice along the normal; at an angle the way is longer and less is kept.
-        /// Default: 1.
+        /// What light keeps, in each channel, that crosses the coat twice along the normal; at an angle the way is
+        /// longer and less is kept. Default: 1.
         #[serde(default = "white")]
         tint: ColorDesc,
     },
@@ -231,7 +234,8 @@ pub enum MaterialDesc {
         /// Weight of the diffuse part within `[0, 1]`. Default: 0.5.
         #[serde(default = "half_scalar")]
         d: ScalarDesc,
-        /// Weight of the specular part within `[0, 1]`; with `d` at most 1, where textures exceed it `d` is less. Default: 0.5.
+        /// Weight of the specular part within `[0, 1]`; with `d` at most 1, where textures exceed it `d` is less.
+        /// Default: 0.5.
         #[serde(default = "half_scalar")]
         s: ScalarDesc,
         /// Width of the distribution of slopes within `[0, 1]`; at least 0.001 counts. Default: 0.3.
@@ -256,8 +260,9 @@ pub enum MaterialDesc {
         /// The material of the other side, by name.
         back: String,
     },
-    /// Another material on a surface that looks as if it had relief: give `normal_map` or `bump_map`. The shape itself stays as it is, and
-    /// needs uv: every shape has them but a mesh without `uvs`. It may be a part of other materials.
+    /// Another material on a surface that looks as if it had relief: give `normal_map` or `bump_map`. The shape itself
+    /// stays as it is, and needs uv: every shape has them but a mesh without `uvs`. It may be a part of other
+    /// materials.
     Relief {
         /// The material, by name; neither it nor a part of it has a relief of its own.
         material: String,
@@ -293,8 +298,8 @@ pub struct PlasticDesc {
     /// Factor on what the coat reflects, within `[0, 1]`. Default: 1.
     #[serde(default = "white", skip_serializing_if = "is_white")]
     pub coat_tint: ColorDesc,
-    /// Whether the base's colour deepens each time that the coat throws light back onto it. Default: false, light keeps the colour of one
-    /// reflection.
+    /// Whether the base's colour deepens each time that the coat throws light back onto it. Default: false, light keeps
+    /// the colour of one reflection.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub nonlinear: bool,
     /// Whether light that a rough coat's microfacets scatter several times is kept. If not, `ior`, `roughness` and
@@ -305,16 +310,17 @@ pub struct PlasticDesc {
 
 /// Glass, water and the like. Smooth unless `roughness` or `alpha` is given.
 ///
-/// With none of `priority`, `absorption` and `abbe` it is a boundary alone, whose `ior` is relative to whatever lies outside.
+/// With none of `priority`, `absorption` and `abbe` it is a boundary alone, whose `ior` is relative to whatever lies
+/// outside.
 ///
-/// With any of them it is a medium, which fills the closed surfaces that have the material (or a mix of it with opaque materials, such as a
-/// label). Surfaces of media may overlap, as that of a drink must overlap the inner side of its glass: each point belongs to the medium of
-/// the highest `priority` among those around it, at equal priorities to the one of the higher `ior`, then to the one
-/// that absorbs more. Light is reflected and refracted only where the medium changes, by the ratio of both indices;
-/// elsewhere it passes as if no surface were there, which then does not show in the layers either. Materials with the
-/// same `ior`, `priority`, `absorption` and `abbe` are one medium, rough or not. Up to eight different media overlap. A
-/// hollow is a surface with `reverse_normal`, or one of a medium of `ior` 1 and a higher priority. The camera may stand
-/// in a medium; `near` belongs to what is not seen, and absorbs nothing.
+/// With any of them it is a medium, which fills the closed surfaces that have the material (or a mix of it with opaque
+/// materials, such as a label). Surfaces of media may overlap, as that of a drink must overlap the inner side of its
+/// glass: each point belongs to the medium of the highest `priority` among those around it, at equal priorities to the
+/// one of the higher `ior`, then to the one that absorbs more. Light is reflected and refracted only where the medium
+/// changes, by the ratio of both indices; elsewhere it passes as if no surface were there, which then does not show in
+/// the layers either. Materials with the same `ior`, `priority`, `absorption` and `abbe` are one medium, rough or not.
+/// Up to eight different media overlap. A hollow is a surface with `reverse_normal`, or one of a medium of `ior` 1 and
+/// a higher priority. The camera may stand in a medium; `near` belongs to what is not seen, and absorbs nothing.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DielectricDesc {
@@ -340,7 +346,8 @@ pub struct DielectricDesc {
     /// Factor on what crosses the surface, within `[0, 1]`. Default: 1.
     #[serde(default = "white", skip_serializing_if = "is_white")]
     pub transmission_tint: ColorDesc,
-    /// Which medium is there where several overlap: the one of the highest priority, a whole number. Default for a medium: 0.
+    /// Which medium is there where several overlap: the one of the highest priority, a whole number. Default for a
+    /// medium: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub priority: Option<i32>,
     /// What the medium absorbs. Default: nothing.
@@ -360,7 +367,8 @@ impl DielectricDesc {
     }
 }
 
-/// Absorption by Beer and Lambert's law: what is left of white light is `color` to the power of the way over `distance`.
+/// Absorption by Beer and Lambert's law: what is left of white light is `color` to the power of the way over
+/// `distance`.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AbsorptionDesc {

@@ -1,8 +1,8 @@
-//! What the user writes: the scene file as plain data. The doc comments here are the manual of the format, and its JSON Schema
-//! (`steradian schema`) is made from the same types.
+//! What the user writes: the scene file as plain data. The doc comments here are the manual of the format, and its JSON
+//! Schema (`steradian schema`) is made from the same types.
 //!
-//! World: right-handed, +Y up by custom; the camera looks along its local -Z with +Y up. Angles are in degrees and say so. Colours are
-//! linear Rec.709. Unknown keys are errors. Comments (`//` and `/* */`) are allowed.
+//! World: right-handed, +Y up by custom; the camera looks along its local -Z with +Y up. Angles are in degrees, as
+//! their names end. Colours are linear Rec.709. Unknown keys are errors. Comments (`//` and `/* */`) are allowed.
 
 mod camera;
 mod files;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A file to write; its extension (`.exr` or `.png`) says which kind.
+/// A file to write; its extension (`.exr` or `.png`) selects the format.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutputDesc {
@@ -32,7 +32,7 @@ pub struct OutputDesc {
     /// EXR: store the whole picture, black around the crop, for programs that ignore data windows. Default: false.
     #[serde(default, skip_serializing_if = "is_default")]
     pub uncropped: bool,
-    /// EXR: how many objects Cryptomatte tells apart in a pixel: an even number. Default: 6.
+    /// EXR: Cryptomatte ranks, the number of objects stored per pixel: an even number. Default: 6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crypto_depth: Option<u32>,
     /// EXR: where Cryptomatte's names are stored. Default: embedded.
@@ -41,7 +41,7 @@ pub struct OutputDesc {
     /// EXR: the attribute `owner`. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub owner: Option<String>,
-    /// EXR: text before what the attribute `comments` says of the layers. Default: none.
+    /// EXR: text before the description of layers in the attribute `comments`. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub comments: Option<String>,
     /// EXR: the attribute `framesPerSecond`. Default: none.
@@ -50,7 +50,8 @@ pub struct OutputDesc {
     /// PNG: exposure in stops before the view. Default: 0.
     #[serde(default)]
     pub exposure: f32,
-    /// PNG: how light becomes colours of the display. Default: agx; srgb with the integrators that show data in place of light.
+    /// PNG: how light becomes colours of the display. Default: agx; srgb with the integrators that show data in place
+    /// of light.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<ViewDesc>,
 }
@@ -84,7 +85,8 @@ pub enum LayerKind {
     /// The picture: radiance, premultiplied by coverage, and coverage. It is always there, so scenes do not name it.
     #[serde(skip)]
     Color,
-    /// Depth along the view axis (not ray length), or the distance from an environment camera, in world units; 1e10 where nothing was hit.
+    /// Depth along the view axis (not ray length), or the distance from an environment camera, in world units; 1e10
+    /// where nothing was hit.
     Z,
     /// Shading normal in world space; zero where nothing was hit.
     N,
@@ -95,7 +97,8 @@ pub enum LayerKind {
     /// Surface parameters; zero where nothing was hit.
     #[serde(rename = "uv")]
     Uv,
-    /// How far the surface moves in the picture from when the shutter opens to when it closes, in pixels to the right and down.
+    /// How far the surface moves in the picture from when the shutter opens to when it closes, in pixels to the right
+    /// and down.
     #[serde(rename = "motion")]
     Motion,
     /// Fraction of light scattered by the first surface.
@@ -125,19 +128,22 @@ pub enum LayerKind {
     /// Light from infinity that is seen directly.
     #[serde(rename = "background")]
     Background,
-    /// A layer `light_NAME` for each group of lights and `light_default` for lights in no group; they sum to the picture.
+    /// A layer `light_NAME` for each group of lights and `light_default` for lights in no group; they sum to the
+    /// picture.
     #[serde(rename = "light_groups")]
     LightGroups,
-    /// Variance of the picture's red, green and blue, that is, their expected squared error, as far as the samples show it.
+    /// Variance of the picture's red, green and blue, that is, their expected squared error, as far as the samples show
+    /// it.
     #[serde(rename = "variance")]
     Variance,
     /// Number of samples.
     #[serde(rename = "samples")]
     Samples,
-    /// Fraction of light scattered by the first surface that is no mirror and no clear glass: what denoisers ask for.
+    /// Fraction of light scattered by the first surface that is no mirror and no clear glass: the albedo feature for
+    /// denoisers.
     #[serde(rename = "feature_albedo")]
     FeatureAlbedo,
-    /// Mean shading normal of that surface in world space: what denoisers ask for.
+    /// Mean shading normal of that surface in world space: the normal feature for denoisers.
     #[serde(rename = "feature_normal")]
     FeatureNormal,
     /// The picture before it was denoised, which denoisers add.

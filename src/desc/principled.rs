@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{ColorDesc, RangedDesc, ScalarDesc};
 
-/// The parameters of the principled model in one table: `$generate!` gets the documentation, name, kind and default of each. A `scalar` is
-/// within `[0, 1]`; `specular` and `ior` exclude each other.
+/// The parameters of the principled model in one table: `$generate!` gets the documentation, name, kind and default of
+/// each. A `scalar` is within `[0, 1]`; `specular` and `ior` exclude each other.
 macro_rules! principled_parameters {
     ($generate:ident) => {
         $generate! {
@@ -41,7 +41,8 @@ texture for either."]
             transmission: scalar = 0.0,
             /// Whether the surface is a thin sheet: nothing is bent, and both sides are the outside. Default: false.
             thin: flag = false,
-            /// How much of what the diffuse base scatters leaves on the other side, for `thin` surfaces only. Default: 0.
+            /// How much of what the diffuse base scatters leaves on the other side, for `thin` surfaces only. Default:
+            /// 0.
             diffuse_transmission: scalar = 0.0,
             /// Whether light that rough microfacets scatter several times is kept. Default: true.
             multiscatter: flag = true,
@@ -70,9 +71,9 @@ macro_rules! written {
 
 macro_rules! describe {
     ($($(#[doc = $doc:literal])* $(#[serde $serde:tt])? $name:ident: $kind:ident = $default:tt,)*) => {
-        /// Disney's principled model ("Physically Based Shading at Disney" and its extension to transmission): a clear coat
-        /// over a blend of metal, a diffuse base below a dielectric layer, and glass. Every number is within `[0, 1]` unless it
-        /// says otherwise and may come from a texture. It never scatters more than it receives.
+        /// Disney's principled model ("Physically Based Shading at Disney" and its extension to transmission): a clear
+        /// coat over a blend of metal, a diffuse base below a dielectric layer, and glass. Every number is within
+        /// `[0, 1]` unless noted otherwise, and may come from a texture. It never scatters more than it receives.
         #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct PrincipledDesc {

@@ -16,7 +16,8 @@ pub struct FilmDesc {
     /// Render only `[x, y, width, height]`, in pixels from the upper left corner.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crop: Option<[u32; 4]>,
-    /// Render this many pixels more on each side, for whoever moves or distorts the picture later; at most the shorter side. Default: 0.
+    /// Render this many pixels more on each side, for whoever moves or distorts the picture later; at most the shorter
+    /// side. Default: 0.
     #[serde(skip_serializing_if = "is_zero")]
     pub overscan: u32,
     /// The pixel filter.
@@ -111,7 +112,8 @@ pub enum FilterSamplesDesc {
     /// Each sample counts for all pixels whose filter reaches it: the weighted mean of the samples around a pixel.
     /// Filters with a radius of at most half a pixel or above 4 pixels are importance sampled instead.
     Shared,
-    /// The filter is importance sampled: each sample counts for one pixel. Noise is higher, but independent between pixels.
+    /// The filter is importance sampled: each sample counts for one pixel. Noise is higher, but independent between
+    /// pixels.
     Importance,
 }
 
@@ -214,8 +216,8 @@ pub enum IntegratorDesc {
         /// How directions towards lights are found.
         #[serde(default)]
         strategy: StrategyDesc,
-        /// Takes the noise of rare bright paths, and some light with it: biased. No single path that was scattered more than once brings a
-        /// channel more than this, above 0. Default: no limit, no bias.
+        /// Takes the noise of rare bright paths, and some light with it: biased. No single path that was scattered more
+        /// than once adds to a channel more than this, above 0. Default: no limit, no bias.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         clamp: Option<f32>,
         /// Takes the noise of caustics that paths find by rare chance, and some of their sharpness with it: the least
@@ -323,7 +325,7 @@ pub enum StrategyDesc {
     Mis,
     /// By sampling lights, wherever that is possible.
     Light,
-    /// By chance, when a scattered ray meets a light. (Point, spot and sharp directional lights are still sampled: nothing else finds
-    /// them.)
+    /// By chance, when a scattered ray meets a light. (Point, spot and sharp directional lights are still sampled:
+    /// nothing else finds them.)
     Bsdf,
 }

@@ -30,7 +30,7 @@ macro_rules! shapes {
                 #[serde(default, skip_serializing_if = "Vec::is_empty")]
                 pub motion: Vec<KeyframeDesc>,
                 /// How much of the surface is there: a number from 0 to 1, or `{ "texture": "name" }`. Rays, shadow
-                /// rays too, pass through the rest. Default: 1, or what an MTL says. Not with `emission`.
+                /// rays too, pass through the rest. Default: 1, or that of an MTL. Not with `emission`.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 pub opacity: Option<OpacityDesc>,
                 /// Light that the shape gives off.
@@ -135,7 +135,7 @@ pub struct ShapeCommonMut<'a> {
 shapes! {
     /// A triangle mesh from a file, or inline by `positions` and `triangles`.
     Mesh(MeshDesc) {
-        /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ brings
+        /// A PLY (binary or ASCII) or OBJ file, relative to the scene file. Without a `material` here, an OBJ uses
         /// those of its MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular colour
         /// Ks with an exponent Ns has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic
         /// with base Kd otherwise; all else is diffuse with Kd. Ke is radiance given off. `map_Kd` is a texture times
@@ -161,8 +161,8 @@ shapes! {
         /// Inline: a linear colour for each vertex, which is the attribute `vertex_color`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         colors: Option<Vec<[f32; 3]>>,
-        /// Inline: numbers, or colours, for each vertex (`vertex_NAME`) or each triangle (`face_NAME`) by name, for textures of type
-        /// `mesh_attribute`.
+        /// Inline: numbers, or colours, for each vertex (`vertex_NAME`) or each triangle (`face_NAME`) by name, for
+        /// textures of type `mesh_attribute`.
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         attributes: BTreeMap<String, AttributeDesc>,
         /// A mesh that deforms: the files with its vertices at further times, evenly spaced until the shutter closes,
@@ -176,8 +176,8 @@ shapes! {
         /// How normals are found. Default: given ones are interpolated, else the mesh is flat.
         #[serde(default)]
         shading: MeshShadingDesc,
-        /// Where normals are computed: triangles at an angle above this are not smoothed together, from 0 to 180 degrees. Default: 180, no
-        /// creases.
+        /// Where normals are computed: triangles at an angle above this are not smoothed together, from 0 to 180
+        /// degrees. Default: 180, no creases.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         crease_angle_degrees: Option<f64>,
         /// Where normals are computed: how triangles around a vertex are weighted. Default: `angle`.
@@ -187,8 +187,8 @@ shapes! {
         #[serde(default)]
         smooth_by: SmoothByDesc,
     }
-    /// A sphere about the origin, or the part of it between two heights and within an angle about +z. u is the angle over `phi_max`; v runs
-    /// from the bottom to the top of what is kept, by the angle from -z.
+    /// A sphere about the origin, or the part of it between two heights and within an angle about +z. u is the angle
+    /// over `phi_max`; v runs from the bottom to the top of what is kept, by the angle from -z.
     Sphere(SphereDesc) {
         /// Radius, above 0. Default: 1.
         #[serde(default = "one")]
@@ -224,15 +224,15 @@ shapes! {
         /// A point of the plane, where u and v are 0. Default: the origin.
         #[serde(default)]
         point: [f64; 3],
-        /// The normal; any length. u grows along +x cross normal (+y cross normal if the normal is along x by more than a tenth), v along
-        /// normal cross u. Default: +y.
+        /// The normal; any length. u grows along +x cross normal (+y cross normal if the normal is along x by more than
+        /// a tenth), v along normal cross u. Default: +y.
         #[serde(default = "plane_normal")]
         normal: [f64; 3],
     }
     /// The cube `[-1, 1]³` with normals outward. Each face has u and v from 0 to 1.
     Cube(CubeDesc) {}
-    /// A disk, ring or sector at z = 0 about the origin, with normal +z. u is the angle over `phi_max`; v runs from the inner to the outer
-    /// radius.
+    /// A disk, ring or sector at z = 0 about the origin, with normal +z. u is the angle over `phi_max`; v runs from the
+    /// inner to the outer radius.
     Disk(DiskDesc) {
         /// Outer radius, above 0. Default: 1.
         #[serde(default = "one")]
@@ -244,7 +244,8 @@ shapes! {
         #[serde(default = "full_turn")]
         phi_max_degrees: f64,
     }
-    /// A cylinder about +z from z = 0 to `height`, without caps, with normals outward. u is the angle over `phi_max`; v is `z / height`.
+    /// A cylinder about +z from z = 0 to `height`, without caps, with normals outward. u is the angle over `phi_max`; v
+    /// is `z / height`.
     Cylinder(CylinderDesc) {
         /// Radius, above 0. Default: 1.
         #[serde(default = "one")]
@@ -256,8 +257,8 @@ shapes! {
         #[serde(default = "full_turn")]
         phi_max_degrees: f64,
     }
-    /// A cone about +z with its base at z = 0 and its apex (or, with a `top_radius`, its upper rim) at `height`, without caps, with
-    /// normals outward. u is the angle over `phi_max`; v is `z / height`.
+    /// A cone about +z with its base at z = 0 and its apex (or, with a `top_radius`, its upper rim) at `height`,
+    /// without caps, with normals outward. u is the angle over `phi_max`; v is `z / height`.
     Cone(ConeDesc) {
         /// Radius of the base. Default: 1.
         #[serde(default = "one")]
@@ -272,8 +273,9 @@ shapes! {
         #[serde(default = "full_turn")]
         phi_max_degrees: f64,
     }
-    /// A surface of revolution: a profile curve in the xy plane turned about +y. x is the distance from the axis and must not be
-    /// negative. u is the angle over `phi_max`; v runs from 0 to 1 along the profile. A profile that runs towards +y has normals outward.
+    /// A surface of revolution: a profile curve in the xy plane turned about +y. x is the distance from the axis and
+    /// must not be negative. u is the angle over `phi_max`; v runs from 0 to 1 along the profile. A profile that runs
+    /// towards +y has normals outward.
     Revolution(RevolutionDesc) {
         /// The profile.
         profile: ProfileDesc,
@@ -292,7 +294,8 @@ shapes! {
 pub enum ProfileDesc {
     /// Joined cubic Bezier curves: 3n + 1 control points.
     Bezier(Vec<[f64; 2]>),
-    /// A uniform cubic B-spline: at least 4 control points. The curve does not reach its end points unless they are tripled.
+    /// A uniform cubic B-spline: at least 4 control points. The curve does not reach its end points unless they are
+    /// tripled.
     BSpline(Vec<[f64; 2]>),
 }
 
@@ -303,7 +306,8 @@ pub enum ProfileParameterDesc {
     /// The curve's parameter, the same share of v for each of its segments.
     #[default]
     Curve,
-    /// The height: v = 0 at the lowest point of the profile, 1 at the highest. Where the profile turns back, values occur again.
+    /// The height: v = 0 at the lowest point of the profile, 1 at the highest. Where the profile turns back, values
+    /// occur again.
     Height,
     /// The length of the curve: images are not stretched along it.
     ArcLength,
@@ -416,7 +420,7 @@ pub enum OpacityDesc {
     Number(f32),
     /// A texture by name.
     Texture {
-        /// The texture's name. An image with alpha that names no `channel` stands for its alpha, other textures for their luminance.
+        /// The texture's name. An image with alpha and no `channel` gives its alpha, other textures their luminance.
         texture: String,
         /// Where the texture is below this number within `[0, 1]` there is a hole, elsewhere all of the surface: an
         /// alpha test, of the texture as filtered. Default: none, the texture is the fraction of light that the surface
@@ -438,7 +442,8 @@ pub struct EmissionDesc {
     /// Whether both sides emit; otherwise only the front does.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub two_sided: bool,
-    /// A group of lights by name (letters, digits and underscores): what groups give to the picture can be told apart. Default: none.
+    /// The light group, by name (letters, digits and underscores): the contribution of each group can be stored as an
+    /// AOV. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
@@ -459,8 +464,8 @@ pub struct ObjectDesc {
 pub struct InstanceDesc {
     /// The object's name.
     pub object: String,
-    /// What the instance is called in layers that pick objects; those of the same name are picked together. Default: the object's name with
-    /// the place in the list, as in `tree_17`.
+    /// What the instance is called in layers that pick objects; those of the same name are picked together. Default:
+    /// the object's name with the place in the list, as in `tree_17`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Where it stands.

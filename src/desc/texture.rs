@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::ColorDesc;
 
-/// A texture. Every shape has its uv, described there; on an image the origin of uv is the bottom left corner and v grows upward.
+/// A texture. Every shape has its uv, described there; on an image the origin of uv is the bottom left corner and v
+/// grows upward.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum TextureDesc {
@@ -35,7 +36,8 @@ pub enum TextureDesc {
         /// How whole numbers become colours. Default: `auto`.
         #[serde(default)]
         color_space: ColorSpaceDesc,
-        /// What stands between the middles of pixels, and what is seen where they are small in the picture. Default: `trilinear`.
+        /// What stands between the middles of pixels, and what is seen where they are small in the picture. Default:
+        /// `trilinear`.
         #[serde(default)]
         filter: TextureFilterDesc,
         /// What lies beyond the edges: one word, or one for u and one for v. Default: `repeat`.
@@ -51,17 +53,18 @@ pub enum TextureDesc {
         /// See `scale`. Default: 0, 0.
         #[serde(default)]
         offset: [f32; 2],
-        /// One number of each pixel in place of its colour. Default: where a colour is asked for, the colour; where a
-        /// number is asked for, its luminance.
+        /// One number of each pixel in place of its colour. Default: where a colour is needed, the colour; where a
+        /// number is needed, its luminance.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         channel: Option<ChannelDesc>,
         /// Whether 1 minus the value is meant. Default: false.
         #[serde(default)]
         invert: bool,
     },
-    /// The colour of the surface itself: between those of a mesh's vertices, which may have any. In a PLY file these are `red`, `green` and
-    /// `blue` (or `r`, `g` and `b`) of the vertices, linear as floats and sRGB as whole numbers; in an OBJ file three
-    /// numbers behind those of a position, sRGB. The same as `mesh_attribute` with the name `vertex_color`.
+    /// The colour of the surface itself: between those of a mesh's vertices, which may have any. In a PLY file these
+    /// are `red`, `green` and `blue` (or `r`, `g` and `b`) of the vertices, linear as floats and sRGB as whole numbers;
+    /// in an OBJ file three numbers behind those of a position, sRGB. The same as `mesh_attribute` with the name
+    /// `vertex_color`.
     VertexColor,
     /// An attribute of the mesh itself: numbers or colours, between those of its vertices or one for each face. Opacity
     /// and what is no colour take the luminance of a colour. For parameters of materials, opacity and emission, on
@@ -88,7 +91,7 @@ pub enum TextureDesc {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ColorSpaceDesc {
-    /// As `srgb` where a colour is asked for; as `linear` where data is: roughness, normals, heights, opacity.
+    /// As `srgb` for colours; as `linear` for data: roughness, normals, heights, opacity.
     #[default]
     Auto,
     /// By the sRGB transfer curve.
@@ -97,13 +100,13 @@ pub enum ColorSpaceDesc {
     Linear,
 }
 
-/// What stands between the middles of an image's pixels, and what is seen where they are smaller than what a sample of
-/// the picture stands for.
+/// The filter of an image's pixels: how they are interpolated, and how they are averaged where they are smaller than
+/// the footprint of a sample of the picture.
 ///
-/// A sample stands for its pixel divided by the samples per pixel that the render has been asked for, seen through
-/// mirrors and glass too; after other surfaces, for the part of the light that they gather from. So pictures have less
-/// noise, and what is blurred vanishes as the samples become more. Opacity, normal and bump maps, emission and the
-/// amount of a mix are always looked up as `bilinear` does it.
+/// The footprint of a sample is its pixel divided by the samples per pixel requested for the render, traced through
+/// mirrors and glass too; after other surfaces, that of the lobe that they sample from. So pictures have less noise,
+/// and what is blurred vanishes as the samples become more. Opacity, normal and bump maps, emission and the amount of a
+/// mix are always looked up as `bilinear` does it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TextureFilterDesc {
@@ -111,7 +114,7 @@ pub enum TextureFilterDesc {
     Nearest,
     /// The four nearest pixels, blended in linear colours.
     Bilinear,
-    /// As `bilinear`, in smaller versions of the image where a sample stands for more than a pixel of it.
+    /// As `bilinear`, in smaller versions of the image where a sample's footprint is larger than a pixel of it.
     #[default]
     Trilinear,
 }

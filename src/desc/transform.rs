@@ -17,17 +17,19 @@ impl TransformDesc {
 
 /// A transform at one time of a motion; before the first and after the last the motion rests.
 ///
-/// Where all keyframes have the same kinds of steps in the same order, each step is interpolated by itself: rotations about the same axis
-/// by their angle (0 to 720 degrees are two turns), about different axes the short way round. A `rotate` or `scale` that a keyframe lacks
-/// changes nothing there. So what is moved to the origin, rotated and moved back turns in place, and what is moved and then rotated goes
-/// round the origin.
+/// Where all keyframes have the same kinds of steps in the same order, each step is interpolated by itself: rotations
+/// about the same axis by their angle (0 to 720 degrees are two turns), about different axes the short way round. A
+/// `rotate` or `scale` that a keyframe lacks changes nothing there. So what is moved to the origin, rotated and moved
+/// back turns in place, and what is moved and then rotated goes round the origin.
 ///
-/// Other keyframes, such as a `matrix` and a `translate`, are interpolated as matrices: translation, rotation (the short way round, evenly)
-/// and stretch each by itself, about the point which the steps before the first rotation move to the origin.
+/// Other keyframes, such as a `matrix` and a `translate`, are interpolated as matrices: translation, rotation (the
+/// short way round, evenly) and stretch each by itself, about the point which the steps before the first rotation move
+/// to the origin.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KeyframeDesc {
-    /// When, in the time in which the camera's `shutter` is given: from 0 to 1 by default. Times must grow; they may lie outside of it.
+    /// When, in the time in which the camera's `shutter` is given: from 0 to 1 by default. Times must grow; they may
+    /// lie outside of it.
     pub time: f64,
     /// The transform at that time.
     #[serde(default)]
@@ -59,7 +61,8 @@ pub enum TransformStepDesc {
         #[serde(default = "y_axis")]
         up: [f64; 3],
     },
-    /// A 4x4 matrix by rows; it multiplies column vectors, so the translation is the last column. The last row must be 0 0 0 1.
+    /// A 4x4 matrix by rows; it multiplies column vectors, so the translation is the last column. The last row must be
+    /// 0 0 0 1.
     Matrix([[f64; 4]; 4]),
 }
 

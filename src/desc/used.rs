@@ -19,8 +19,8 @@ pub struct UsedNames {
 }
 
 impl SceneDesc {
-    /// What the world uses. A word that happens to be a name counts as that name: what is used is never missing here, and what is missing
-    /// is never used.
+    /// What the world uses. A word that happens to be a name counts as that name: what is used is never missing here,
+    /// and what is missing is never used.
     pub fn used_names(&self) -> UsedNames {
         let mut used = UsedNames::default();
         let mut instances: Vec<_> = self.instances.iter().collect();

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 /// The most frames of a sequence.
 const MOST_FRAMES: u64 = 1_000_000;
 
-/// Digits of a frame's number in names that do not say.
+/// Digits of a frame's number in names that do not give them.
 const DEFAULT_DIGITS: usize = 4;
 
 /// Frames in the order in which they are rendered, each once, and at least one.
@@ -26,7 +26,8 @@ impl FrameList {
         &self.0
     }
 
-    /// The shortest text that means the same numbers in ascending order, with `separator` between a range and its step: `1-10:2,20`.
+    /// The shortest text that means the same numbers in ascending order, with `separator` between a range and its step:
+    /// `1-10:2,20`.
     pub fn ranges(&self, separator: char) -> String {
         let mut sorted = self.0.clone();
         sorted.sort_unstable();
@@ -95,11 +96,12 @@ struct Pattern {
     digits: usize,
 }
 
-/// The first of `####` (a digit for each), `%d` and `%04d` in `text`. In names of folders, a single `#` is a character like any other.
+/// The first of `####` (a digit for each), `%d` and `%04d` in `text`. In names of folders, a single `#` is a character
+/// like any other.
 fn find_pattern(text: &str) -> Option<Pattern> {
     let bytes = text.as_bytes();
     for start in 0..bytes.len() {
-        let run = |from: usize, wanted: fn(&u8) -> bool| bytes[from..].iter().take_while(|b| wanted(b)).count();
+        let run = |from: usize, accepted: fn(&u8) -> bool| bytes[from..].iter().take_while(|b| accepted(b)).count();
         if bytes[start] == b'#' {
             let digits = run(start, |b| *b == b'#');
             if digits == 1 && bytes[start..].contains(&b'/') {
@@ -125,7 +127,8 @@ pub fn has_frame_pattern(name: &str) -> bool {
     find_pattern(name).is_some()
 }
 
-/// Checks the name of a file that is written without frames: one with a place for a frame's number is most likely a slip.
+/// Checks the name of a file that is written without frames: one with a place for a frame's number is most likely a
+/// slip.
 ///
 /// # Errors
 /// [`Error::Usage`] if it has one. A single `#` is a character like any other.
@@ -168,7 +171,8 @@ pub fn file_of_frame(name: &str, frame: i64) -> String {
     out + rest
 }
 
-/// Whether a scene's path is a pattern for a file of each frame: it has a pattern, and no file of that very name exists.
+/// Whether a scene's path is a pattern for a file of each frame: it has a pattern, and no file of that very name
+/// exists.
 pub fn is_scene_per_frame(scene: &Path) -> bool {
     scene.to_str().is_some_and(has_frame_pattern) && !scene.exists()
 }

@@ -9,7 +9,7 @@ use super::frames::{FrameList, file_of_frame};
 pub struct Job {
     /// A name for queues: the scene's.
     pub name: String,
-    /// The program `steradian` as the machines know it.
+    /// The program `steradian`: its path on the machines of the farm.
     pub program: PathBuf,
     /// The scene's file, or with a place for the frame's number one for each frame.
     pub scene: PathBuf,

@@ -6,12 +6,13 @@ use serde_json::{Value, json};
 
 use super::job::{Job, quote};
 
-/// The template as JSON: a step of shards (and frames), and one that merges each frame when all shards are rendered. Whoever submits it may
-/// change the number of shards, the frames, the program, and the folder of shards and checkpoints.
+/// The template as JSON: a step of shards (and frames), and one that merges each frame when all shards are rendered.
+/// Whoever submits it may change the number of shards, the frames, the program, and the folder of shards and
+/// checkpoints.
 ///
 /// A task that is cancelled gets two minutes to write its checkpoint.
 pub fn openjd_template(job: &Job) -> Value {
-    // Paths are strings: the specification wants defaults of type PATH relative to the template.
+    // Paths are strings: the specification requires defaults of type PATH to be relative to the template.
     let text = |name: &str, value: &str, what: &str| json!({ "name": name, "type": "STRING", "default": value, "description": what });
     let mut parameters = vec![
         text("Scene", &job.scene.to_string_lossy(), "The scene"),

@@ -15,7 +15,7 @@ pub struct Status {
     pub frame: Option<i64>,
     /// Samples in a second.
     pub samples_per_second: f64,
-    /// Seconds until the end, as far as can be told.
+    /// Estimated seconds until the end.
     pub seconds_left: Option<f64>,
     /// Rate and time left in words; may be empty.
     pub text: String,
@@ -28,7 +28,7 @@ pub enum Event<'a> {
     Begin(Option<i64>),
     /// It goes on.
     Progress(&'a Status),
-    /// Something the user should know.
+    /// A warning.
     Warning(&'a str),
     /// The work has failed.
     Failure(&'a str),
@@ -68,8 +68,8 @@ impl ProgressFormat {
 /// What farms look for in a program's output, anywhere in a line.
 const MARKERS: [&str; 8] = ["openjd_", "Progress:", "PROGRESS:", "ALF_PROGRESS", "FRAME:", "ACTIVITY:", "[ PARSER", "Error:"];
 
-/// A message on one line in which no farm finds one of its own words, whatever names are in it: the word's first letter is written as JSON
-/// writes odd characters.
+/// A message on one line in which no farm finds one of its own words, whatever names are in it: the word's first letter
+/// is written as JSON writes odd characters.
 pub fn message_line(text: &str) -> String {
     without_markers(printable::line(text))
 }
@@ -200,14 +200,14 @@ mod tests {
         ];
         assert_eq!(expected.len(), FORMATS.len());
         for (name, line) in expected {
-            let told = lines(name, &Event::Progress(&status));
+            let printed = lines(name, &Event::Progress(&status));
             match name {
                 "json" => {
                     let parse = |text: &str| serde_json::from_str::<Value>(text).unwrap();
-                    assert_eq!(parse(&told[0]), parse(line));
-                    assert!(!told[0].contains('\n'));
+                    assert_eq!(parse(&printed[0]), parse(line));
+                    assert!(!printed[0].contains('\n'));
                 }
-                _ => assert_eq!(told, [line], "{name}"),
+                _ => assert_eq!(printed, [line], "{name}"),
             }
         }
     }

@@ -4,7 +4,7 @@ use super::job::{Job, quote, quote_path};
 use crate::error::{Error, Result};
 use crate::printable;
 
-/// What Slurm is asked for.
+/// The resources requested from Slurm.
 #[derive(Clone, Debug, Default)]
 pub struct SlurmOptions {
     /// `--partition`.
@@ -24,11 +24,11 @@ pub struct SlurmOptions {
 /// A script: its name and its text.
 pub type Script = (&'static str, String);
 
-/// The scripts of a job, for its folder: `render.sh` for the array of shards, `merge.sh` for the job that waits for them, and `submit.sh`,
-/// which submits both for every frame.
+/// The scripts of a job, for its folder: `render.sh` for the array of shards, `merge.sh` for the job that waits for
+/// them, and `submit.sh`, which submits both for every frame.
 ///
-/// A task whose node is lost, which is preempted or reaches its time limit is queued again and goes on from its checkpoint; one that fails
-/// by itself is rendered again some times, unless its exit code says that this is of no use.
+/// A task whose node is lost, which is preempted or reaches its time limit is queued again and goes on from its
+/// checkpoint; one that fails by itself is rendered again some times, unless its exit code marks a permanent failure.
 ///
 /// # Errors
 /// [`Error::Usage`] if what stands in a directive for `sbatch`, which is a comment of the shell, has a control
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn scripts_say_what_was_asked() {
+    fn scripts_hold_the_requested_options() {
         let options = SlurmOptions {
             partition: Some("farm".to_owned()),
             time: Some("2:00:00".to_owned()),
@@ -178,7 +178,8 @@ mod tests {
         assert!(render.contains("--every 30 --resume"));
         assert!(merge.contains("#SBATCH --mem=16G") && !merge.contains("--cpus-per-task"));
         assert!(submit.contains("submit 1 /show/room.0001.exr '/show/it'\\''s.01.png'\nsubmit 3 /show/room.0003.exr"), "{submit}");
-        // Every place is filled, and what precedes the directives is comments: Slurm stops reading them at the first command.
+        // Every place is filled, and what precedes the directives is comments: Slurm stops reading them at the first
+        // command.
         for script in [&render, &merge, &submit] {
             let left = script.split('@').find(|part| part.len() > 2 && part.chars().all(|c| c.is_ascii_uppercase()));
             assert_eq!(left, None, "{script}");

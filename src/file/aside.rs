@@ -102,8 +102,8 @@ fn is_at(file: &File, name: &Path) -> bool {
     matches!((file.metadata(), fs::symlink_metadata(name)), (Ok(a), Ok(b)) if id(&a) == id(&b))
 }
 
-/// The names for files on their way to `target`: the same ones in every run on a machine, and others on other machines, whose locks some
-/// network file systems do not show.
+/// The names for files on their way to `target`: the same ones in every run on a machine, and others on other machines,
+/// whose locks some network file systems do not show.
 fn names(target: &Path) -> impl Iterator<Item = PathBuf> {
     let host = fs::read("/proc/sys/kernel/hostname").unwrap_or_default();
     let mut hasher = blake3::Hasher::new();
@@ -139,7 +139,7 @@ fn remove_left_over(name: &Path) {
     }
     let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32;
     let Ok(file) = File::options().read(true).custom_flags(flags).open(name) else { return };
-    // Where there are no locks, nobody knows.
+    // Without locks, this cannot be determined.
     if file.try_lock().is_ok() && is_at(&file, name) {
         let _ = fs::remove_file(name);
     }

@@ -1,4 +1,5 @@
-//! Pixels of EXR files, block by block: the memory is that of the channels that are kept and of the blocks being decoded.
+//! Pixels of EXR files, block by block: the memory is that of the channels that are kept and of the blocks being
+//! decoded.
 
 use std::collections::HashSet;
 use std::io::{Read, Seek};
@@ -30,18 +31,18 @@ pub struct Place {
     pub channel: usize,
 }
 
-/// Consecutive samples of a wanted channel, in one row of the picture.
+/// Consecutive samples of a requested channel, in one row of the picture.
 #[derive(Clone, Copy, Debug)]
-pub struct Row<'a> {
-    /// Which of the channels wanted.
-    pub wanted: usize,
+pub struct ChannelRow<'a> {
+    /// Index into the channels requested.
+    pub requested: usize,
     /// The first sample's pixel: `y * width + x` in the part's data window.
     pub start: usize,
     sample_type: SampleType,
     bytes: &'a [u8],
 }
 
-impl Row<'_> {
+impl ChannelRow<'_> {
     /// Writes the samples to the items of `to`, one after the other.
     pub fn write<'t, T: 't>(&self, to: impl Iterator<Item = &'t mut T>, convert: impl Fn(f32) -> T) {
         match self.sample_type {
@@ -93,30 +94,30 @@ fn out_of_memory(path: &Path, bytes: usize) -> Error {
     Error::OutOfMemory(format!("the pixels of {} need {} MiB", path.display(), bytes >> 20))
 }
 
-/// Reads the largest level of flat parts and gives each row of the channels `wanted` to `keep`, in no particular order
-/// but each sample once. The parts without wanted channels are decoded too, so that damage is found, if `every_part` is
-/// set. `headers` are those that the places come from.
+/// Reads the largest level of flat parts and gives each row of the channels `requested` to `keep`, in no particular
+/// order but each sample once. The parts without requested channels are decoded too, so that damage is found, if
+/// `every_part` is set. `headers` are those that the places come from.
 ///
 /// # Errors
 /// The library's, for files that are malformed, cut short, or use what it does not support.
 pub fn read_rows(
     source: impl Read + Seek,
     headers: &[Header],
-    wanted: &[Place],
+    requested: &[Place],
     every_part: bool,
-    mut keep: impl FnMut(Row),
+    mut keep: impl FnMut(ChannelRow),
 ) -> ExrResult<()> {
     let reader = exr::block::read(source, false)?;
     let shape = |headers: &[Header]| headers.iter().map(|header| (header.layer_size, header.channels.list.len())).collect::<Vec<_>>();
     if shape(reader.headers()) != shape(headers) {
         return Err(ExrError::Invalid("the file changed while it was read".into()));
     }
-    // Which of `wanted` a channel is, by part and channel; none for parts that are passed over.
+    // Which of `requested` a channel is, by part and channel; none for parts that are passed over.
     let mut uses: Vec<Vec<Vec<usize>>> = headers.iter().map(|header| vec![Vec::new(); header.channels.list.len()]).collect();
-    for (i, place) in wanted.iter().enumerate() {
+    for (i, place) in requested.iter().enumerate() {
         uses[place.part][place.channel].push(i);
     }
-    let is_read = |part: usize, level: Vec2<usize>| level == Vec2(0, 0) && (every_part || wanted.iter().any(|place| place.part == part));
+    let is_read = |part: usize, level: Vec2<usize>| level == Vec2(0, 0) && (every_part || requested.iter().any(|place| place.part == part));
     let chunks = reader.filter_chunks(false, |_, _, block| is_read(block.layer, block.level))?;
 
     let mut seen = HashSet::new();
@@ -128,9 +129,9 @@ pub fn read_rows(
         }
         for line in block.lines(&header.channels) {
             let at = line.location;
-            for &wanted in &uses[part][at.channel] {
+            for &requested in &uses[part][at.channel] {
                 let start = at.position.y() * header.layer_size.width() + at.position.x();
-                keep(Row { wanted, start, sample_type: header.channels.list[at.channel].sample_type, bytes: line.value });
+                keep(ChannelRow { requested, start, sample_type: header.channels.list[at.channel].sample_type, bytes: line.value });
             }
         }
         Ok(())
@@ -187,7 +188,7 @@ mod tests {
     fn wanted_channels_are_kept_and_no_others() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
-        let wanted = [(1, 3), (0, 11), (1, 100), (1, 3)].map(|(part, channel)| Place { part, channel });
+        let requested = [(1, 3), (0, 11), (1, 100), (1, 3)].map(|(part, channel)| Place { part, channel });
         for (compression, blocks) in [
             (Compression::ZIP16, Blocks::ScanLines),
             (Compression::Uncompressed, Blocks::ScanLines),
@@ -195,17 +196,17 @@ mod tests {
         ] {
             write(&path, compression, blocks);
             let headers = read_headers(&path).unwrap();
-            let mut kept = vec![vec![f32::NAN; SIZE.area()]; wanted.len()];
+            let mut kept = vec![vec![f32::NAN; SIZE.area()]; requested.len()];
             let mut count = 0;
             let source = crate::file::open(&path).unwrap();
-            read_rows(source, &headers, &wanted, false, |row| {
-                let to = &mut kept[row.wanted][row.start..];
+            read_rows(source, &headers, &requested, false, |row| {
+                let to = &mut kept[row.requested][row.start..];
                 row.write(to.iter_mut().inspect(|_| count += 1), |v| v);
             })
             .unwrap();
             // Four of 320 channels.
-            assert_eq!(count, wanted.len() * SIZE.area());
-            for (place, kept) in wanted.iter().zip(kept) {
+            assert_eq!(count, requested.len() * SIZE.area());
+            for (place, kept) in requested.iter().zip(kept) {
                 let expected: Vec<f32> = (0..SIZE.area()).map(|pixel| sample(place.part, place.channel, pixel)).collect();
                 assert!(kept == expected, "{compression:?} {place:?}");
             }

@@ -1,4 +1,4 @@
-//! Headers of EXR files, and whether a file can hold what they claim: memory is not asked for on a header's word alone.
+//! Headers of EXR files, and whether a file can hold what they claim: memory is not allocated by a header alone.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use exr::meta::header::Header;
 /// Bytes that a block takes at least: its place in the table of offsets, its coordinate, its size.
 const BLOCK_BYTES: u64 = 16;
 
-/// How many bytes of pixels a byte of a file can at most become. Run lengths make 128 of 2, deflate at most 1032 of one, and what the other
-/// methods leave out is bounded by the size of their smallest codes.
+/// How many bytes of pixels a byte of a file can at most become. Run lengths make 128 of 2, deflate at most 1032 of
+/// one, and what the other methods leave out is bounded by the size of their smallest codes.
 fn most_per_byte(compression: Compression) -> u64 {
     match compression {
         Compression::Uncompressed => 1,

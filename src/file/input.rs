@@ -15,9 +15,10 @@ const MAX_STREAM: u64 = 1 << 32;
 /// Opens a regular file for reading. Of one that grows, no more is read than it held.
 ///
 /// # Errors
-/// The system's, or [`io::ErrorKind::InvalidInput`] for folders, devices, pipes and sockets: reading those may wait, or go on, for ever.
+/// The system's, or [`io::ErrorKind::InvalidInput`] for folders, devices, pipes and sockets: reading those may wait, or
+/// go on, for ever.
 pub fn open(path: &Path) -> io::Result<Take<File>> {
-    // Looked at before opening, which can make a device act; and after it, lest the file was exchanged in between.
+    // Checked before opening, which can make a device act; and after it, in case the file was exchanged in between.
     check_regular(&std::fs::metadata(path)?)?;
     let file = File::options().read(true).custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32).open(path)?;
     let metadata = file.metadata()?;
@@ -74,8 +75,8 @@ pub fn skip_mark<R: BufRead>(mut source: R) -> io::Result<R> {
     Ok(source)
 }
 
-/// All bytes of a regular file or, up to 4 GiB, of a pipe. For files that the user names, not for those named by files: a pipe without a
-/// writer waits for one.
+/// All bytes of a regular file or, up to 4 GiB, of a pipe. For files that the user names, not for those named by files:
+/// a pipe without a writer waits for one.
 ///
 /// # Errors
 /// As [`open`], but for pipes.

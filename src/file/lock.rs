@@ -23,12 +23,13 @@ pub struct Lock {
 pub enum LockError {
     /// Another process holds it; its number as text, if it left one.
     Held(String),
-    /// The system refuses.
+    /// The system rejects.
     System(io::Error),
 }
 
 impl Lock {
-    /// Makes a lock file and locks it. A symbolic link in its place is not followed, and what is no lock file is not touched.
+    /// Makes a lock file and locks it. A symbolic link in its place is not followed, and what is no lock file is not
+    /// touched.
     ///
     /// # Errors
     /// [`LockError`].
@@ -56,7 +57,8 @@ impl Lock {
                     if e.kind() == io::ErrorKind::Unsupported || e.raw_os_error() == Some(Errno::NOLCK.raw_os_error()) => {}
                 Err(TryLockError::Error(e)) => return Err(LockError::System(e)),
             }
-            // Between opening and locking, the owner may have removed the file; then it is another that has to be locked.
+            // Between opening and locking, the owner may have removed the file; then it is another that has to be
+            // locked.
             let own = (metadata.dev(), metadata.ino());
             if fs::symlink_metadata(path).is_ok_and(|there| (there.dev(), there.ino()) == own) {
                 // For those who come later.

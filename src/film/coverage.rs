@@ -81,7 +81,8 @@ impl Default for Coverage {
 }
 
 impl Coverage {
-    /// Adds the next pixel: the weight of each shape, that of [`ShapeKey::NONE`] included. A shape may occur several times.
+    /// Adds the next pixel: the weight of each shape, that of [`ShapeKey::NONE`] included. A shape may occur several
+    /// times.
     pub fn push(&mut self, mut weights: Vec<(ShapeKey, f64)>) {
         let whole: f64 = weights.iter().map(|(_, weight)| weight).sum();
         weights.sort_by_key(|(key, _)| *key);
@@ -103,7 +104,8 @@ impl Coverage {
         self.starts.len() - 1
     }
 
-    /// What a pixel shows: shapes with the share that each covers, above 0, the largest first; among equals in the order of their keys.
+    /// What a pixel shows: shapes with the share that each covers, above 0, the largest first; among equals in the
+    /// order of their keys.
     pub fn of(&self, pixel: usize) -> &[(ShapeKey, f32)] {
         &self.entries[self.starts[pixel]..self.starts[pixel + 1]]
     }

@@ -20,7 +20,8 @@ fn color(film: &Film) -> [f32; 4] {
     film.resolve().pixel(LayerKind::Color, 0, 0).unwrap().try_into().unwrap()
 }
 
-/// A step edge through the filter's negative lobe: the mean over many pixels is the filter's integral over the bright side.
+/// A step edge through the filter's negative lobe: the mean over many pixels is the filter's integral over the bright
+/// side.
 #[test]
 fn negative_lobes_overshoot_at_an_edge_without_bias() {
     let desc = FilterDesc::Mitchell { radius: 2.0, b: 1.0 / 3.0, c: 1.0 / 3.0, samples: Some(FilterSamplesDesc::Importance) };
@@ -34,7 +35,8 @@ fn negative_lobes_overshoot_at_an_edge_without_bias() {
             film.tiles_mut()[0].add(0, i * 16 + j, &gray(if s.offset.x > edge { 1.0 } else { 0.0 }), s.weight);
         }
     }
-    // The integral over [1, 2] of the outer cubic for B = C = 1/3 is -5/288; the whole is 1 in units of half the radius.
+    // The integral over [1, 2] of the outer cubic for B = C = 1/3 is -5/288; the whole is 1 in units of half the
+    // radius.
     let expected = 1.0 + 5.0 / 288.0;
     let measured = color(&film)[0];
     assert!((f64::from(measured) - expected).abs() < 5e-4, "{measured} {expected}");
@@ -121,7 +123,8 @@ fn impossible_films_are_refused() {
     assert!(matches!(Film::new(FilmShape::new(huge, Crop::full(huge), LayerSet::COLOR), 16), Err(Error::OutOfMemory(_))));
 }
 
-/// Films whose samples count differently: the mean is the weighted one, the variance that of a weighted mean, all else is as of one film.
+/// Films whose samples count differently: the mean is the weighted one, the variance that of a weighted mean, all else
+/// is as of one film.
 #[test]
 fn merged_films_weigh_their_samples() {
     let layers: LayerSet = [LayerKind::Variance, LayerKind::Samples].into_iter().collect();
@@ -171,7 +174,8 @@ fn shared(desc: FilterDesc, crop: Crop, block_size: Option<u32>, samples: impl F
     film
 }
 
-/// Against a direct sum over all samples and pixels: shared samples give the weighted mean, whatever tiles and blocks there are.
+/// Against a direct sum over all samples and pixels: shared samples give the weighted mean, whatever tiles and blocks
+/// there are.
 #[test]
 fn shared_samples_give_the_weighted_mean_across_tiles_and_blocks() {
     for desc in Filter::examples(FilterSamplesDesc::Shared) {
@@ -224,7 +228,8 @@ fn importance_sampled_pixels_do_not_depend_on_the_samples_of_others() {
     }
 }
 
-/// A crop is a part of the whole, films of parts of the samples sum to the film of all, and states come back: all bit for bit.
+/// A crop is a part of the whole, films of parts of the samples sum to the film of all, and states come back: all bit
+/// for bit.
 #[test]
 fn crops_merges_and_states_of_shared_samples_have_the_same_bits() {
     for desc in Filter::examples(FilterSamplesDesc::Shared).into_iter().filter(|desc| Filter::new(desc).is_shared()) {
@@ -245,7 +250,8 @@ fn crops_merges_and_states_of_shared_samples_have_the_same_bits() {
     }
 }
 
-/// Batches are summed one average after the other, and have the bits of their samples added one by one; what is not finite is dropped.
+/// Batches are summed one average after the other, and have the bits of their samples added one by one; what is not
+/// finite is dropped.
 #[test]
 fn batches_have_the_bits_of_single_samples() {
     let request = LightAovRequest { by_scattering: true, light_groups: 2 };

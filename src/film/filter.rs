@@ -1,4 +1,5 @@
-//! Pixel filters: shared samples, or importance sampled as in "Filter Importance Sampling" (Ernst, Stamminger and Greiner, 2006).
+//! Pixel filters: shared samples, or importance sampled as in "Filter Importance Sampling" (Ernst, Stamminger and
+//! Greiner, 2006).
 //!
 //! All filters are separable and even, so one axis is described on `[0, radius]`. With shared samples, points are
 //! uniform within each pixel and a sample is weighted for every pixel whose filter reaches it. For importance sampling,
@@ -10,7 +11,8 @@ use super::Crop;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
 use crate::math::Vec2;
 
-/// Cells of a table. With them the sampled distribution differs from the filter's by less than `1e-6` (a test measures it).
+/// Cells of a table. With them the sampled distribution differs from the filter's by less than `1e-6` (a test measures
+/// it).
 const CELLS: usize = 1024;
 
 /// Cells of the offsets within a pixel, an even number: usual filters have their kinks at ends of cells.
@@ -126,7 +128,8 @@ impl Filter {
         Self { desc, kernel, shared }
     }
 
-    /// Where a sample lies: uniform within the pixel if samples are shared, else in proportion to the filter's absolute value.
+    /// Where a sample lies: uniform within the pixel if samples are shared, else in proportion to the filter's absolute
+    /// value.
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> FilterSample {
         if self.is_shared() {
@@ -324,8 +327,9 @@ fn mitchell(x: f64, b: f64, c: f64) -> f64 {
 
 /// The inverse of one axis' distribution.
 ///
-/// With `v` uniform in `[-1, 1)` the distance at which a fraction `1 - |v|` of the filter's absolute value lies farther out is tabulated
-/// over `s = sqrt(1 - |v|)`: that makes the cells small where the filter fades out, and a linear step between knots exact for a tent.
+/// With `v` uniform in `[-1, 1)` the distance at which a fraction `1 - |v|` of the filter's absolute value lies farther
+/// out is tabulated over `s = sqrt(1 - |v|)`: that makes the cells small where the filter fades out, and a linear step
+/// between knots exact for a tent.
 #[derive(Clone, Debug)]
 struct Table {
     /// Distance at `s = i / CELLS`, from the radius down to 0.
@@ -360,7 +364,8 @@ impl Table {
             while i + 1 < STEPS && outside[i + 1] < target {
                 i += 1;
             }
-            // Within a step |f| is taken as linear: from `a` at its outer end to `b`; solved for the part of the step's mass.
+            // Within a step |f| is taken as linear: from `a` at its outer end to `b`; solved for the part of the step's
+            // mass.
             let (a, b) = (evaluate(desc, at(i)).abs(), evaluate(desc, at(i + 1)).abs());
             let mass = outside[i + 1] - outside[i];
             let part = if mass > 0.0 { ((target - outside[i]) / mass).clamp(0.0, 1.0) } else { 0.0 };
@@ -404,8 +409,8 @@ struct AxisSample {
 }
 
 impl AxisSample {
-    /// The filter over its integral, over the density. Both on one side: `1 - s²` is uniform there and distance is linear in `s` within a
-    /// cell, so the density is `2 s (ds / dx)`.
+    /// The filter over its integral, over the density. Both on one side: `1 - s²` is uniform there and distance is
+    /// linear in `s` within a cell, so the density is `2 s (ds / dx)`.
     #[inline]
     fn weight(self, desc: &FilterDesc, integral: f64) -> f64 {
         let cells = CELLS as f64;

@@ -7,7 +7,8 @@ fn integral(desc: &FilterDesc, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     (0..steps).map(|i| a + (f64::from(i) + 0.5) * h).map(|x| f(evaluate(desc, x)) * h).sum()
 }
 
-/// The largest difference between the sampled distribution (weights included) and the filter's, over a grid of random numbers.
+/// The largest difference between the sampled distribution (weights included) and the filter's, over a grid of random
+/// numbers.
 #[test]
 fn the_sampled_distribution_is_the_filters() {
     for desc in Filter::EXAMPLES {

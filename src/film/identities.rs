@@ -11,13 +11,15 @@ use super::ShapeKey;
 const NONE: u32 = u32::MAX;
 
 /// What the shapes of a scene are called, by [`ShapeKey`]. A few numbers for each shape and instance; names that are
-/// made of another one and a number are put together when they are asked for. Things with the same name count as one.
+/// made of another one and a number are put together when they are requested. Things with the same name count as one.
 ///
 /// - The object of a shape is the instance that places it, or the shape itself. An instance within another is named
 ///   after both, `outer/inner`.
-/// - Its asset is the object that the outermost instance places, else the file that the shape comes from, else the shape.
+/// - Its asset is the object that the outermost instance places, else the file that the shape comes from, else the
+///   shape.
 ///
-/// What has no name is called after its kind, its file or its object, with the place in its list: `sphere_3`, `bunny_0`, `tree_17`.
+/// What has no name is called after its kind, its file or its object, with the place in its list: `sphere_3`,
+/// `bunny_0`, `tree_17`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identities {
     names: Vec<Box<str>>,

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Coverage, LayerInfo, LayerKind};
 
-/// A rectangle of pixels; `x` and `y` count from the upper left corner of the full picture. Serialized as `[x, y, width, height]`.
+/// A rectangle of pixels; `x` and `y` count from the upper left corner of the full picture. Serialized as
+/// `[x, y, width, height]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "[u32; 4]", from = "[u32; 4]")]
 pub struct Crop {
@@ -82,7 +83,7 @@ impl From<[u32; 4]> for Crop {
 /// A named group of channels, row by row from the top; a pixel's channels lie side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// Which layer; the table knows its name and channels.
+    /// Which layer; its name and channels are in the table.
     pub kind: LayerKind,
     /// Of layers of [groups of lights](LayerKind::LightGroups): the group's name.
     pub group: Option<String>,
@@ -125,7 +126,8 @@ pub struct Image {
     pub size: [u32; 2],
     /// The part that the layers hold.
     pub crop: Crop,
-    /// Pixels on each side of `size` that lie around the picture to be shown, whose upper left corner is thus this pixel.
+    /// Pixels on each side of `size` that lie around the picture to be shown, whose upper left corner is thus this
+    /// pixel.
     pub overscan: u32,
     /// The layers; the first is [`LayerKind::Color`].
     pub layers: Vec<Layer>,

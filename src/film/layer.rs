@@ -8,7 +8,7 @@ use crate::desc::LayerKind;
 
 /// Where a layer's numbers come from.
 #[derive(Clone, Copy, Debug)]
-pub enum Source {
+pub enum LayerSource {
     /// The picture itself.
     Color,
     /// First surfaces: how a sample's values are read, one for each channel, and how those of samples are put together.
@@ -38,7 +38,7 @@ pub enum Filtering {
 pub(super) const fn channels_of(filtering: Filtering) -> usize {
     let (mut total, mut i) = (0, 0);
     while i < LayerInfo::ALL.len() {
-        if let Source::Surface(_, other) = LayerInfo::ALL[i].source
+        if let LayerSource::Surface(_, other) = LayerInfo::ALL[i].source
             && other as u8 == filtering as u8
         {
             total += LayerInfo::ALL[i].channels.len();
@@ -75,7 +75,7 @@ impl SurfaceChannels {
     #[inline]
     pub fn readers(&self) -> impl Iterator<Item = fn(&SurfaceSample, &mut [f32])> {
         self.layers.iter().map_while(|info| *info).filter_map(|info| match info.source {
-            Source::Surface(read, _) => Some(read),
+            LayerSource::Surface(read, _) => Some(read),
             _ => None,
         })
     }
@@ -104,21 +104,27 @@ impl SurfaceChannels {
 pub struct LayerInfo {
     /// Which layer.
     pub kind: LayerKind,
-    /// The name users ask for it by.
+    /// Its name in scene files and on the command line.
     pub name: &'static str,
-    /// Its channels' full names in a file, in the order of the pixel data; of groups of lights what follows their layers' names; none of
-    /// layers made from [coverage](Source::Coverage).
+    /// Its channels' full names in a file, in the order of the pixel data; of groups of lights what follows their
+    /// layers' names; none of layers made from [coverage](LayerSource::Coverage).
     pub channels: &'static [&'static str],
     /// Stored as 32-bit floats whatever the pixel type: 16 bits would spoil it.
     pub always_float: bool,
-    /// What the file's comment says of it.
+    /// Its description in the file's comment.
     pub comment: &'static str,
     /// Where its numbers come from.
-    pub source: Source,
+    pub source: LayerSource,
 }
 
 impl LayerInfo {
-    const fn new(kind: LayerKind, name: &'static str, channels: &'static [&'static str], source: Source, comment: &'static str) -> Self {
+    const fn new(
+        kind: LayerKind,
+        name: &'static str,
+        channels: &'static [&'static str],
+        source: LayerSource,
+        comment: &'static str,
+    ) -> Self {
         Self { kind, name, channels, always_float: false, comment, source }
     }
 
@@ -134,7 +140,7 @@ macro_rules! part {
             LayerKind::$part,
             $name,
             &[concat!($name, ".R"), concat!($name, ".G"), concat!($name, ".B")],
-            Source::LightAov(LightAov::$part),
+            LayerSource::LightAov(LightAov::$part),
             concat!($name, ": ", $comment),
         )
     };
@@ -143,12 +149,12 @@ macro_rules! part {
 impl LayerInfo {
     /// Every layer, in the order of files and of memory.
     pub const ALL: [Self; 28] = [
-        Self::new(LayerKind::Color, "color", &["R", "G", "B", "A"], Source::Color, ""),
+        Self::new(LayerKind::Color, "color", &["R", "G", "B", "A"], LayerSource::Color, ""),
         Self::new(
             LayerKind::Z,
             "Z",
             &["Z"],
-            Source::Surface(|s, out| out[0] = s.depth, Filtering::Nearest),
+            LayerSource::Surface(|s, out| out[0] = s.depth, Filtering::Nearest),
             "Z: depth along the view axis of the nearest sample; 1e10 where nothing was hit",
         )
         .float(),
@@ -156,21 +162,21 @@ impl LayerInfo {
             LayerKind::N,
             "N",
             &["N.X", "N.Y", "N.Z"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.normal.to_array()), Filtering::Nearest),
+            LayerSource::Surface(|s, out| out.copy_from_slice(&s.normal.to_array()), Filtering::Nearest),
             "N: shading normal of the nearest sample, world; 0 where nothing was hit",
         ),
         Self::new(
             LayerKind::Ng,
             "Ng",
             &["Ng.X", "Ng.Y", "Ng.Z"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.geometric_normal.to_array()), Filtering::Nearest),
+            LayerSource::Surface(|s, out| out.copy_from_slice(&s.geometric_normal.to_array()), Filtering::Nearest),
             "Ng: geometric normal of the nearest sample, world; 0 where nothing was hit",
         ),
         Self::new(
             LayerKind::P,
             "P",
             &["P.X", "P.Y", "P.Z"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.position.to_array()), Filtering::Nearest),
+            LayerSource::Surface(|s, out| out.copy_from_slice(&s.position.to_array()), Filtering::Nearest),
             "P: position of the nearest sample, world; 0 where nothing was hit",
         )
         .float(),
@@ -178,7 +184,7 @@ impl LayerInfo {
             LayerKind::Uv,
             "uv",
             &["uv.U", "uv.V"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.uv), Filtering::Nearest),
+            LayerSource::Surface(|s, out| out.copy_from_slice(&s.uv), Filtering::Nearest),
             "uv: surface parameters of the nearest sample; 0 where nothing was hit",
         )
         .float(),
@@ -186,7 +192,7 @@ impl LayerInfo {
             LayerKind::Motion,
             "motion",
             &["motion.X", "motion.Y"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.motion), Filtering::Nearest),
+            LayerSource::Surface(|s, out| out.copy_from_slice(&s.motion), Filtering::Nearest),
             "motion: of the nearest sample, from where the surface is when the shutter opens to where it is when it closes, in pixels to the right and down; without a \
              surface, that of a point infinitely far away",
         )
@@ -195,7 +201,7 @@ impl LayerInfo {
             LayerKind::Albedo,
             "albedo",
             &["albedo.R", "albedo.G", "albedo.B"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.albedo.to_array()), Filtering::Mean),
+            LayerSource::Surface(|s, out| out.copy_from_slice(&s.albedo.to_array()), Filtering::Mean),
             "albedo: fraction of light scattered by the first surface",
         ),
         part!(DiffuseDirect, "diffuse_direct", "light scattered once, by diffuse reflection"),
@@ -210,44 +216,44 @@ impl LayerInfo {
             LayerKind::LightGroups,
             "light_groups",
             &["R", "G", "B"],
-            Source::LightGroups,
+            LayerSource::LightGroups,
             "light_*: what each group of lights gives; they sum to RGB",
         ),
         Self::new(
             LayerKind::Variance,
             "variance",
             &["variance.R", "variance.G", "variance.B"],
-            Source::Film,
+            LayerSource::Film,
             "variance: of the filtered picture's R, G and B, their expected squared error",
         )
         .float(),
-        Self::new(LayerKind::Samples, "samples", &["stats.samples"], Source::Film, "stats.samples: samples of the pixel").float(),
+        Self::new(LayerKind::Samples, "samples", &["stats.samples"], LayerSource::Film, "stats.samples: samples of the pixel").float(),
         Self::new(
             LayerKind::FeatureAlbedo,
             "feature_albedo",
             &["feature_albedo.R", "feature_albedo.G", "feature_albedo.B"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.feature_albedo.to_array()), Filtering::Mean),
+            LayerSource::Surface(|s, out| out.copy_from_slice(&s.feature_albedo.to_array()), Filtering::Mean),
             "feature_albedo: fraction of light scattered by the first surface that is no mirror and no clear glass",
         ),
         Self::new(
             LayerKind::FeatureNormal,
             "feature_normal",
             &["feature_normal.X", "feature_normal.Y", "feature_normal.Z"],
-            Source::Surface(|s, out| out.copy_from_slice(&s.feature_normal.to_array()), Filtering::Mean),
+            LayerSource::Surface(|s, out| out.copy_from_slice(&s.feature_normal.to_array()), Filtering::Mean),
             "feature_normal: mean shading normal of that surface, world, not of unit length",
         ),
         Self::new(
             LayerKind::Noisy,
             "noisy",
             &["noisy.R", "noisy.G", "noisy.B", "noisy.A"],
-            Source::Denoiser,
+            LayerSource::Denoiser,
             "noisy: the picture before it was denoised",
         ),
         Self::new(
             LayerKind::ObjectId,
             "object_id",
             &["object_id.id"],
-            Source::Coverage,
+            LayerSource::Coverage,
             "object_id: the object that covers most of the pixel",
         )
         .float(),
@@ -255,7 +261,7 @@ impl LayerInfo {
             LayerKind::MaterialId,
             "material_id",
             &["material_id.id"],
-            Source::Coverage,
+            LayerSource::Coverage,
             "material_id: the material that covers most of the pixel",
         )
         .float(),
@@ -263,13 +269,13 @@ impl LayerInfo {
             LayerKind::InstanceId,
             "instance_id",
             &["instance_id.id"],
-            Source::Coverage,
+            LayerSource::Coverage,
             "instance_id: the instance that covers most of the pixel",
         )
         .float(),
-        Self::new(LayerKind::CryptoObject, "crypto_object", &[], Source::Coverage, "").float(),
-        Self::new(LayerKind::CryptoMaterial, "crypto_material", &[], Source::Coverage, "").float(),
-        Self::new(LayerKind::CryptoAsset, "crypto_asset", &[], Source::Coverage, "").float(),
+        Self::new(LayerKind::CryptoObject, "crypto_object", &[], LayerSource::Coverage, "").float(),
+        Self::new(LayerKind::CryptoMaterial, "crypto_material", &[], LayerSource::Coverage, "").float(),
+        Self::new(LayerKind::CryptoAsset, "crypto_asset", &[], LayerSource::Coverage, "").float(),
     ];
 
     /// The row of a layer.
@@ -303,7 +309,7 @@ impl LayerSet {
     /// Only the colour.
     pub const COLOR: Self = Self { bits: 0 };
     /// Every layer that a render fills.
-    pub const FULL: Self = Self { bits: ((1 << LayerInfo::ALL.len()) - 1) & !layers_from!(Source::Denoiser) & !Self::COLOR_BIT };
+    pub const FULL: Self = Self { bits: ((1 << LayerInfo::ALL.len()) - 1) & !layers_from!(LayerSource::Denoiser) & !Self::COLOR_BIT };
     /// Never set, so that equal sets have equal bits.
     const COLOR_BIT: u32 = 1 << LayerKind::Color as u32;
 
@@ -321,24 +327,24 @@ impl LayerSet {
     /// Whether any layer is part of the set that [`SurfaceSample`] is needed for.
     #[inline]
     pub const fn needs_surface(self) -> bool {
-        self.bits & layers_from!(Source::Surface(..) | Source::Coverage) != 0
+        self.bits & layers_from!(LayerSource::Surface(..) | LayerSource::Coverage) != 0
     }
 
     /// Whether any layer is part of the set that needs the shapes that samples show.
     #[inline]
     pub const fn needs_coverage(self) -> bool {
-        self.bits & layers_from!(Source::Coverage) != 0
+        self.bits & layers_from!(LayerSource::Coverage) != 0
     }
 
     /// Whether any layer is part of the set that is a [`LightAov`] of the radiance.
     #[inline]
     pub const fn needs_light_aovs(self) -> bool {
-        self.bits & layers_from!(Source::LightAov(_)) != 0
+        self.bits & layers_from!(LayerSource::LightAov(_)) != 0
     }
 
     /// The layers of first surfaces that are filtered so, in the table's order.
     pub fn surfaces(self, filtering: Filtering) -> impl Iterator<Item = &'static LayerInfo> {
-        self.iter().filter(move |info| matches!(info.source, Source::Surface(_, other) if other == filtering))
+        self.iter().filter(move |info| matches!(info.source, LayerSource::Surface(_, other) if other == filtering))
     }
 
     /// All layers, in the table's order.

@@ -1,7 +1,7 @@
 //! From the sums of a film to the picture.
 
 use super::tile::FilmTile;
-use super::{Coverage, Film, Filtering, Image, Layer, LayerInfo, LayerKind, Layout, ShapeKey, Source, VarianceKernel};
+use super::{Coverage, Film, Filtering, Image, Layer, LayerInfo, LayerKind, LayerSource, Layout, ShapeKey, VarianceKernel};
 
 /// Depth where nothing was hit.
 const MISS_DEPTH: f32 = 1e10;
@@ -38,7 +38,8 @@ impl<'a> Estimator<'a> {
         self.own = own;
         self.entries.clear();
         let Layout { border, cell_size: size, .. } = film.layout;
-        // Where cells differ in their samples, each counts by its own number; without a border, pixels are normalised by theirs.
+        // Where cells differ in their samples, each counts by its own number; without a border, pixels are normalised
+        // by theirs.
         let is_scaled = film.shape().block_size.is_some() && border > 0;
         let cells = |at: u32| at.saturating_sub(border) / size..=(at + border) / size;
         for row in cells(y) {
@@ -140,10 +141,10 @@ impl Film {
             });
             let take = |next: &mut usize, count: usize| std::mem::replace(next, *next + count);
             firsts.push(match info.source {
-                Source::LightAov(part) => part as usize,
-                Source::LightGroups => self.light_aovs().first_group() + group.unwrap_or_default(),
-                Source::Surface(_, Filtering::Nearest) => take(&mut nearest, channels),
-                Source::Surface(_, Filtering::Mean) => take(&mut mean, 1),
+                LayerSource::LightAov(part) => part as usize,
+                LayerSource::LightGroups => self.light_aovs().first_group() + group.unwrap_or_default(),
+                LayerSource::Surface(_, Filtering::Nearest) => take(&mut nearest, channels),
+                LayerSource::Surface(_, Filtering::Mean) => take(&mut mean, 1),
                 _ => 0,
             });
         }
@@ -160,12 +161,14 @@ impl Film {
                 layer.data.resize(start + info.channels.len(), 0.0);
                 let out = &mut layer.data[start..];
                 match info.source {
-                    Source::Color => estimator.color(out),
-                    Source::LightAov(_) | Source::LightGroups | Source::Surface(_, Filtering::Mean) => estimator.average(first, out),
-                    Source::Surface(_, Filtering::Nearest) => estimator.data(info, first, out),
-                    Source::Film if info.kind == LayerKind::Samples => out[0] = estimator.own.0.samples[estimator.own.1] as f32,
-                    Source::Film => out.copy_from_slice(&self.variance(&kernel, x, y).map(to_f32)),
-                    Source::Coverage | Source::Denoiser => {}
+                    LayerSource::Color => estimator.color(out),
+                    LayerSource::LightAov(_) | LayerSource::LightGroups | LayerSource::Surface(_, Filtering::Mean) => {
+                        estimator.average(first, out);
+                    }
+                    LayerSource::Surface(_, Filtering::Nearest) => estimator.data(info, first, out),
+                    LayerSource::Film if info.kind == LayerKind::Samples => out[0] = estimator.own.0.samples[estimator.own.1] as f32,
+                    LayerSource::Film => out.copy_from_slice(&self.variance(&kernel, x, y).map(to_f32)),
+                    LayerSource::Coverage | LayerSource::Denoiser => {}
                 }
             }
             if let Some(coverage) = &mut coverage {
@@ -189,9 +192,9 @@ impl Film {
 
     /// The picture's layers, and of those of groups of lights, which.
     fn stored(&self) -> impl Iterator<Item = (LayerKind, Option<usize>)> + '_ {
-        let all = self.layout.set.iter().filter(|info| !matches!(info.source, Source::Coverage | Source::Denoiser));
+        let all = self.layout.set.iter().filter(|info| !matches!(info.source, LayerSource::Coverage | LayerSource::Denoiser));
         all.flat_map(|info| {
-            let is_group = matches!(info.source, Source::LightGroups);
+            let is_group = matches!(info.source, LayerSource::LightGroups);
             let groups = if is_group { self.layout.light_aovs.light_groups as usize } else { 1 };
             (0..groups).map(move |group| (info.kind, is_group.then_some(group)))
         })

@@ -1,4 +1,4 @@
-//! What samples of pixels bring.
+//! The values of pixel samples.
 
 use crate::color::Rgb;
 use crate::math::Vec3;
@@ -103,7 +103,7 @@ impl LightAov {
 pub struct LightAovRequest {
     /// Those of [`LightAov`].
     pub by_scattering: bool,
-    /// How many groups of lights there are, the last for lights in no group; 0 if they are not wanted.
+    /// How many groups of lights there are, the last for lights in no group; 0 if they are not requested.
     pub light_groups: u32,
 }
 
@@ -126,7 +126,8 @@ impl LightAovRequest {
 pub struct LightAovRows {
     request: LightAovRequest,
     samples: usize,
-    /// By AOV: those of [`LightAov`], then those of groups of lights; each only if wanted. Empty where all samples are black.
+    /// By AOV: those of [`LightAov`], then those of groups of lights; each only if requested. Empty where all samples
+    /// are black.
     rows: Vec<Vec<Rgb>>,
 }
 

@@ -1,9 +1,9 @@
 //! Sums that do not depend on the order of their terms.
 //!
-//! Each is an unevaluated pair: an `f64`, and an `f32` for what adding to it rounds away (the error-free sum of two floats of
-//! Knuth, "The Art of Computer Programming", volume 2, 4.2.2). Terms with the 24 bits of an `f32` are summed exactly as
-//! long as the sum is less than 2^36 times the smallest of 2^17 terms (beyond that, the `f32` is rounded). So films of any
-//! parts of the samples merge to the same bits.
+//! Each is an unevaluated pair: an `f64`, and an `f32` for what adding to it rounds away (the error-free sum of two
+//! floats of Knuth, "The Art of Computer Programming", volume 2, 4.2.2). Terms with the 24 bits of an `f32` are summed
+//! exactly as long as the sum is less than 2^36 times the smallest of 2^17 terms (beyond that, the `f32` is rounded).
+//! So films of any parts of the samples merge to the same bits.
 
 use crate::bytes::{ByteReader, ByteWriter};
 

@@ -113,7 +113,8 @@ impl FilmTile {
         [self.area.width, self.area.height]
     }
 
-    /// The pixels that reach the picture: those within the film's crop, in coordinates of the full picture. Never empty.
+    /// The pixels that reach the picture: those within the film's crop, in coordinates of the full picture. Never
+    /// empty.
     pub fn active(&self) -> Crop {
         self.active
     }
@@ -137,8 +138,8 @@ impl FilmTile {
         true
     }
 
-    /// As [`add`](Self::add) for samples of a batch, each of which is a [group](Self::add_moments) of its own. `samples`
-    /// keeps those that were not dropped.
+    /// As [`add`](Self::add) for samples of a batch, each of which is a [group](Self::add_moments) of its own.
+    /// `samples` keeps those that were not dropped.
     pub fn add_batch(&mut self, batch: &SampleBatch, samples: &mut Vec<PlacedSample>) {
         if !self.layout.beside_color() || self.layout.signed || !batch.light_aovs.are_bounded() {
             samples.retain(|at| self.add(at.pixel as usize, at.sample, batch.sample(at.slot as usize), at.weight));
@@ -187,7 +188,7 @@ impl FilmTile {
         }
     }
 
-    /// [`add`](Self::add) where nothing but the colour is kept, and all samples weigh the same.
+    /// [`add`](Self::add) where nothing but the colour is kept, and all samples have the same weight.
     #[inline(always)]
     fn add_color(&mut self, pixel: usize, sample: u32, PixelSample { radiance, alpha }: &PixelSample, weight: f32) -> bool {
         if !is_finite(weight, *radiance, *alpha) {
@@ -258,9 +259,9 @@ impl FilmTile {
         Some(values)
     }
 
-    /// Adds a group of the pixel's samples, which have been added, by their mean radiance, if the variance is asked
-    /// for. The better the samples of a group are spread, the less is their variance overestimated; all groups of a
-    /// pixel are of one size.
+    /// Adds a group of the pixel's samples, which have been added, by their mean radiance, if the variance is needed.
+    /// The better the samples of a group are spread, the less is their variance overestimated; all groups of a pixel
+    /// are of one size.
     #[inline]
     pub fn add_moments(&mut self, pixel: usize, radiance: [f64; 3]) {
         if let Some(moments) = &mut self.moments {

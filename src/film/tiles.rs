@@ -25,7 +25,8 @@ pub struct FilmShape {
     pub light_groups: Vec<String>,
     /// The pixel filter.
     pub filter: FilterDesc,
-    /// Width and height in pixels of the squares whose pixels have equally many samples, if not all have: a divisor of the tiles' size.
+    /// Width and height in pixels of the squares whose pixels have equally many samples, if not all have: a divisor of
+    /// the tiles' size.
     pub block_size: Option<u32>,
 }
 
@@ -146,7 +147,8 @@ impl Film {
     /// not depend on the crop.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the crop is empty or reaches beyond the picture; [`Error::OutOfMemory`] if the film cannot be held.
+    /// [`Error::Usage`] if the crop is empty or reaches beyond the picture; [`Error::OutOfMemory`] if the film cannot
+    /// be held.
     pub fn new(shape: FilmShape, tile_size: u32) -> Result<Self> {
         let (size, crop) = (shape.size, shape.crop);
         if !crop.fits(size) {

@@ -24,7 +24,8 @@ impl Mesh {
         !self.attributes.is_empty()
     }
 
-    /// The attributes at barycentric coordinates `u`, `v` of a triangle's second and third vertex; `None` if there are none.
+    /// The attributes at barycentric coordinates `u`, `v` of a triangle's second and third vertex; `None` if there are
+    /// none.
     pub fn attributes_at(&self, prim: PrimId, u: f32, v: f32) -> Option<AttributePoint<'_>> {
         self.has_attributes().then(|| self.attribute_point(prim, [1.0 - u - v, u, v]))
     }
@@ -103,10 +104,10 @@ mod tests {
         let mut rng = Rng::new(7);
         let inside = (0..200).map(|_| [rng.unit_f32(), rng.unit_f32()]).filter(|[u, v]| u + v < 1.0);
         for [u, v] in inside.chain([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.5]]) {
-            let (target, wanted) = (blend(&CORNERS, u, v), blend(&COLORS, u, v));
+            let (target, expected) = (blend(&CORNERS, u, v), blend(&COLORS, u, v));
             for map in [None, Some(map)] {
                 let found = seen(triangle(), target, 0.0, map);
-                assert!((found - wanted).abs().max_element() < 1e-5, "{u} {v} {map:?}: {found} for {wanted}");
+                assert!((found - expected).abs().max_element() < 1e-5, "{u} {v} {map:?}: {found} for {expected}");
             }
         }
     }

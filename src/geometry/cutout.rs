@@ -10,7 +10,7 @@ use crate::math::random::mix_32;
 
 /// Opacity of surfaces, decided stochastically hit by hit during traversal.
 ///
-/// A hit counts if a number in `[0, 1)`, hashed from the ray, the ids and the side, lies below alpha. So the answer is
+/// A hit counts if a number in `[0, 1)`, hashed from the ray, the ids and the side, lies below alpha. So the result is
 /// the same in any order of visits, for closest and any hits, and a ray that looks again meets the same surfaces.
 pub trait AlphaMask: Debug + Send + Sync {
     /// Whether a shape has holes; [`alpha`](Self::alpha) is evaluated on no other.
@@ -48,7 +48,8 @@ impl AlphaMasks {
         if self.is_empty() { 0 } else { ray_key(ray) }
     }
 
-    /// Whether a hit of the ray with this key counts. `ray` is in the space the shapes are placed in; `hit` names its instance.
+    /// Whether a hit of the ray with this key counts. `ray` is in the space the shapes are placed in; `hit` names its
+    /// instance.
     #[inline(always)]
     pub fn counts(&self, shapes: &[Shape], key: u32, ray: &Ray, hit: &Hit) -> bool {
         match &self.0 {
@@ -61,8 +62,8 @@ impl AlphaMasks {
     }
 }
 
-/// Tells the hits of a ray with one analytic shape apart, for they have the same ids: it enters and leaves from different sides. Distances
-/// would not do, for accelerators round them differently.
+/// Distinguishes the hits of a ray with one analytic shape, which have the same ids: it enters and leaves from
+/// different sides. Distances would not do, for accelerators round them differently.
 fn side(shape: &Shape, ray: &Ray, hit: &Hit) -> u32 {
     match shape {
         Shape::Mesh(_) => 0,

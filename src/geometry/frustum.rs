@@ -33,7 +33,8 @@ impl Frustum {
     /// A frustum; a `top_radius` of zero makes a cone. `phi_max` in radians.
     ///
     /// # Errors
-    /// Unless the radii are finite and not negative with one above zero, the height is finite and above zero and `0 < phi_max <= 2 pi`.
+    /// Unless the radii are finite and not negative with one above zero, the height is finite and above zero and
+    /// `0 < phi_max <= 2 pi`.
     pub fn new(radius: f64, top_radius: f64, height: f64, phi_max: f64) -> Result<Self, ShapeError> {
         not_negative("radius", radius)?;
         not_negative("top radius", top_radius)?;
@@ -101,7 +102,8 @@ impl Frustum {
     /// Where the ray meets the whole double cone or cylinder; NaN where it does not.
     #[inline(always)]
     fn roots(&self, ray: &RayF64) -> Quadratic {
-        // height² (x² + y²) = (radius * height + (top_radius - radius) z)², homogeneous in the height: nothing is divided by.
+        // height² (x² + y²) = (radius * height + (top_radius - radius) z)², homogeneous in the height: nothing is
+        // divided by.
         let (o, d) = (ray.origin, ray.direction);
         let spread = self.top_radius - self.radius;
         let squared = self.height * self.height;
@@ -113,8 +115,8 @@ impl Frustum {
             return quadratic_roots(a, half_b, c, difference_of_products(half_b, half_b, a, c));
         };
 
-        // About the apex the discriminant is a form of the ray's moments. Of the coefficients only the last digits would be left there, and
-        // rays from inside would pass.
+        // About the apex the discriminant is a form of the ray's moments. Of the coefficients only the last digits
+        // would be left there, and rays from inside would pass.
         let o = dvec3(o.x, o.y, o.z - apex);
         let (spread_squared, moment) = (spread * spread, o.cross(d));
         let form = spread_squared * (moment.x * moment.x + moment.y * moment.y) - squared * moment.z * moment.z;
@@ -129,7 +131,8 @@ impl Frustum {
         Quadratic { near: roots.near + t_closest, far: roots.far + t_closest }
     }
 
-    /// The surface at a hit of `ray`. At an apex the normal is that of the line on the cone at the ray's own angle, or at phi = 0.
+    /// The surface at a hit of `ray`. At an apex the normal is that of the line on the cone at the ray's own angle, or
+    /// at phi = 0.
     #[inline(always)]
     pub fn surface(&self, detail: Detail, ray: &RayF64, hit: &LocalHit) -> LocalSurface {
         let raw = ray.at(hit.t);
@@ -171,7 +174,8 @@ impl Frustum {
     /// A point distributed uniformly by area.
     #[inline(always)]
     pub fn sample(&self, u: [f64; 2]) -> ShapeSample {
-        // The density along the side is proportional to the radius; inverted without dividing by the difference of the radii.
+        // The density along the side is proportional to the radius; inverted without dividing by the difference of the
+        // radii.
         let (bottom, top) = (self.radius, self.top_radius);
         let radius = (bottom * bottom + u[1] * (top * top - bottom * bottom)).max(0.0).sqrt();
         let sum = bottom + radius;

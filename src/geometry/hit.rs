@@ -23,7 +23,8 @@ impl Hit {
     /// The instance of shapes that are placed in the world directly.
     pub const NO_INSTANCE: InstanceId = InstanceId(u32::MAX);
 
-    /// The order in which ties are broken: by distance, then by ids, so that every accelerator of ours answers the same.
+    /// The order in which ties are broken: by distance, then by ids, so that all accelerators of ours return the same
+    /// hit.
     #[inline]
     pub fn is_before(&self, other: &Self) -> bool {
         let key = |h: &Self| (h.instance, h.shape, h.prim);

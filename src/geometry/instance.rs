@@ -47,10 +47,12 @@ impl Instance {
         Some(Self { object, transform, motion })
     }
 
-    /// Whether the map stretches so unevenly that an inverse made in `f32` is off by more than [`SurfaceInteraction::error`] says.
+    /// Whether the map stretches so unevenly that an inverse made in `f32` exceeds the bound of
+    /// [`SurfaceInteraction::error`].
     pub fn is_uneven(&self) -> bool {
         let squared_norm = |m: &DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
-        // The product is 9 for a rotation with a scale; the square of the limit is that of a stretch by about 8 along one axis.
+        // The product is 9 for a rotation with a scale; the square of the limit is that of a stretch by about 8 along
+        // one axis.
         let Transform { world_from_object, object_from_world, .. } = &self.transform;
         squared_norm(&world_from_object.matrix3) * squared_norm(&object_from_world.matrix3) > 9.0 * 16.0
     }
@@ -70,7 +72,7 @@ impl Instance {
         let offsets = rows.map(|row| row.abs().dot(translation.abs()));
         let reach = rows.iter().map(|row| row.abs().element_sum()).fold(0.0, f32::max);
         let offset = offsets.into_iter().fold(0.0, f32::max);
-        // A NaN row would be lost in the maxima, so each is looked at.
+        // A NaN row would be lost in the maxima, so each is checked.
         let finite = rows.iter().all(|row| row.is_finite()) && offsets.iter().all(|o| *o < 0.25 * EMBREE_LARGE);
         (finite && reach.is_normal()).then_some(InverseReach { reach, offset })
     }
@@ -119,7 +121,8 @@ impl Instance {
         let n_s = t.normal(local.n_s.as_dvec3()).normalize().as_vec3();
         let p = t.point(local.p);
 
-        // The accelerator inverts the matrix and moves the ray in f32: 4 units of roundoff of each term, seen along the normal.
+        // The accelerator inverts the matrix and moves the ray in f32: 4 units of roundoff of each term, seen along the
+        // normal.
         let inverse = &t.object_from_world;
         let m = &inverse.matrix3;
         let moved = m.x_axis.abs() * p.x.abs() + m.y_axis.abs() * p.y.abs() + m.z_axis.abs() * p.z.abs() + inverse.translation.abs();

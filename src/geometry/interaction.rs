@@ -1,7 +1,8 @@
 //! A point on a surface with all that shading needs, and the rays that start there.
 //!
-//! Secondary rays start at the hit point moved off the surface by a bound of the rounding errors made so far: no tolerance in scene units.
-//! The bound has a part for rounding the origin to `f32` (the half-ulp box) and, where an accelerator computes in `f32`, a part for that.
+//! Secondary rays start at the hit point moved off the surface by a bound of the rounding errors made so far: no
+//! tolerance in scene units. The bound has a part for rounding the origin to `f32` (the half-ulp box) and, where an
+//! accelerator computes in `f32`, a part for that.
 
 use crate::geometry::Hit;
 use crate::id::{InstanceId, PrimId, ShapeId};
@@ -15,7 +16,8 @@ pub struct SurfaceInteraction {
     pub p: DVec3,
     /// Distance along the ray that found it, in units of its direction.
     pub t: f32,
-    /// Bound on the error of the surface's position as an accelerator sees it, along the normal, beyond the rounding of `p` to `f32`.
+    /// Bound on the error of the surface's position as an accelerator sees it, along the normal, beyond the rounding of
+    /// `p` to `f32`.
     pub error: f32,
     /// Unit geometric normal, towards the front of the surface.
     pub n_g: Vec3,
@@ -98,7 +100,8 @@ impl SpawnPoint {
     pub fn ray_to(&self, target: &Self) -> Ray {
         let toward = (target.p - self.p).as_vec3();
         let origin = offset_origin(self.p, self.n, self.error, toward.dot(self.n));
-        // The end moves off the light towards us, also by the rounding of the direction and of the accelerator's arithmetic on it.
+        // The end moves off the light towards us, also by the rounding of the direction and of the accelerator's
+        // arithmetic on it.
         let side = -toward.dot(target.n);
         let n = target.n.as_dvec3().abs();
         let end_error = f64::from(target.error) + 4.0 * UNIT_ROUNDOFF * n.dot(toward.as_dvec3().abs());
@@ -116,7 +119,8 @@ fn offset_point(p: DVec3, n: Vec3, error: f64, side: f32) -> DVec3 {
     p + n * delta.copysign(f64::from(side))
 }
 
-/// [`offset_point`] rounded to `f32`. The half-ulp box is added twice: what rounding to nearest takes back at most, and what is to remain.
+/// [`offset_point`] rounded to `f32`. The half-ulp box is added twice: what rounding to nearest takes back at most, and
+/// what is to remain.
 #[inline(always)]
 fn offset_origin(p: DVec3, n: Vec3, error: f32, side: f32) -> Vec3 {
     let half_ulp_box = UNIT_ROUNDOFF * n.as_dvec3().abs().dot(p.abs());

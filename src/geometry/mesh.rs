@@ -12,7 +12,7 @@ use crate::id::PrimId;
 use crate::math::float::{EMBREE_LARGE, UNIT_ROUNDOFF};
 use crate::math::{Aabb, Bounds, DVec3, Ray, Transform, Vec2, Vec3};
 
-/// Why a mesh is refused; indices count from 0.
+/// Why a mesh is rejected; indices count from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// No triangles at all.
@@ -64,7 +64,7 @@ pub struct Mesh {
     /// For normal maps, those of each triangle at each time; else empty.
     pub(super) tangents: Vec<Vec<CornerTangents>>,
     has_slivers: bool,
-    /// Found when they are first asked for.
+    /// Computed on first use.
     bounds: OnceLock<Aabb>,
 }
 
@@ -292,7 +292,8 @@ impl Mesh {
         }
     }
 
-    /// The uv at barycentric coordinates `u`, `v` of a triangle's second and third vertex; without uvs these coordinates themselves.
+    /// The uv at barycentric coordinates `u`, `v` of a triangle's second and third vertex; without uvs these
+    /// coordinates themselves.
     pub fn uv(&self, prim: PrimId, u: f32, v: f32) -> Vec2 {
         interpolated_uv(self.vertex_uvs(self.triangles[prim.index()]), [u, v])
     }
@@ -366,9 +367,10 @@ impl Mesh {
         interpolated_normal([n_a, n_b, n_c], [hit.u, hit.v], n_g)
     }
 
-    /// The point `p` of a triangle moved to the surface that the corners' normals suggest (Hanika, "Hacking the Shadow Terminator"): to the
-    /// mean of its projections onto the planes through the corners at right angles to their normals. Only outwards on the side of `toward`;
-    /// `None` where it stays. `p` and `toward` are in the world, where `placement` puts the mesh.
+    /// The point `p` of a triangle moved to the surface that the corners' normals suggest (Hanika, "Hacking the Shadow
+    /// Terminator"): to the mean of its projections onto the planes through the corners at right angles to their
+    /// normals. Only outwards on the side of `toward`; `None` where it stays. `p` and `toward` are in the world, where
+    /// `placement` puts the mesh.
     pub(super) fn terminator_point(
         &self,
         prim: PrimId,
@@ -401,7 +403,8 @@ impl Mesh {
         let uvs = self.vertex_uvs(corners);
         let uv = interpolated_uv(uvs, [hit.u, hit.v]);
         if let Some((tangent, side)) = self.tangent(hit.prim, [1.0 - hit.u - hit.v, hit.u, hit.v], time) {
-            // MikkTSpace's frame is that of the interpolated vectors before they are normalised, up to a factor common to all three.
+            // MikkTSpace's frame is that of the interpolated vectors before they are normalised, up to a factor common
+            // to all three.
             return Parameters { dp_du: tangent / length, dp_dv: n_s.cross(tangent) * side, uv };
         }
         let [dp_du, dp_dv] = derivatives([edge_b, edge_c], uvs);
@@ -429,7 +432,8 @@ impl Mesh {
     }
 }
 
-/// The unit shading normal where the corners' normals have these weights but the first one's, and the length of the interpolated vector.
+/// The unit shading normal where the corners' normals have these weights but the first one's, and the length of the
+/// interpolated vector.
 #[inline(always)]
 pub(crate) fn interpolated_normal([n_a, n_b, n_c]: [Vec3; 3], [u, v]: [f32; 2], n_g: Vec3) -> (Vec3, f32) {
     let n = n_a * (1.0 - u - v) + n_b * u + n_c * v;

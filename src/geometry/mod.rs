@@ -1,4 +1,5 @@
-//! Shapes and everything an accelerator sees of a scene: bounds, counts, ids and intersection; nothing of materials or lights.
+//! Shapes and everything an accelerator sees of a scene: bounds, counts, ids and intersection; nothing of materials or
+//! lights.
 
 mod attributes;
 mod cutout;
@@ -69,7 +70,8 @@ impl Shape {
         }
     }
 
-    /// Bounds of one primitive over the whole shutter interval, fit for an accelerator (outward, padded on analytic shapes).
+    /// Bounds of one primitive over the whole shutter interval, fit for an accelerator (outward, padded on analytic
+    /// shapes).
     pub fn prim_bounds(&self, prim: PrimId) -> Aabb {
         match self {
             Self::Mesh(mesh) => mesh.triangle_bounds(prim),
@@ -94,7 +96,8 @@ impl Shape {
         }
     }
 
-    /// The hit of `ray` (in the space the shape is placed in) with one primitive. `occluded` queries use this very function.
+    /// The hit of `ray` (in the space the shape is placed in) with one primitive. `occluded` queries use this very
+    /// function.
     #[inline]
     pub fn intersect_prim(&self, ray: &Ray, shape: ShapeId, prim: PrimId) -> Option<Hit> {
         let instance = Hit::NO_INSTANCE;
@@ -195,13 +198,13 @@ impl Geometry {
 
     /// Everything that shading needs about a hit of `ray`, with the hit point recomputed in `f64`.
     ///
-    /// `None` if the exact distance is not positive: the hit is a rounding artefact of the accelerator, and the caller looks again from
-    /// [`step_past`] of `hit.t`.
+    /// `None` if the exact distance is not positive: the hit is a rounding artefact of the accelerator, and the caller
+    /// looks again from [`step_past`] of `hit.t`.
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         self.interaction_with(Detail::Full, ray, hit)
     }
 
-    /// [`interaction`](Self::interaction), or only the part of it that is asked for.
+    /// [`interaction`](Self::interaction), or only the requested part of it.
     #[inline]
     pub fn interaction_with(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         if hit.instance == Hit::NO_INSTANCE {

@@ -20,7 +20,7 @@ impl Geometry {
     /// Surface parameters of a point of which only the [place](super::Detail::Place) is known; `hit` is what led to it.
     pub fn uv(&self, at: &SurfaceInteraction, hit: Option<&Hit>) -> Vec2 {
         let Shape::Mesh(mesh) = self.shape(at.shape) else { return at.uv };
-        // Behind a rounding artefact another triangle is met than the hit says.
+        // By a rounding artefact, the ray meets another triangle than that of the hit.
         if let Some(hit) = hit.filter(|hit| (hit.instance, hit.shape, hit.prim) == at.ids()) {
             return mesh.uv(at.prim, hit.u, hit.v);
         }

@@ -1,8 +1,8 @@
 //! Analytic surfaces and their placement.
 //!
-//! Contract of every analytic shape, all in its own space and in `f64`: `intersect` gives the first hit within the ray's interval that
-//! passes the clips; `surface` gives the reprojected point, unit normal, derivatives and uv there; `bounds` and `area` are those of the
-//! clipped part; `sample` covers exactly that part and `pdf_area` is its density.
+//! Contract of every analytic shape, all in its own space and in `f64`: `intersect` gives the first hit within the
+//! ray's interval that passes the clips; `surface` gives the reprojected point, unit normal, derivatives and uv there;
+//! `bounds` and `area` are those of the clipped part; `sample` covers exactly that part and `pdf_area` is its density.
 //!
 //! Errors of an intersection are those of `f64` relative to the coordinates of the ray's origin in the shape's space.
 //! [`TransformedShape`] therefore first moves the origin along the ray to the shape, so that they are relative to the
@@ -157,8 +157,8 @@ pub struct TransformedShape {
     /// The middle of the shape in its own space, and where the transform puts it.
     center: DVec3,
     placed_center: DVec3,
-    /// Bound on the error of a point of the placed surface in `f64`. Rays that start on the surface must clear it even where the
-    /// coordinate along the normal is zero and rounding to `f32` gives no distance.
+    /// Bound on the error of a point of the placed surface in `f64`. Rays that start on the surface must clear it even
+    /// where the coordinate along the normal is zero and rounding to `f32` gives no distance.
     error: f32,
 }
 
@@ -189,7 +189,8 @@ impl TransformedShape {
         let taken = origin - from_center;
         let lost = (origin - (from_center + taken)) + (taken - self.placed_center);
 
-        // With 24 bits, the shift times the direction (also 24 bits) is exact, and the sum rounds at the size of the result.
+        // With 24 bits, the shift times the direction (also 24 bits) is exact, and the sum rounds at the size of the
+        // result.
         let to_closest = -from_center.dot(direction) / direction.length_squared();
         let shift = f64::from_bits(to_closest.to_bits() & !((1 << 29) - 1));
         let near_center = (from_center + direction * shift) + lost;
@@ -220,15 +221,16 @@ impl TransformedShape {
         let CenteredRay { ray: mut local, shift } = self.centered_ray(ray);
         let mut hit = self.shape.intersect(&local)?;
         if hit.t + shift < f64::from(ray.t_min) {
-            // The start of the interval is lost in the shift: a ray that steps past its own start would hit there for ever.
+            // The start of the interval is lost in the shift: a ray that steps past its own start would hit there for
+            // ever.
             local.t_min = hit.t.next_up();
             hit = self.shape.intersect(&local)?;
         }
         Some(LocalHit { t: hit.t + shift, ..hit })
     }
 
-    /// Bounds, which turn with the shape (rather than its box) where it makes a full turn; to be [padded](Bounds::padded) for an
-    /// accelerator.
+    /// Bounds, which turn with the shape (rather than its box) where it makes a full turn; to be
+    /// [padded](Bounds::padded) for an accelerator.
     pub fn bounds(&self) -> Bounds {
         let map = &self.transform.world_from_object;
         let boxed = self.shape.bounds().transformed(map);
@@ -260,7 +262,7 @@ impl TransformedShape {
         self.interaction_with(Detail::Full, ray, hit)
     }
 
-    /// [`interaction`](Self::interaction), or only the part of it that is asked for.
+    /// [`interaction`](Self::interaction), or only the requested part of it.
     #[inline]
     pub fn interaction_with(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<SurfaceInteraction> {
         self.interaction_and_dp_dv(detail, ray, hit).map(|(at, _)| at)
@@ -311,8 +313,8 @@ impl TransformedShape {
         Some((at, self.transform.vector(surface.dp_dv).as_vec3()))
     }
 
-    /// The hit nearest to the distance `t` of the original ray. It need not be the first: the surface may have holes. It need not be exact
-    /// either: on their way into an instance, accelerators move the ray in `f32`.
+    /// The hit nearest to the distance `t` of the original ray. It need not be the first: the surface may have holes.
+    /// It need not be exact either: on their way into an instance, accelerators move the ray in `f32`.
     #[inline]
     fn hit_near(&self, t: f32, centered: &CenteredRay) -> Option<LocalHit> {
         let mut nearest = self.shape.intersect(&centered.ray)?;
@@ -352,8 +354,8 @@ impl TransformedShape {
         Vec2::new(s as f32, t as f32)
     }
 
-    /// The density (with respect to transformed area) with which [`TransformedShape::sample_area`] finds the point where
-    /// `ray` hits; `None` on a miss.
+    /// The density (with respect to transformed area) with which [`TransformedShape::sample_area`] finds the point
+    /// where `ray` hits; `None` on a miss.
     pub fn pdf_area(&self, ray: &Ray) -> Option<f64> {
         let centered = self.centered_ray(ray);
         let hit = self.shape.intersect(&centered.ray)?;
@@ -361,8 +363,8 @@ impl TransformedShape {
         Some(self.place(surface.p, surface.n, surface.pdf_area).pdf_area)
     }
 
-    /// [`TransformedShape::pdf_area`] at a point known to be on the surface, from its unit normal (of either side) alone;
-    /// `None` for surfaces whose sampling is not uniform by area in their own space.
+    /// [`TransformedShape::pdf_area`] at a point known to be on the surface, from its unit normal (of either side)
+    /// alone; `None` for surfaces whose sampling is not uniform by area in their own space.
     #[inline]
     pub fn pdf_area_from_normal(&self, n: Vec3) -> Option<f64> {
         if matches!(self.shape, Analytic::Revolution(_)) {

@@ -3,7 +3,8 @@
 use super::ShapeError;
 use crate::math::{DVec2, dvec2};
 
-/// A curve of cubic Bezier segments, each beginning at the very point where the one before ends. `x` is the distance from the axis.
+/// A curve of cubic Bezier segments, each beginning at the very point where the one before ends. `x` is the distance
+/// from the axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     segments: Vec<[DVec2; 4]>,
@@ -23,8 +24,8 @@ impl Profile {
         Ok(Self { segments })
     }
 
-    /// A uniform cubic B-spline from `n >= 4` control points `[x, y]`, converted to `n - 3` Bezier segments. The curve reaches an end point
-    /// only if it is tripled.
+    /// A uniform cubic B-spline from `n >= 4` control points `[x, y]`, converted to `n - 3` Bezier segments. The curve
+    /// reaches an end point only if it is tripled.
     ///
     /// # Errors
     /// If there are fewer than 4 points, or a coordinate is not finite.

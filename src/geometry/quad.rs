@@ -1,7 +1,7 @@
 //! Parallelograms.
 //!
-//! Object space: `origin + u edge_u + v edge_v` with `u` and `v` in `[0, 1]`, which are also the uv unless others are given. The normal is
-//! `edge_u` x `edge_v`.
+//! Object space: `origin + u edge_u + v edge_v` with `u` and `v` in `[0, 1]`, which are also the uv unless others are
+//! given. The normal is `edge_u` x `edge_v`.
 
 use super::{Detail, LocalHit, LocalSurface, ShapeError, ShapeSample};
 use crate::math::{Bounds, DVec3, RayF64};

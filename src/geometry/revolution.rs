@@ -1,13 +1,14 @@
 //! Surfaces of revolution.
 //!
-//! Object space: a profile curve in the xy plane, where x is the distance from the axis, turned about +y; `0 <= phi <= phi_max` with phi
-//! from +z towards +x. A profile that runs towards +y has normals outward; the normal is on the right of the profile's direction.
+//! Object space: a profile curve in the xy plane, where x is the distance from the axis, turned about +y;
+//! `0 <= phi <= phi_max` with phi from +z towards +x. A profile that runs towards +y has normals outward; the normal is
+//! on the right of the profile's direction.
 //!
 //! `uv = (phi / phi_max, v)` with `v = (segment + s) / segments` of the parameter `s` within the profile's segment, or
 //! by height or arc length.
 //!
-//! Inside this module everything turns about z: `(x, y, z)` is the object's `(z, x, y)`, and heights are measured from the middle
-//! of the profile.
+//! Inside this module everything turns about z: `(x, y, z)` is the object's `(z, x, y)`, and heights are measured from
+//! the middle of the profile.
 
 mod along;
 mod density;

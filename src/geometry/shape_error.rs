@@ -1,6 +1,6 @@
-//! Why the parameters of an analytic shape are refused.
+//! Why the parameters of an analytic shape are rejected.
 
-/// Why the parameters of an analytic shape are refused.
+/// Why the parameters of an analytic shape are rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
     /// A length that must be finite and above zero.

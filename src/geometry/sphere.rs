@@ -1,6 +1,7 @@
 //! Spheres, and the parts of them between two heights and within a sector.
 //!
-//! Object space: `|p| = radius`, `z_min <= z <= z_max`, `0 <= phi <= phi_max` with phi from +x towards +y. The normal points outward.
+//! Object space: `|p| = radius`, `z_min <= z <= z_max`, `0 <= phi <= phi_max` with phi from +x towards +y. The normal
+//! points outward.
 //!
 //! `u = phi / phi_max`. `v = (theta_max - theta) / (theta_max - theta_min)` where theta is the angle from +z, so v is 0
 //! at the bottom and 1 at the top of the part that is kept: a map of the world in latitude and longitude stands upright
@@ -74,8 +75,9 @@ impl Sphere {
     /// Distance of the first hit within the ray's interval; NaN on a miss.
     #[inline(always)]
     pub fn distance(&self, ray: &RayF64) -> f64 {
-        // The point of the ray closest to the centre, then half the chord (Haines et al., "Precision Improvements for Ray/Sphere
-        // Intersection"). A zero direction gives a NaN, as the root of a negative number does, which fails every test.
+        // The point of the ray closest to the centre, then half the chord (Haines et al., "Precision Improvements for
+        // Ray/Sphere Intersection"). A zero direction gives a NaN, as the root of a negative number does, which fails
+        // every test.
         let d = ray.direction;
         let inverse = 1.0 / d.length_squared();
         let t_middle = -ray.origin.dot(d) * inverse;

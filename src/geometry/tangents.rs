@@ -1,15 +1,17 @@
-//! Tangents of meshes as normal maps are baked for: MikkTSpace (Mikkelsen, "Simulation of Wrinkled Surfaces Revisited").
+//! Tangents of meshes as normal maps are baked for: MikkTSpace (Mikkelsen, "Simulation of Wrinkled Surfaces
+//! Revisited").
 
 use bevy_mikktspace::TangentSpace;
 
 use super::mesh::Mesh;
 use crate::math::Vec3;
 
-/// A unit tangent for each corner of a triangle, with the side of the bitangent: `w (n x t)`. All zero where the uv have no direction.
+/// A unit tangent for each corner of a triangle, with the side of the bitangent: `w (n x t)`. All zero where the uv
+/// have no direction.
 pub type CornerTangents = [[f32; 4]; 3];
 
 /// What the algorithm reads and writes.
-struct Source<'a> {
+struct TangentSpaceInput<'a> {
     positions: &'a [[f32; 3]],
     normals: Option<&'a [[f32; 3]]>,
     uvs: &'a [[f32; 2]],
@@ -17,13 +19,13 @@ struct Source<'a> {
     tangents: Vec<CornerTangents>,
 }
 
-impl Source<'_> {
+impl TangentSpaceInput<'_> {
     fn vertex(&self, face: usize, corner: usize) -> usize {
         self.triangles[face][corner] as usize
     }
 }
 
-impl bevy_mikktspace::Geometry for Source<'_> {
+impl bevy_mikktspace::Geometry for TangentSpaceInput<'_> {
     fn num_faces(&self) -> usize {
         self.triangles.len()
     }
@@ -62,12 +64,13 @@ pub(super) fn corner_tangents(
     uvs: &[[f32; 2]],
     triangles: &[[u32; 3]],
 ) -> Option<Vec<CornerTangents>> {
-    let mut source = Source { positions, normals, uvs, triangles, tangents: vec![[[0.0; 4]; 3]; triangles.len()] };
+    let mut source = TangentSpaceInput { positions, normals, uvs, triangles, tangents: vec![[[0.0; 4]; 3]; triangles.len()] };
     bevy_mikktspace::generate_tangents(&mut source).ok()?;
     Some(source.tangents)
 }
 
-/// The tangent interpolated over a triangle (not of unit length), and the side of the bitangent; `None` where there is no direction.
+/// The tangent interpolated over a triangle (not of unit length), and the side of the bitangent; `None` where there is
+/// no direction.
 #[inline]
 pub(super) fn interpolate(corners: &CornerTangents, weights: [f32; 3]) -> Option<(Vec3, f32)> {
     let at = |k: usize| Vec3::new(corners[k][0], corners[k][1], corners[k][2]) * weights[k];

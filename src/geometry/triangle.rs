@@ -1,7 +1,8 @@
 //! The one triangle test that all accelerators of ours share: watertight, with edge functions in `f64`.
 //!
-//! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection": shear the ray onto the axis where its direction is largest; the signs of
-//! three edge functions decide. Shared edges are computed from the same numbers in both triangles, so no ray passes between them.
+//! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection": shear the ray onto the axis where its direction is
+//! largest; the signs of three edge functions decide. Shared edges are computed from the same numbers in both
+//! triangles, so no ray passes between them.
 
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{Aabb, DVec3, Ray, RayF64, Vec3};
@@ -81,7 +82,8 @@ impl TrianglePoints {
         let p = origin.as_dvec3() + direction.as_dvec3() * t;
         let double_area = cross.length();
         let n_g = (cross / double_area).as_vec3();
-        // Embree subtracts the origin from the corners and forms the normal in f32: 4 units of roundoff of the extent seen from here.
+        // Embree subtracts the origin from the corners and forms the normal in f32: 4 units of roundoff of the extent
+        // seen from here.
         let p32 = p.as_vec3();
         let reach = (self.a - p32).abs().max((self.b - p32).abs()).max((self.c - p32).abs());
         TriangleIntersection { p, t, n_g, error: 4.0 * UNIT_ROUNDOFF as f32 * reach.max_element(), double_area }
@@ -102,7 +104,8 @@ impl TrianglePoints {
         (ab * bc).min(bc * ca).min(ca * ab) / self.cross().length()
     }
 
-    /// Whether the triangle is so flat that rays which leave it may be found to hit it in `f32`, although they start where they should.
+    /// Whether the triangle is so flat that rays which leave it may be found to hit it in `f32`, although they start
+    /// where they should.
     pub fn is_sliver(&self) -> bool {
         // The offset of rays is 4 units of roundoff of the extent; without an area there is nothing to hit.
         let flatness = self.flatness();

@@ -2,8 +2,8 @@
 //! Simulation", 2017, and "'Practical Path Guiding' in Production", 2019).
 //!
 //! For surfaces that face each of six sides, a binary tree divides space; each of its leaves has a distribution of
-//! directions, in proportion to what light from them has brought to paths that were scattered there. Paths record into
-//! sums of whole numbers, so what is learned does not depend on threads. From time to time leaves with many records are
+//! directions, in proportion to the radiance that paths scattered there received from them. Paths record into sums of
+//! whole numbers, so what is learned does not depend on threads. From time to time leaves with many records are
 //! divided, and the directions of each where the light is.
 
 mod quadtree;
@@ -42,15 +42,15 @@ const UNITS: f32 = 65_536.0;
 /// What a single record counts at most, in typical ones: 2^27 such fit into a sum.
 const LARGEST: f32 = 1_048_576.0;
 
-/// The share of directions that surfaces choose where nothing says what is better; the light chooses the others.
-const SURFACE_SHARE: f32 = 0.5;
+/// The BSDF sampling fraction of regions where none has been learned; the other directions are sampled from the guide.
+const BSDF_SAMPLING_FRACTION: f32 = 0.5;
 
-/// The shares that are tried instead. With smaller ones, light that the guide does not know of would weigh too much
+/// The fractions that are tried instead. With smaller ones, light that is not in the guide would get too large a weight
 /// when a path meets it.
-const OTHER_SHARES: [f32; 4] = [0.3, 0.4, 0.7, 0.9];
+const OTHER_FRACTIONS: [f32; 4] = [0.3, 0.4, 0.7, 0.9];
 
 /// A node of the tree over space: the index of the first of two children or, with [`IS_LEAF`], that of a leaf. Small,
-/// for paths ask at every turn.
+/// for paths look it up at every vertex.
 #[derive(Clone, Copy, Debug)]
 struct Node(u32);
 
@@ -77,15 +77,16 @@ struct Region {
 struct Leaf {
     records: DTreeBuilder,
     count: AtomicU64,
-    /// How much better each of [`OTHER_SHARES`] is than half, as the mean logarithm of the density weighted by light.
+    /// How much better each of [`OTHER_FRACTIONS`] is than half, as the mean logarithm of the density weighted by
+    /// light.
     gains: [AtomicI64; 4],
 }
 
 impl Leaf {
     /// The best share by the records.
     fn best_share(&self) -> f32 {
-        let best = self.gains.iter().zip(OTHER_SHARES).max_by_key(|(gain, _)| gain.load(Ordering::Relaxed));
-        best.filter(|(gain, _)| gain.load(Ordering::Relaxed) > 0).map_or(SURFACE_SHARE, |(_, share)| share)
+        let best = self.gains.iter().zip(OTHER_FRACTIONS).max_by_key(|(gain, _)| gain.load(Ordering::Relaxed));
+        best.filter(|(gain, _)| gain.load(Ordering::Relaxed) > 0).map_or(BSDF_SAMPLING_FRACTION, |(_, share)| share)
     }
 }
 
@@ -109,11 +110,11 @@ pub struct Record {
     pub direction: Vec3,
     /// What was scattered towards the path, over the density with which the direction was chosen.
     pub light: f32,
-    /// The densities with which the surface and the guide choose the direction, if the guide knew anything.
+    /// The densities with which the surface and the guide choose the direction, if the guide had a distribution.
     pub densities: Option<[f32; 2]>,
 }
 
-/// What is known of the light that arrives at the points of a scene, and what is being learned of it.
+/// The learned distribution of incident radiance over a scene, and the records of the next one.
 #[derive(Debug)]
 pub struct Guide {
     /// Of the box around the scene, a cube.
@@ -129,14 +130,14 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Knows nothing yet. `typical` is how much light a typical record has, about: records far below it are lost, far
-    /// above are cut. Without it (zero), only places are learned, not light.
+    /// An empty guide. `typical` is about the radiance of a typical record: records far below it are lost, far above
+    /// are cut. Without it (zero), only places are learned, not light.
     pub fn new(bounds: Aabb, typical: f32) -> Self {
         let mut guide = Self {
             corner: Vec3::ZERO,
             inverse_size: 0.0,
             nodes: (0..6).map(|leaf| Node(leaf | IS_LEAF)).collect(),
-            learned: vec![Region { directions: None, surface_share: SURFACE_SHARE }; 6],
+            learned: vec![Region { directions: None, surface_share: BSDF_SAMPLING_FRACTION }; 6],
             leaves: (0..6).map(|_| Leaf::default()).collect(),
             scale: scale_of(typical),
             learns: true,
@@ -192,8 +193,8 @@ impl Guide {
         }
         let amount = (light * self.scale).min(LARGEST * UNITS);
         if let Some([surface, guide]) = densities.filter(|[surface, guide]| (surface + guide).is_finite() && surface + guide > 0.0) {
-            let usual = SURFACE_SHARE * surface + (1.0 - SURFACE_SHARE) * guide;
-            for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_SHARES) {
+            let usual = BSDF_SAMPLING_FRACTION * surface + (1.0 - BSDF_SAMPLING_FRACTION) * guide;
+            for (sum, share) in self.leaves[leaf].gains.iter().zip(OTHER_FRACTIONS) {
                 let gain = ((share * surface + (1.0 - share) * guide) / usual).ln();
                 sum.fetch_add((amount * gain) as i64, Ordering::Relaxed);
             }

@@ -10,7 +10,7 @@ use crate::math::{Vec3, vec3};
 /// A quarter that holds more than this share of a tree's light is divided.
 const DIVIDED_SHARE: f64 = 0.01;
 
-/// As long as it got fewer records it is not: single ones tell of chance.
+/// With fewer records it is not: they are too noisy.
 const RECORDS_TO_DIVIDE: f64 = 16.0;
 
 /// Divisions in a row at most: a cell is then about 0.0005 radians wide.
@@ -196,7 +196,7 @@ struct RecordNode {
 
 /// What quarters hold together with all below them.
 #[derive(Clone, Copy, Debug, Default)]
-struct Held {
+struct NodeSums {
     light: f64,
     count: f64,
 }
@@ -216,8 +216,8 @@ impl Default for DTreeBuilder {
 }
 
 impl DTreeBuilder {
-    /// Adds light from a direction, moved at random (`jitter` in `[0, 1)²`) by up to half a cell, for a cell tells of
-    /// its neighbours too.
+    /// Adds light from a direction, jittered (`jitter` in `[0, 1)²`) by up to half a cell: a stochastic box filter over
+    /// directions.
     #[inline]
     pub fn add(&self, direction: Vec3, jitter: [f32; 2], amount: u64) {
         let (at, _) = square_of(direction);
@@ -244,47 +244,47 @@ impl DTreeBuilder {
     }
 
     /// What all quarters hold, by node. Children come after their parents.
-    fn held(&self) -> Vec<[Held; 4]> {
+    fn node_sums(&self) -> Vec<[NodeSums; 4]> {
         let own = |node: &RecordNode| {
-            [0, 1, 2, 3].map(|k| Held {
+            [0, 1, 2, 3].map(|k| NodeSums {
                 light: node.sums[k].load(Ordering::Relaxed) as f64,
                 count: f64::from(node.counts[k].load(Ordering::Relaxed)),
             })
         };
-        let mut held: Vec<[Held; 4]> = self.nodes.iter().map(own).collect();
+        let mut sums: Vec<[NodeSums; 4]> = self.nodes.iter().map(own).collect();
         for index in (0..self.nodes.len()).rev() {
             for k in 0..4 {
                 let child = self.nodes[index].children[k];
                 if child != LEAF {
-                    let below = held[child as usize];
-                    held[index][k] = Held { light: below.iter().map(|h| h.light).sum(), count: below.iter().map(|h| h.count).sum() };
+                    let below = sums[child as usize];
+                    sums[index][k] = NodeSums { light: below.iter().map(|h| h.light).sum(), count: below.iter().map(|h| h.count).sum() };
                 }
             }
         }
-        held
+        sums
     }
 
     /// The distribution of what was recorded; `None` of nothing.
     pub fn directions(&self) -> Option<DTree> {
-        let held = self.held();
-        let light = |held: &[Held; 4]| held.map(|h| h.light);
-        if light(&held[0]).iter().sum::<f64>() == 0.0 {
+        let sums = self.node_sums();
+        let light = |sums: &[NodeSums; 4]| sums.map(|h| h.light);
+        if light(&sums[0]).iter().sum::<f64>() == 0.0 {
             return None;
         }
         // What holds no light is never entered, so its shares do not matter.
-        let nodes = self.nodes.iter().zip(&held).map(|(node, held)| Node::new(light(held), node.children)).collect();
+        let nodes = self.nodes.iter().zip(&sums).map(|(node, sums)| Node::new(light(sums), node.children)).collect();
         Some(DTree { nodes })
     }
 
-    /// The same records, for each of so many parts of space, in a tree of at most so many nodes that is divided where
-    /// the light is: every quarter with more than a hundredth of it, if enough records tell so.
+    /// The same records, for each of `parts` parts of space, in a tree of at most `most` nodes that is divided where
+    /// the light is: every quarter with more than a hundredth of it, if it has enough records.
     pub fn refined(&self, most: usize, parts: usize) -> Self {
-        let held = self.held();
-        let threshold = DIVIDED_SHARE * held[0].iter().map(|h| h.light).sum::<f64>();
+        let sums = self.node_sums();
+        let threshold = DIVIDED_SHARE * sums[0].iter().map(|h| h.light).sum::<f64>();
         let share = 1.0 / parts.max(1) as f64;
         let mut nodes = vec![RecordNode::default()];
         // The node of old that each new one continues, unless it is a part of a cell; what it holds; its depth.
-        let mut sources = vec![(Some(0), held[0], 1)];
+        let mut sources = vec![(Some(0), sums[0], 1)];
         let mut index = 0;
         while index < nodes.len() {
             let (old, quarters, depth) = sources[index];
@@ -296,9 +296,9 @@ impl DTreeBuilder {
                     continue;
                 }
                 nodes[index].children[k] = nodes.len() as u32;
-                let part = Held { light: 0.25 * quarter.light, count: 0.25 * quarter.count };
+                let part = NodeSums { light: 0.25 * quarter.light, count: 0.25 * quarter.count };
                 let child = old.map(|old: usize| self.nodes[old].children[k]).filter(|child| *child != LEAF);
-                let below = child.map_or([part; 4], |child| held[child as usize]);
+                let below = child.map_or([part; 4], |child| sums[child as usize]);
                 sources.push((child.map(|child| child as usize), below, depth + 1));
                 nodes.push(RecordNode::default());
             }

@@ -1,4 +1,4 @@
-//! Guides as bytes and back. What is read may come from anywhere: a guide that could not have been learned is refused.
+//! Guides as bytes and back. What is read may come from anywhere: a guide that could not have been learned is rejected.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};

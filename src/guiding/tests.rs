@@ -172,7 +172,7 @@ fn memory_is_bounded() {
 
 #[test]
 fn shares_follow_what_explains_the_light() {
-    for (densities, expected) in [([0.01, 1.0], 0.3), ([1.0, 0.01], 0.9), ([1.0, 1.0], SURFACE_SHARE)] {
+    for (densities, expected) in [([0.01, 1.0], 0.3), ([1.0, 0.01], 0.9), ([1.0, 1.0], BSDF_SAMPLING_FRACTION)] {
         let guide = Guide::new(unit_box(), 1.0);
         for _ in 0..100 {
             guide.record(&Record { densities: Some(densities), ..record(Vec3::splat(0.5), Vec3::X, 1.0) });

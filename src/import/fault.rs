@@ -1,7 +1,7 @@
 //! Where in a scene's text a fault lies.
 //!
-//! Serde reads a value with a `type` as a whole before it looks inside, and so names only the value that holds a fault. [`refine`] follows
-//! the fault inward by trying which part makes it go away; [`locate`] finds the part in the text.
+//! Serde reads a value with a `type` as a whole before it looks inside, and so names only the value that holds a fault.
+//! [`refine`] follows the fault inward by trying which part makes it go away; [`locate`] finds the part in the text.
 
 use serde::Deserialize;
 use serde_json::Value;
@@ -85,7 +85,8 @@ fn fault(scene: &Value) -> Option<String> {
 fn culprit(scene: &mut Value, at: &[Step], message: &str) -> Option<Step> {
     match follow(scene, at)? {
         Value::Object(map) => {
-            // Without its type nothing can be told of a value, so the type comes last, and only if it is the word in question.
+            // Without its type a value cannot be checked, so the type comes last, and only if it is the word in
+            // question.
             let is_type = |key: &str| key == "type";
             let mut keys: Vec<String> = map.keys().filter(|key| !is_type(key)).cloned().collect();
             let type_is_wrong = map.get("type").is_some_and(|t| t.as_str().is_none_or(|t| message.contains(&format!("variant `{t}`"))));

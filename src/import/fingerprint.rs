@@ -11,11 +11,11 @@ use crate::assets::{Hash, file_hashes, files_of_obj, is_obj};
 use crate::desc::{FilmDesc, IntegratorDesc, SamplerDesc, SceneDesc};
 use crate::error::{Error, Result};
 
-/// Hashes of a scene, each as 64 hexadecimal digits. Two scenes of the same `whole` look the same under the same settings. Files that
-/// the world does not use do not count.
+/// Hashes of a scene, each as 64 hexadecimal digits. Two scenes of the same `whole` look the same under the same
+/// settings. Files that the world does not use do not count.
 ///
-/// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count, nor do the folder
-/// of the scene and the format it was read from.
+/// Comments, spaces, and what belongs to the settings of a render (film, sampler, integrator, outputs) do not count,
+/// nor do the folder of the scene and the format it was read from.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFingerprint {
@@ -23,7 +23,8 @@ pub struct SceneFingerprint {
     pub whole: String,
     /// Of the description.
     pub scene: String,
-    /// Of the files and assets that the scene names, by the names it uses; materials and images of OBJ files are among them.
+    /// Of the files and assets that the scene names, by the names it uses; materials and images of OBJ files are among
+    /// them.
     pub assets: BTreeMap<String, String>,
 }
 
@@ -91,7 +92,7 @@ pub fn files_of_scene(imported: &Imported, scene_file: &Path) -> Vec<(PathBuf, S
     imported.chain(further).chain(named).collect()
 }
 
-/// The hash of what the description says beside the settings of a render.
+/// The hash of the description without the settings of a render.
 fn description_hash(mut desc: SceneDesc) -> Result<String> {
     desc.schema = None;
     desc.comment = None;

@@ -14,7 +14,7 @@ use crate::suggestion::did_you_mean;
 /// Reads a scene file.
 ///
 /// # Errors
-/// [`Error::Missing`] if it cannot be read, [`Error::Parse`] with line, column and path for what it says.
+/// [`Error::Missing`] if it cannot be read, [`Error::Parse`] with line, column and path for faults in it.
 pub fn load_scene(path: &Path) -> Result<SceneDesc> {
     let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     match std::str::from_utf8(&bytes) {
@@ -50,7 +50,7 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneDesc> {
     }
 }
 
-/// A scene of ours as its file says it, without any default; `None` if it cannot be read or is no JSON.
+/// A scene in our format as its file has it, without any default; `None` if it cannot be read or is no JSON.
 pub fn scene_as_written(path: &Path) -> Option<Value> {
     let text = crate::file::read_to_string(path).ok()?;
     serde_json::from_str(&blank_comments(&text).text).ok()

@@ -1,7 +1,7 @@
 //! Giving up a batch under way, so that a render ends soon even where a pass would take hours.
 //!
 //! Passes are short, and a render that is to end finishes the one under way. Only where that takes long are batches
-//! given up: their samples are not added to the film.
+//! cancelled: their samples are not added to the film.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ pub(super) const BOUNCES: u32 = 16;
 /// Not yet, in milliseconds since the start.
 const NEVER: u64 = u64::MAX;
 
-/// Whether batches under way are to be given up. Once they are, that does not change.
+/// Whether batches under way are to be cancelled. Once they are, that does not change.
 #[derive(Debug)]
 pub struct Cancel<'a> {
     stop: &'a AtomicBool,
@@ -23,7 +23,7 @@ pub struct Cancel<'a> {
     /// When the time is up, and when `stop` was first seen raised; in milliseconds since the start.
     deadline: AtomicU64,
     stopped: AtomicU64,
-    given_up: AtomicBool,
+    is_cancelled: AtomicBool,
 }
 
 impl<'a> Cancel<'a> {
@@ -35,7 +35,7 @@ impl<'a> Cancel<'a> {
             start: Instant::now(),
             deadline: AtomicU64::new(NEVER),
             stopped: AtomicU64::new(NEVER),
-            given_up: AtomicBool::new(false),
+            is_cancelled: AtomicBool::new(false),
         };
         cancel.set_deadline(time_limit.map(|limit| limit.saturating_mul(2)));
         cancel
@@ -51,15 +51,15 @@ impl<'a> Cancel<'a> {
         self.deadline.store(limit.map_or(NEVER, milliseconds), Ordering::Relaxed);
     }
 
-    /// Whether batches are to be given up; looks at the clock only if something is to end the render.
+    /// Whether batches are to be cancelled; reads the clock only if the render has a limit or a stop flag.
     #[inline]
     pub(super) fn is_due(&self) -> bool {
         let stop = self.stop.load(Ordering::Relaxed);
-        (stop || self.deadline.load(Ordering::Relaxed) != NEVER) && self.look(stop)
+        (stop || self.deadline.load(Ordering::Relaxed) != NEVER) && self.check(stop)
     }
 
     #[cold]
-    fn look(&self, stop: bool) -> bool {
+    fn check(&self, stop: bool) -> bool {
         let elapsed = u64::try_from(self.start.elapsed().as_millis()).unwrap_or(NEVER - 1);
         if stop {
             self.stopped.fetch_min(elapsed, Ordering::Relaxed);
@@ -67,14 +67,14 @@ impl<'a> Cancel<'a> {
         let stopped = self.stopped.load(Ordering::Relaxed);
         let waited = stopped != NEVER && elapsed.saturating_sub(stopped) >= GRACE.as_millis() as u64;
         if waited || elapsed >= self.deadline.load(Ordering::Relaxed) {
-            self.given_up.store(true, Ordering::Relaxed);
+            self.is_cancelled.store(true, Ordering::Relaxed);
         }
-        self.given_up()
+        self.is_cancelled()
     }
 
-    /// Whether some batch was given up; those of the pass under way that have ended since may not be whole.
-    pub fn given_up(&self) -> bool {
-        self.given_up.load(Ordering::Relaxed)
+    /// Whether some batch was cancelled; those of the pass under way that have ended since may not be whole.
+    pub fn is_cancelled(&self) -> bool {
+        self.is_cancelled.load(Ordering::Relaxed)
     }
 }
 
@@ -90,9 +90,9 @@ mod tests {
         stop.store(true, Ordering::Relaxed);
         assert!(!cancel.is_due());
         cancel.stopped.store(58_000, Ordering::Relaxed);
-        assert!(cancel.is_due() && cancel.given_up());
+        assert!(cancel.is_due() && cancel.is_cancelled());
         stop.store(false, Ordering::Relaxed);
-        assert!(cancel.given_up());
+        assert!(cancel.is_cancelled());
     }
 
     #[test]

@@ -119,8 +119,8 @@ fn for_each_first_surface(
     let mut hits = vec![None; rays.len()];
     world.accel.intersect_batch(&rays, &mut hits, Coherence::Coherent);
     counts.camera += rays.len() as u64;
-    let wants_surface = needs != SurfaceAovs::default();
-    out.reset(samples.len(), wants_surface, light_aovs);
+    let needs_surface = needs != SurfaceAovs::default();
+    out.reset(samples.len(), needs_surface, light_aovs);
     for (i, ((sample, ray), hit)) in samples.iter().zip(&rays).zip(hits).enumerate() {
         let sample = &sample;
         let Some(at) = world.resolve(ray, hit) else {
@@ -132,7 +132,7 @@ fn for_each_first_surface(
         let radiance = shade(sample, ray, &at);
         out.pixels[i] = PixelSample { radiance, alpha: 1.0 };
         add_emission(&mut out.light_aovs, i, radiance);
-        if wants_surface {
+        if needs_surface {
             out.surfaces[i] =
                 surface_sample(pass, needs, FirstSurface { ray, hit: hit.as_ref(), at: &at }, || world.scene.texture_point(&at));
         }

@@ -1,4 +1,5 @@
-//! The parts of a sample's radiance: by how light left the first surface towards the camera, and by the group of the light that gave it.
+//! The parts of a sample's radiance: by how light left the first surface towards the camera, and by the group of the
+//! light that gave it.
 //!
 //! Light that is scattered by several lobes at once is shared out between diffuse and specular by what the lobes have
 //! of the BSDF's value for its direction. Light that was scattered once is direct, whether light sampling found it or

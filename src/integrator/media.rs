@@ -11,7 +11,8 @@ use crate::scene::Scene;
 /// Surfaces on one straight way, at most; a way along a surface must not go on for ever.
 const MAX_SURFACES: u32 = 4096;
 
-/// The unit direction in which the media around the camera are counted. No axis and no diagonal, where scenes have their edges and poles.
+/// The unit direction in which the media around the camera are counted. No axis and no diagonal, where scenes have
+/// their edges and poles.
 const PROBE: Vec3 = vec3(0.169_031, 0.961_236, 0.217_947);
 
 /// A path within media.
@@ -59,7 +60,8 @@ pub(super) fn bounds(scene: &Scene) -> Aabb {
     })
 }
 
-/// Whether a ray that came along `from` crosses the surface by going on along `to`; as in [`Vertex::shadowing`](super::vertex::Vertex).
+/// Whether a ray that came along `from` crosses the surface by going on along `to`; as in
+/// [`Vertex::shadowing`](super::vertex::Vertex).
 pub(super) fn crosses(at: &SurfaceInteraction, from: Vec3, to: Vec3) -> bool {
     let reflects = to.dot(at.n_g) * (-from).dot(at.n_g) > 0.0;
     !reflects
@@ -83,7 +85,8 @@ impl World<'_> {
         self.scene.met_material(at, direction).boundary(&self.scene.textures, || self.scene.texture_point(at), ior)
     }
 
-    /// The media beyond a surface, if a path that came along `from` crosses it by going on along `to`; else those it is in.
+    /// The media beyond a surface, if a path that came along `from` crosses it by going on along `to`; else those it is
+    /// in.
     pub(super) fn media_toward(&self, at: &SurfaceInteraction, from: Vec3, to: Vec3, current: &MediumStack) -> MediumStack {
         match self.scene.surface(at.shape).medium {
             Some(medium) if crosses(at, from, to) => {

@@ -1,8 +1,8 @@
 //! Light transport: from camera rays to the radiance and AOVs of samples.
 //!
-//! Integrators take a batch of camera samples (one sample of every pixel of a tile) and work through it stage by stage: trace all rays,
-//! shade all hits, trace all shadow rays. Accelerators can then trace rays side by side that belong together, and each stage's code and
-//! data stay in the caches. `docs/wavefront.md` has the figures behind this choice.
+//! Integrators take a batch of camera samples (one sample of every pixel of a tile) and work through it stage by stage:
+//! trace all rays, shade all hits, trace all shadow rays. Accelerators can then trace rays side by side that belong
+//! together, and each stage's code and data stay in the caches. `docs/wavefront.md` has the figures behind this choice.
 
 mod cancel;
 mod cones;
@@ -55,7 +55,8 @@ pub mod dimensions {
         1 + 2 * bounce
     }
 
-    /// Of path tracing: choice of a lobe (one), a direction (two) and roulette (one), at the vertex with this many bounces before it.
+    /// Of path tracing: choice of a lobe (one), a direction (two) and roulette (one), at the vertex with this many
+    /// bounces before it.
     pub const fn bsdf(bounce: u32) -> u32 {
         2 + 2 * bounce
     }
@@ -94,7 +95,8 @@ impl CameraBatch {
         self.count = 0;
     }
 
-    /// The place for up to [`BATCH`] more samples, which [`extend`](Self::extend) adds; the batch has full blocks so far.
+    /// The place for up to [`BATCH`] more samples, which [`extend`](Self::extend) adds; the batch has full blocks so
+    /// far.
     pub fn next_block(&mut self) -> &mut CameraBlock {
         let block = self.count.div_ceil(BATCH);
         if block == self.blocks.len() {
@@ -193,7 +195,7 @@ pub trait Integrator: Send + Sync {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace);
 }
 
-/// What integrators need to know beside their parameters.
+/// What integrators need beside their parameters.
 #[derive(Clone, Copy)]
 pub struct Setup {
     /// Where random numbers come from.

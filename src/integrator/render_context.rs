@@ -1,4 +1,4 @@
-//! What belongs to one render of a scene: the picture, and whether batches are to be given up.
+//! The state of one render of a scene: the picture, and whether batches are to be cancelled.
 
 use super::cancel::Cancel;
 use super::cones::scattered;
@@ -33,7 +33,7 @@ impl<'a> RenderContext<'a> {
         Self { shows_background: false, ..self }
     }
 
-    /// With what says that batches are to be given up.
+    /// With the flag that cancels batches.
     #[must_use]
     pub fn with_cancel(self, cancel: &'a Cancel<'a>) -> Self {
         Self { cancel: Some(cancel), ..self }
@@ -45,16 +45,16 @@ impl<'a> RenderContext<'a> {
         if self.shows_background && !self.scene.lights.at_infinity().is_empty() { 1.0 } else { 0.0 }
     }
 
-    /// Whether the batch under way is to be given up.
+    /// Whether the batch under way is to be cancelled.
     #[inline]
     pub(super) fn gives_up(&self) -> bool {
         self.cancel.is_some_and(Cancel::is_due)
     }
 
-    /// Whether a batch was given up.
+    /// Whether a batch was cancelled.
     #[inline]
-    pub fn has_given_up(&self) -> bool {
-        self.cancel.is_some_and(Cancel::given_up)
+    pub fn is_cancelled(&self) -> bool {
+        self.cancel.is_some_and(Cancel::is_cancelled)
     }
 
     /// The cone of a camera ray; `None` if no texture would make use of it.

@@ -1,5 +1,5 @@
-//! Shading normals that differ from the surface's own, on smooth meshes and under normal maps: no reflection below the surface, and under
-//! normal maps no hard edge where the surface turns away from the light.
+//! Shading normals that differ from the surface's own, on smooth meshes and under normal maps: no reflection below the
+//! surface, and under normal maps no hard edge where the surface turns away from the light.
 
 use super::World;
 use crate::geometry::{SpawnPoint, SurfaceInteraction};
@@ -57,7 +57,8 @@ pub fn terminator_factor(cos_geometric: f32, cos_shading: f32, cos_normals: f32)
     }
 }
 
-/// How far above a facet a ray may start at least, in roundings of its place: a multiple of the distances that rays keep from surfaces.
+/// How far above a facet a ray may start at least, in roundings of its place: a multiple of the distances that rays
+/// keep from surfaces.
 const MIN_TERMINATOR_OFFSET: f64 = 256.0;
 
 /// Where rays start that see more than the facet `at` does: above it on the side of the shading normal `n`, on the

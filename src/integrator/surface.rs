@@ -1,4 +1,5 @@
-//! What layers need of the first surface of a sample, and denoisers of the first one that is no mirror and no clear glass.
+//! What layers need of the first surface of a sample, and denoisers of the first one that is no mirror and no clear
+//! glass.
 
 use super::{PassContext, World};
 use crate::color::Rgb;
@@ -7,7 +8,7 @@ use crate::geometry::{Detail, Hit, SurfaceInteraction};
 use crate::math::{Frame, Ray, Vec2, Vec3};
 use crate::texture::Footprint;
 
-/// Which parts of [`SurfaceSample`] are wanted; the rest is not computed.
+/// Which parts of [`SurfaceSample`] are requested; the rest is not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SurfaceAovs {
     /// Any of depth, normals, position and the shape.
@@ -22,7 +23,8 @@ pub struct SurfaceAovs {
     pub features: bool,
 }
 
-/// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator found.
+/// What the layers need of the place of the first surface, which `ray` meets at `at`; `hit` is what the accelerator
+/// found.
 pub(super) fn place_sample(pass: &PassContext, needs: SurfaceAovs, at: &SurfaceInteraction, hit: Option<&Hit>) -> SurfaceSample {
     let (world, mut sample) = (pass.world, SurfaceSample::default());
     if needs.geometry {
@@ -73,7 +75,7 @@ pub(super) fn albedo_at<'f>(world: &World, at: &SurfaceInteraction, ray: &Ray, f
     world.scene.bsdf(at, ray.direction, footprint).albedo(frame.to_local(-ray.direction))
 }
 
-/// Tells of the last surface so far that the sample shows, through mirrors and clear glass that leave `throughput`.
+/// Sets the denoising features to the surface reached last, through mirrors and clear glass of this `throughput`.
 pub(super) fn set_features(sample: &mut SurfaceSample, throughput: Rgb, albedo: Rgb, normal: Vec3) {
     sample.feature_albedo = (throughput * albedo).map(|value| value.clamp(0.0, 1.0));
     sample.feature_normal = normal;

@@ -109,8 +109,8 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other directions, and where
-    /// [`terminator_start`] finds no start.
+    /// What is reflected into a direction that the shading normal sees and the facet does not. `None` for other
+    /// directions, and where [`terminator_start`] finds no start.
     #[inline]
     fn eval_raised(&self, world: &World, direction: Vec3) -> Option<(BsdfEval, SurfaceInteraction)> {
         let start = self.terminator_point(world, direction)?;
@@ -121,7 +121,8 @@ impl<'a> Vertex<'a> {
     #[inline]
     fn terminator_point(&self, world: &World, direction: Vec3) -> Option<SurfaceInteraction> {
         let sides = HemisphereTest::new([self.wo.z, direction.dot(self.frame.z)], [self.cos_geometric, direction.dot(self.at.n_g)]);
-        // Under a normal map, the factor has darkened what comes near. Where light passes, the side of the facet says what a ray is in.
+        // Under a normal map, the factor has darkened what comes near. Where light passes, the side of the facet
+        // decides the medium of a ray.
         if !sides.is_below_facet() || !world.scene.features.shading_normals || self.cos_normals.is_some() || self.bsdf.flags().transmits() {
             return None;
         }

@@ -1,5 +1,5 @@
-//! Whitted's ray tracing: mirror reflection, refraction, direct light of every light and an ambient term ("An Improved Illumination Model
-//! for Shaded Display").
+//! Whitted's ray tracing: mirror reflection, refraction, direct light of every light and an ambient term ("An Improved
+//! Illumination Model for Shaded Display").
 
 use std::borrow::Cow;
 
@@ -19,9 +19,10 @@ use crate::medium::MediumStack;
 use crate::sampling::Sampler;
 use crate::texture::Footprint;
 
-/// Whitted's ray tracing. At every surface each light is sampled once, with a direction of its own for each camera sample: the mean over
-/// the samples of a pixel is the direct illumination, with hard shadows of point lights and soft ones of area lights and environments.
-/// Scattering that is neither mirror-like nor lit by a light contributes only through the ambient term.
+/// Whitted's ray tracing. At every surface each light is sampled once, with a direction of its own for each camera
+/// sample: the mean over the samples of a pixel is the direct illumination, with hard shadows of point lights and soft
+/// ones of area lights and environments. Scattering that is neither mirror-like nor lit by a light contributes only
+/// through the ambient term.
 pub struct Whitted {
     /// Largest number of segments from the camera.
     pub max_depth: u32,
@@ -41,8 +42,8 @@ impl Integrator for Whitted {
     fn render_batch(&self, pass: &PassContext, samples: &CameraBatch, workspace: &mut Workspace) {
         let (world, Workspace { out, counts, .. }) = (pass.world, workspace);
         counts.camera += samples.len() as u64;
-        let wants_surface = self.needs != SurfaceAovs::default();
-        out.reset(samples.len(), wants_surface, self.light_aovs);
+        let needs_surface = self.needs != SurfaceAovs::default();
+        out.reset(samples.len(), needs_surface, self.light_aovs);
         for (i, sample) in samples.iter().enumerate() {
             let sample = &sample;
             let in_media = world.scene.features.media;
@@ -53,7 +54,7 @@ impl Integrator for Whitted {
                 counts.camera += 1 + world.skip_emitters(&mut ray, hit).1;
             }
             let segment = Segment::trace(world, ray, pass.render.camera_cone(&ray), current, counts);
-            if wants_surface {
+            if needs_surface {
                 out.surfaces[i] = match &segment.end {
                     Some(at) => {
                         let first = FirstSurface { ray: &segment.ray, hit: segment.hit.as_ref(), at };
@@ -208,7 +209,8 @@ impl Whitted {
             }
         }
 
-        // Both delta lobes, each without the division by its probability: u at either end of [0, 1) chooses reflection and refraction.
+        // Both delta lobes, each without the division by its probability: u at either end of [0, 1) chooses reflection
+        // and refraction.
         let lobe = |u: f32| vertex.bsdf.sample(vertex.wo, u, [0.5; 2]).filter(|s| s.is_delta);
         let first = lobe(0.0);
         let second = lobe(ONE_MINUS_EPSILON).filter(|s| Some(s.wi) != first.map(|f| f.wi));

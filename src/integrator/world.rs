@@ -68,8 +68,9 @@ impl<'a> World<'a> {
         self.parametrization[shape.index()] != Parametrization::Unused
     }
 
-    /// Whether a shape is analytic and [`TransformedShape::resolve_rows`](crate::geometry::TransformedShape::resolve_rows) finds all that
-    /// is needed of its hits.
+    /// Whether a shape is analytic and
+    /// [`TransformedShape::resolve_rows`](crate::geometry::TransformedShape::resolve_rows) finds all that is needed of
+    /// its hits.
     #[inline]
     pub(super) fn resolves_in_rows(&self, shape: ShapeId) -> bool {
         match self.scene.geometry.shape(shape) {
@@ -88,8 +89,8 @@ impl<'a> World<'a> {
         self.resolve(ray, self.accel.intersect(ray))
     }
 
-    /// The surface at the hit that the accelerator found for `ray`. A hit whose exact distance is not positive is an artefact of `f32`
-    /// rounding near the ray's origin; the ray then looks again behind it.
+    /// The surface at the hit that the accelerator found for `ray`. A hit whose exact distance is not positive is an
+    /// artefact of `f32` rounding near the ray's origin; the ray then looks again behind it.
     #[inline]
     pub fn resolve(&self, ray: &Ray, hit: Option<Hit>) -> Option<SurfaceInteraction> {
         let hit = hit?;
@@ -171,7 +172,8 @@ fn clip_to_scene(bounds: Aabb, reach_squared: f32, rays: &mut RayRows, count: us
         let nearest = origin.max(bounds.min).min(bounds.max);
         let gap_squared = (nearest - origin).length_squared();
         let gap = gap_squared.sqrt();
-        // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and stays here too.
+        // Within one box length of the scene the loss is as small as inside it. An empty box gives NaN or infinity and
+        // stays here too.
         let is_far = (gap_squared > reach_squared) & (gap > extent) & (gap < f32::INFINITY);
         let (o, d) = (origin.as_dvec3(), rays.direction.get(i).as_dvec3());
         let moved = (o + d * (f64::from(gap - 0.5 * extent) / d.length())).as_vec3();

@@ -4,8 +4,8 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use crate::math::{Aabb, DVec3, Vec3};
 
-/// Directions of emission (Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting"): surface normals lie
-/// within `spread` of the axis, and light leaves within `reach` of a normal. Radians.
+/// Directions of emission (Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting"):
+/// surface normals lie within `spread` of the axis, and light leaves within `reach` of a normal. Radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionCone {
     /// Unit axis.
@@ -57,8 +57,8 @@ fn angle_between(a: Vec3, b: Vec3) -> f32 {
     a.cross(b).length().atan2(a.dot(b))
 }
 
-/// Where a light or a group of lights is and how it shines: enough to estimate, from any point, what arrives there. The bounds are
-/// conservative: no light reaches a point that they exclude.
+/// Where a light or a group of lights is and how it shines: enough to estimate, from any point, what arrives there. The
+/// bounds are conservative: no light reaches a point that they exclude.
 #[derive(Clone, Copy, Debug)]
 pub struct LightBounds {
     /// Around all points that emit.

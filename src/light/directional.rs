@@ -26,12 +26,12 @@ struct Disk {
     pdf: f32,
 }
 
-/// Half-angles below this many radians cannot be told from zero with directions in `f32`.
+/// Half-angles below this many radians cannot be distinguished from zero with directions in `f32`.
 const SMALLEST_HALF_ANGLE: f64 = 1e-6;
 
 impl DirectionalLight {
-    /// Light that travels along `direction` (any length but zero) and gives `irradiance` on a surface that faces it. `angular_diameter` is
-    /// the full angle it subtends, in radians, from 0 to below pi.
+    /// Light that travels along `direction` (any length but zero) and gives `irradiance` on a surface that faces it.
+    /// `angular_diameter` is the full angle it subtends, in radians, from 0 to below pi.
     pub fn new(direction: DVec3, irradiance: Rgb, angular_diameter: f64) -> Self {
         let half_angle = (0.5 * angular_diameter).min(FRAC_PI_2);
         let disk = (half_angle > SMALLEST_HALF_ANGLE).then(|| {
@@ -66,7 +66,8 @@ impl DirectionalLight {
         Some(LightSample { wi: wi.normalize(), radiance: disk.radiance, pdf: disk.pdf, is_delta: false, target })
     }
 
-    /// Radiance arriving along the unit direction `wi` at a ray that leaves the scene, with the density of `sample`; zero for a delta.
+    /// Radiance arriving along the unit direction `wi` at a ray that leaves the scene, with the density of `sample`;
+    /// zero for a delta.
     #[inline]
     pub fn eval(&self, wi: Vec3) -> InfiniteLightEval {
         match &self.disk {

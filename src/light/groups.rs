@@ -2,7 +2,7 @@
 
 use crate::id::{LightGroupId, LightId};
 
-/// Which lights belong together, by name: what each group gives to the picture can be told apart.
+/// Light groups by name: the contribution of each to the picture can be stored as an AOV.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LightGroups {
     names: Vec<String>,

@@ -50,7 +50,8 @@ impl IesProfile {
         Some(profile)
     }
 
-    /// Intensity at the angles, in degrees, from the nadir (within `[0, 180]`) and about it (any). Nothing beyond the vertical angles.
+    /// Intensity at the angles, in degrees, from the nadir (within `[0, 180]`) and about it (any). Nothing beyond the
+    /// vertical angles.
     pub fn intensity(&self, from_nadir: f32, about: f32) -> f32 {
         let (first, last) = (self.vertical[0], self.vertical[self.vertical.len() - 1]);
         if !(first..=last).contains(&from_nadir) {

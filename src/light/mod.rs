@@ -135,8 +135,8 @@ impl Light {
         }
     }
 
-    /// Light that arrives along the unit direction `wi` at a ray that leaves the scene, with the density of sampling it; nothing from
-    /// lights that such rays cannot see.
+    /// Light that arrives along the unit direction `wi` at a ray that leaves the scene, with the density of sampling
+    /// it; nothing from lights that such rays cannot see.
     #[inline]
     pub fn eval_infinite(&self, wi: Vec3, compensation: MisCompensation) -> InfiniteLightEval {
         match self {
@@ -184,7 +184,8 @@ impl Light {
         }
     }
 
-    /// Emitted power in watts per unit of the radiance's bandwidth, as luminance; `scene_radius` bounds the scene for lights at infinity.
+    /// Emitted power in watts per unit of the radiance's bandwidth, as luminance; `scene_radius` bounds the scene for
+    /// lights at infinity.
     pub fn power(&self, scene_radius: f64) -> f64 {
         match self {
             Self::Area(light) => light.power(),

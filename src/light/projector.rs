@@ -45,7 +45,8 @@ impl TextureProjection {
         self.texture.map_or(Rgb::WHITE, |id| textures[id.index()].color(uv))
     }
 
-    /// The colour along the unit direction `w` away from the light, whether or not that leads into the unit square; black behind the light.
+    /// The colour along the unit direction `w` away from the light, whether or not that leads into the unit square;
+    /// black behind the light.
     pub(super) fn color(&self, textures: &[Texture], w: Vec3) -> Rgb {
         self.place(w).map_or(Rgb::BLACK, |(uv, _)| self.at(textures, uv))
     }

@@ -63,7 +63,8 @@ impl LightSampleRows {
     }
 }
 
-/// Vertices that sample lights, at most [`BATCH`]: area lights and the image around the scene are sampled for many of them at once.
+/// Vertices that sample lights, at most [`BATCH`]: area lights and the image around the scene are sampled for many of
+/// them at once.
 pub struct LightQueue {
     /// Probability with which the light of each vertex was chosen.
     pmfs: Row,

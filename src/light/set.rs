@@ -1,4 +1,4 @@
-//! All lights of a scene, and which one a path looks at.
+//! All lights of a scene, and the sampling of one of them.
 
 use super::tree::{LightSampleContext, LightTree};
 use super::{Environment, EnvironmentMap, Light, MisCompensation};
@@ -21,16 +21,18 @@ pub struct LightChoice {
 pub enum LightSelection {
     /// In proportion to its power.
     Power,
-    /// In proportion to an estimate of its irradiance at the shading point, by a light tree; lights at infinity by their power.
+    /// In proportion to an estimate of its irradiance at the shading point, by a light tree; lights at infinity by
+    /// their power.
     Tree,
 }
 
 /// All lights of a scene and the probability with which each is chosen.
 ///
-/// Few lights are chosen in proportion to their power, many by a tree that knows where they are and where they shine. What a light at
-/// infinity gives to a scene depends on the scene's size more than on what the camera sees; so if there are both lights at infinity and
-/// others, either kind has at least a quarter of the choices. Where power decides, a twentieth of the choices of a kind is spread evenly,
-/// so that no light of positive power starves beside a strong one.
+/// Few lights are chosen in proportion to their power, many by a light tree over their positions and emission
+/// directions. What a light at infinity gives to a scene depends on the scene's size more than on what the camera sees;
+/// so if there are both lights at infinity and others, either kind has at least a quarter of the choices. Where power
+/// decides, a twentieth of the choices of a kind is spread evenly, so that no light of positive power starves beside a
+/// strong one.
 ///
 /// With [compensation](MisCompensation::On) an environment counts with the power that its lowered density leaves.
 #[derive(Clone, Debug, Default)]
@@ -54,14 +56,14 @@ struct LightDistribution {
     tree_share: f32,
 }
 
-/// At least this many lights that are not at infinity are sampled by a tree. Where time is equal, it halves the error of 16
-/// lights, and gains nothing on 3 or 4.
+/// At least this many lights that are not at infinity are sampled by a tree. Where time is equal, it halves the error
+/// of 16 lights, and gains nothing on 3 or 4.
 const TREE_FROM: usize = 6;
 
 /// Least share of the choices for lights at infinity, and for all others, if both exist.
 const LEAST_SHARE: f64 = 0.25;
 
-/// Share of the choices that does not ask for power.
+/// Share of the choices that is independent of power.
 const EVEN_SHARE: f64 = 0.05;
 
 impl LightSet {
@@ -139,8 +141,8 @@ impl LightSet {
         }
     }
 
-    /// A light for `from`, `u` in the unit square (the second number adds digits to the first, for many lights); `None` if none shines
-    /// there, as far as the choice has looked.
+    /// A light for `from`, `u` in the unit square (the second number adds digits to the first, for many lights); `None`
+    /// if none shines there, as far as the choice has looked.
     #[inline]
     pub fn choose(&self, from: &LightSampleContext, u: [f32; 2], compensation: MisCompensation) -> Option<LightChoice> {
         let distribution = self.distribution(compensation);

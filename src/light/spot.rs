@@ -10,8 +10,9 @@ use crate::texture::Texture;
 
 /// Light from a point within a cone.
 ///
-/// The intensity at the angle theta from the axis is that of the axis up to the beam's half-angle, zero from the cutoff half-angle on, and
-/// falls linearly with the angle between: `intensity * (cutoff - theta) / (cutoff - beam)`, as Mitsuba has it.
+/// The intensity at the angle theta from the axis is that of the axis up to the beam's half-angle, zero from the cutoff
+/// half-angle on, and falls linearly with the angle between: `intensity * (cutoff - theta) / (cutoff - beam)`, as
+/// Mitsuba has it.
 #[derive(Clone, Debug)]
 pub struct SpotLight {
     source: PointLight,
@@ -27,8 +28,8 @@ pub struct SpotLight {
 }
 
 impl SpotLight {
-    /// A light at `position` that shines along `axis` (any length but zero). `beam` and `cutoff` are half-angles in radians, taken into
-    /// `0 <= beam <= cutoff <= pi`.
+    /// A light at `position` that shines along `axis` (any length but zero). `beam` and `cutoff` are half-angles in
+    /// radians, taken into `0 <= beam <= cutoff <= pi`.
     pub fn new(position: DVec3, axis: DVec3, intensity: Rgb, beam: f64, cutoff: f64) -> Self {
         let cutoff = cutoff.clamp(0.0, PI);
         let beam = beam.clamp(0.0, cutoff);

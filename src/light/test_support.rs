@@ -2,7 +2,8 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Asserts that counts follow probabilities, at a false-alarm rate of 1e-6. Cells of fewer than 5 expected counts are pooled.
+/// Asserts that counts follow probabilities, at a false-alarm rate of 1e-6. Cells of fewer than 5 expected counts are
+/// pooled.
 pub fn assert_chi_squared(counts: &[u32], probabilities: &[f64], what: &str) {
     let n: f64 = counts.iter().map(|&c| f64::from(c)).sum();
     let (mut statistic, mut cells) = (0.0, 0u32);

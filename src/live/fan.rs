@@ -9,7 +9,7 @@ pub struct Fan<'a> {
 }
 
 impl<'a> Fan<'a> {
-    /// For these listeners, told in this order.
+    /// For these listeners, notified in this order.
     pub fn new(listeners: impl IntoIterator<Item = &'a dyn Progress>) -> Self {
         Self { listeners: listeners.into_iter().collect() }
     }
@@ -40,8 +40,8 @@ impl Progress for Fan<'_> {
         self.listeners.iter().for_each(|listener| listener.warn(message));
     }
 
-    fn wants_picture(&self) -> bool {
-        self.listeners.iter().any(|listener| listener.wants_picture())
+    fn needs_picture(&self) -> bool {
+        self.listeners.iter().any(|listener| listener.needs_picture())
     }
 
     fn picture(&self, image: &Image, spp: u32) {

@@ -1,6 +1,6 @@
 //! Live view: the picture as it grows, sent to the viewer tev and served to browsers as a small web page.
 //!
-//! The render hands over a copy of the picture when a viewer needs one ([`Progress::wants_picture`]) and goes on at
+//! The render hands over a copy of the picture when a viewer needs one ([`Progress::needs_picture`]) and goes on at
 //! once; sending, converting and waiting happen on threads of the viewers. No viewer can slow or end the render: what
 //! one has not taken when the next picture comes is replaced by that.
 
@@ -56,7 +56,8 @@ impl Live {
     /// Starts the threads of the viewers.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] if the page cannot be served at the address and port asked for. A tev that is not there is no error.
+    /// [`crate::Error::Usage`] if the page cannot be served at the requested address and port. A tev that is not
+    /// running is no error.
     pub fn new(options: Options) -> Result<Self> {
         let statistics = Arc::new(Statistics::new(options.time_limit));
         let preview = options.preview.map(|preview| Preview::new(&preview, options.name.clone(), Arc::clone(&statistics))).transpose()?;
@@ -104,15 +105,15 @@ impl Progress for Live {
         self.statistics.add(samples);
     }
 
-    fn wants_picture(&self) -> bool {
-        let is_wanted = self.tev.as_ref().is_some_and(Tev::wants_picture) || self.preview.as_ref().is_some_and(Preview::wants_picture);
-        is_wanted && self.pace.may_ask()
+    fn needs_picture(&self) -> bool {
+        let is_needed = self.tev.as_ref().is_some_and(Tev::needs_picture) || self.preview.as_ref().is_some_and(Preview::needs_picture);
+        is_needed && self.pace.may_request()
     }
 
     fn picture(&self, image: &Image, samples_per_pixel: u32) {
-        // Those who do not want it yet would only have it replaced sooner.
-        let tev = self.tev.as_ref().filter(|tev| tev.wants_picture());
-        let preview = self.preview.as_ref().filter(|preview| preview.wants_picture());
+        // A viewer that is not ready for it yet would only drop it for a later one.
+        let tev = self.tev.as_ref().filter(|tev| tev.needs_picture());
+        let preview = self.preview.as_ref().filter(|preview| preview.needs_picture());
         if tev.is_none() && preview.is_none() {
             return;
         }

@@ -14,8 +14,8 @@ pub(super) struct Pace {
 
 #[derive(Debug, Default)]
 struct State {
-    /// When a picture was last asked for.
-    asked: Option<Instant>,
+    /// When a picture was last requested.
+    requested: Option<Instant>,
     /// No picture before this time.
     next: Option<Instant>,
 }
@@ -25,20 +25,20 @@ impl Pace {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the next picture may be made; if so, this is when it was asked for.
-    pub fn may_ask(&self) -> bool {
+    /// Whether the next picture may be made; if so, this is when it was requested.
+    pub fn may_request(&self) -> bool {
         let (now, mut state) = (Instant::now(), self.lock());
         let is_due = state.next.is_none_or(|next| now >= next);
         if is_due {
-            state.asked = Some(now);
+            state.requested = Some(now);
         }
         is_due
     }
 
-    /// The picture asked for has been made and copied.
+    /// The requested picture has been made and copied.
     pub fn made(&self) {
         let (now, mut state) = (Instant::now(), self.lock());
-        let cost = state.asked.take().map_or(Duration::ZERO, |asked| now - asked);
+        let cost = state.requested.take().map_or(Duration::ZERO, |requested| now - requested);
         state.next = Some(now + cost * (SHARE - 1));
     }
 }
@@ -50,18 +50,18 @@ mod tests {
     #[test]
     fn dear_pictures_are_rare() {
         let pace = Pace::default();
-        assert!(pace.may_ask());
+        assert!(pace.may_request());
         std::thread::sleep(Duration::from_millis(50));
         let end = Instant::now();
         pace.made();
-        assert!(end.elapsed() > Duration::from_millis(900) || !pace.may_ask());
-        while !pace.may_ask() {
+        assert!(end.elapsed() > Duration::from_millis(900) || !pace.may_request());
+        while !pace.may_request() {
             std::thread::sleep(Duration::from_millis(1));
         }
         assert!(end.elapsed() >= Duration::from_millis(50) * (SHARE - 1));
-        // One that nobody asked for costs nothing.
+        // One without a request costs nothing.
         let pace = Pace::default();
         pace.made();
-        assert!(pace.may_ask());
+        assert!(pace.may_request());
     }
 }

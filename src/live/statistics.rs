@@ -71,7 +71,7 @@ impl Statistics {
         (plan.total, plan.errors) = (samples, Some([error, target]));
     }
 
-    /// So many samples more.
+    /// Adds a number of samples.
     pub fn add(&self, samples: u64) {
         self.done.fetch_add(samples, Ordering::Relaxed);
     }
@@ -101,7 +101,8 @@ impl Statistics {
     }
 }
 
-/// Seconds left after `elapsed` seconds: what the samples missing will take, or what the time limit leaves if that is less.
+/// Seconds left after `elapsed` seconds: what the samples missing will take, or what the time limit leaves if that is
+/// less.
 fn left(samples: u64, total: u64, elapsed: f64, time_limit: Option<Duration>) -> Option<f64> {
     let of_samples = (samples > 0).then(|| elapsed * total.saturating_sub(samples) as f64 / samples as f64);
     let of_time = time_limit.map(|limit| (limit.as_secs_f64() - elapsed).max(0.0));
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_follow_what_the_render_tells() {
+    fn numbers_follow_the_progress_of_the_render() {
         let statistics = Statistics::new(None);
         assert_eq!((statistics.numbers().spp, statistics.numbers().error), (0.0, None));
         statistics.start(8, 100);

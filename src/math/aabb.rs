@@ -104,8 +104,8 @@ impl Bounds {
         Self { min: center - reach, max: center + reach }
     }
 
-    /// The `f32` box for an accelerator: rounded outward, then one float wider on each side, since Embree's traversal of user geometry is
-    /// not conservative (it errs by about half a unit in the last place of the ray's origin).
+    /// The `f32` box for an accelerator: rounded outward, then one float wider on each side, since Embree's traversal
+    /// of user geometry is not conservative (it errs by about half a unit in the last place of the ray's origin).
     pub fn padded(&self) -> Aabb {
         let lower = |x: f64| round_down(x).next_down();
         let upper = |x: f64| round_up(x).next_up();

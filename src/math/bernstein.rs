@@ -1,15 +1,18 @@
-//! Polynomials in Bernstein form on `[0, 1]`: products of cubics, and isolation of real roots by the variation-diminishing property.
+//! Polynomials in Bernstein form on `[0, 1]`: products of cubics, and isolation of real roots by the
+//! variation-diminishing property.
 //!
-//! A polynomial has at most as many roots in the interval as its coefficients have changes of sign, and the same number modulo two. No
-//! change means no root; one change means one root; otherwise the interval is halved (Lane, Riesenfeld, "Bounds on a polynomial").
+//! A polynomial has at most as many roots in the interval as its coefficients have changes of sign, and the same number
+//! modulo two. No change means no root; one change means one root; otherwise the interval is halved (Lane, Riesenfeld,
+//! "Bounds on a polynomial").
 
 use super::roots::Bracket;
 
-/// How often an interval is halved before two roots in it count as one tangency. 2^-44 is a thousand times the rounding of a parameter.
+/// How often an interval is halved before two roots in it count as one tangency. 2^-44 is a thousand times the rounding
+/// of a parameter.
 const MAX_DEPTH: u32 = 44;
 
-/// The product of two cubics, of degree 6. The end coefficients are the products of the end coefficients, exactly as one multiplication
-/// rounds them.
+/// The product of two cubics, of degree 6. The end coefficients are the products of the end coefficients, exactly as
+/// one multiplication rounds them.
 pub fn product_of_cubics(a: &[f64; 4], b: &[f64; 4]) -> [f64; 7] {
     const CHOOSE_3: [f64; 4] = [1.0, 3.0, 3.0, 1.0];
     const CHOOSE_6: [f64; 7] = [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0];
@@ -19,7 +22,8 @@ pub fn product_of_cubics(a: &[f64; 4], b: &[f64; 4]) -> [f64; 7] {
     })
 }
 
-/// Whether a value counts as positive. Zero does, so that a root between two polynomials that share an end value belongs to exactly one.
+/// Whether a value counts as positive. Zero does, so that a root between two polynomials that share an end value
+/// belongs to exactly one.
 #[inline]
 fn is_positive(x: f64) -> bool {
     x >= 0.0
@@ -39,9 +43,9 @@ fn first_crossing<const N: usize>(coefficients: &[f64; N]) -> f64 {
     (at as f64 + from / (from - to)) / (N - 1) as f64
 }
 
-/// Calls `found` with an interval around each root, in ascending order. Pairs of roots closer than 2^-44 are dropped together, and so are
-/// pairs between which the polynomial stays below `noise`, the rounding of its coefficients: without that, a polynomial that is all
-/// rounding would be halved for ever.
+/// Calls `found` with an interval around each root, in ascending order. Pairs of roots closer than 2^-44 are dropped
+/// together, and so are pairs between which the polynomial stays below `noise`, the rounding of its coefficients:
+/// without that, a polynomial that is all rounding would be halved for ever.
 #[inline]
 pub fn isolate_roots<const N: usize>(coefficients: &[f64; N], noise: f64, found: &mut impl FnMut(Bracket)) {
     isolate(coefficients, noise, Part { lo: 0.0, width: 1.0, depth: 0 }, found);

@@ -1,9 +1,11 @@
-//! Rounding of `f32` and `f64`: the only home of tolerances. All are relative to the numbers at hand; none is in scene units.
+//! Rounding of `f32` and `f64`: the only home of tolerances. All are relative to the numbers at hand; none is in scene
+//! units.
 
 /// Unit roundoff of `f32`, 2^-24: the largest relative error of one rounding to nearest.
 pub const UNIT_ROUNDOFF: f64 = 1.0 / 16_777_216.0;
 
-/// Bound on the relative error of a chain of some tens of `f64` operations: transforming a ray, solving for a hit, transforming back.
+/// Bound on the relative error of a chain of some tens of `f64` operations: transforming a ray, solving for a hit,
+/// transforming back.
 pub const F64_CHAIN_ERROR: f64 = 64.0 * f64::EPSILON;
 
 /// Largest magnitude that Embree accepts in a ray or a vertex (its `FLT_LARGE`, 1.844e18).

@@ -23,7 +23,8 @@ impl Frame {
         Self { x: Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), y: Vec3::new(b, sign + n.y * n.y * a, -n.y), z: n }
     }
 
-    /// A frame around the unit normal `n` whose `x` is `tangent` without its part along `n`; any frame if nothing is left of it.
+    /// A frame around the unit normal `n` whose `x` is `tangent` without its part along `n`; any frame if nothing is
+    /// left of it.
     #[inline(always)]
     pub fn from_normal_and_tangent(n: Vec3, tangent: Vec3) -> Self {
         let across = tangent - n * n.dot(tangent);

@@ -7,7 +7,8 @@ use super::{Bounds, Transform};
 /// Intervals into which bounds and checks divide the shutter.
 const INTERVALS: u32 = 64;
 
-/// A transform over the shutter interval, whose time runs from 0 to 1: a product of constant maps and keyframed ones, the outermost first.
+/// A transform over the shutter interval, whose time runs from 0 to 1: a product of constant maps and keyframed ones,
+/// the outermost first.
 #[derive(Clone, Debug)]
 pub struct Motion {
     parts: Vec<Part>,
@@ -28,8 +29,8 @@ struct Angle {
     angle: f64,
 }
 
-/// A transform at one time: first `stretch`, then `rotation`, then `translation` (Shoemake and Duff, "Matrix Animation and Polar
-/// Decomposition"). Each is interpolated by itself, so that what turns keeps its shape.
+/// A transform at one time: first `stretch`, then `rotation`, then `translation` (Shoemake and Duff, "Matrix Animation
+/// and Polar Decomposition"). Each is interpolated by itself, so that what turns keeps its shape.
 #[derive(Clone, Copy, Debug)]
 struct Keyframe {
     time: f64,
@@ -44,8 +45,9 @@ impl Motion {
         Self { parts: vec![Part::Constant(map)] }
     }
 
-    /// Passes through each map at its time; before the first and after the last it rests. Times must grow; they may lie outside of the
-    /// shutter. `None` if there is no keyframe, a time does not grow, or a map on the way is not finite or singular.
+    /// Passes through each map at its time; before the first and after the last it rests. Times must grow; they may lie
+    /// outside of the shutter. `None` if there is no keyframe, a time does not grow, or a map on the way is not finite
+    /// or singular.
     pub fn keyframed(keyframes: &[(f64, DAffine3)]) -> Option<Self> {
         let mut list: Vec<Keyframe> = Vec::with_capacity(keyframes.len());
         for &(time, map) in keyframes {
@@ -67,8 +69,8 @@ impl Motion {
         motion.is_regular().then_some(motion)
     }
 
-    /// Turns about a unit axis through the origin, counter-clockwise when looking against it, by an angle in radians at each time, of any
-    /// number of turns. `None` if there is no angle, a time does not grow, or a number is not finite.
+    /// Turns about a unit axis through the origin, counter-clockwise when looking against it, by an angle in radians at
+    /// each time, of any number of turns. `None` if there is no angle, a time does not grow, or a number is not finite.
     pub fn turning(axis: DVec3, angles: &[(f64, f64)]) -> Option<Self> {
         let grow = angles.windows(2).all(|pair| pair[0].0 < pair[1].0);
         let finite = axis.is_finite() && angles.iter().all(|(time, angle)| time.is_finite() && angle.is_finite());
@@ -107,7 +109,7 @@ impl Motion {
 
     /// The transform at a time from 0 to 1.
     pub fn at(&self, time: f64) -> Transform {
-        // Regular at all times that were looked at; between them it can fail only by a hair.
+        // Regular at all times that were sampled; between them it can fail only by a hair.
         Transform::new(self.map_at(time)).unwrap_or(Transform::IDENTITY)
     }
 
@@ -120,7 +122,7 @@ impl Motion {
         all.fold(Bounds::EMPTY, |a, b| a.union(&b))
     }
 
-    /// Times at which [`at`](Self::at) may be looked at to learn its range.
+    /// Times at which [`at`](Self::at) may be evaluated to find its range.
     pub fn sample_times() -> impl Iterator<Item = f64> {
         (0..=INTERVALS).map(|i| f64::from(i) / f64::from(INTERVALS))
     }
@@ -149,7 +151,8 @@ impl Part {
         }
     }
 
-    /// How far a point within `bounds` can stray from the straight line between its places at two times between which there is no keyframe.
+    /// How far a point within `bounds` can stray from the straight line between its places at two times between which
+    /// there is no keyframe.
     fn deviation(&self, bounds: &Bounds, from: f64, to: f64) -> f64 {
         match self {
             Self::Constant(_) => 0.0,
@@ -294,7 +297,8 @@ impl Keyframe {
     }
 }
 
-/// The rotation nearest to a regular matrix with positive determinant, by Newton's iteration (Higham, "Computing the Polar Decomposition").
+/// The rotation nearest to a regular matrix with positive determinant, by Newton's iteration (Higham, "Computing the
+/// Polar Decomposition").
 fn polar_rotation(m: &DMat3) -> DMat3 {
     // Scaled to determinant 1, the iteration converges from anywhere; quadratically at the end.
     let mut q = *m * m.determinant().cbrt().recip();
@@ -397,7 +401,8 @@ mod tests {
             let [some, many] = [4.0, 400.0].map(turning);
             let pivot = DAffine3::from_translation(DVec3::new(2.0, 1.0, -3.0));
             let about = Motion::constant(pivot).after(&many).after(&Motion::constant(pivot.inverse()));
-            // In a product the outer motion turns the inner one's boxes, which makes them larger; so do many turns in each interval.
+            // In a product the outer motion turns the inner one's boxes, which makes them larger; so do many turns in
+            // each interval.
             let motions = [(inner.clone(), 1.05), (outer.after(&inner), 3.0), (some, 1.05), (about, 1.5)];
             for (motion, tightness) in motions {
                 let bounds = motion.bounds(&cube);

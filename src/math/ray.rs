@@ -36,8 +36,8 @@ impl Ray {
         self.origin + self.direction * t
     }
 
-    /// Whether an accelerator may be asked about this ray at all: finite and not huge, a direction that is not zero, `0 <= t_min <=
-    /// t_max`, time within `[0, 1]`. All other rays hit nothing, by definition.
+    /// Whether this ray can be traced: finite and not huge, a direction that is not zero, `0 <= t_min <= t_max`, time
+    /// within `[0, 1]`. All other rays hit nothing, by definition.
     #[inline]
     pub fn is_valid(&self) -> bool {
         let limit = EMBREE_LARGE;

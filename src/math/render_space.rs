@@ -1,19 +1,22 @@
-//! The space in which a scene is rendered: the world, or, where `f32` could not hold the world's coordinates, the world moved and scaled.
+//! The space in which a scene is rendered: the world, or, where `f32` could not hold the world's coordinates, the world
+//! moved and scaled.
 
 use super::{Bounds, DAffine3, DMat3, DVec3, Motion};
 
-/// Scenes whose extent lies within these powers of two are not scaled. Measured: from 2^-26 to 2^36 pictures do not depend on the scale.
+/// Scenes whose extent lies within these powers of two are not scaled. Measured: from 2^-26 to 2^36 pictures do not
+/// depend on the scale.
 const UNSCALED: [i32; 2] = [-20, 30];
 
-/// The extent, as a power of two, that smaller and larger scenes are scaled to. Large ones stay large: what is small in them gains.
+/// The extent, as a power of two, that smaller and larger scenes are scaled to. Large ones stay large: what is small in
+/// them gains.
 const SCALED: [i32; 2] = [0, 20];
 
 /// Scenes that reach this many times as far from their middle as that lies from the origin are not moved: they would
 /// gain less than two bits.
 const LEAST_GAIN: f64 = 4.0;
 
-/// Scenes are not moved if their middle is nearer than this many times the size of their smallest shape, whose edges `f32` places to a
-/// 16,384th of that size there.
+/// Scenes are not moved if their middle is nearer than this many times the size of their smallest shape, whose edges
+/// `f32` places to a 16,384th of that size there.
 const NEAR: f64 = 1024.0;
 
 /// Render space: the world after a translation and then a scale by a power of two.
@@ -29,10 +32,12 @@ impl RenderSpace {
     /// The world itself.
     pub const WORLD: Self = Self { origin: DVec3::ZERO, scale: 1.0 };
 
-    /// The least and largest extent, in world units, of scenes that it is made for; beyond them not even layers hold world coordinates.
+    /// The least and largest extent, in world units, of scenes that it is made for; beyond them not even layers hold
+    /// world coordinates.
     pub const EXTENTS: [f64; 2] = [1e-30, 1e30];
 
-    /// The space for shapes (or groups of them) with these bounds; the world if that will do. What has no finite bounds does not count.
+    /// The space for shapes (or groups of them) with these bounds; the world if that will do. What has no finite bounds
+    /// does not count.
     pub fn around(shapes: &[Bounds]) -> Self {
         let finite = |b: &&Bounds| b.min.is_finite() && b.max.is_finite() && b.min.cmple(b.max).all();
         let shapes: Vec<&Bounds> = shapes.iter().filter(finite).collect();
@@ -48,12 +53,12 @@ impl RenderSpace {
         let origin = if moves { middle } else { DVec3::ZERO };
         let extent = reach(origin);
         let exponent = if extent > 0.0 { extent.log2().floor() as i32 } else { 0 };
-        let wanted = match exponent {
+        let target = match exponent {
             e if e < UNSCALED[0] => SCALED[0],
             e if e > UNSCALED[1] => SCALED[1],
             e => e,
         };
-        Self { origin, scale: f64::from(wanted - exponent).exp2() }
+        Self { origin, scale: f64::from(target - exponent).exp2() }
     }
 
     /// Whether it is the world.
@@ -123,7 +128,8 @@ impl RenderSpace {
     }
 }
 
-/// The median of the middles, rounded to `f32` so that differences to it lose nothing: a few shapes far away do not move it.
+/// The median of the middles, rounded to `f32` so that differences to it lose nothing: a few shapes far away do not
+/// move it.
 fn middle(shapes: &[&Bounds]) -> DVec3 {
     let axis = |i: usize| {
         let mut middles: Vec<f64> = shapes.iter().map(|b| 0.5 * b.min[i] + 0.5 * b.max[i]).collect();

@@ -1,6 +1,7 @@
 //! Roots of quadratics without cancellation, and roots of functions within an interval at whose ends the sign differs.
 
-/// `a * b - c * d` with one rounding error at most (Kahan; Jeannerod, Louvet, Muller, "Further analysis of Kahan's algorithm").
+/// `a * b - c * d` with one rounding error at most (Kahan; Jeannerod, Louvet, Muller, "Further analysis of Kahan's
+/// algorithm").
 #[inline(always)]
 pub fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let cd = c * d;
@@ -8,8 +9,8 @@ pub fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     a.mul_add(b, -cd) + error
 }
 
-/// The real roots of a quadratic in ascending order. A root may be infinite when the leading coefficient vanishes; it fails every range
-/// test.
+/// The real roots of a quadratic in ascending order. A root may be infinite when the leading coefficient vanishes; it
+/// fails every range test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quadratic {
     /// The smaller root.
@@ -18,8 +19,8 @@ pub struct Quadratic {
     pub far: f64,
 }
 
-/// The roots of `a t² + 2 half_b t + c`, or `None` if there are none. No special case for a vanishing `a`: one root is then infinite or
-/// NaN, the other finite.
+/// The roots of `a t² + 2 half_b t + c`, or `None` if there are none. No special case for a vanishing `a`: one root is
+/// then infinite or NaN, the other finite.
 #[inline]
 pub fn solve_quadratic(a: f64, half_b: f64, c: f64) -> Option<Quadratic> {
     let roots = quadratic_roots(a, half_b, c, difference_of_products(half_b, half_b, a, c));
@@ -61,8 +62,9 @@ impl Bracket {
     }
 }
 
-/// The root in a bracket within `[0, 1]` by Newton's method from the guess, held inside by bisection. `f` returns the value and the
-/// derivative. An end of the bracket may itself be (nearly) a root that does not count, so the guess must be nearer to the one that does.
+/// The root in a bracket within `[0, 1]` by Newton's method from the guess, held inside by bisection. `f` returns the
+/// value and the derivative. An end of the bracket may itself be (nearly) a root that does not count, so the guess must
+/// be nearer to the one that does.
 #[inline]
 pub fn newton_in_bracket(bracket: &Bracket, f: impl Fn(f64) -> (f64, f64)) -> f64 {
     // A step this small leaves an error of its square times the curvature.
@@ -78,7 +80,8 @@ pub fn newton_in_bracket(bracket: &Bracket, f: impl Fn(f64) -> (f64, f64)) -> f6
             hi = s;
         }
         let newton = s - value / slope;
-        // Newton alone may take ever smaller steps from one side; then every other step halves. Written so that a NaN halves too.
+        // Newton alone may take ever smaller steps from one side; then every other step halves. Written so that a NaN
+        // halves too.
         let halve = !(lo <= newton && newton <= hi) || (i >= 10 && i % 2 == 0);
         let next = if halve { 0.5 * (lo + hi) } else { newton };
         if (next - s).abs() <= if halve { f64::EPSILON } else { LAST_STEP } {

@@ -2,7 +2,7 @@
 
 use super::{DAffine3, DMat3, DVec3};
 
-/// An affine map with its inverse. The name says destination first: `world_from_object`.
+/// An affine map with its inverse. Names are destination first: `world_from_object`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform {
     /// Object to world.
@@ -107,7 +107,8 @@ impl Transform {
         self.determinant
     }
 
-    /// By how much the map stretches area on a surface with the unit object normal `n`: dA_world / dA_object = |det M| |M^-T n|.
+    /// By how much the map stretches area on a surface with the unit object normal `n`: dA_world / dA_object = |det
+    /// M| |M^-T n|.
     #[inline]
     pub fn area_factor(&self, n: DVec3) -> f64 {
         self.determinant.abs() * self.normal(n).length()

@@ -3,7 +3,8 @@
 use super::DVec2;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// Sine and cosine of `x` radians, `|x| <= pi / 4`; at most 1.2e-7 from the exact values (coefficients of Moshier's Cephes library).
+/// Sine and cosine of `x` radians, `|x| <= pi / 4`; at most 1.2e-7 from the exact values (coefficients of Moshier's
+/// Cephes library).
 #[inline(always)]
 pub fn sin_cos_eighth(x: f32) -> (f32, f32) {
     let x2 = x * x;
@@ -37,8 +38,8 @@ pub fn unit_circle(u: f32) -> DVec2 {
     v * (1.5 - 0.5 * v.length_squared())
 }
 
-/// The angle of the point (x, y), within `[-pi, pi]`; at most 3e-7 from the exact one, and 0 or pi at the origin (coefficients of Moshier's
-/// Cephes library). Without branches, for loops over many numbers.
+/// The angle of the point (x, y), within `[-pi, pi]`; at most 3e-7 from the exact one, and 0 or pi at the origin
+/// (coefficients of Moshier's Cephes library). Without branches, for loops over many numbers.
 #[inline(always)]
 pub fn angle_of(y: f32, x: f32) -> f32 {
     const TAN_EIGHTH: f32 = 0.414_213_57;

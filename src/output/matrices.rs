@@ -19,7 +19,8 @@ impl Matrix {
     }
 }
 
-/// Where a point on the view axis, one to its right and one above it lie on the picture; `None` if a matrix is singular.
+/// Where a point on the view axis, one to its right and one above it lie on the picture; `None` if a matrix is
+/// singular.
 pub fn centre_and_axes(world_to_camera: &Matrix, world_to_ndc: &Matrix) -> Option<[[f64; 2]; 3]> {
     let camera_to_ndc = world_to_ndc.0 * world_to_camera.0.inverse();
     let place = |x: f64, y: f64| {

@@ -54,7 +54,8 @@ impl Format {
     }
 }
 
-/// Checks that a picture can be written to `path`: a known extension, an existing folder, and the right to create files there.
+/// Checks that a picture can be written to `path`: a known extension, an existing folder, and the right to create files
+/// there.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown extension, [`Error::Output`] otherwise.
@@ -70,9 +71,11 @@ pub struct RenderInfo {
     pub samples_per_pixel: u32,
     /// Wall-clock time of the rendering in seconds.
     pub render_seconds: f64,
-    /// World to camera, for row vectors (the translation in the last row); camera space has +X right, +Y up, +Z forward.
+    /// World to camera, for row vectors (the translation in the last row); camera space has +X right, +Y up, +Z
+    /// forward.
     pub world_to_camera: Option<[[f32; 4]; 4]>,
-    /// World to the picture, for row vectors: x and y from 0 to 1 over the display window, y down; z grows with the depth.
+    /// World to the picture, for row vectors: x and y from 0 to 1 over the display window, y down; z grows with the
+    /// depth.
     pub world_to_ndc: Option<[[f32; 4]; 4]>,
     /// Width of a pixel over its height; 1 if not given.
     pub pixel_aspect: Option<f32>,
@@ -88,7 +91,7 @@ pub struct RenderInfo {
     pub settings: Option<serde_json::Value>,
 }
 
-/// Counts of a rendering that files tell of.
+/// Statistics of a render that are stored in files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RenderStatistics {
     /// Threads that rendered.
@@ -108,10 +111,11 @@ pub fn files_of_output(output: &OutputDesc) -> Vec<PathBuf> {
     std::iter::once(file.clone()).chain(sidecars).collect()
 }
 
-/// Writes `image` where and how `output` says.
+/// Writes `image` to the file of `output`, with its settings.
 ///
 /// # Errors
-/// [`Error::Usage`] for an unknown extension; [`Error::Output`] if the file cannot be written, in which case nothing is left behind.
+/// [`Error::Usage`] for an unknown extension; [`Error::Output`] if the file cannot be written, in which case nothing is
+/// left behind.
 pub fn write(output: &OutputDesc, image: &Image, info: &RenderInfo) -> Result<()> {
     let path = Path::new(&output.file);
     match Format::from_path(path)? {

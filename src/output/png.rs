@@ -52,8 +52,8 @@ fn encode(image: &Image, shown: &Crop, exposure: f32, view: ViewDesc) -> Vec<u8>
     bytes
 }
 
-/// A number in `(0, 1)` for rounding up or down: the additive recurrence on the plastic number's powers, evenly spread over any
-/// neighbourhood. It keeps clear of both ends, lest rounding errors move exact values.
+/// A number in `(0, 1)` for rounding up or down: the additive recurrence on the plastic number's powers, evenly spread
+/// over any neighbourhood. It keeps clear of both ends, so that rounding errors do not move exact values.
 fn dither(x: u32, y: u32) -> f32 {
     let phase = f64::from(x) * 0.754_877_666_246_692_7 + f64::from(y) * 0.569_840_290_998_053_3;
     (phase.fract() as f32).clamp(1.0 / 256.0, 255.0 / 256.0)

@@ -7,7 +7,8 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// The files that a command reads and writes. A written file is neither read nor written by another name, be it by symbolic or hard links.
+/// The files that a command reads and writes. A written file is neither read nor written by another name, be it by
+/// symbolic or hard links.
 #[derive(Clone, Debug, Default)]
 pub struct FileUses {
     uses: HashMap<Identity, Use>,

@@ -80,7 +80,8 @@ mod tests {
             let grey = agx(Rgb::splat(0.18 * f32::exp2(stops)));
             assert!(close(grey.r, code) && close(grey.g, code) && close(grey.b, code), "{stops}: {grey:?}");
         }
-        // One stop up at the pivot: a slope of 2 per 16.5 stops, bent by the shoulder as in the closed form with its published constant.
+        // One stop up at the pivot: a slope of 2 per 16.5 stops, bent by the shoulder as in the closed form with its
+        // published constant.
         let x: f32 = 1.0 / 16.5;
         let expected = 0.5 + 2.0 * x / (1.0 + 69.862_79 * x.powf(3.25)).powf(1.0 / 3.25);
         assert!(close(agx(Rgb::splat(0.36)).g, expected));

@@ -16,7 +16,7 @@ use crate::film::FilmTile;
 use crate::integrator::{Cancel, RayCounts};
 use crate::scene::Scene;
 
-/// A pass aims at this time: long enough to cost nothing, short enough that an interrupt is answered soon.
+/// A pass aims at this time: long enough to cost nothing, short enough that an interrupt takes effect soon.
 const PASS_TIME: Duration = Duration::from_millis(500);
 
 /// Checkpoints make passes no shorter than this.
@@ -63,7 +63,7 @@ impl RenderSession<'_> {
         Ok((state, Stats { render_seconds, rays, spp_done, nan_samples, dropped, ..stats }))
     }
 
-    /// Refuses a render without a picture when its time is over.
+    /// An error for a render without a picture when its time is over.
     fn check_time(&self, stats: &Stats, done: u32) -> Result<()> {
         match self.settings.time_limit.filter(|_| stats.time_limited && done == 0) {
             Some(limit) => {
@@ -110,9 +110,9 @@ impl Driver<'_> {
             let start = Instant::now();
             let rays = self.render_pass(state, &pass);
             state.rays.add(&rays);
-            if self.cancel.given_up() {
+            if self.cancel.is_cancelled() {
                 self.ends(&mut stats, true);
-                state.give_up_pass();
+                state.cancel_pass();
                 break;
             }
             state.complete_pass(&pass, self.session, &rays);
@@ -188,7 +188,7 @@ impl Driver<'_> {
         if let Some(checkpoints) = &mut self.checkpoints {
             self.pool.install(|| checkpoints.pass_done(state, elapsed, next, progress));
         }
-        if progress.wants_picture() {
+        if progress.needs_picture() {
             progress.picture(&state.picture(self.session.settings), state.done);
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::desc::{CompressionDesc, CryptoManifestDesc, ExrProfileDesc, OutputDesc};
 
-/// Changes of every EXR output; what is `None` stays as the scene says.
+/// Changes of every EXR output; `None` keeps the value of the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExrOverrides {
     /// `--exr-profile`.

@@ -16,7 +16,7 @@ mod tile_renderer;
 pub use driver::RenderSession;
 pub use exr_overrides::ExrOverrides;
 pub use progress::{Progress, Silent};
-pub use provenance::{Frame, RenderProvenance};
+pub use provenance::{RenderProvenance, SequenceFrame};
 pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings, threads};
 pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 
@@ -61,7 +61,7 @@ pub struct Stats {
     pub nan_samples: u64,
     /// The first few of them.
     pub dropped: Vec<DroppedSample>,
-    /// Whether a stop was asked for before all samples were done.
+    /// Whether a stop was requested before all samples were done.
     pub interrupted: bool,
     /// Whether the time limit ended the render.
     pub time_limited: bool,
@@ -103,13 +103,13 @@ fn picture(film: &Film, layers: LayerSet, overscan: u32) -> Image {
     Image { overscan, ..image }
 }
 
-/// Names of the groups of lights that a picture of the scene may tell apart.
+/// Names of the light groups of a scene, which can be stored as AOVs.
 fn light_groups(scene: &Scene) -> Vec<String> {
     scene.light_groups.names().iter().map(String::as_str).chain([LightGroups::OF_THE_REST]).map(str::to_owned).collect()
 }
 
 /// Renders a scene. When `stop` becomes true, or the time limit passes, the pass under way is finished and what there
-/// is becomes the picture. A pass that is not done a second later is given up; tiles then differ in their samples, and
+/// is becomes the picture. A pass that is not done a second later is cancelled; tiles then differ in their samples, and
 /// of a first pass there is no picture ([`Stats::spp_done`] is 0).
 ///
 /// # Errors
@@ -132,7 +132,7 @@ pub fn render(
 pub struct Replayed {
     /// For the picture.
     pub pixel: PixelSample,
-    /// Of its first surface; zero where there is none, and where no layer of surfaces is wanted.
+    /// Of its first surface; zero where there is none, and where no surface AOV is requested.
     pub surface: SurfaceSample,
 }
 

@@ -14,7 +14,7 @@ pub trait Progress: Sync {
         let _ = (samples, error, target);
     }
 
-    /// So many samples, all pixels together, are there already from an earlier run.
+    /// `samples` samples, all pixels together, are there already from an earlier run.
     fn resumed(&self, samples: u64) {
         let _ = samples;
     }
@@ -24,8 +24,8 @@ pub trait Progress: Sync {
         let _ = samples;
     }
 
-    /// Whether a picture of what there is so far is wanted: asked between passes. Making one takes time.
-    fn wants_picture(&self) -> bool {
+    /// Whether a picture of the samples so far is needed: called between passes. Making one takes time.
+    fn needs_picture(&self) -> bool {
         false
     }
 
@@ -37,13 +37,13 @@ pub trait Progress: Sync {
     /// No more samples will come. The picture is not written yet.
     fn finish(&self) {}
 
-    /// Something the user should know.
+    /// A warning.
     fn warn(&self, message: &str) {
         let _ = message;
     }
 }
 
-/// Tells nobody.
+/// Reports nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

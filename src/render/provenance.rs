@@ -18,9 +18,11 @@ use crate::output::check_output;
 /// The version of the format of recipes.
 const VERSION: u64 = 1;
 
-/// How a picture was made. Files keep it, with how they are written, as [`settings`](crate::output::RenderInfo::settings).
+/// How a picture was made. Files keep it, with how they are written, as
+/// [`settings`](crate::output::RenderInfo::settings).
 ///
-/// It is data: it names the scene and what the picture depends on, never a file to write, a library to load or an address to connect to.
+/// It is data: it names the scene and what the picture depends on, never a file to write, a library to load or an
+/// address to connect to.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RenderProvenance {
@@ -28,7 +30,7 @@ pub struct RenderProvenance {
     pub version: u64,
     /// Name and version of the program.
     pub program: String,
-    /// What followed the program's name on its command line. Only for people who look at the file.
+    /// What followed the program's name on its command line. Only for the information of people.
     #[serde(default)]
     pub arguments: Vec<String>,
     /// The folder that names of files refer to.
@@ -45,7 +47,7 @@ pub struct RenderProvenance {
     pub allow_missing: bool,
     /// The frame of a sequence that a single scene file holds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frame: Option<Frame>,
+    pub frame: Option<SequenceFrame>,
     /// What the picture depends on beside the scene.
     pub settings: Settings,
     /// Whether the picture was denoised, with the denoiser's own defaults.
@@ -59,7 +61,7 @@ pub struct RenderProvenance {
 /// A frame of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Frame {
+pub struct SequenceFrame {
     /// Its number.
     pub number: i64,
     /// Frames in a second.
@@ -102,8 +104,8 @@ impl RenderProvenance {
         Self { frame: None, settings: Settings { seed, ..self.settings.clone() }, ..self.clone() }
     }
 
-    /// What of this is not as in `expected`, of which a file is to be written as `output` says: settings by name, each
-    /// with both values. The command line, the folder and the version of the program do not count.
+    /// Differences from `expected`, whose file is written with the settings of `output`: settings by name, each with
+    /// both values. The command line, the folder and the version of the program do not count.
     pub fn differences(&self, expected: &Self, output: &OutputDesc) -> Vec<String> {
         let flat = |provenance: &Self, output: Option<&OutputDesc>| {
             let mut values = BTreeMap::new();
@@ -134,7 +136,8 @@ impl RenderProvenance {
     /// As a file has kept it.
     ///
     /// # Errors
-    /// [`Error::Malformed`] if it is of another version, has unknown keys or lacks some; [`Error::Scene`] if a number makes no sense.
+    /// [`Error::Malformed`] if it is of another version, has unknown keys or lacks some; [`Error::Scene`] if a number
+    /// makes no sense.
     pub fn from_value(value: Value, file: &Path) -> Result<Self> {
         let malformed = |message: String| Error::Malformed { file: file.to_owned(), message };
         match value.get("version").map(Value::as_u64) {
@@ -180,7 +183,8 @@ impl RenderProvenance {
         })
     }
 
-    /// The settings of this picture, to be written as [`output`](Self::output) says, with `threads` threads.
+    /// The settings of this picture, to be written with the settings of [`output`](Self::output), with `threads`
+    /// threads.
     pub fn settings(&self, threads: usize) -> Settings {
         let layers = self.output.iter().flat_map(|output| &output.layers).collect();
         let outputs = self.output.iter().cloned().collect();
@@ -197,8 +201,12 @@ mod tests {
         let desc = serde_json::from_str(r#"{ "camera": {}, "film": { "width": 40, "height": 30 } }"#).unwrap();
         let settings = Settings::new(&desc, &Overrides::default()).unwrap();
         let provenance = RenderProvenance::new(Path::new("s.json"), SceneFingerprint::default(), &settings, Vec::new());
-        RenderProvenance { output: Some(OutputDesc::new("a.exr")), frame: Some(Frame { number: 3, per_second: 24.0 }), ..provenance }
-            .to_value()
+        RenderProvenance {
+            output: Some(OutputDesc::new("a.exr")),
+            frame: Some(SequenceFrame { number: 3, per_second: 24.0 }),
+            ..provenance
+        }
+        .to_value()
     }
 
     fn refusal(value: Value) -> String {
@@ -221,7 +229,7 @@ mod tests {
         let provenance = RenderProvenance::from_value(provenance(), Path::new("a.exr")).unwrap();
         let of_frame = |number: i64| {
             let settings = Settings { seed: 5u64.wrapping_add_signed(number), ..provenance.settings.clone() };
-            RenderProvenance { frame: Some(Frame { number, per_second: 24.0 }), settings, ..provenance.clone() }.of_frame(number)
+            RenderProvenance { frame: Some(SequenceFrame { number, per_second: 24.0 }), settings, ..provenance.clone() }.of_frame(number)
         };
         let differences = |own: &RenderProvenance, output: &OutputDesc| own.differences(&of_frame(-7), output);
         let output = OutputDesc::new("b.exr");
@@ -249,7 +257,7 @@ mod tests {
         assert!(refusal(Value::Null).contains("no version"));
     }
 
-    /// No object in a recipe takes a key that it does not know, and none that is needed may be missing.
+    /// No object in a recipe takes an unknown key, and no required key may be missing.
     #[test]
     fn unknown_keys_are_refused_at_every_level() {
         for place in ["", "/scene", "/import", "/frame", "/settings", "/settings/filter", "/settings/integrator", "/output"] {

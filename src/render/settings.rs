@@ -1,4 +1,4 @@
-//! Everything a render needs beside the scene: what the scene file says, with the command line's changes.
+//! Everything a render needs beside the scene: the values of the scene file, overridden by the command line.
 
 use std::num::NonZero;
 use std::time::Duration;
@@ -18,7 +18,7 @@ use crate::sampling::SamplerKind;
 /// Extensions of the files written if neither the scene nor the command line names one.
 pub const DEFAULT_EXTENSIONS: [&str; 2] = ["exr", "png"];
 
-/// The most samples of a pixel where a target error decides and nothing else is said.
+/// The most samples of a pixel with a target error, by default.
 const MOST_SAMPLES: u32 = 1 << 16;
 
 /// More threads than this are a slip of the keyboard.
@@ -26,8 +26,9 @@ const MAX_THREADS: usize = 4096;
 
 /// How a scene is rendered.
 ///
-/// Serialized, these are the settings that the picture depends on: EXR files keep them for [`RenderProvenance`](super::RenderProvenance),
-/// and a checkpoint or shard belongs to another picture if any differs. Only what can never change a pixel is skipped.
+/// Serialized, these are the settings that the picture depends on: EXR files keep them for
+/// [`RenderProvenance`](super::RenderProvenance), and a checkpoint or shard belongs to another picture if any differs.
+/// Only what can never change a pixel is skipped.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
@@ -69,7 +70,7 @@ pub struct Settings {
     pub layers: LayerSet,
 }
 
-/// What the command line changes; everything else is as the scene says.
+/// Overrides of the command line; `None` keeps the value of the scene.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
     /// `--spp`.
@@ -257,11 +258,11 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
         }
         *regularize = Some(alpha).filter(|&alpha| alpha > 0.0);
     }
-    if let Some(wanted) = overrides.guiding {
+    if let Some(enabled) = overrides.guiding {
         let IntegratorDesc::Path { guiding, .. } = &mut integrator else {
             return Err(usage("--guiding: only the integrator path can be guided"));
         };
-        *guiding = wanted;
+        *guiding = enabled;
     }
     if matches!(integrator, IntegratorDesc::Path { guiding: true, .. }) && overrides.target_error.is_some() {
         return Err(usage("--target-error: not with guiding; give --guiding off, or --spp or --time-limit in its place"));
@@ -273,8 +274,8 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
 ///
 /// # Errors
 /// [`Error::Usage`] if there are too many.
-pub fn threads(wanted: Option<usize>) -> Result<usize> {
-    match wanted.unwrap_or(0) {
+pub fn threads(requested: Option<usize>) -> Result<usize> {
+    match requested.unwrap_or(0) {
         0 => Ok(std::thread::available_parallelism().map_or(1, NonZero::get)),
         threads if threads > MAX_THREADS => Err(usage(format!("--threads {threads}: at most {MAX_THREADS}"))),
         threads => Ok(threads),
@@ -306,8 +307,8 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
         by_name(&overrides.default_outputs)
     };
     let has_extension = |output: &OutputDesc, extension: &str| output.file.to_ascii_lowercase().ends_with(extension);
-    let needs = |option: &str, asked: bool, extension: &str| {
-        if asked && !outputs.iter().any(|output| has_extension(output, extension)) {
+    let needs = |option: &str, given: bool, extension: &str| {
+        if given && !outputs.iter().any(|output| has_extension(output, extension)) {
             return Err(usage(format!("{option} has no effect: no output is an {extension} file")));
         }
         Ok(())

@@ -73,19 +73,19 @@ impl TileWorkspace {
 impl<'a> TileRenderer<'a> {
     pub fn new(scene: &'a Scene, accel: &'a dyn Accelerator, settings: &Settings) -> Self {
         let sampler = Sampler::new(settings.sampler, settings.seed);
-        let wanted = |kind| settings.layers.contains(kind);
+        let has = |kind| settings.layers.contains(kind);
         let needs = SurfaceAovs {
             // The distance decides which sample's data counts.
             geometry: settings.layers.surfaces(Filtering::Nearest).next().is_some() || settings.layers.needs_coverage(),
-            uv: wanted(LayerKind::Uv),
-            motion: wanted(LayerKind::Motion),
-            albedo: wanted(LayerKind::Albedo),
-            features: wanted(LayerKind::FeatureAlbedo) || wanted(LayerKind::FeatureNormal),
+            uv: has(LayerKind::Uv),
+            motion: has(LayerKind::Motion),
+            albedo: has(LayerKind::Albedo),
+            features: has(LayerKind::FeatureAlbedo) || has(LayerKind::FeatureNormal),
         };
         let (shape, filter) = (film_shape(scene, settings), Filter::new(&settings.filter));
         let light_aovs = LightAovRequest {
             by_scattering: settings.layers.needs_light_aovs(),
-            light_groups: if wanted(LayerKind::LightGroups) { shape.light_groups.len() as u32 } else { 0 },
+            light_groups: if has(LayerKind::LightGroups) { shape.light_groups.len() as u32 } else { 0 },
         };
         let (world, context) = (World::new(scene, accel), RenderContext::new(scene, settings.size, settings.spp.min(FINEST_SPP)));
         // Analytic shapes have their parameters only with the whole parametrisation.
@@ -186,7 +186,7 @@ impl<'a> TileRenderer<'a> {
         let count = samples.len() as u64 * active.area();
         for sample in samples {
             self.render_batch(origin, sample, guide, workspace);
-            if self.context.has_given_up() {
+            if self.context.is_cancelled() {
                 break;
             }
             workspace.placed.clear();

@@ -20,8 +20,8 @@ struct Bin {
     pmf: f32,
 }
 
-/// Chooses an index in proportion to its weight in constant time (Vose, "A Linear Algorithm for Generating Random Numbers with a Given
-/// Distribution").
+/// Chooses an index in proportion to its weight in constant time (Vose, "A Linear Algorithm for Generating Random
+/// Numbers with a Given Distribution").
 #[derive(Clone, Debug)]
 pub struct AliasTable {
     bins: Vec<Bin>,
@@ -82,7 +82,8 @@ impl AliasTable {
         if self.bins.len() == 1 {
             return DiscreteSample { index: 0, u };
         }
-        // `u` represents the 2^-24 wide interval that begins with it; the middle keeps the rounding of the bins' limits free of bias.
+        // `u` represents the 2^-24 wide interval that begins with it; the middle keeps the rounding of the bins' limits
+        // free of bias.
         let x = (f64::from(u) + 0.5 / f64::from(1 << 24)) * self.bins.len() as f64;
         let i = (x as usize).min(self.bins.len() - 1);
         let bin = self.bins[i];
@@ -139,7 +140,7 @@ mod tests {
 
     #[test]
     fn large_tables_select_with_the_probability_they_state() {
-        // Every number that f32 can bring: the share of each entry is exact.
+        // Every number that f32 can represent: the share of each entry is exact.
         let weights: Vec<f64> = (0..1000).map(|i| f64::from(i % 17) * f64::from(i % 31) + if i == 500 { 1e5 } else { 0.0 }).collect();
         let table = AliasTable::new(&weights).unwrap();
         let mut count = vec![0u32; weights.len()];

@@ -1,4 +1,5 @@
-//! Random numbers, warps beside their densities, discrete and piecewise-constant distributions, weights that combine strategies.
+//! Random numbers, warps beside their densities, discrete and piecewise-constant distributions, weights that combine
+//! strategies.
 
 mod discrete;
 mod mis;

@@ -1,10 +1,10 @@
 //! Samplers: pure functions of (seed, pixel, sample, dimension).
 //!
-//! The Sobol sampler follows Burley, "Practical Hash-based Owen Scrambling": every set of four dimensions uses the first four dimensions of
-//! Sobol's sequence (direction numbers of Joe and Kuo), with an index shuffle and four Owen scrambles of its own, all by hashing. Within a
-//! set, `2^k` consecutive samples from a multiple of `2^k` on are as stratified as Sobol's; between sets and pixels
-//! nothing is shared. The table takes 2 KiB and any number of samples and sets is good. A call costs about 21 ns
-//! (baseline x86-64 code on an AMD EPYC), an independent one 4 ns.
+//! The Sobol sampler follows Burley, "Practical Hash-based Owen Scrambling": every set of four dimensions uses the
+//! first four dimensions of Sobol's sequence (direction numbers of Joe and Kuo), with an index shuffle and four Owen
+//! scrambles of its own, all by hashing. Within a set, `2^k` consecutive samples from a multiple of `2^k` on are as
+//! stratified as Sobol's; between sets and pixels nothing is shared. The table takes 2 KiB and any number of samples
+//! and sets is good. A call costs about 21 ns (baseline x86-64 code on an AMD EPYC), an independent one 4 ns.
 
 mod batch;
 
@@ -93,7 +93,8 @@ impl SobolSeeds {
 #[inline(always)]
 fn sobol_4d(pixel: PixelSeed, sample: u32, set: u32) -> [u32; 4] {
     let seeds = SobolSeeds::new(pixel, set);
-    // All bits are reversed between here and the end: an Owen scramble is then a hash in which no bit depends on a higher one.
+    // All bits are reversed between here and the end: an Owen scramble is then a hash in which no bit depends on a
+    // higher one.
     let index = owen_scramble(sample.reverse_bits(), seeds.shuffle);
     let mut point = 0u128;
     for (digit, row) in SOBOL.iter().enumerate() {
@@ -144,8 +145,8 @@ fn pcg_4d(v: [u32; 4]) -> [u32; 4] {
     [x, y, z, w]
 }
 
-/// Sobol's first four dimensions, bit-reversed: `SOBOL[digit][value]` is what the hexadecimal digit at `4 digit` of the bit-reversed index
-/// contributes, 32 bits for each dimension, the first lowest.
+/// Sobol's first four dimensions, bit-reversed: `SOBOL[digit][value]` is what the hexadecimal digit at `4 digit` of the
+/// bit-reversed index contributes, 32 bits for each dimension, the first lowest.
 static SOBOL: [[u128; 16]; 8] = sobol_table();
 
 const fn sobol_table() -> [[u128; 16]; 8] {
@@ -190,7 +191,8 @@ const SOBOL_COLUMNS: [[u32; 4]; 32] = {
 
 /// Direction numbers of the first four dimensions, one for each bit of the index.
 const fn sobol_directions() -> [[u32; 32]; 4] {
-    // Degree, inner coefficients and initial numbers of the primitive polynomials (Joe and Kuo's table, dimensions 2 to 4).
+    // Degree, inner coefficients and initial numbers of the primitive polynomials (Joe and Kuo's table, dimensions 2 to
+    // 4).
     const POLYNOMIALS: [(usize, u32, [u32; 3]); 3] = [(1, 0, [1, 0, 0]), (2, 1, [1, 3, 0]), (3, 1, [1, 3, 1])];
     let mut directions = [[0u32; 32]; 4];
     let mut bit = 0;

@@ -59,7 +59,8 @@ pub struct DirectionTest {
 }
 
 impl DirectionTest {
-    /// How far the density's integral is from the fraction of draws that succeeded, beyond `deviations` standard deviations of the latter.
+    /// How far the density's integral is from the fraction of draws that succeeded, beyond `deviations` standard
+    /// deviations of the latter.
     pub fn excess(&self, deviations: f64) -> f64 {
         let deviation = (self.accepted * (1.0 - self.accepted) / f64::from(self.count)).sqrt();
         (self.integral - self.accepted).abs() - deviations * deviation
@@ -152,12 +153,12 @@ impl Cell {
         if self.height > COARSEST {
             return self.quarters().iter().map(|part| part.integrate_in_parts(f)).sum();
         }
-        // So many halvings resolve a ridge of 2e-6 radians, as a lobe of alpha 1e-3 has at a cosine of 1e-3.
+        // 14 halvings resolve a ridge of 2e-6 radians, as a lobe of alpha 1e-3 has at a cosine of 1e-3.
         self.integrate(f, self.simpson(f), 14)
     }
 
-    /// Simpson's rule, drawn in a little: with nodes this close to the edge halving a cell shows any jump of the density, yet no node lies
-    /// on the horizon itself.
+    /// Simpson's rule, drawn in a little: with nodes this close to the edge halving a cell shows any jump of the
+    /// density, yet no node lies on the horizon itself.
     fn simpson(&self, f: &impl Fn(f64, f64) -> f64) -> f64 {
         const REACH: f64 = 0.498;
         const WEIGHT: f64 = 1.0 / (24.0 * REACH * REACH);

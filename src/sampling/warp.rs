@@ -71,8 +71,8 @@ pub fn uniform_sphere(u: [f32; 2]) -> Vec3 {
 /// Density per solid angle of [`uniform_sphere`].
 pub const UNIFORM_SPHERE_PDF: f32 = 0.25 * FRAC_1_PI;
 
-/// A direction within a cone, with density [`uniform_cone_pdf`]. The cone is given by `1 - cos` of its half-angle, within `(0, 2]`, since
-/// the cosine of a narrow cone has no digits left.
+/// A direction within a cone, with density [`uniform_cone_pdf`]. The cone is given by `1 - cos` of its half-angle,
+/// within `(0, 2]`, since the cosine of a narrow cone has no digits left.
 #[inline]
 pub fn uniform_cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {
     let one_minus_cos = u[0] * one_minus_cos_max;
@@ -87,7 +87,8 @@ pub fn uniform_cone_pdf(one_minus_cos_max: f32) -> f32 {
     1.0 / (TAU * one_minus_cos_max)
 }
 
-/// Barycentric weights of the second and third corner, uniform by area (Heitz, "A Low-Distortion Map Between Triangle and Square").
+/// Barycentric weights of the second and third corner, uniform by area (Heitz, "A Low-Distortion Map Between Triangle
+/// and Square").
 #[inline]
 pub fn uniform_triangle(u: [f32; 2]) -> [f64; 2] {
     let [b, c] = u.map(|u| 0.5 * f64::from(u));

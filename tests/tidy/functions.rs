@@ -15,7 +15,7 @@ const MAX_FUNCTION_LINES: usize = 60;
 const MAX_PARAMETERS: usize = 5;
 
 /// Why a kernel has many parameters.
-const ROWS: &str = "rows are separate parameters, so that the compiler knows that they do not overlap";
+const ROWS: &str = "rows are separate parameters, so that the compiler can assume that they do not overlap";
 
 /// Functions that break a rule of [`Rule`], by file and name, with the reason.
 const EXCEPTIONS: &[(Rule, &str, &str, &str)] = &[
@@ -26,13 +26,6 @@ const EXCEPTIONS: &[(Rule, &str, &str, &str)] = &[
     (Rule::Parameters, "src/integrator/path/scatter.rs", "spawn_rays", ROWS),
     (Rule::Parameters, "src/light/area/queue.rs", "sample_by_area", ROWS),
     (Rule::Parameters, "src/light/area/queue.rs", "set_samples", ROWS),
-];
-
-/// Names of public types with several definitions, with the reason.
-const SHARED_NAMES: &[(&str, &str)] = &[
-    ("Frame", "`math::Frame`, and the frames of a sequence in src/render, which is unchecked yet"),
-    ("Row", "`math::rows::Row`, and a row of samples of an EXR block, which src/output/exr names, unchecked yet"),
-    ("Source", "where a layer comes from, and that of a plane in src/output/exr, which is unchecked yet"),
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -192,8 +185,6 @@ fn public_types_have_names_of_their_own() {
         }
     }
     files.retain(|_, files| files.len() > 1);
-    let mut faults: Vec<String> =
-        SHARED_NAMES.iter().filter(|(name, _)| files.remove(*name).is_none()).map(|e| format!("needless exception: {e:?}")).collect();
-    faults.extend(files.iter().map(|(name, files)| format!("{name}: {}", files.join(", "))));
+    let faults: Vec<String> = files.iter().map(|(name, files)| format!("{name}: {}", files.join(", "))).collect();
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }

@@ -13,7 +13,7 @@ use rustix::process::{Pid, kill_process, kill_process_group};
 pub const SCENE: &str = r#"{
     "film": { "width": 24, "height": 16 },
     "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
-    // Said in the scene, though it is the default.
+    // Given in the scene, though it is the default.
     "sampler": { "spp": 2, "seed": 0 },
     "shapes": [{ "type": "sphere", "radius": 1 }],
     "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
@@ -34,13 +34,13 @@ pub fn run(folder: &Path, arguments: &str) -> Output {
     steradian(folder, arguments).output().unwrap()
 }
 
-/// What the program said on stderr.
-pub fn told(output: &Output) -> String {
+/// What the program printed to stderr.
+pub fn stderr_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A process in a group of its own. When it is dropped, as in a test that fails, it and what it started are ended: by SIGTERM, which
-/// programs pass on to groups they made themselves, then by SIGKILL.
+/// A process in a group of its own. When it is dropped, as in a test that fails, it and what it started are ended: by
+/// SIGTERM, which programs pass on to groups they made themselves, then by SIGKILL.
 pub struct Running {
     /// `None` once its output is collected.
     child: Option<Child>,

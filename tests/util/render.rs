@@ -5,8 +5,8 @@ pub use steradian::bench::stability::render::*;
 
 /// What an estimate is held to.
 pub trait AssertIs {
-    /// Asserts that the mean agrees with `expected`: 5.5 standard errors (two-sided false-alarm rate 4e-8 for a normal mean, below 1e-6 with
-    /// 255 degrees of freedom), or the relative rounding bound where there is no noise.
+    /// Asserts that the mean agrees with `expected`: 5.5 standard errors (two-sided false-alarm rate 4e-8 for a normal
+    /// mean, below 1e-6 with 255 degrees of freedom), or the relative rounding bound where there is no noise.
     #[track_caller]
     fn assert_is(&self, expected: f64, what: &str);
 }

@@ -1,4 +1,5 @@
-//! Computes `src/bsdf/energy/tables.bin`: what microfacets scatter at once, for the compensation of multiple scattering.
+//! Computes `src/bsdf/energy/tables.bin`: what microfacets scatter at once, for the compensation of multiple
+//! scattering.
 //!
 //! `cargo xtask bake_energy` overwrites the file; it changes only if the code of the microfacet distributions does.
 

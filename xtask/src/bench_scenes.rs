@@ -1,6 +1,6 @@
-//! Makes `benches/scenes/meshes`, the meshes of the scenes in `benches/scenes`: a Cornell box, a tessellated sphere, a ground, and `bunny.ply` and
-//! `dragon.ply`. The latter two are the scans in `scenes/scans` (`bunny.ply`, `dragon_res2.ply`; see `scenes/get_scans.sh`) if they are there, else
-//! generated meshes of as many triangles.
+//! Makes `benches/scenes/meshes`, the meshes of the scenes in `benches/scenes`: a Cornell box, a tessellated sphere, a
+//! ground, and `bunny.ply` and `dragon.ply`. The latter two are the scans in `scenes/scans` (`bunny.ply`,
+//! `dragon_res2.ply`; see `scenes/get_scans.sh`) if they are there, else generated meshes of as many triangles.
 //!
 //! `cargo xtask bench_scenes` overwrites them.
 
@@ -99,7 +99,8 @@ fn sphere(rings: u32, slices: u32) -> Mesh {
     mesh
 }
 
-/// A scan scaled to the height 1, on y = 0 above the origin, with normals averaged over the faces around each vertex by area.
+/// A scan scaled to the height 1, on y = 0 above the origin, with normals averaged over the faces around each vertex by
+/// area.
 fn standing(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {
     let points = || positions.iter().map(|p| V::from(*p));
     let (low, high) = points().fold((V::MAX, V::MIN), |(low, high), p| (low.min(p), high.max(p)));

@@ -1,15 +1,18 @@
-//! Compares renders of `scenes/` and `benches/scenes/` with independent reference images of the same scenes, block by block.
+//! Compares renders of `scenes/` and `benches/scenes/` with independent reference images of the same scenes, block by
+//! block.
 //!
-//! `cargo xtask compare_refs REFS [--spp N] [SCENE...]`: the folder `REFS` holds `SCENE.exr` for each scene (default: cornell, glass, analytic; a name
-//! in one of the two folders, or the path of a scene file) and, of some, two independent halves `SCENE.half0.exr` and `SCENE.half1.exr`. Mitsuba 3 makes
-//! references of `benches/scenes/*.xml`: `mitsuba -m llvm_ad_rgb -D spp=1024 -D seed=1 -o REFS/cornell.half0.exr benches/scenes/cornell.xml`.
+//! `cargo xtask compare_refs REFS [--spp N] [SCENE...]`: the folder `REFS` holds `SCENE.exr` for each scene (default:
+//! cornell, glass, analytic; a name in one of the two folders, or the path of a scene file) and, of some, two
+//! independent halves `SCENE.half0.exr` and `SCENE.half1.exr`. Mitsuba 3 makes references of `benches/scenes/*.xml`:
+//! `mitsuba -m llvm_ad_rgb -D spp=1024 -D seed=1 -o REFS/cornell.half0.exr benches/scenes/cornell.xml`.
 //!
-//! Two renders of N samples with different seeds give our variance, the halves give the reference's; without halves the differences between the
-//! two pictures, from pixel to pixel of a block, give both together. Over blocks of 16 x 16 pixels, z = (ours - reference) / sqrt(variances).
+//! Two renders of N samples with different seeds give our variance, the halves give the reference's; without halves the
+//! differences between the two pictures, from pixel to pixel of a block, give both together. Over blocks of 16 x 16
+//! pixels, z = (ours - reference) / sqrt(variances).
 //!
-//! Prints one line per scene: means, relMSE, relMSE without the worst thousandth of the pixels, blocks with |z| < 3, ratio of the medians over
-//! blocks of their medians (for references with fireflies). Writes the signed difference, in units of its standard deviation, to
-//! `target/compare_refs/SCENE.png` (grey: none; a structure there is a bug).
+//! Prints one line per scene: means, relMSE, relMSE without the worst thousandth of the pixels, blocks with |z| < 3,
+//! ratio of the medians over blocks of their medians (for references with fireflies). Writes the signed difference, in
+//! units of its standard deviation, to `target/compare_refs/SCENE.png` (grey: none; a structure there is a bug).
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -24,8 +27,9 @@ use crate::{Outcome, root};
 
 const BLOCK: u32 = 16;
 
-/// What conventions may change under a sky where there is no noise: the rows of an environment reach from pole to pole either with their edges,
-/// as ours, or with their centres. Then each of 1,024 rows, and a sun on them, is larger by 1/1023.
+/// What conventions may change under a sky where there is no noise: the rows of an environment reach from pole to pole
+/// either with their edges, as ours, or with their centres. Then each of 1,024 rows, and a sun on them, is larger by
+/// 1/1023.
 const SKY_CONVENTIONS: f64 = 1e-3;
 
 struct Arguments {
@@ -167,9 +171,9 @@ impl Sums {
     }
 }
 
-/// Sums over one block. Pixels are independent, so the variance of the sum is the sum of the pixels' variances, each from the difference of
-/// two independent halves: (a - b)² / 4 estimates the variance of (a + b) / 2. Without halves of the reference it is the variance of the
-/// differences between ours and the reference over the pixels of the block.
+/// Sums over one block. Pixels are independent, so the variance of the sum is the sum of the pixels' variances, each
+/// from the difference of two independent halves: (a - b)² / 4 estimates the variance of (a + b) / 2. Without halves of
+/// the reference it is the variance of the differences between ours and the reference over the pixels of the block.
 fn block_sums(reference: &Image, halves: Option<&[Image; 2]>, ours: &[Image; 2], origin: [u32; 2], channel: usize) -> Sums {
     let mut sums = Sums::default();
     let at = |image: &Image, [x, y]: [u32; 2]| f64::from(color(image, x, y)[channel]);
@@ -209,7 +213,8 @@ fn mean_image(images: &[Image; 2]) -> Vec<[f64; 3]> {
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
 }
 
-/// Mean over pixels and channels of (test - reference)² / (reference² + 0.01), of all pixels and without the worst thousandth.
+/// Mean over pixels and channels of (test - reference)² / (reference² + 0.01), of all pixels and without the worst
+/// thousandth.
 fn relative_mse(reference: &Image, test: &[[f64; 3]]) -> [f64; 2] {
     let [width, _] = reference.size;
     let error = |(i, pixel): (usize, &[f64; 3])| {

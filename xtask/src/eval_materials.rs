@@ -1,8 +1,8 @@
 //! Values of materials for pairs of directions, to compare with other renderers; `tools/mitsuba_materials.py` does.
 //!
-//! Reads `{ "materials": [MATERIAL, ...], "pairs": [[WO, WI], ...] }` from standard input, where a material is as in a scene file and
-//! directions are unit and local (`z` is the normal), and writes for each material and each pair `[red, green, blue, pdf]` of
-//! `f(wo, wi) |cos wi|` as JSON.
+//! Reads `{ "materials": [MATERIAL, ...], "pairs": [[WO, WI], ...] }` from standard input, where a material is as in a
+//! scene file and directions are unit and local (`z` is the normal), and writes for each material and each pair
+//! `[red, green, blue, pdf]` of `f(wo, wi) |cos wi|` as JSON.
 
 use std::path::Path;
 

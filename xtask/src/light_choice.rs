@@ -1,9 +1,9 @@
 //! Compares choosing lights by a tree with choosing them by power, at equal time.
 //!
-//! `cargo xtask light_choice [SCENE.json] [--spp N] [--rounds N]` renders the scene in turns with either choice, each time
-//! with two seeds. Prints of each choice the seconds, the noise (variance of a pixel over the square of its mean, averaged over the picture,
-//! from the difference of the two pictures; the worst thousandth of the pixels left out) and the noise times the seconds, against those by
-//! power. Medians over the rounds.
+//! `cargo xtask light_choice [SCENE.json] [--spp N] [--rounds N]` renders the scene in turns with either choice, each
+//! time with two seeds. Prints of each choice the seconds, the noise (variance of a pixel over the square of its mean,
+//! averaged over the picture, from the difference of the two pictures; the worst thousandth of the pixels left out) and
+//! the noise times the seconds, against those by power. Medians over the rounds.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;

@@ -1,8 +1,9 @@
 //! Writes `src/bench/stability/vectors`: rays at shapes with their exact hits, found in arithmetic of 256 bits.
 //!
-//! A line of a quadric's or a flat shape's file, all numbers as the hexadecimal bits of their floats: origin and direction (`f32`), the
-//! shape's translation (`f64`), and of a hit the distance and the point, rounded to `f64`, and in decimals the condition of the point:
-//! one over the cosine between ray and normal. Of a surface of revolution: origin, direction, and the distances of all hits in order.
+//! A line of a quadric's or a flat shape's file, all numbers as the hexadecimal bits of their floats: origin and
+//! direction (`f32`), the shape's translation (`f64`), and of a hit the distance and the point, rounded to `f64`, and
+//! in decimals the condition of the point: one over the cosine between ray and normal. Of a surface of revolution:
+//! origin, direction, and the distances of all hits in order.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -109,7 +110,8 @@ fn first_hit(equation: &Equation, ray: &Ray, center: DVec3) -> Result<Option<Fou
     Ok(None)
 }
 
-/// A ray from 3 to 1e6 away, every other one within 1e-1 to 1e-6 of a silhouette or an edge, and the translation that makes it so.
+/// A ray from 3 to 1e6 away, every other one within 1e-1 to 1e-6 of a silhouette or an edge, and the translation that
+/// makes it so.
 fn aimed(rng: &mut Rng, case: &Case, i: usize) -> Option<(Ray, DVec3)> {
     let direction = rng.direction();
     let distance = rng.magnitude(3f64.log10(), 6.0);
@@ -283,7 +285,7 @@ fn revolution_file(points: &[[f64; 2]], seed: u64) -> String {
         }
         let ray = Ray::new((through - direction * rng.magnitude(0.5, 2.0)).as_vec3(), direction.as_vec3());
         let hits = all_hits(points, &ray);
-        // Pairs so close that f64 cannot tell them from one tangency.
+        // Pairs so close that f64 cannot distinguish them from one tangency.
         if hits.windows(2).any(|pair| pair[1] - pair[0] < 1e-6) {
             excluded += 1;
             continue;

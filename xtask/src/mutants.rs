@@ -1,12 +1,12 @@
-//! Injects faults, one at a time, and says whether the tests named for each find it.
+//! Injects faults, one at a time, and reports whether the tests named for each find it.
 //!
 //! ```text
 //! cargo xtask mutants [NAME...]
 //! ```
 //!
-//! `tests/mutants.json` lists one-line changes of the source with the tests that must fail on them. Each is made in a copy of the tree below
-//! `target/mutants`; first the tests must pass there without any. A table goes to stdout, progress to stderr; the exit code is 1 if a fault
-//! survives. About a minute a fault on two cores.
+//! `tests/mutants.json` lists one-line changes of the source with the tests that must fail on them. Each is made in a
+//! copy of the tree below `target/mutants`; first the tests must pass there without any. A table goes to stdout,
+//! progress to stderr; the exit code is 1 if a fault survives. About a minute a fault on two cores.
 
 use std::error::Error;
 use std::fs;
@@ -96,7 +96,8 @@ fn survivals<'a>(tree: &Path, mutant: &'a Mutant) -> Result<Vec<&'a str>> {
     Ok(endings.into_iter().filter(|(_, ending)| *ending == Ending::Passed).map(|(test, _)| test).collect())
 }
 
-/// Builds and runs tests by their full paths; a process that dies or does not end in a quarter of an hour counts as a failure.
+/// Builds and runs tests by their full paths; a process that dies or does not end in a quarter of an hour counts as a
+/// failure.
 fn run_tests(tree: &Path, tests: &[&str]) -> Result<Ending> {
     let (of_tests, of_library): (Vec<&str>, Vec<&str>) = tests.iter().partition(|test| test.starts_with("tests::"));
     let mut ending = Ending::Passed;

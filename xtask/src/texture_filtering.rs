@@ -1,13 +1,15 @@
-//! Measures ways to look up an image on a plane that reaches to the horizon: the error of a picture at equal samples, and the time of a lookup.
+//! Measures ways to look up an image on a plane that reaches to the horizon: the error of a picture at equal samples,
+//! and the time of a lookup.
 //!
-//! `cargo xtask texture_filtering`. A camera one unit above the plane sees it from below its feet to the horizon. Each pixel's
-//! samples are those of the renderer's sampler; the reference has 4,096 points per pixel. The ways are
+//! `cargo xtask texture_filtering`. A camera one unit above the plane sees it from below its feet to the horizon. Each
+//! pixel's samples are those of the renderer's sampler; the reference has 4,096 points per pixel. The ways are
 //!
 //! - `point`: bilinear where the ray meets the plane;
 //! - `stochastic`: bilinear at a random point of the parallelogram that a pixel covers;
-//! - `pixel's cone`: in the image's pyramid, over the area where the ray cone of a pixel meets the plane (Akenine-Möller et al., "Texture Level
-//!   of Detail Strategies for Real-Time Ray Tracing");
-//! - `samples' cone`: the same with a cone that is narrower by the root of the samples per pixel, as the renderer does it;
+//! - `pixel's cone`: in the image's pyramid, over the area where the ray cone of a pixel meets the plane
+//!   (Akenine-Möller et al., "Texture Level of Detail Strategies for Real-Time Ray Tracing");
+//! - `samples' cone`: the same with a cone that is narrower by the root of the samples per pixel, as the renderer does
+//!   it;
 //! - `longer axis`, `shorter axis`: the same by one axis of that area in place of their geometric mean.
 //!
 //! The last column is the error that remains at 1,024 samples: what the way blurs.

@@ -1,5 +1,5 @@
-//! The binary hierarchy: binned surface area heuristic (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies"), built in
-//! parallel, the same for any number of threads.
+//! The binary hierarchy: binned surface area heuristic (Wald, "On fast Construction of SAH-based Bounding Volume
+//! Hierarchies"), built in parallel, the same for any number of threads.
 
 use crate::math::{Aabb, Vec3};
 
@@ -48,7 +48,8 @@ pub(in crate::accel) struct Binary {
 }
 
 impl Binary {
-    /// Builds the hierarchy; `references` must not be empty. `is_alone` is true for items that may not share a leaf with others.
+    /// Builds the hierarchy; `references` must not be empty. `is_alone` is true for items that may not share a leaf
+    /// with others.
     pub fn new(references: Vec<Reference>, is_alone: impl Fn(u32) -> bool + Sync) -> Self {
         Self::from_depth(references, is_alone, 0)
     }

@@ -1,4 +1,4 @@
-//! Eight boxes and four triangles at once: with AVX2 where the machine has it, and in plain Rust with the same answers.
+//! Eight boxes and four triangles at once: with AVX2 where available, and in plain Rust with the same results.
 
 use std::arch::x86_64::{__m256d, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NEQ_UQ};
 
@@ -37,7 +37,8 @@ pub(super) trait SimdIsa: Copy {
     /// The children that the ray may meet within `[t_min, t_max]` as bits, and where it enters each.
     fn enter(self, node: &WideNode, ray: &WideRay, t_min: f32, t_max: f32) -> (u32, [f32; WIDTH]);
 
-    /// [`TriangleRay::intersect`] for each triangle, with the very same operations; `None` if no lane passes the edge tests.
+    /// [`TriangleRay::intersect`] for each triangle, with the very same operations; `None` if no lane passes the edge
+    /// tests.
     fn intersect(self, block: &Block, ray: &TriangleRay) -> Option<BlockHits>;
 }
 
@@ -150,7 +151,7 @@ impl SimdIsa for V3 {
     }
 }
 
-/// One corner of four triangles as the ray sees it, sheared.
+/// One corner of four triangles in the ray's sheared space.
 #[derive(Clone, Copy)]
 struct Corner {
     x: __m256d,

@@ -85,7 +85,7 @@ impl WideNode {
     }
 }
 
-/// Up to four triangles side by side. Unused lanes repeat the first triangle under its own ids, which changes no answer.
+/// Up to four triangles in lanes. Unused lanes repeat the first triangle under its own ids, which changes no result.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(super) struct Block {

@@ -1,4 +1,5 @@
-//! What Embree calls: with errors, with changes of memory, and to intersect a shape. None of these may panic; a panic would abort.
+//! What Embree calls: with errors, with changes of memory, and to intersect a shape. None of these may panic; a panic
+//! would abort.
 
 use std::ffi::{CStr, c_char, c_void};
 use std::sync::atomic::Ordering;
@@ -34,7 +35,7 @@ pub(super) unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError,
     let _ = monitor.first_error.set((code, message));
 }
 
-/// Counts bytes; called from all building threads at once. An allocation is never refused.
+/// Counts bytes; called from all building threads at once. An allocation is never rejected.
 pub(super) unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post: bool) -> bool {
     // SAFETY: as in `on_error`.
     let monitor = unsafe { &*user.cast::<Monitor>() };
@@ -44,8 +45,8 @@ pub(super) unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, _post
 
 /// The distance at which `ray` hits the [`TransformedShape`] behind `shape`; negative on a miss.
 pub(super) unsafe extern "C" fn intersect_placed(shape: *const c_void, ray: *const sys::StRay, _key: u32, _instance: u32) -> f32 {
-    // SAFETY: `shape` was made from a `&TransformedShape` inside the geometry that the accelerator borrows, which nobody changes;
-    // `ray` points to a ray on the shim's stack, and `StRay` has the layout of `Ray`.
+    // SAFETY: `shape` was made from a `&TransformedShape` inside the geometry that the accelerator borrows, which
+    // nobody changes; `ray` points to a ray on the shim's stack, and `StRay` has the layout of `Ray`.
     let (placed, ray) = unsafe { (&*shape.cast::<TransformedShape>(), &*ray.cast::<Ray>()) };
     // Rounding to f32 keeps the order, so the result stays within the ray's interval.
     placed.intersect(ray).map_or(-1.0, |hit| hit.t as f32)
@@ -78,8 +79,8 @@ const ROWS: usize = 9;
 
 /// Writes `ray` in the space of the [`Instance`] behind `instance`; false if it cannot be traced there.
 pub(super) unsafe extern "C" fn enter_instance(instance: *const c_void, ray: *const sys::StRay, inside: *mut sys::StRay) -> bool {
-    // SAFETY: `instance` was made from a `&Instance` inside the geometry that the accelerator borrows; both rays are on the shim's stack,
-    // and `StRay` has the layout of `Ray`.
+    // SAFETY: `instance` was made from a `&Instance` inside the geometry that the accelerator borrows; both rays are on
+    // the shim's stack, and `StRay` has the layout of `Ray`.
     let (instance, ray) = unsafe { (&*instance.cast::<Instance>(), &*ray.cast::<Ray>()) };
     let local = instance.object_ray(ray);
     // SAFETY: as above; every bit pattern is a `Ray`.
@@ -102,7 +103,7 @@ impl Filter {
     /// # Safety
     /// The geometry must be alive.
     unsafe fn geometry(&self) -> &Geometry {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { &*self.geometry }
     }
 

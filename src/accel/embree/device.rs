@@ -14,13 +14,13 @@ use crate::error::{Error, Result};
 pub struct EmbreeInfo {
     /// Version, such as `3.13.5`.
     pub version: String,
-    /// Instruction set, such as `AVX-512`: the best of those that Embree has code for and the processor runs, which is what Embree
-    /// chooses. Embree has no query for it.
+    /// Instruction set, such as `AVX-512`: the best of those that Embree has code for and the processor runs, which is
+    /// what Embree chooses. Embree has no query for it.
     pub isa: String,
 }
 
 impl EmbreeInfo {
-    /// Asks the installed Embree, without a scene.
+    /// Queries the installed Embree, without a scene.
     ///
     /// # Errors
     /// If no device can be made, or the build of Embree lacks something this crate needs.
@@ -28,9 +28,9 @@ impl EmbreeInfo {
         Ok(Device::new(1)?.info())
     }
 
-    /// A bound for the relative error of the reciprocals that distances of triangles are found with, so that hits that near
-    /// the end of a ray's interval may be missed or found beyond it; 0 if those of powers of two are exact. Without AVX-512 an
-    /// estimate of 11 bits is refined once, which leaves the last bit.
+    /// A bound for the relative error of the reciprocals that distances of triangles are found with, so that hits that
+    /// near the end of a ray's interval may be missed or found beyond it; 0 if those of powers of two are exact.
+    /// Without AVX-512 an estimate of 11 bits is refined once, which leaves the last bit.
     pub fn reciprocal_error(&self) -> f32 {
         if self.isa == "AVX-512" { 0.0 } else { 2.0 * f32::EPSILON }
     }
@@ -57,8 +57,8 @@ pub(super) struct Device {
     monitor: Arc<Monitor>,
 }
 
-// SAFETY: a device is a reference-counted object whose functions may be called from any thread; those that must not run at the same time as
-// others are called while the device is still owned by a builder.
+// SAFETY: a device is a reference-counted object whose functions may be called from any thread; those that must not run
+// at the same time as others are called while the device is still owned by a builder.
 unsafe impl Send for Device {}
 // SAFETY: as above; through a shared reference only properties, error and byte count are read.
 unsafe impl Sync for Device {}
@@ -152,7 +152,8 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: this is the last use of the handle; the monitor is dropped after this body, when no callback can come any more.
+        // SAFETY: this is the last use of the handle; the monitor is dropped after this body, when no callback can come
+        // any more.
         unsafe { sys::rtcReleaseDevice(self.handle()) }
     }
 }

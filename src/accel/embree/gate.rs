@@ -1,5 +1,5 @@
-//! Which rays may be handed to Embree. Debian's build has assertions on: a ray that is not valid aborts the process, also when it only
-//! becomes invalid in the space of an instance.
+//! Which rays may be handed to Embree. Debian's build has assertions on: a ray that is not valid aborts the process,
+//! also when it only becomes invalid in the space of an instance.
 
 use crate::error::{Error, Result};
 use crate::geometry::{Instance, InverseReach};
@@ -42,7 +42,7 @@ impl RayLimits {
         // Half the limit leaves room for rounding.
         const LIMIT: f32 = 0.5 * EMBREE_LARGE;
         let mut gate = Self::OPEN;
-        // Instances that move look at each ray themselves.
+        // Instances that move test each ray themselves.
         for (i, instance) in instances.iter().enumerate().filter(|(_, instance)| instance.motion.is_none()) {
             let InverseReach { reach, offset } = instance
                 .inverse_reach()
@@ -52,8 +52,9 @@ impl RayLimits {
         Ok(gate)
     }
 
-    /// Whether `ray` may be handed to Embree: it is [valid](Ray::is_valid) and within the limits. Every other ray hits nothing; so does one
-    /// with `t_max = 0`, which Embree's closest-hit query passes over and its any-hit query does not.
+    /// Whether `ray` may be handed to Embree: it is [valid](Ray::is_valid) and within the limits. Every other ray hits
+    /// nothing; so does one with `t_max = 0`, which Embree's closest-hit query passes over and its any-hit query does
+    /// not.
     #[inline(always)]
     pub(super) fn accepts(&self, ray: &RayWords) -> bool {
         let RayWords { origin_t_min: o, direction_time: d, t_max } = *ray;
@@ -63,10 +64,10 @@ impl RayLimits {
         within.all() && !still && o.w <= t_max && t_max > 0.0
     }
 
-    /// Whether `ray` may be traced side by side with others. Embree sorts the rays of a packet by the signs of their directions but takes
-    /// the reciprocal of any component below [`SMALLEST_RECIPROCAL`] as positive; a small negative one spoils the common frustum: nodes
-    /// are missed, and empty ones entered, which ends in an assertion. An interval of one point goes alone too: any-hit
-    /// packets pass over it.
+    /// Whether `ray` may be traced side by side with others. Embree sorts the rays of a packet by the signs of their
+    /// directions but takes the reciprocal of any component below [`SMALLEST_RECIPROCAL`] as positive; a small negative
+    /// one spoils the common frustum: nodes are missed, and empty ones entered, which ends in an assertion. An interval
+    /// of one point goes alone too: any-hit packets pass over it.
     #[inline(always)]
     pub(super) fn admits_to_packet(&self, ray: &Ray) -> bool {
         let tame = |x: f32| (x == 0.0) | (x.abs() >= SMALLEST_RECIPROCAL);

@@ -1,5 +1,5 @@
-//! Embree as an accelerator: triangles on the meshes' own buffers, analytic shapes as user geometry, objects as scenes of their own that
-//! instances place.
+//! Embree as an accelerator: triangles on the meshes' own buffers, analytic shapes as user geometry, objects as scenes
+//! of their own that instances place.
 //!
 //! This directory is the only home of `unsafe`. What of Embree's interface is inline or differs between versions is in
 //! `ffi/embree_shim.c`.
@@ -33,7 +33,7 @@ use sys::StHit;
 /// thread of Embree's. It gets whether memory or threads ran out, and a description that lives during the call, and
 /// must not return.
 pub fn on_uncaught_exception(report: extern "C" fn(bool, *const c_char)) {
-    // SAFETY: the function pointer is valid for ever, and takes what the header says.
+    // SAFETY: the function pointer is valid for ever, and takes the parameters declared in the header.
     unsafe { sys::st_on_uncaught(Some(report)) }
 }
 
@@ -137,8 +137,8 @@ impl<'g> EmbreeAccel<'g> {
         memory.bytes()
     }
 
-    /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an object it is the
-    /// shape's place there.
+    /// The hit in our ids: in the world a geometry's number is its shape's id, and instances follow the shapes; in an
+    /// object it is the shape's place there.
     #[inline(always)]
     fn hit(&self, raw: StHit) -> Hit {
         let (shape, instance) =

@@ -26,7 +26,8 @@ pub(super) const ALL_GEOMETRIES: u32 = u32::MAX;
 pub(super) struct Tracer {
     pub(super) scene: Scene,
     pub(super) gate: RayLimits,
-    /// Whether packets may be traced as frusta: not through instances, since a transform can make a component of the direction tiny.
+    /// Whether packets may be traced as frusta: not through instances, since a transform can make a component of the
+    /// direction tiny.
     pub(super) frusta: bool,
     /// For the keys of rays, where shapes have holes.
     pub(super) cutouts: AlphaMasks,
@@ -55,7 +56,8 @@ impl Tracer {
             (&raw mut (*rayhit).hit.instID[0]).write(INVALID);
             let mut query = MaybeUninit::<sys::StQuery>::uninit();
             sys::st_intersect1(self.scene.handle(), query.as_mut_ptr(), rayhit);
-            // Embree has just written these one by one; read together they would wait for its stores to reach the cache.
+            // Embree has just written these one by one; read together they would wait for its stores to reach the
+            // cache.
             let hit = &raw const (*rayhit).hit;
             let geometry = (&raw const (*hit).geomID).read_volatile();
             (geometry != INVALID).then(|| StHit {
@@ -88,13 +90,15 @@ impl Tracer {
     }
 }
 
-/// Writes a ray in pieces of 16 bytes, which Embree reads at once; smaller ones could not be forwarded from the store buffer.
+/// Writes a ray in pieces of 16 bytes, which Embree reads at once; smaller ones could not be forwarded from the store
+/// buffer.
 ///
 /// # Safety
 /// `out` points to memory for an `RTCRay`, initialised or not.
 #[inline(always)]
 unsafe fn set_ray(out: *mut RTCRay, words: &RayWords, key: u32) {
-    // SAFETY: by the contract; an `RTCRay` is aligned to 16 bytes and starts with origin and `tnear`, then direction and time.
+    // SAFETY: by the contract; an `RTCRay` is aligned to 16 bytes and starts with origin and `tnear`, then direction
+    // and time.
     unsafe {
         out.cast::<Vec4>().write(words.origin_t_min);
         out.cast::<Vec4>().add(1).write(words.direction_time);
@@ -105,7 +109,7 @@ unsafe fn set_ray(out: *mut RTCRay, words: &RayWords, key: u32) {
     }
 }
 
-/// Which lanes Embree may look at: -1, others 0.
+/// The valid lanes for Embree: -1, others 0.
 #[repr(C, align(64))]
 pub(super) struct LaneMask(pub(super) [i32; WIDTH]);
 
@@ -128,13 +132,15 @@ impl HitPacket {
         Self { valid: LaneMask([0; WIDTH]), rayhits: RTCRayHit16 { ray, hit: RTCHit16::default() } }
     }
 
-    /// Traces at most sixteen `lanes` of `rays`, the first of which is a multiple of 16; [`read`](Self::read) gives the results.
+    /// Traces at most sixteen `lanes` of `rays`, the first of which is a multiple of 16; [`read`](Self::read) gives the
+    /// results.
     #[inline]
     pub(super) fn intersect(&mut self, tracer: &Tracer, rays: &RayRows, lanes: Range<usize>, coherence: Coherence) {
         fill(&mut self.rayhits.ray, &mut self.valid, tracer, rays, lanes.clone());
         self.rayhits.hit.geomID = [INVALID; WIDTH];
         self.rayhits.hit.instID = [[INVALID; WIDTH]];
-        // SAFETY: the scene is committed, both structs are aligned by their types, and every valid lane has passed the gate.
+        // SAFETY: the scene is committed, both structs are aligned by their types, and every valid lane has passed the
+        // gate.
         unsafe { sys::st_intersect16(tracer.scene.handle(), self.valid.0.as_ptr(), &mut self.rayhits, tracer.as_frustum(coherence)) };
         if !self.valid.is_full() {
             self.intersect_left_out(tracer, rays, lanes);

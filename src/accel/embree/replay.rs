@@ -1,4 +1,5 @@
-//! Rays of a render, traced again by calls of Embree with nothing around them: what the render could not be faster than.
+//! Rays of a render, traced again by calls of Embree with nothing around them: what the render could not be faster
+//! than.
 
 use std::mem::MaybeUninit;
 
@@ -41,8 +42,8 @@ impl<'a, 'g> EmbreeReplay<'a, 'g> {
         Self { accel, chunks: Vec::new() }
     }
 
-    /// Adds rays that were handed over together; one by one if nothing is said of their coherence. Rays that the
-    /// accelerator answers without Embree are left out.
+    /// Adds rays that were handed over together; one by one if their coherence is unspecified. Rays that the
+    /// accelerator traces without Embree are left out.
     pub fn push(&mut self, rays: &[Ray], any_hit: bool, coherence: Option<Coherence>) {
         if self.chunks.last().is_none_or(|chunk| chunk.rays >= CHUNK) {
             self.chunks.push(Chunk::default());
@@ -129,7 +130,8 @@ fn trace_packet(tracer: &Tracer, valid: &LaneMask, rays: &RTCRay16, any_hit: boo
     let lanes = valid.0.as_ptr();
     if any_hit {
         let mut rays = *rays;
-        // SAFETY: the scene is committed, both structs are aligned by their types, and every valid lane has passed the gate.
+        // SAFETY: the scene is committed, both structs are aligned by their types, and every valid lane has passed the
+        // gate.
         unsafe { sys::st_occluded16(tracer.scene.handle(), lanes, &mut rays, frustum) };
         return rays.tfar.iter().map(|t_far| u64::from(*t_far == f32::NEG_INFINITY)).sum();
     }

@@ -1,5 +1,5 @@
-//! From borrowed geometry to a committed Embree scene. A [`SceneBuilder`] takes geometries; [`SceneBuilder::commit`] consumes it and only
-//! the committed [`Scene`] can be traced.
+//! From borrowed geometry to a committed Embree scene. A [`SceneBuilder`] takes geometries; [`SceneBuilder::commit`]
+//! consumes it and only the committed [`Scene`] can be traced.
 
 use std::ffi::c_void;
 use std::ptr::NonNull;
@@ -79,11 +79,12 @@ impl UserShapes {
     }
 }
 
-/// The user data of the instances that move or stretch unevenly, into whose space we move the rays ourselves; the others have none. Embree
-/// keeps addresses into it.
+/// The user data of the instances that move or stretch unevenly, into whose space we move the rays ourselves; the
+/// others have none. Embree keeps addresses into it.
 pub(super) struct UserInstances(Vec<Option<sys::StEnteredInstance>>);
 
-// SAFETY: the pointers inside lead to the geometry and to Embree's scenes, and are only read through, which both allow from any thread.
+// SAFETY: the pointers inside lead to the geometry and to Embree's scenes, and are only read through, which both allow
+// from any thread.
 unsafe impl Send for UserInstances {}
 // SAFETY: as above.
 unsafe impl Sync for UserInstances {}
@@ -155,8 +156,8 @@ impl GeometryHandle {
         // SAFETY: the device is alive.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
         let this = Self::new(device, handle)?;
-        // SAFETY: all buffers hold as many items of that format as are announced; 16 bytes may be read of the last position, since the
-        // mesh keeps one more behind it; Embree only reads them, and the caller keeps them alive.
+        // SAFETY: all buffers hold as many items of that format as are announced; 16 bytes may be read of the last
+        // position, since the mesh keeps one more behind it; Embree only reads them, and the caller keeps them alive.
         unsafe {
             sys::rtcSetGeometryTimeStepCount(handle, mesh.padded_steps().count() as u32);
             for (step, positions) in (0..).zip(mesh.padded_steps()) {
@@ -178,14 +179,15 @@ impl GeometryHandle {
     /// # Safety
     /// There must be as many, and they must outlive the geometry.
     unsafe fn share(&self, kind: sys::RTCBufferType, slot: u32, format: sys::RTCFormat, items: *const c_void, count: usize) {
-        // SAFETY: the handle is alive; the rest is the caller's promise.
+        // SAFETY: the handle is alive; the rest is guaranteed by the caller.
         unsafe { sys::rtcSetSharedGeometryBuffer(self.0.as_ptr(), kind, slot, format, items, 0, 12, count) }
     }
 
     /// The committed geometry of an instance into whose space we move the rays.
     ///
     /// # Safety
-    /// The user data, the instance and the scene it names must outlive every scene the geometry is attached to, and must not move.
+    /// The user data, the instance and the scene it names must outlive every scene the geometry is attached to, and
+    /// must not move.
     pub(super) unsafe fn of_entered_instance(device: &Device, user: &sys::StEnteredInstance) -> Result<Self> {
         // SAFETY: the device is alive; the caller keeps the rest alive.
         let handle = unsafe { sys::st_new_entered_instance(device.handle(), user) };
@@ -199,7 +201,8 @@ impl GeometryHandle {
         let this = Self::new(device, handle)?;
         let map = &instance.transform.world_from_object;
         let columns = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis, map.translation].map(|c| c.as_vec3().to_array());
-        // SAFETY: both handles are alive, the geometry keeps the object's scene alive, and Embree copies the twelve floats.
+        // SAFETY: both handles are alive, the geometry keeps the object's scene alive, and Embree copies the twelve
+        // floats.
         unsafe {
             sys::rtcSetGeometryInstancedScene(handle, object.handle());
             sys::rtcSetGeometryTransform(handle, 0, sys::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.as_ptr().cast());
@@ -268,7 +271,8 @@ impl<'d> SceneBuilder<'d> {
 /// A committed scene, released on drop.
 pub(super) struct Scene(NonNull<sys::RTCSceneTy>);
 
-// SAFETY: a committed scene is only traced, which Embree allows from any number of threads at once, and at last released, by its owner.
+// SAFETY: a committed scene is only traced, which Embree allows from any number of threads at once, and at last
+// released, by its owner.
 unsafe impl Send for Scene {}
 // SAFETY: as above.
 unsafe impl Sync for Scene {}
@@ -287,7 +291,7 @@ impl Drop for Scene {
     }
 }
 
-/// What a failed creation says: the device's error, or at least what is missing.
+/// The message of a failed creation: the device's error, or at least what is missing.
 fn no_object(device: &Device, what: &str) -> Error {
     device.check().err().unwrap_or_else(|| Error::Embree(format!("no {what} could be created")))
 }

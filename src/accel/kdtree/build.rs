@@ -1,5 +1,6 @@
-//! Building by the surface area heuristic over bins, with the exact bounds of what is left of an item in a cell ("perfect splits": Havran,
-//! "Heuristic Ray Shooting Algorithms"; Wald and Havran, "On building fast kd-trees for ray tracing").
+//! Building by the surface area heuristic over bins, with the exact bounds of what is left of an item in a cell
+//! ("perfect splits": Havran, "Heuristic Ray Shooting Algorithms"; Wald and Havran, "On building fast kd-trees for ray
+//! tracing").
 
 use super::{KdTreeOptions, Node};
 use crate::accel::inspect::Item;
@@ -18,7 +19,7 @@ const STEP_COST: f32 = 0.5;
 /// How much cheaper a split is that cuts off empty space.
 const EMPTY_BONUS: f32 = 0.8;
 
-/// Splits in a row that cost more than they bring.
+/// Successive splits that cost more than they save, at most.
 const MAX_BAD_SPLITS: u32 = 3;
 
 /// Levels at most, whatever the number of items.
@@ -103,7 +104,7 @@ impl Builder<'_> {
         let (mut lower, mut upper) = (Vec::new(), Vec::new());
         for &Part { item, bounds } in &cell.parts {
             let (min, max) = (bounds.min[plane.axis], bounds.max[plane.axis]);
-            // What lies in the plane belongs below it.
+            // Primitives in the plane belong to the side below it.
             if max <= plane.at {
                 lower.push(Part { item, bounds });
             } else if min >= plane.at {
@@ -118,7 +119,8 @@ impl Builder<'_> {
             }
         }
         let total = lower.len() + upper.len();
-        // A half that keeps everything still pays where the other one is cut off with a few large parts, so only the sum of both is judged.
+        // A half that keeps everything still pays where the other one is cut off with a few large parts, so only the
+        // sum of both is judged.
         let is_bad = if self.median { lower.len().min(upper.len()) == count } else { plane.cost > leaf_cost };
         let bad_splits = cell.bad_splits + u32::from(is_bad);
         if bad_splits >= MAX_BAD_SPLITS || total as f64 > cell.budget {

@@ -21,8 +21,8 @@ pub struct KdTreeOptions {
 struct Node {
     /// Of an inner node the plane; of a leaf the number of references, as bits.
     split: f32,
-    /// In the lowest two bits the axis, 3 on a leaf; above them the upper child of an inner node (the lower one follows it), or the first
-    /// reference of a leaf.
+    /// In the lowest two bits the axis, 3 on a leaf; above them the upper child of an inner node (the lower one follows
+    /// it), or the first reference of a leaf.
     link: u32,
 }
 
@@ -82,8 +82,9 @@ impl Tree for KdTree {
             let node = &self.nodes[index as usize];
             let axis = node.axis();
             if axis != LEAF {
-                // Beyond the plane begins at the near distance at the earliest; before it ends at the far distance at the latest. A far
-                // distance that is not a number belongs to a ray within the plane, which sees both sides.
+                // Beyond the plane begins at the near distance at the earliest; before it ends at the far distance at
+                // the latest. A far distance that is not a number belongs to a ray within the plane, which sees both
+                // sides.
                 let axis = axis as usize;
                 let begin = (node.split - slab.near_origin[axis]) * slab.near_reciprocal[axis];
                 let end = (node.split - slab.far_origin[axis]) * slab.far_reciprocal[axis];

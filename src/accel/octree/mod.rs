@@ -1,7 +1,7 @@
 //! An octree: cells halved along all three axes, items in every cell that they touch.
 //!
-//! Nodes keep the bounds of what lies in their cell rather than the cell, and are visited in the order in which the ray meets the cells, so
-//! that a hit ends the search as soon as no nearer node is left.
+//! Nodes keep the bounds of what lies in their cell rather than the cell, and are visited in the order in which the ray
+//! meets the cells, so that a hit ends the search as soon as no nearer node is left.
 
 use arrayvec::ArrayVec;
 

@@ -127,7 +127,7 @@ impl<'g> Builder<'_, 'g> {
         }
     }
 
-    /// Adds the primitive at an index; says how many items that were.
+    /// Adds the primitive at an index; returns the number of items added.
     fn add_at(&mut self, index: usize) -> usize {
         let ItemKind::Prim(shape, id) = self.items.list[index].kind() else { return 1 };
         let (number, bounds) = (self.prims.len() as u32, self.items.bounds[index]);

@@ -14,7 +14,8 @@ pub(super) type Vector<S> = [<S as Simd>::f32s; 3];
 /// Rays that start farther from the middle of the scene than this many times its radius are traced alone.
 pub(super) const REACH: f32 = 8.0;
 
-/// Directions whose largest component is outside these limits are traced alone: products of them could leave the range of `f32`.
+/// Directions whose largest component is outside these limits are traced alone: products of them could leave the range
+/// of `f32`.
 const DIRECTIONS: [f32; 2] = [1e-9, 1e9];
 
 /// Where a component of a direction is smaller, its reciprocal is that of this number.
@@ -51,14 +52,15 @@ pub(super) struct Packet<S: Simd> {
     pub moment: Vector<S>,
     /// Bound of the rounding error of distances to edges, times the length of the direction.
     pub edge_error: S::f32s,
-    /// Products of the direction and a unit normal up to this say that the ray is nearly parallel to the plane.
+    /// Products of the direction and a unit normal up to this mean that the ray is nearly parallel to the plane.
     pub flat: S::f32s,
     /// Reciprocal of the direction, finite.
     reciprocal: Vector<S>,
     /// Minus the origin times the reciprocal.
     scaled_origin: Vector<S>,
     pub t_min: S::f32s,
-    /// Distance of the closest hit, at first the end of the ray; minus infinity in lanes that are not traced, and in those found occluded.
+    /// Distance of the closest hit, at first the end of the ray; minus infinity in lanes that are not traced, and in
+    /// those found occluded.
     pub t: S::f32s,
     /// The number of the primitive hit, or [`NONE`].
     pub prim: S::u32s,
@@ -247,13 +249,15 @@ impl<S: Simd> Packet<S> {
         simd.less_than_or_equal_f32s(self.t_min, self.t)
     }
 
-    /// The product of rays and the unit `direction` of a line with a `moment`: the distance to it, times lengths and sines.
+    /// The product of rays and the unit `direction` of a line with a `moment`: the distance to it, times lengths and
+    /// sines.
     #[inline(always)]
     pub fn side(&self, simd: S, direction: Vec3, moment: Vec3) -> S::f32s {
         add_dot(simd, self.moment, splat(simd, direction), dot(simd, self.direction, splat(simd, moment)))
     }
 
-    /// Takes hits at `t` on a primitive where they are the closest so far; of hits at one distance, that on the first primitive.
+    /// Takes hits at `t` on a primitive where they are the closest so far; of hits at one distance, that on the first
+    /// primitive.
     #[inline(always)]
     pub fn offer<const ANY: bool>(&mut self, simd: S, is_hit: S::m32s, t: S::f32s, prim: u32) {
         let s = simd;

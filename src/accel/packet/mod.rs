@@ -1,5 +1,5 @@
-//! A bounding volume hierarchy that whole packets of rays traverse together, in `f32`: for scenes of few primitives, where most rays of a
-//! packet meet the same boxes whatever their directions.
+//! A bounding volume hierarchy that whole packets of rays traverse together, in `f32`: for scenes of few primitives,
+//! where most rays of a packet meet the same boxes whatever their directions.
 
 mod hierarchy;
 mod lanes;
@@ -22,8 +22,8 @@ const FEW: usize = 40;
 
 /// Traces batches in packets, and single rays as the BVH does.
 ///
-/// An answer of a batch depends on its ray alone, and is the same on every machine. Edges are widened by a bound of the rounding errors: no
-/// ray slips between triangles that share an edge or a corner.
+/// A result in a batch depends on its ray alone, and is the same on every machine. Edges are widened by a bound of the
+/// rounding errors: no ray slips between triangles that share an edge or a corner.
 pub struct PacketBvh<'g> {
     single: TwoLevel<'g, Bvh>,
     /// `None` where something moves, is instanced or has holes: rays of batches are traced one by one then.

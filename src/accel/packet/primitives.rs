@@ -1,4 +1,5 @@
-//! What packets are intersected with: triangles, pairs of triangles that make a flat quadrilateral, and analytic shapes.
+//! What packets are intersected with: triangles, pairs of triangles that make a flat quadrilateral, and analytic
+//! shapes.
 
 use pulp::Simd;
 
@@ -42,8 +43,9 @@ impl<const N: usize> Polygon<N> {
         Self { edges, corner: corners[0], normal: normal.normalize().as_vec3(), prim }
     }
 
-    /// Intersects the rays of a packet with the polygon. Those that pass so close to an edge that rounding could decide, or so flat that it
-    /// decides the distance, are intersected by `exact`, which takes lanes and gives distances, negative on a miss.
+    /// Intersects the rays of a packet with the polygon. Those that pass so close to an edge that rounding could
+    /// decide, or so flat that it decides the distance, are intersected by `exact`, which takes lanes and gives
+    /// distances, negative on a miss.
     #[inline(always)]
     pub fn intersect<S: Simd, const ANY: bool>(
         &self,

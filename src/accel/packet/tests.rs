@@ -75,7 +75,8 @@ fn geometries(random: &mut Sequence) -> Vec<Geometry> {
     all
 }
 
-/// Rays of all kinds, among them some at corners and along edges, some that are traced alone, and some that are not valid.
+/// Rays of all kinds, among them some at corners and along edges, some that are traced alone, and some that are not
+/// valid.
 fn rays(random: &mut Sequence, geometry: &Geometry) -> Vec<Ray> {
     let corners: Vec<Vec3> = match &geometry.shapes[0] {
         Shape::Mesh(mesh) => mesh.positions().iter().map(|&p| Vec3::from_array(p)).collect(),
@@ -134,7 +135,7 @@ fn packets_hit_what_the_oracle_hits() {
     }
 }
 
-/// The answers of packets to a block of rays.
+/// The hits of packets for a block of rays.
 fn answers<S: Simd>(simd: S, packets: &Hierarchy<'_>, rays: &[Ray]) -> (Vec<Option<Hit>>, Vec<bool>) {
     let (rows, count) = (RayRows::of(rays), rays.len());
     let (mut hits, mut occluded) = (HitRows::default(), [false; BATCH]);

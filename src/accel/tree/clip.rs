@@ -9,8 +9,8 @@ use crate::math::{Aabb, Bounds, DVec3, Vec3};
 const MAX_CORNERS: usize = 12;
 
 impl Items<'_> {
-    /// Bounds of the part of an item in a box: exact for triangles at rest, except that they are rounded outward; for all else the
-    /// intersection with its bounds. Empty if no part is there.
+    /// Bounds of the part of an item in a box: exact for triangles at rest, except that they are rounded outward; for
+    /// all else the intersection with its bounds. Empty if no part is there.
     pub fn clipped_bounds(&self, index: usize, cell: &Aabb) -> Aabb {
         let common = intersection(&self.bounds[index], cell);
         if common.is_empty() {
@@ -24,7 +24,8 @@ impl Items<'_> {
         }
     }
 
-    /// Whether some part of an item lies in a box or touches it: exact for triangles at rest, for all else a test of its bounds.
+    /// Whether some part of an item lies in a box or touches it: exact for triangles at rest, for all else a test of
+    /// its bounds.
     pub fn overlaps(&self, index: usize, cell: &Aabb) -> bool {
         let common = intersection(&self.bounds[index], cell);
         if common.is_empty() {
@@ -55,9 +56,9 @@ fn margin(corners: &[DVec3; 3], cell: &Aabb) -> f64 {
 
 /// Bounds of the part of a triangle in a box (Sutherland and Hodgman, "Reentrant Polygon Clipping").
 ///
-/// A cut computes its corners with an error of at most 8 roundings of the largest coordinate, as the two differences it divides are those
-/// of the numbers at hand. So if the planes stand off by the error of all six cuts, each point of the exact part is within that error of a
-/// point that is kept.
+/// A cut computes its corners with an error of at most 8 roundings of the largest coordinate, as the two differences it
+/// divides are those of the numbers at hand. So if the planes stand off by the error of all six cuts, each point of the
+/// exact part is within that error of a point that is kept.
 fn clip_triangle(triangle: &TrianglePoints, cell: &Aabb) -> Aabb {
     let points = corners(triangle);
     let margin = margin(&points, cell);
@@ -83,8 +84,8 @@ struct Polygon {
 }
 
 impl Polygon {
-    /// The part where `height`, linear in the point, is not negative. `None` if it has too many corners, as rounding may make a polygon
-    /// cross a plane more than twice.
+    /// The part where `height`, linear in the point, is not negative. `None` if it has too many corners, as rounding
+    /// may make a polygon cross a plane more than twice.
     fn cut(&self, height: impl Fn(DVec3) -> f64) -> Option<Self> {
         let mut kept = Self { corners: [DVec3::ZERO; MAX_CORNERS], count: 0 };
         for i in 0..self.count {
@@ -107,8 +108,9 @@ impl Polygon {
     }
 }
 
-/// Whether a triangle and a box have a point in common, by thirteen separating axes (Akenine-Moeller, "Fast 3D Triangle-Box Overlap
-/// Testing"). The box is grown by more than the roundings of all terms, so that what touches overlaps.
+/// Whether a triangle and a box have a point in common, by thirteen separating axes (Akenine-Moeller, "Fast 3D
+/// Triangle-Box Overlap Testing"). The box is grown by more than the roundings of all terms, so that what touches
+/// overlaps.
 fn triangle_overlaps(triangle: &TrianglePoints, cell: &Aabb) -> bool {
     let points = corners(triangle);
     let margin = 2.0 * margin(&points, cell);

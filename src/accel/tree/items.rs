@@ -29,7 +29,8 @@ impl<'g> Items<'g> {
         Self { geometry, list, bounds }
     }
 
-    /// Everything in the world: primitives, and instances of objects whose bounds are given. Instances of empty objects are left out.
+    /// Everything in the world: primitives, and instances of objects whose bounds are given. Instances of empty objects
+    /// are left out.
     pub fn of_world(geometry: &'g Geometry, objects: &[Aabb]) -> Self {
         let mut items = Self::of_shapes(geometry, &geometry.world);
         for (i, instance) in geometry.instances.iter().enumerate() {

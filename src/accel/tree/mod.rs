@@ -1,5 +1,5 @@
-//! What the octree, the kd-tree and the BVH have in common: the items they are built over, the query that visits them, conservative slabs,
-//! and instances as a second level.
+//! What the octree, the kd-tree and the BVH have in common: the items they are built over, the query that visits them,
+//! conservative slabs, and instances as a second level.
 
 mod clip;
 mod items;
@@ -22,11 +22,12 @@ pub(super) trait Tree: Send + Sync + Sized {
     /// What can be chosen.
     type Options: Sync;
 
-    /// Builds the tree. It must end for any finite input, with a bounded depth and with memory of the order of the number of items.
+    /// Builds the tree. It must end for any finite input, with a bounded depth and with memory of the order of the
+    /// number of items.
     fn build(items: &Items<'_>, options: &Self::Options) -> Self;
 
-    /// Visits every item that the query's ray may hit within its interval, nearer ones first as far as the tree knows, until a visit
-    /// returns true. An item may be visited twice.
+    /// Visits every item that the query's ray may hit within its interval, nearer ones first as far as the bounds show,
+    /// until a visit returns true. An item may be visited twice.
     fn traverse<C: Counter, const ANY: bool>(&self, query: &mut Query<'_, Self, C, ANY>);
 
     /// Bounds of all items; empty if there is none.

@@ -1,4 +1,4 @@
-//! One ray on its way through a tree: tests items, keeps the best hit, counts if asked to.
+//! One ray on its way through a tree: tests items, keeps the best hit, optionally counts the work.
 
 use super::{Tree, TwoLevel};
 use crate::accel::inspect::{Item, ItemKind, TraversalCounts};
@@ -35,8 +35,8 @@ impl Counter for TraversalCounts {
 
 /// A closest-hit query (`ANY` false) or an any-hit query.
 pub(in crate::accel) struct Query<'a, T, C, const ANY: bool> {
-    /// The ray in the tree's space. Its `t_max` shrinks to one float beyond the best hit, so that a hit which rounds to the same distance
-    /// takes part in the tie.
+    /// The ray in the tree's space. Its `t_max` shrinks to one float beyond the best hit, so that a hit which rounds to
+    /// the same distance is compared as a tie.
     pub ray: Ray,
     /// The ray prepared for triangles, with the same `t_max`.
     pub triangle_ray: TriangleRay,
@@ -64,7 +64,8 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
         self.ray.t_max
     }
 
-    /// The slack that boxes of this tree need, in units of the tree's space: rays are rounded to `f32` on their way into instances.
+    /// The slack that boxes of this tree need, in units of the tree's space: rays are rounded to `f32` on their way
+    /// into instances.
     #[inline(always)]
     pub fn slack(&self) -> f32 {
         if self.instance == Hit::NO_INSTANCE { self.accel.instance_slack(&self.ray) } else { 0.0 }
@@ -97,7 +98,8 @@ impl<'a, T: Tree, C: Counter, const ANY: bool> Query<'a, T, C, ANY> {
         self.instance
     }
 
-    /// Takes a hit of a triangle within the ray's interval, if it counts and is better than the best. True ends the traversal.
+    /// Takes a hit of a triangle within the ray's interval, if it counts and is better than the best. True ends the
+    /// traversal.
     #[inline(always)]
     pub fn offer(&mut self, hit: Hit) -> bool {
         let geometry = self.accel.geometry();

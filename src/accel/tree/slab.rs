@@ -2,11 +2,12 @@
 
 use crate::math::{Aabb, Ray, Vec3};
 
-/// Relative slack of a distance to a plane: three roundings on each side and the scaling itself, twice over (Ize, "Robust BVH Ray
-/// Traversal").
+/// Relative slack of a distance to a plane: three roundings on each side and the scaling itself, twice over (Ize,
+/// "Robust BVH Ray Traversal").
 const RELATIVE: f32 = 4.0 * f32::EPSILON;
 
-/// What tests of primitives in `f64` can err by, relative to the magnitudes of origin and bounds; a few thousand of their roundings.
+/// What tests of primitives in `f64` can err by, relative to the magnitudes of origin and bounds; a few thousand of
+/// their roundings.
 const TRACE: f32 = 1e-12;
 
 /// Largest reciprocal of a direction's component on the near side; smaller ones only open more boxes.
@@ -14,10 +15,10 @@ const LARGEST_RECIPROCAL: f32 = 1e30;
 
 /// A ray prepared for conservative slab tests.
 ///
-/// A box is entered at `max((near plane - near_origin) * near_reciprocal)` and left at `min((far plane - far_origin) *
-/// far_reciprocal)` over the axes. Origins stand one float (or the slack asked for) outside, reciprocals are scaled by
-/// a few roundings, so entries are never late and exits never early. A far product is NaN where a plane holds the
-/// origin and the direction has no component; it then does not count.
+/// A box is entered at `max((near plane - near_origin) * near_reciprocal)` and left at
+/// `min((far plane - far_origin) * far_reciprocal)` over the axes. Origins stand one float (or the given slack)
+/// outside, reciprocals are scaled by a few roundings, so entries are never late and exits never early. A far product
+/// is NaN where a plane holds the origin and the direction has no component; it then does not count.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::accel) struct SlabRay {
     /// Origin to subtract from near planes.

@@ -91,8 +91,8 @@ impl InstanceRounding {
         let moving = |instance: &Instance| instance.motion.clone().map(|motion| Motion::sample_times().map(move |time| motion.at(time)));
         let transforms = geometry.instances.iter().flat_map(|i| at_rest(i).into_iter().chain(moving(i).into_iter().flatten()));
         for Transform { world_from_object, object_from_world, .. } in transforms {
-            // One rounding of the origin and one of the direction, with room for the arithmetic in f64 and for what lies between the times
-            // at which motions were looked at.
+            // One rounding of the origin and one of the direction, with room for the arithmetic in f64 and for what
+            // lies between the times at which motions were sampled.
             let relative = (8.0 * UNIT_ROUNDOFF * norm(&world_from_object) * norm(&object_from_world)) as f32;
             let translation = world_from_object.translation.abs().max_element() as f32;
             let old = rounding.unwrap_or(Self { relative, reach });

@@ -1,4 +1,5 @@
-//! Portable float maps: `PF` or `Pf`, width, height and a scale whose sign gives the byte order, then rows of floats from the bottom.
+//! Portable float maps: `PF` or `Pf`, width, height and a scale whose sign gives the byte order, then rows of floats
+//! from the bottom.
 
 use std::path::Path;
 

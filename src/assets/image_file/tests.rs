@@ -116,7 +116,7 @@ fn files_that_are_cut_short_are_errors() {
 }
 
 #[test]
-fn sizes_that_no_image_has_are_refused_before_memory_is_asked_for() {
+fn sizes_that_no_image_has_are_rejected_before_memory_is_allocated() {
     let folder = folder();
     let path = folder.path().join("big.hdr");
     std::fs::write(&path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1000000 +X 1000000\n").unwrap();

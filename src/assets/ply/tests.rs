@@ -50,8 +50,8 @@ fn vertices_and_faces_have_attributes() {
         ("vertex_temp", AttributeValues::Numbers(vec![0.5, 1.5, 2.5, -1.0])),
     ];
     assert_eq!(mesh.attributes, expected.clone().map(|(name, values)| (name.to_owned(), values)).into());
-    let wanted = BTreeSet::from(["face_q".to_owned(), "vertex_other".to_owned()]);
-    let some = parse_with(text.as_bytes(), Some(&wanted)).unwrap();
+    let requested = BTreeSet::from(["face_q".to_owned(), "vertex_other".to_owned()]);
+    let some = parse_with(text.as_bytes(), Some(&requested)).unwrap();
     assert_eq!(some.attributes, [expected[1].clone()].map(|(name, values)| (name.to_owned(), values)).into());
     assert_eq!((some.positions, some.triangles), (mesh.positions, mesh.triangles));
 }

@@ -34,9 +34,9 @@ impl Blocks {
         }
     }
 
-    /// The mean of the tests over that of the reference, and the ends of its 95 % confidence interval; `None` for a black reference or a
-    /// single block. Under the hypothesis of no bias the differences of blocks are independent and centred, so that the variance of their
-    /// sum is the sum of their squares; it holds the reference's noise too.
+    /// The mean of the tests over that of the reference, and the ends of its 95 % confidence interval; `None` for a
+    /// black reference or a single block. Under the hypothesis of no bias the differences of blocks are independent and
+    /// centred, so that the variance of their sum is the sum of their squares; it holds the reference's noise too.
     pub(super) fn ratio(&self) -> Option<[f64; 3]> {
         let n = self.differences.len() as f64;
         if n < 2.0 || !(self.reference > 0.0) {

@@ -30,8 +30,8 @@ impl External {
         };
         needs("{out}", "the EXR file that it shall write")?;
         match budgets.first() {
-            Some(Budget::Seconds(_)) => needs("{seconds}", "the time that it may take, which --times asks for")?,
-            _ => needs("{spp}", "the samples per pixel, which --spp asks for")?,
+            Some(Budget::Seconds(_)) => needs("{seconds}", "the time that it may take, of --times")?,
+            _ => needs("{spp}", "the samples per pixel, of --spp")?,
         }
         Ok(Self { name: name.to_owned(), template: template.to_owned(), scene: scene.to_owned() })
     }
@@ -43,16 +43,16 @@ impl External {
         let out = folder.path().join("out.exr");
         let line = self.line(&out, budget, seed);
         let ended = child::run(Command::new("sh").args(["-c", &line]), None, stop).map_err(failed)?;
-        let Some(Ended { status, seconds: process_seconds, said, complained }) = ended else { return Ok(None) };
+        let Some(Ended { status, seconds: process_seconds, stdout, stderr }) = ended else { return Ok(None) };
         if !status.success() || !out.exists() {
             let what = if status.success() { "it wrote no {out}".to_owned() } else { status.to_string() };
-            return Err(failed(format!("{what}; command: {line}; its messages end in: {complained}")));
+            return Err(failed(format!("{what}; command: {line}; its messages end in: {stderr}")));
         }
         let image = read_exr(&out).map_err(|e| failed(e.to_string()))?;
-        let told = Told::in_text(&said);
-        let spp = told.spp.or(if let Budget::Spp(spp) = budget { Some(spp) } else { None });
+        let printed = PrintedStatistics::in_text(&stdout);
+        let spp = printed.spp.or(if let Budget::Spp(spp) = budget { Some(spp) } else { None });
         Ok(Some(Measured {
-            seconds: told.seconds.unwrap_or(process_seconds),
+            seconds: printed.seconds.unwrap_or(process_seconds),
             process_seconds: Some(process_seconds),
             spp,
             samples: spp.map(|spp| u64::from(spp) * image.crop.area()),
@@ -73,21 +73,22 @@ impl External {
     }
 }
 
-/// What a renderer says of itself on standard output, as JSON.
+/// Statistics that a renderer prints to standard output as JSON.
 #[derive(Debug, Default, PartialEq)]
-struct Told {
+struct PrintedStatistics {
     /// Seconds of the render without what comes before.
     seconds: Option<f64>,
     /// Samples per pixel done.
     spp: Option<u32>,
 }
 
-impl Told {
-    /// In the whole text or in one of its lines: our own statistics, or an object with `runs`, whose last has `render_s`.
+impl PrintedStatistics {
+    /// In the whole text or in one of its lines: our own statistics, or an object with `runs`, whose last has
+    /// `render_s`.
     fn in_text(text: &str) -> Self {
         let objects = std::iter::once(text).chain(text.lines().filter(|line| line.starts_with('{')));
         let values = objects.filter_map(|object| serde_json::from_str::<Value>(object).ok());
-        values.map(|value| Self::in_value(&value)).find(|told| told.seconds.is_some()).unwrap_or_default()
+        values.map(|value| Self::in_value(&value)).find(|printed| printed.seconds.is_some()).unwrap_or_default()
     }
 
     fn in_value(value: &Value) -> Self {
@@ -146,11 +147,11 @@ mod tests {
 
     #[test]
     fn statistics_are_read_from_standard_output() {
-        let told = |seconds, spp| Told { seconds: Some(seconds), spp: Some(spp) };
-        assert_eq!(Told::in_text("{\n \"render_seconds\": 1.5,\n \"spp\": 16\n}\n"), told(1.5, 16));
+        let printed = |seconds, spp| PrintedStatistics { seconds: Some(seconds), spp: Some(spp) };
+        assert_eq!(PrintedStatistics::in_text("{\n \"render_seconds\": 1.5,\n \"spp\": 16\n}\n"), printed(1.5, 16));
         let line = "noise\n{\"load_s\": 1, \"runs\": [{\"render_s\": [9]}, {\"render_s\": [0.25, 0.3], \"eff_spp\": 16.4}]}\n";
-        assert_eq!(Told::in_text(line), told(0.25, 16));
-        assert_eq!(Told::in_text("{}\n{ broken"), Told::default());
-        assert_eq!(Told::in_text("Rendering 4 s"), Told::default());
+        assert_eq!(PrintedStatistics::in_text(line), printed(0.25, 16));
+        assert_eq!(PrintedStatistics::in_text("{}\n{ broken"), PrintedStatistics::default());
+        assert_eq!(PrintedStatistics::in_text("Rendering 4 s"), PrintedStatistics::default());
     }
 }

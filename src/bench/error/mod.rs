@@ -1,6 +1,7 @@
 //! Error against time: variants of a render, and other renderers, beside a reference, in one run.
 //!
-//! Repeats go over all variants in turn, each with a seed of its own, so that whatever else the machine does falls on all alike.
+//! Repeats go over all variants in turn, each with a seed of its own, so that whatever else the machine does falls on
+//! all alike.
 
 mod bias;
 mod external;
@@ -38,8 +39,8 @@ struct Reference {
     floor: [f64; 3],
 }
 
-/// Measures the error of every variant with every budget. `after` is given what there is after each repeat; a run that is ended early gives
-/// what there is.
+/// Measures the error of every variant with every budget. `after` is given what there is after each repeat; a run that
+/// is ended early gives what there is.
 ///
 /// # Errors
 /// If a render or an external command fails, or a picture is of another size than the reference.
@@ -117,7 +118,8 @@ fn reference(program: &Program, options: &ErrorOptions, watch: &dyn Watch) -> Re
     Ok(Some(Reference { image: mean, info, floor: differences }))
 }
 
-/// The mean of two pictures, and its errors (MSE, relMSE, trimmed relMSE): independent halves differ by four times its variance.
+/// The mean of two pictures, and its errors (MSE, relMSE, trimmed relMSE): independent halves differ by four times its
+/// variance.
 fn mean_of_halves(a: &Image, b: &Image) -> Result<(Image, [f64; 3])> {
     let mut mean = a.clone();
     for (layer, other) in mean.layers.iter_mut().zip(&b.layers) {

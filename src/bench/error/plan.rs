@@ -14,7 +14,8 @@ use crate::film::Image;
 use crate::render::{self, Settings, Silent};
 use crate::scene::Scene;
 
-/// A render may turn out this many times as fast as its first sample before the number of samples ends it and not the time.
+/// A render may turn out this many times as fast as its first sample before the number of samples ends it and not the
+/// time.
 const HEADROOM: f64 = 4.0;
 
 /// What a render may take.
@@ -73,12 +74,12 @@ pub enum Standard {
     Halves,
 }
 
-/// What is asked of the benchmark.
+/// Options of the benchmark.
 #[derive(Clone, Debug)]
 pub struct ErrorOptions {
     /// The scene's name.
     pub scene: String,
-    /// The command that asks.
+    /// The command line.
     pub command: String,
     /// What is compared; the first must be ours unless there is a reference.
     pub variants: Vec<Variant>,

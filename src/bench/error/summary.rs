@@ -18,7 +18,7 @@ pub struct ErrorReport {
     pub scene: String,
     /// What was rendered against.
     pub reference: ReferenceInfo,
-    /// Repetitions asked for.
+    /// Repetitions requested.
     pub repeats: usize,
     /// Whether it ended before the last of them.
     pub interrupted: bool,
@@ -26,7 +26,7 @@ pub struct ErrorReport {
     pub variants: Vec<VariantReport>,
     /// The time that each takes to the same error.
     pub equal_error: Option<EqualError>,
-    /// What rendering takes beyond tracing, if asked for.
+    /// What rendering takes beyond tracing, if requested.
     pub tax: Option<TaxReport>,
     /// For the viewer.
     #[serde(skip)]
@@ -95,7 +95,8 @@ pub struct Point {
 pub struct Bias {
     /// The ratio.
     pub ratio: f64,
-    /// Lower end of its 95 % confidence interval, from the differences of blocks of 8 x 8 pixels summed over the repeats.
+    /// Lower end of its 95 % confidence interval, from the differences of blocks of 8 x 8 pixels summed over the
+    /// repeats.
     pub low: f64,
     /// Upper end.
     pub high: f64,
@@ -139,8 +140,8 @@ pub struct Run {
 pub struct EqualError {
     /// The smallest that every variant reached.
     pub relmse: f64,
-    /// Seconds by variant, between the points measured on straight lines of the logarithms; where a variant was better from the start, what
-    /// its first point says for a slope of -1.
+    /// Seconds by variant, between the points measured on straight lines of the logarithms; where a variant was better
+    /// from the start, what follows from its first point with a slope of -1.
     pub seconds: Vec<Option<f64>>,
 }
 

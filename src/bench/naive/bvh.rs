@@ -1,4 +1,5 @@
-//! The bounding volume hierarchy of a course report: halved along the longest axis by centre, both children visited in no order.
+//! The bounding volume hierarchy of a course report: halved along the longest axis by centre, both children visited in
+//! no order.
 
 use super::search::{Search, bounds_of, center, triangle_bounds};
 use super::{Forest, MeshTree};
@@ -36,8 +37,8 @@ impl<'g> NaiveBvh<'g> {
         Self(Forest::new(geometry, "naive BVH", |mesh: &Mesh| Tree::new(mesh, false)))
     }
 
-    /// The same with the slip of a report: a leaf of n triangles from place i on tests i triangles from place n on. Those are its own and
-    /// most of the others; only the first leaf is lost.
+    /// The same with the slip of a report: a leaf of n triangles from place i on tests i triangles from place n on.
+    /// Those are its own and most of the others; only the first leaf is lost.
     pub fn with_wrong_leaves(geometry: &'g Geometry) -> Self {
         Self(Forest::new(geometry, "naive BVH, wrong leaves", |mesh: &Mesh| Tree::new(mesh, true)))
     }

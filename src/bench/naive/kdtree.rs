@@ -1,4 +1,5 @@
-//! The kd-tree of a course report: axes in turn, split at the median of the lower bounds, both children visited even after a near hit.
+//! The kd-tree of a course report: axes in turn, split at the median of the lower bounds, both children visited even
+//! after a near hit.
 
 use super::search::{Search, bounds_of, triangle_bounds};
 use super::{Forest, MeshTree};

@@ -1,4 +1,5 @@
-//! The search of every triangle as a course framework has it: each test multiplies three matrices for each of three corners.
+//! The search of every triangle as a course framework has it: each test multiplies three matrices for each of three
+//! corners.
 
 use std::hint::black_box;
 
@@ -13,7 +14,8 @@ pub struct MatrixLinear<'g>(Forest<'g, Triangles>);
 
 struct Triangles {
     corners: Vec<[Vec3; 3]>,
-    /// The mesh's place: translation, rotation, scale. All are one, so that the answers stay those of the other accelerators.
+    /// The mesh's place: translation, rotation, scale. All are one, so that the answers stay those of the other
+    /// accelerators.
     place: [Matrix; 3],
 }
 

@@ -1,4 +1,4 @@
-//! Accelerators as course reports wrote them, to tell what the tree itself brings and what the care taken with it.
+//! Accelerators as in course reports, to separate the gain of the tree itself from that of its optimisation.
 //!
 //! They are built over the triangles of the meshes in the world, one tree for each mesh, with boxed children, visited
 //! recursively or through a queue. They test triangles with the function that all other accelerators use, so their

@@ -1,4 +1,5 @@
-//! The octree of a course report: eight equal cells, triangles in every cell that their box overlaps, a queue, no order.
+//! The octree of a course report: eight equal cells, triangles in every cell that their box overlaps, a queue, no
+//! order.
 
 use std::collections::VecDeque;
 

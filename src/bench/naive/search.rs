@@ -12,7 +12,8 @@ pub struct Search<'g> {
     pub shape: ShapeId,
     /// The closest hit so far.
     pub best: Option<Hit>,
-    /// The ray, which ends one float beyond the best hit, so that a hit which rounds to the same distance takes part in the tie.
+    /// The ray, which ends one float beyond the best hit, so that a hit which rounds to the same distance is compared
+    /// as a tie.
     pub ray: Ray,
     /// Triangles tested.
     pub tests: u64,

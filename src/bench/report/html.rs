@@ -26,7 +26,7 @@ pub fn escape(text: &str) -> String {
     printable::lines(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
 }
 
-/// A page down to the line that says where it was measured.
+/// A page down to the line with the machine of the measurement.
 pub fn begin(title: &str, header: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
@@ -106,7 +106,8 @@ fn rates(scene: &SceneReport, kinds: &[RayKind]) -> Vec<Series> {
     series
 }
 
-/// Time to build and then trace a number of rays, on one thread each, with the numbers at which one accelerator overtakes another.
+/// Time to build and then trace a number of rays, on one thread each, with the numbers at which one accelerator
+/// overtakes another.
 fn break_even(scene: &SceneReport, kind: RayKind) -> Result<Option<(String, String)>> {
     let mut lines = Vec::new();
     for accel in &scene.accels {

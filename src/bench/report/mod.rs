@@ -22,7 +22,7 @@ pub struct Report {
     pub command: String,
     /// One for each scene.
     pub scenes: Vec<SceneReport>,
-    /// Cost over the number of triangles, if asked for.
+    /// Cost over the number of triangles, if requested.
     pub scaling: Option<ScalingReport>,
 }
 

@@ -107,7 +107,8 @@ fn bars_over(groups: &[&str], series: &[Series], unit: &str, label: fn(f64) -> f
     Ok(svg)
 }
 
-/// The colour of an accelerator in every plot, paler for its batches, if `name` begins with one; of the `nth` curve otherwise.
+/// The colour of an accelerator in every plot, paler for its batches, if `name` begins with one; of the `nth` curve
+/// otherwise.
 fn color(name: &str, nth: usize) -> RGBAColor {
     let accel = name.split([',', ' ']).next().unwrap_or(name);
     let index = AccelKind::CHOICES.iter().position(|(choice, _)| *choice == accel).unwrap_or(nth);

@@ -7,7 +7,7 @@ use super::html::{self, add_table, escape, figure};
 use super::markdown::{self, Table, range};
 use super::plot::{self, Series};
 use super::write_files;
-use crate::bench::{Comparison, ReportsReport, Row};
+use crate::bench::{Comparison, ComparisonRow, ReportsReport};
 use crate::error::{Error, Result};
 
 const TITLE: &str = "What reports say of accelerators, repeated";
@@ -82,7 +82,7 @@ fn add_list(out: &mut String, lines: &[String]) {
 }
 
 /// How many times faster than the first accelerator each is, within the accelerator.
-fn times_faster(comparison: &Comparison, accel_seconds: fn(&Row) -> f64) -> Vec<f64> {
+fn times_faster(comparison: &Comparison, accel_seconds: fn(&ComparisonRow) -> f64) -> Vec<f64> {
     let first = comparison.rows.first().map_or(f64::NAN, accel_seconds);
     comparison.rows.iter().map(|row| first / accel_seconds(row)).collect()
 }
@@ -90,7 +90,8 @@ fn times_faster(comparison: &Comparison, accel_seconds: fn(&Row) -> f64) -> Vec<
 fn ratios(comparison: &Comparison) -> Result<String> {
     let kinds = [times_faster(comparison, |row| row.normals.accel_seconds), times_faster(comparison, |row| row.paths.accel_seconds)];
     let bar = |ratio: f64| Some([ratio; 3]).filter(|_| ratio.is_finite() && ratio > 0.0);
-    let series = |(i, row): (usize, &Row)| Series { name: row.name.clone(), values: kinds.iter().map(|kind| bar(kind[i])).collect() };
+    let series =
+        |(i, row): (usize, &ComparisonRow)| Series { name: row.name.clone(), values: kinds.iter().map(|kind| bar(kind[i])).collect() };
     let series: Vec<_> = comparison.rows.iter().enumerate().map(series).collect();
     plot::log_bars(&["normals", "path traced"], &series, "times faster")
 }

@@ -51,7 +51,7 @@ impl Kind {
                 { "type": "environment", "radiance": [0.4, 0.45, 0.5] },
                 { "type": "directional", "direction": [-0.4, 0.6, -1], "irradiance": [2, 1.9, 1.7] }
             ]);
-            // Of two triangles: accelerators of the reports know no other shapes.
+            // Of two triangles: accelerators of the reports support no other shapes.
             if let Some(shapes) = scene["shapes"].as_array_mut() {
                 shapes.push(json!({
                     "type": "mesh", "triangles": [[0, 1, 2], [0, 2, 3]],

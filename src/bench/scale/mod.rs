@@ -1,7 +1,7 @@
 //! Time and memory as scenes and pictures grow.
 //!
-//! Every case runs in a process of its own, so that its memory is not that of an earlier one; repeats go over all cases in turn, so that
-//! whatever else the machine does falls on all alike.
+//! Every case runs in a process of its own, so that its memory is not that of an earlier one; repeats go over all cases
+//! in turn, so that whatever else the machine does falls on all alike.
 
 mod plan;
 mod quantity;
@@ -20,11 +20,12 @@ use super::child::{self, Ended};
 use super::{Machine, Watch};
 use crate::error::{Error, Result};
 
-/// Measures all sweeps. `program` is started for each case with the case as JSON on its standard input, and answers with what [`run_case`]
-/// gives, as JSON. `after` is given what there is after each sweep of each repeat; a run that is ended early gives what there is.
+/// Measures all sweeps. `program` is started for each case with the case as JSON on its standard input, and answers
+/// with what [`run_case`] gives, as JSON. `after` is given what there is after each sweep of each repeat; a run that is
+/// ended early gives what there is.
 ///
 /// # Errors
-/// If a sweep does not exist, or what `after` says. A case that fails is part of the report.
+/// If a sweep does not exist, or the error of `after`. A case that fails is part of the report.
 pub fn bench_scale(
     options: &ScaleOptions,
     program: impl Fn() -> Command,
@@ -61,13 +62,13 @@ pub fn bench_scale(
 fn in_a_process(mut program: Command, case: &Case, stop: &AtomicBool) -> Result<Option<Measured>> {
     let failed = |message: String| Error::Internal(message);
     let case = serde_json::to_string(case).map_err(|e| failed(e.to_string()))?;
-    let Some(Ended { status, said, complained, .. }) = child::run(&mut program, Some(&case), stop).map_err(failed)? else {
+    let Some(Ended { status, stdout, stderr, .. }) = child::run(&mut program, Some(&case), stop).map_err(failed)? else {
         return Ok(None);
     };
     if !status.success() {
-        return Err(failed(format!("{status}: {complained}")));
+        return Err(failed(format!("{status}: {stderr}")));
     }
-    serde_json::from_str(&said).map(Some).map_err(|e| failed(format!("no answer: {e}")))
+    serde_json::from_str(&stdout).map(Some).map_err(|e| failed(format!("no result: {e}")))
 }
 
 #[cfg(test)]

@@ -7,12 +7,12 @@ use crate::accel::AccelKind;
 use crate::desc::{LayerKind, MAX_SIDE};
 use crate::error::{Error, Result};
 
-/// What is asked of the benchmark.
+/// Options of the benchmark.
 #[derive(Clone, Debug)]
 pub struct ScaleOptions {
     /// The command, for the report.
     pub command: String,
-    /// Names of sweeps; none stands for all.
+    /// Names of sweeps; all if empty.
     pub sweeps: Vec<String>,
     /// Smaller scenes and pictures.
     pub quick: bool,
@@ -91,7 +91,7 @@ pub(super) struct Sweep {
     pub columns: &'static [Quantity],
     /// Of them those that a power law is fitted to.
     pub fitted: &'static [Quantity],
-    /// The place on the axis, the name of it if a number says too little, and the case.
+    /// The place on the axis, a label where a number is not enough, and the case.
     pub cases: Vec<(f64, Option<String>, Case)>,
 }
 
@@ -113,7 +113,7 @@ const INSTANCED: [usize; 2] = [2_000, 20_000];
 /// Depth, where that is not what grows.
 const DEPTH: u32 = 8;
 
-/// The sweeps that are asked for.
+/// The sweeps requested.
 ///
 /// # Errors
 /// [`Error::Usage`] for a name that none has.
@@ -122,8 +122,8 @@ pub(super) fn sweeps(options: &ScaleOptions) -> Result<Vec<Sweep>> {
         let known: Vec<&str> = SWEEPS.iter().map(|(known, _)| *known).collect();
         return Err(Error::Usage(format!("there is no sweep \"{name}\"; there are {}", known.join(", "))));
     }
-    let wanted = |name: &str| options.sweeps.is_empty() || options.sweeps.iter().any(|sweep| sweep == name);
-    Ok(SWEEPS.iter().filter(|(name, _)| wanted(name)).map(|(name, axis)| sweep(name, axis, options)).collect())
+    let selected = |name: &str| options.sweeps.is_empty() || options.sweeps.iter().any(|sweep| sweep == name);
+    Ok(SWEEPS.iter().filter(|(name, _)| selected(name)).map(|(name, axis)| sweep(name, axis, options)).collect())
 }
 
 fn sweep(name: &'static str, axis: &'static str, options: &ScaleOptions) -> Sweep {

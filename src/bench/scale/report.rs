@@ -31,7 +31,7 @@ pub struct ScaleReport {
     pub machine: Machine,
     /// The command that ran it.
     pub command: String,
-    /// Repeats asked for.
+    /// Repeats requested.
     pub repeats: usize,
     /// Whether it ended before the last of them.
     pub interrupted: bool,
@@ -59,7 +59,7 @@ pub struct SweepReport {
 pub struct PointReport {
     /// How much of what grows.
     pub at: f64,
-    /// That in words, where a number says too little.
+    /// A label, where a number is not enough.
     pub label: Option<String>,
     /// What is rendered, and how.
     pub case: Case,

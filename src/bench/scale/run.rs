@@ -1,4 +1,5 @@
-//! One case: made, loaded, built, rendered. In a process of its own, for a process never forgets how much memory it once held.
+//! One case: made, loaded, built, rendered. In a process of its own, for a process never forgets how much memory it
+//! once held.
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -45,7 +46,7 @@ pub struct Measured {
     pub accelerator_bytes: u64,
     /// Bytes of the film for each pixel.
     pub film_bytes_per_pixel: u64,
-    /// Memory of the process; none where the system does not say.
+    /// Memory of the process; none where the system does not provide it.
     pub memory: Option<Memory>,
 }
 

@@ -13,7 +13,7 @@ use crate::math::Rng;
 /// The name of the mesh that a scene is about.
 const MESH: &str = "generated.ply";
 
-/// From so many segments on, paths end by chance: never, so that the depth is what is asked for.
+/// The depth of Russian roulette: none, so that paths have the requested depth.
 const NO_ROULETTE: u32 = u32::MAX;
 
 /// The scene of a case, as if it had been read from a file.

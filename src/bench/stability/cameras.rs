@@ -67,7 +67,8 @@ fn k1_thin_lens(effort: Effort) -> Outcome {
         let film = film_point(&mut rng);
         let pinhole = sharp.ray(film, SIZE, [0.5; 2], 0.0);
         let focus = at_depth(&pose, &pinhole, lens.focus_distance);
-        // Rounding of the origin, of the direction over the distance, and of the pinhole's ray likewise; seen along the view axis.
+        // Rounding of the origin, of the direction over the distance, and of the pinhole's ray likewise; seen along the
+        // view axis.
         let slant = focus.length() / lens.focus_distance;
         let unit = UNIT_ROUNDOFF * slant * (pose.translation.length() + lens.radius + 2.0 * focus.length());
         for _ in 0..20 {
@@ -199,7 +200,8 @@ fn k3_pixel_cones(effort: Effort) -> Outcome {
         .at_most("relative error of the width, environment", environment, 1e-3)
 }
 
-/// A black card, one wide, that goes from x = -1 to 1 in unit time before a white sky, or a camera that goes the other way; 4 wide.
+/// A black card, one wide, that goes from x = -1 to 1 in unit time before a white sky, or a camera that goes the other
+/// way; 4 wide.
 fn passing_card(shutter: [f64; 2], camera_moves: bool, spp: u32) -> Value {
     let way = |from: f64, to: f64| {
         let key = |time: f64, x: f64| json!({ "time": time, "transform": [{ "translate": [x, 0, 0] }] });
@@ -225,7 +227,8 @@ fn passing_card(shutter: [f64; 2], camera_moves: bool, spp: u32) -> Value {
 const COLUMNS: usize = 64;
 const ROWS: usize = 8;
 
-/// The share of the column's samples that the card covers: an integral over its width of the time that the card is over each point.
+/// The share of the column's samples that the card covers: an integral over its width of the time that the card is over
+/// each point.
 fn exact_coverage(column: usize, shutter: [f64; 2]) -> f64 {
     const STEPS: usize = 1024;
     let over = |x: f64| {

@@ -184,7 +184,8 @@ pub fn ids(hit: &Hit) -> (u32, u32, u32) {
     (hit.instance.0, hit.shape.0, hit.prim.0)
 }
 
-/// The largest distance along an axis from the origin of `ray` to a corner of the triangle hit, in its own space; zero on analytic shapes.
+/// The largest distance along an axis from the origin of `ray` to a corner of the triangle hit, in its own space; zero
+/// on analytic shapes.
 pub fn reach(geometry: &Geometry, ray: &Ray, hit: &Hit) -> f64 {
     let Shape::Mesh(mesh) = geometry.shape(hit.shape) else { return 0.0 };
     let points = mesh.triangle_points(hit.prim);

@@ -1,7 +1,7 @@
 //! Numerical stability: a catalogue of checks with criteria, which `steradian bench stability` and the tests run alike.
 //!
 //! Each group has its file: a `checks!` list of ids, names and set-ups, and below it one function for each check, which
-//! measures and says what the numbers must be.
+//! measures numbers and sets their bounds.
 
 pub mod geometry;
 pub mod oracle;
@@ -141,10 +141,10 @@ pub fn choose(names: &[String]) -> Result<Vec<&'static Check>> {
             return Err(Error::Usage(format!("no check is called {name:?}; --list shows them; groups are {}", groups.join(", "))));
         }
     }
-    let wanted = |check: &&Check| {
+    let selected = |check: &&Check| {
         names.is_empty() || names.iter().any(|name| check.id == name || check.id.trim_end_matches(char::is_numeric) == name)
     };
-    Ok(catalogue().filter(wanted).collect())
+    Ok(catalogue().filter(selected).collect())
 }
 
 impl Check {
@@ -160,8 +160,8 @@ impl Check {
     }
 }
 
-/// Runs checks one after the other, all but those in `kept`, which stand for themselves; ends early if `watch` says so. `after` is given
-/// what there is after each.
+/// Runs checks one after the other, all but those in `kept`, whose results are reused; ends early if `watch` is
+/// stopped. `after` is given what there is after each.
 ///
 /// # Errors
 /// Those of `after`.

@@ -85,7 +85,7 @@ impl ExactTransform {
     }
 }
 
-/// What the oracle says about a ray.
+/// The oracle's result for a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
     /// It meets nothing.
@@ -101,7 +101,7 @@ pub enum Answer {
     Undecidable,
 }
 
-/// The surface a shape stands for.
+/// The surface of a shape.
 #[derive(Clone, Copy, Debug)]
 enum Surface {
     /// `round (x² + y²) + z_squared z² + z_linear z + constant = 0` between two heights.
@@ -237,7 +237,8 @@ impl Case {
         }
     }
 
-    /// A point beside the silhouette as seen along `d`, inside by `depth`; `None` if there is none at a height chosen at random.
+    /// A point beside the silhouette as seen along `d`, inside by `depth`; `None` if there is none at a height chosen
+    /// at random.
     pub fn near_silhouette(&self, rng: &mut Rng, d: DVec3, depth: f64) -> Option<DVec3> {
         let target = self.sample(rng);
         let (rho, n_z) = (target.p.x.hypot(target.p.y), target.n.z);

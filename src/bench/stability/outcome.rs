@@ -14,7 +14,7 @@ pub enum Bound {
     AtLeast(f64),
     /// Between these, inclusive.
     Within(f64, f64),
-    /// Anything: the number is told, not judged.
+    /// Anything: the number is reported, not judged.
     Any,
 }
 
@@ -47,7 +47,7 @@ pub struct Measure {
 pub enum Status {
     /// Every number keeps its bound.
     Passed,
-    /// Every number keeps a bound that is weaker than one would wish, for a reason that is told.
+    /// Every number keeps a bound that is weaker than one would wish, for a reason that is reported.
     Short,
     /// A number breaks its bound.
     Failed,
@@ -117,13 +117,13 @@ impl Outcome {
         self.with(what, count as f64, Bound::AtMost(0.0))
     }
 
-    /// A number to tell.
+    /// A number without a bound.
     #[must_use]
-    pub fn tell(self, what: impl Into<String>, value: f64) -> Self {
+    pub fn record(self, what: impl Into<String>, value: f64) -> Self {
         self.with(what, value, Bound::Any)
     }
 
-    /// Says why a bound is weaker than one would wish.
+    /// Sets the reason why a bound is weaker than desired.
     #[must_use]
     pub fn short(mut self, cause: impl Into<String>) -> Self {
         self.shortfalls.push(cause.into());

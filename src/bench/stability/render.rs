@@ -41,7 +41,8 @@ pub fn render(scene: &Value) -> Image {
     render_with(&prepare(scene, &Overrides { threads: Some(2), ..Overrides::default() }), AccelKind::EMBREE).image
 }
 
-/// A scene with a camera at `position` looking at `look_at` through a very narrow angle, so that all pixels see nearly one point.
+/// A scene with a camera at `position` looking at `look_at` through a very narrow angle, so that all pixels see nearly
+/// one point.
 pub fn probe(position: [f64; 3], look_at: [f64; 3], rest: Value) -> Value {
     let mut scene = json!({
         "film": { "width": 16, "height": 16, "filter": { "type": "box" } },

@@ -84,8 +84,8 @@ impl StabilityReport {
         Ok(out)
     }
 
-    /// Writes `stability.json`, `stability.md` and `stability.html` into a folder, which is made if it does not exist, and below it
-    /// `evidence/` with the pictures of checks that failed.
+    /// Writes `stability.json`, `stability.md` and `stability.html` into a folder, which is made if it does not exist,
+    /// and below it `evidence/` with the pictures of checks that failed.
     ///
     /// # Errors
     /// [`Error::Output`] naming the file.
@@ -111,8 +111,8 @@ impl StabilityReport {
         self.checks.iter().map(line).collect()
     }
 
-    /// The checks of an earlier run of this version that left `stability.json` in a folder, those that failed excepted; none if there is no
-    /// such file.
+    /// The checks of an earlier run of this version that left `stability.json` in a folder, those that failed excepted;
+    /// none if there is no such file.
     pub fn kept(folder: &Path, effort: Effort) -> Vec<CheckReport> {
         let report = std::fs::read(folder.join(JSON)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
         let Some(report) = report else { return Vec::new() };

@@ -223,11 +223,11 @@ fn s6_decorrelation(effort: Effort) -> Outcome {
             .collect();
         let largest = found.iter().fold(0f64, |m, c| m.max(c.abs())) * f64::from(count).sqrt();
         let mean_square = found.iter().map(|c| c * c).sum::<f64>() * f64::from(count) / found.len() as f64;
-        // Of so many independent numbers; the catalogue's 4 would be passed by chance in one of 36 seeds.
+        // Of `found.len()` independent numbers; the catalogue's 4 would be passed by chance in one of 36 seeds.
         let limit = -Normal::standard().inverse_cdf(0.5 * sidak_level(found.len()));
         outcome = outcome
             .at_most(format!("largest of {} correlations in 1 / sqrt({count}), {kind:?}", found.len()), largest, limit)
-            .tell(format!("their root mean square, {kind:?}"), mean_square.sqrt());
+            .record(format!("their root mean square, {kind:?}"), mean_square.sqrt());
     }
     outcome
 }
@@ -296,7 +296,7 @@ fn s7_convergence(effort: Effort) -> Outcome {
     })
 }
 
-/// Mean over pixels of the mean of so many samples, and its squared standard error.
+/// Mean over pixels of the mean of a number of samples, and its squared standard error.
 fn mean_over_pixels(sampler: Sampler, integrand: &Integrand, samples: u32, pixels: u32) -> (f64, f64) {
     let of_pixel = |pixel: u32| {
         (0..samples).map(|i| (integrand.f)(sampler.sample_4d(sampler.pixel(pixel, 3), i, 0))).sum::<f64>() / f64::from(samples)
@@ -329,5 +329,5 @@ fn s8_seeds_and_counts(effort: Effort) -> Outcome {
             p_values.iter().copied().fold(1.0, f64::min),
             sidak_level(p_values.len()),
         )
-        .tell("largest relative error of a mean", relative)
+        .record("largest relative error of a mean", relative)
 }

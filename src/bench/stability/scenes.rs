@@ -1,4 +1,4 @@
-//! Scenes, rays at them, every way to ask for hits, and when two hits are the same: for checks that compare accelerators.
+//! Scenes, rays at them, every kind of query, and when two hits are the same: for checks that compare accelerators.
 
 use super::geometry::{
     Rng, cube, grid, instances, meshes, placed_analytic_shapes, ray, ray_through, reach, soup, sphere_mesh, transform, world,
@@ -252,7 +252,7 @@ pub fn camera_rays(geometry: &Geometry, resolution: usize) -> Vec<Ray> {
 
 /// Whether two hits of `ray` are the same within rounding: 8 ulp of t, and over the cosine with the surface 4 roundoffs
 /// of the reach and the error with which an accelerator may see the surface (in the space of an instance rays are
-/// rounded anew).
+/// rounded again).
 pub fn same(geometry: &Geometry, ray: &Ray, a: &Hit, b: &Hit) -> bool {
     let length = f64::from(ray.direction.length());
     let slack = |hit: &Hit| {

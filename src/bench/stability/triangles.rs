@@ -60,8 +60,8 @@ struct Tally {
 }
 
 impl Tally {
-    /// Counts the rays that every accelerator loses, by closest and by any hit. Each must hit something. The linear one is slow and gets
-    /// every eighth.
+    /// Counts the rays that every accelerator loses, by closest and by any hit. Each must hit something. The linear one
+    /// is slow and gets every eighth.
     fn trace(&mut self, accels: &[Named], rays: &[Ray]) {
         self.rays += rays.len();
         for (name, accel) in accels {
@@ -189,7 +189,8 @@ fn a4_edges(effort: Effort) -> Outcome {
             let center = DVec3::new(0.7, -0.4, 0.6) * offset * scale;
             let mesh = sphere_mesh(center, 2.0 * scale, 48, 24);
             let geometry = meshes(vec![mesh.clone()]);
-            // At the largest offset a sphere is a few floats wide: rays start in the middle, the one point that is inside for sure.
+            // At the largest offset a sphere is a few floats wide: rays start in the middle, the one point that is
+            // inside for sure.
             let next = || {
                 let [a, b, _] = corners(&mesh, rng.below(mesh.triangles().len()));
                 ray_through(center, a.lerp(b, rng.unit()))
@@ -207,7 +208,8 @@ fn a5_vertices(effort: Effort) -> Outcome {
     let geometry = meshes(vec![sphere.clone()]);
     let next = || {
         let p = sphere.positions()[rng.below(sphere.positions().len())];
-        // From the centre the ray passes exactly through the vertex; from elsewhere up to the rounding of the direction.
+        // From the centre the ray passes exactly through the vertex; from elsewhere up to the rounding of the
+        // direction.
         let from = if rng.unit() < 0.5 { DVec3::ZERO } else { 0.5 * rng.cube() };
         ray_through(from, DVec3::from_array(p.map(f64::from)))
     };
@@ -287,16 +289,18 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
     Outcome::new()
         .at_least("rays", f64::from(rays), 1_000.0)
         .none("missed by ours", missed)
-        // At 1e6 corners less the origin lie on a grid of 1/16, so that some rays meet corners exactly, of which Embree loses a few (A5).
+        // At 1e6 corners less the origin lie on a grid of 1/16, so that some rays meet corners exactly, of which Embree
+        // loses a few (A5).
         .at_most("fraction missed by Embree", missed_by_embree as f64 / f64::from(rays), 2e-5)
         .none("other triangles than the ray meets, ours", wrong)
         // Corners less the origin have one unit of roundoff, the edge functions made of them up to seven more.
         .at_most("embree: distance of the ray from the triangle found, units of roundoff of the origin", off, 8.0)
-        .tell("embree: fraction with another triangle than aimed at", other as f64 / f64::from(rays))
+        .record("embree: fraction with another triangle than aimed at", other as f64 / f64::from(rays))
         .short("Embree forms edge functions in f32 from corners less the origin, which are 0.03 units off at 1e6; the catalogue asks for 99.998 % right, which f32 rays cannot name")
 }
 
-/// The solid angle of a triangle seen from the origin (van Oosterom and Strackee, "The Solid Angle of a Plane Triangle").
+/// The solid angle of a triangle seen from the origin (van Oosterom and Strackee, "The Solid Angle of a Plane
+/// Triangle").
 fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     let [a, b, c] = [a, b, c].map(DVec3::normalize);
     2.0 * a.dot(b.cross(c)).abs().atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
@@ -314,7 +318,8 @@ fn a8_solid_angle(effort: Effort) -> Outcome {
         let exact = solid_angle(corners(&mesh, 0));
         let shift = rng.pair();
         let terms = (0..POINTS).map(|i| {
-            // The additive recurrence of the plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences").
+            // The additive recurrence of the plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom
+            // Sequences").
             let u = [0.754_877_666_246_693, 0.569_840_290_998_053].map(|step| f64::from(i) * step);
             let u = [0, 1].map(|k| (u[k] + f64::from(shift[k])).fract() as f32);
             points.sample(u).map_or(0.0, |s| {

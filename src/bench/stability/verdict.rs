@@ -14,7 +14,7 @@ pub(super) fn estimate(values: &[f64]) -> Estimate {
     Estimate { mean, error: (variance / n).sqrt() }
 }
 
-/// Two-sided p-value of Welch's test for means over so many values each, which may differ by `slack`.
+/// Two-sided p-value of Welch's test for means over `na` and `nb` values, which may differ by `slack`.
 pub(super) fn welch(a: Estimate, na: usize, b: Estimate, nb: usize, slack: f64) -> f64 {
     let (va, vb) = (a.error * a.error, b.error * b.error);
     let difference = ((a.mean - b.mean).abs() - slack).max(0.0);

@@ -165,7 +165,7 @@ fn options(arguments: &BenchAccelArgs) -> Options {
     }
 }
 
-/// What each accelerator says of one ray.
+/// The hit of each accelerator for one ray.
 fn replay(arguments: &BenchAccelArgs, ray: &str) -> Result<()> {
     let ray = parse_ray(ray).map_err(|message| Error::Usage(format!("--ray: {message}")))?;
     for path in &arguments.scenes {
@@ -188,7 +188,7 @@ fn show(path: &Path) -> String {
 pub struct Steps<'a> {
     /// The line.
     pub bar: ProgressBar,
-    /// Asks for the end.
+    /// Requests the end.
     pub interrupt: &'a Interrupt,
     /// Whether steps are lines, where there is no terminal.
     pub lines: bool,

@@ -125,7 +125,7 @@ fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>
     Ok(variants)
 }
 
-/// What is given, or once what the scene says.
+/// The values given, or else that of the scene.
 fn choices<T: Copy>(given: &[T]) -> Vec<Option<T>> {
     if given.is_empty() { vec![None] } else { given.iter().copied().map(Some).collect() }
 }
@@ -135,7 +135,7 @@ fn part<T>(given: &[T], name: Option<String>) -> Option<String> {
     name.filter(|_| given.len() > 1)
 }
 
-/// The name by which the scene format knows a value.
+/// The name of a value in the scene format.
 fn name(value: impl Serialize) -> Option<String> {
     match serde_json::to_value(value).ok()? {
         Value::String(name) => Some(name),

@@ -57,9 +57,9 @@ pub fn run(arguments: &BenchScaleArgs) -> Result<u8> {
 
 /// One case, as JSON on standard input; what it took goes to standard output.
 pub fn run_one() -> Result<()> {
-    let mut asked = String::new();
-    std::io::stdin().read_to_string(&mut asked).map_err(|e| Error::Usage(format!("{ONE_CASE}: {e}")))?;
-    let case: Case = serde_json::from_str(&asked).map_err(|e| Error::Usage(format!("{ONE_CASE}: {e}")))?;
+    let mut input = String::new();
+    std::io::stdin().read_to_string(&mut input).map_err(|e| Error::Usage(format!("{ONE_CASE}: {e}")))?;
+    let case: Case = serde_json::from_str(&input).map_err(|e| Error::Usage(format!("{ONE_CASE}: {e}")))?;
     let measured = run_case(&case)?;
     text::print(&serde_json::to_string(&measured).map_err(|e| Error::Internal(e.to_string()))?)
 }

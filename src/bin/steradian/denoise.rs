@@ -15,7 +15,8 @@ use crate::log::{self, Level};
 use crate::progress::Reporter;
 use crate::text;
 
-/// The denoiser of a render, if it is asked for: opened before the render, so that it is not missed after it.
+/// The denoiser of a render, if it is requested: opened before the render, so that a missing library is an error at the
+/// start.
 pub fn prepare(arguments: &RenderDenoiseArgs, settings: &mut Settings) -> Result<Option<Denoiser>> {
     if !arguments.denoise {
         return Ok(None);
@@ -36,7 +37,8 @@ pub struct Denoised {
     pub failure: Option<Error>,
 }
 
-/// Denoises a render's picture. If that fails, the picture is not lost: it is written as it is before the program ends with the failure.
+/// Denoises a render's picture. If that fails, the picture is not lost: it is written as it is before the program ends
+/// with the failure.
 pub fn finish(denoiser: Option<&Denoiser>, image: &mut Image, reporter: &Reporter) -> Denoised {
     let Some(denoiser) = denoiser else { return Denoised::default() };
     match denoise::denoise_image(denoiser, image) {
@@ -111,7 +113,7 @@ pub fn value(report: &Report, denoiser: &Denoiser) -> Value {
     })
 }
 
-/// What a user should know of a picture.
+/// Warnings about a picture.
 pub fn warnings(report: &Report) -> Vec<String> {
     let mut lines = report.notes.clone();
     let pixels = |count: u64| if count == 1 { "1 pixel was".to_owned() } else { format!("{count} pixels were") };

@@ -71,7 +71,8 @@ fn job(arguments: &JobArgs) -> Result<Job> {
         return Err(Error::Missing { file: arguments.scene.clone(), message: "no such scene".to_owned() });
     }
     let stem = arguments.scene.file_stem().map_or("picture".into(), |stem| stem.to_string_lossy().into_owned());
-    // A name for queues and folders: no place for a frame's number, no line break, no braces, which are the format's in a template.
+    // A name for queues and folders: no place for a frame's number, no line break, no braces, which are the format's in
+    // a template.
     let plain = |c: char| if printable::line(&c.to_string()) != c.to_string() || "{}".contains(c) { '_' } else { c };
     let name: String = stem.replace(['#', '%'], "").trim_matches('.').chars().map(plain).collect();
     let default = [PathBuf::from(format!("{name}.exr"))];
@@ -106,7 +107,7 @@ fn job(arguments: &JobArgs) -> Result<Job> {
     })
 }
 
-/// Options that render does not know are found before they fail on every node.
+/// Unknown options of render are found before they fail on every node.
 fn check_options(options: &[String]) -> Result<()> {
     let is_own = |option: &&String| OWN.iter().any(|own| *option == own || option.starts_with(&format!("{own}=")));
     if let Some(own) = options.iter().find(is_own) {

@@ -112,7 +112,8 @@ pub fn of_command(cli: &Cli, mut uses: FileUses) -> Result<()> {
     written.iter().filter(|(path, _)| !is_stdout(path)).try_for_each(|(path, purpose)| uses.write(path, *purpose))
 }
 
-/// Compares the files of a render, with those that the scene names; `outputs` and `shard` have names for all frames of a sequence.
+/// Compares the files of a render, with those that the scene names; `outputs` and `shard` have names for all frames of
+/// a sequence.
 pub fn of_render(arguments: &RenderArgs, shot: &Shot, outputs: &[OutputDesc], shard: Option<&Path>, mut uses: FileUses) -> Result<()> {
     if shot.unchecked.is_empty() {
         return Ok(());

@@ -19,7 +19,7 @@ use crate::{chain, exit_code, render, scene, skipped};
 
 /// What all frames of a run share.
 pub struct Session {
-    /// Tells progress.
+    /// Reports progress.
     pub reporter: Reporter,
     /// The files of every command.
     pub uses: FileUses,
@@ -42,7 +42,7 @@ impl Session {
         Ok(&self.interrupt)
     }
 
-    /// The exit code that a signal has asked for.
+    /// The exit code requested by a signal.
     fn interrupted(&self) -> Option<u8> {
         self.interrupt.stop.load(std::sync::atomic::Ordering::Relaxed).then(|| self.interrupt.exit_code())
     }
@@ -52,7 +52,7 @@ impl Session {
 pub struct Shot {
     /// The scene's file.
     pub scene: PathBuf,
-    /// What it says, for this frame.
+    /// Its arguments, for this frame.
     pub imported: Imported,
     /// The frame of a sequence.
     pub frame: Option<i64>,
@@ -61,7 +61,8 @@ pub struct Shot {
 }
 
 impl Shot {
-    /// The settings of this frame: its own files, and noise of its own, so that none stands still while the picture moves.
+    /// The settings of this frame: its own files, and noise of its own, so that none stands still while the picture
+    /// moves.
     pub fn adapt(&self, settings: &mut Settings) {
         let Some(frame) = self.frame else { return };
         settings.seed = settings.seed.wrapping_add_signed(frame);
@@ -75,7 +76,8 @@ impl Shot {
         self.frame.is_some() && !overwrite && settings.outputs.iter().all(|output| Path::new(&output.file).exists())
     }
 
-    /// The file of this frame of a sequence: its number goes where the name has a place for it, or before the extension.
+    /// The file of this frame of a sequence: its number goes where the name has a place for it, or before the
+    /// extension.
     pub fn file_of(&self, name: &Path) -> PathBuf {
         match (self.frame, name.to_str()) {
             (Some(frame), Some(text)) => file_of_frame(&with_frame_pattern(text), frame).into(),
@@ -83,7 +85,7 @@ impl Shot {
         }
     }
 
-    /// The file that a name with a place for the frame's number stands for.
+    /// The file of a name with a place for the frame's number.
     pub fn file(&self, name: &Path) -> PathBuf {
         match (self.frame, name.to_str()) {
             (Some(frame), Some(text)) => file_of_frame(text, frame).into(),
@@ -138,7 +140,7 @@ impl<'a> Sequence<'a> {
         if !skipped.is_empty() {
             let count =
                 if skipped.len() == 1 { "1 frame exists and is".to_owned() } else { format!("{} frames exist and are", skipped.len()) };
-            reporter.say(&format!("{count} skipped (--overwrite replaces files that exist)"));
+            reporter.say(&format!("{count} skipped (--overwrite renders them again)"));
             let shares_files = !is_scene_per_frame(&self.arguments.scene) && !is_gltf(&self.arguments.scene);
             skipped::warn(self.arguments, &skipped, self.session, shares_files, |frame| self.shot_to_compare(frame));
         }

@@ -1,5 +1,5 @@
-//! Signals. The first Ctrl-C or SIGTERM asks the render to stop, so that its state and the picture so far are written;
-//! the second ends the program at once. SIGUSR1 asks for a checkpoint, and the render goes on.
+//! Signals. The first Ctrl-C or SIGTERM stops the render, and its state and the picture so far are written; the second
+//! ends the program at once. SIGUSR1 writes a checkpoint, and the render continues.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -14,15 +14,15 @@ const INTERRUPTED: u8 = 130;
 /// Exit code after SIGTERM.
 const TERMINATED: u8 = 143;
 
-/// How often a wait looks whether a signal has come.
+/// How often a wait checks for a signal.
 const WAIT_STEP: Duration = Duration::from_millis(50);
 
-/// What the signals have asked for.
+/// The requests of the signals.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     /// Becomes true with the first signal to stop.
     pub stop: Arc<AtomicBool>,
-    /// Becomes true when a checkpoint is asked for.
+    /// Becomes true when a checkpoint is requested.
     pub checkpoint: Arc<AtomicBool>,
     code: Arc<AtomicUsize>,
 }
@@ -46,7 +46,8 @@ impl Interrupt {
     /// Starts to listen to signals to stop.
     pub fn listen_to_stop(&self) -> Result<()> {
         for (signal, code) in [(SIGINT, INTERRUPTED), (SIGTERM, TERMINATED)] {
-            // Actions run in the order of their registration: the first signal finds the flag down and only then raises it.
+            // Actions run in the order of their registration: the first signal finds the flag down and only then raises
+            // it.
             let registered = flag::register_conditional_shutdown(signal, i32::from(code), Arc::clone(&self.stop))
                 .and_then(|_| flag::register_usize(signal, Arc::clone(&self.code), usize::from(code)))
                 .and_then(|_| flag::register(signal, Arc::clone(&self.stop)));

@@ -19,7 +19,7 @@ use crate::progress::Reporter;
 /// The extension of shards.
 const EXTENSION: &str = "shard";
 
-/// What the command line says of the state.
+/// The command line's options for the state.
 pub struct Resumable<'a> {
     arguments: &'a StateArgs,
     shard: Shard,
@@ -28,7 +28,7 @@ pub struct Resumable<'a> {
     checkpoint: Option<StateFile>,
 }
 
-/// Takes the name of the shard out of the outputs; what is left says which layers pictures have.
+/// Takes the name of the shard out of the outputs; the others determine the layers of pictures.
 pub fn take_shard_name(arguments: &StateArgs, scene: &Path, overrides: &mut Overrides) -> Result<Option<PathBuf>> {
     let is_shard = |name: &String| Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case(EXTENSION));
     let Some(shard) = arguments.shard else { return Ok(None) };
@@ -96,7 +96,7 @@ impl<'a> Resumable<'a> {
         // What an interrupted shard has is in its checkpoint; a shard that is there is complete.
         let unfinished = stats.interrupted && checkpoints.is_some();
         if state.torn && self.shard_file.is_some() && !unfinished {
-            let message = "the pass under way took too long and was given up";
+            let message = "the pass under way took too long and was cancelled";
             if !stats.interrupted {
                 return Err(Error::Usage(format!("--time-limit: {message}, so there is no shard")));
             }

@@ -25,7 +25,7 @@ use crate::args::{ColorChoice, LogArgs, LogFormat, Verbosity};
 pub enum Level {
     /// Why the program ends.
     Error,
-    /// What the user should know.
+    /// Warnings.
     Warning,
     /// What was done.
     Note,
@@ -57,7 +57,7 @@ impl Level {
     }
 }
 
-/// Where messages go and how they look.
+/// Where messages go and their format.
 struct Log {
     shown: Level,
     format: LogFormat,
@@ -102,7 +102,8 @@ pub fn start(arguments: &LogArgs, verbosity: Verbosity, default_format: LogForma
     Ok(())
 }
 
-/// Whether a file is empty or begins as logs do: with a time, or with an object in JSON. Any other may be one that somebody needs.
+/// Whether a file is empty or begins as logs do: with a time, or with an object in JSON. Any other may be one that
+/// somebody needs.
 fn is_log(path: &Path) -> std::io::Result<bool> {
     let mut start = Vec::new();
     steradian::file::open(path)?.take(64).read_to_end(&mut start)?;
@@ -118,7 +119,7 @@ pub fn colored(choice: ColorChoice) -> bool {
     decide_color(choice, &variable, std::io::stderr().is_terminal())
 }
 
-/// `NO_COLOR` speaks before `CLICOLOR_FORCE`, which speaks before the terminal.
+/// `NO_COLOR` takes precedence over `CLICOLOR_FORCE`, which takes precedence over the terminal.
 fn decide_color(choice: ColorChoice, variable: &dyn Fn(&str) -> String, terminal: bool) -> bool {
     match choice {
         ColorChoice::Always => true,
@@ -200,7 +201,7 @@ fn now() -> String {
     text
 }
 
-/// What the library says.
+/// Messages of the library.
 struct Events;
 
 impl<S: tracing::Subscriber> Layer<S> for Events {
@@ -233,7 +234,7 @@ mod tests {
     #[test]
     fn colours_follow_the_option_then_the_environment_then_the_terminal() {
         let with =
-            |name: &'static str, value: &'static str| move |asked: &str| if asked == name { value.to_owned() } else { String::new() };
+            |name: &'static str, value: &'static str| move |variable: &str| if variable == name { value.to_owned() } else { String::new() };
         let none = |_: &str| String::new();
         use ColorChoice::{Always, Auto, Never};
         assert!(decide_color(Auto, &none, true) && !decide_color(Auto, &none, false));

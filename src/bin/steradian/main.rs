@@ -56,7 +56,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Compares the names of files, starts to log, shows what the configuration brought, and runs the command.
+/// Compares the names of files, starts to log, shows the settings of the configuration, and runs the command.
 fn start(parsed: config::Parsed) -> Result<u8> {
     let cli = parsed.cli;
     let mut uses = FileUses::default();
@@ -103,7 +103,8 @@ fn run(cli: Cli, uses: FileUses) -> Result<u8> {
     }
 }
 
-/// Starts the threads that files are read and written with: they would be started when first needed, and end the program if that fails.
+/// Starts the threads that files are read and written with: they would be started when first needed, and end the
+/// program if that fails.
 fn start_threads() -> Result<()> {
     let count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let started = rayon::ThreadPoolBuilder::new().build_global();
@@ -145,7 +146,8 @@ fn chain(error: &Error) -> String {
     line
 }
 
-/// A panic is a fault of the program, not of its input: it says so in one line and ends with the code of an internal failure.
+/// A panic is a fault of the program, not of its input: it is reported in one line and ends with the code of an
+/// internal failure.
 fn report_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let message = panic.payload_as_str().unwrap_or("unknown");

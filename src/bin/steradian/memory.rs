@@ -46,7 +46,7 @@ fn checked(memory: *mut u8, size: usize) -> *mut u8 {
 // SAFETY: every method is that of the system's allocator with the same arguments; what it returns is returned.
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: the caller's promises are those of the same method.
+        // SAFETY: the caller's obligations are those of the same method.
         checked(unsafe { System.alloc(layout) }, layout.size())
     }
 
@@ -72,7 +72,7 @@ pub fn grow_stack() {
     std::hint::black_box([1_u8; 1 << 20]);
 }
 
-/// Panics of the standard library for want of memory end the program as other failures of memory do.
+/// Panics of the standard library for lack of memory end the program as other failures of memory do.
 pub fn end_if_out_of_memory(panic: &str) {
     // ENOMEM, as `std::io::Error` displays it.
     if panic.contains("(os error 12)") {
@@ -142,7 +142,8 @@ fn end(code: c_int, message: std::fmt::Arguments) -> ! {
     } else {
         writeln!(line, "error: {message}")
     };
-    // SAFETY: stderr is open, or writing fails; it is never closed here. Its own writer might wait for a thread that waits above.
+    // SAFETY: stderr is open, or writing fails; it is never closed here. Its own writer might wait for a thread that
+    // waits above.
     let mut stderr = ManuallyDrop::new(unsafe { File::from_raw_fd(2) });
     let _ = stderr.write_all(&line.bytes[..line.length]);
     // SAFETY: the function may be called at any time.

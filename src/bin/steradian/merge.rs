@@ -61,9 +61,9 @@ fn check_plain(name: &str) -> Result<()> {
     let mut components = Path::new(name).components();
     match (components.next(), components.next()) {
         (Some(Component::Normal(only)), None) if only == name => Ok(()),
-        _ => {
-            Err(Error::Usage(format!("the shards name the output {name:?}, which is not in the working folder; say with -o what to write")))
-        }
+        _ => Err(Error::Usage(format!(
+            "the shards name the output {name:?}, which is not in the working folder; name the file to write with -o"
+        ))),
     }
 }
 

@@ -1,4 +1,5 @@
-//! Names of enum variants, taken from the types that the scene format is made of, so that the command line and the format cannot differ.
+//! Names of enum variants, taken from the types that the scene format is made of, so that the command line and the
+//! format cannot differ.
 
 use std::fmt;
 

@@ -54,12 +54,13 @@ struct State {
     last_percent: Option<u64>,
     /// What the picture's error is and is to be.
     errors: Option<[f64; 2]>,
-    stop_told: bool,
+    stop_reported: bool,
     bar: Option<ProgressBar>,
 }
 
 impl Reporter {
-    /// Tells progress in `format`, if that is given, in any case; else as fits where stderr goes, or not at all if `quiet`.
+    /// Reports progress in `format`, if that is given, in any case; else as fits where stderr goes, or not at all if
+    /// `quiet`.
     pub fn new(format: Option<&'static ProgressFormat>, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb");
         let human = format.is_none_or(|format| format.name == "human");
@@ -81,7 +82,7 @@ impl Reporter {
             last: None,
             last_percent: None,
             errors: None,
-            stop_told: false,
+            stop_reported: false,
             bar: None,
         };
         let format = format.or_else(|| ProgressFormat::by_name("plain")).unwrap_or(&steradian::farm::FORMATS[0]);
@@ -105,7 +106,7 @@ impl Reporter {
         if let Ok(mut state) = self.state.lock() {
             state.frame = frame;
         }
-        self.tell(&Event::Begin(frame));
+        self.emit(&Event::Begin(frame));
     }
 
     /// The rendering of a frame ends after this time.
@@ -120,7 +121,7 @@ impl Reporter {
         log::message(Level::Note, line);
     }
 
-    /// The frame's files are in their places, or it was given up: only now is the work on it complete.
+    /// The frame's files are in their places, or it failed: only now is the work on it complete.
     pub fn complete_frame(&self) {
         if let Ok(mut state) = self.state.lock() {
             state.frames_done += 1;
@@ -128,7 +129,7 @@ impl Reporter {
             let is_last = state.frames_done >= state.frames;
             if self.sink == Sink::Lines && (is_last || state.last.is_none_or(|last| last.elapsed() >= LINE_PERIOD)) {
                 let status = Status { fraction, frame_fraction: 1.0, frame: state.frame, ..Status::default() };
-                self.tell(&Event::Progress(&status));
+                self.emit(&Event::Progress(&status));
                 state.last = Some(Instant::now());
             }
         }
@@ -136,16 +137,16 @@ impl Reporter {
 
     /// All is done, and well.
     pub fn succeed(&self) {
-        self.tell(&Event::Success);
+        self.emit(&Event::Success);
     }
 
     /// The work has failed.
     pub fn fail(&self, message: &str) {
         self.finish();
-        self.tell(&Event::Failure(message));
+        self.emit(&Event::Failure(message));
     }
 
-    fn tell(&self, event: &Event) {
+    fn emit(&self, event: &Event) {
         if self.sink == Sink::Lines {
             (self.format.lines)(event).iter().for_each(|line| log::line(line));
         }
@@ -157,8 +158,8 @@ impl Reporter {
         if state.last.is_some_and(|last| now - last < period) {
             return;
         }
-        if !state.stop_told && self.stop.get().is_some_and(|stop| stop.load(Ordering::Relaxed)) {
-            state.stop_told = true;
+        if !state.stop_reported && self.stop.get().is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            state.stop_reported = true;
             self.say("interrupted: finishing the samples under way; interrupt again to leave at once");
         }
         let mut status = status(state, self.done.load(Ordering::Relaxed), now);
@@ -176,7 +177,7 @@ impl Reporter {
                 if state.last_percent == Some(percent) && state.last.is_some_and(|last| now - last < SIGN_OF_LIFE) {
                     return;
                 }
-                self.tell(&Event::Progress(&status));
+                self.emit(&Event::Progress(&status));
             }
             _ => {}
         }
@@ -268,7 +269,7 @@ impl Progress for Reporter {
 
     fn warn(&self, message: &str) {
         log::message(Level::Warning, message);
-        self.tell(&Event::Warning(message));
+        self.emit(&Event::Warning(message));
     }
 }
 

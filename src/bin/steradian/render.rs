@@ -25,7 +25,7 @@ use crate::skipped::Skipped;
 use crate::stats::{self, Run};
 use crate::{files, text};
 
-/// Renders a picture and writes what was asked for; the result is the exit code. `start` is when the scene's reading began.
+/// Renders a picture and writes its outputs; the result is the exit code. `start` is when the scene's reading began.
 pub fn picture(arguments: &RenderArgs, shot: Shot, session: &Session, start: Instant) -> Result<u8> {
     let Some(mut plan) = Plan::new(arguments, &shot, session)? else {
         session.reporter.complete_frame();
@@ -137,7 +137,7 @@ impl<'a> Plan<'a> {
         Ok(Some(Self { arguments, settings, scene_file, frame, json, shard_file, provenance, denoiser, kept }))
     }
 
-    /// What files tell of the rendering before it is done.
+    /// The metadata of files that is known before the render.
     fn info(&self, scene: &Scene) -> RenderInfo {
         RenderInfo {
             world_to_camera: Some(scene.camera.world_to_camera()),
@@ -150,7 +150,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// What the state of the render says of itself, if it is kept.
+    /// The header of the render's state, if it is kept.
     fn header(&self, shot: &Shot, scene: &Scene) -> Result<Option<Header>> {
         let header = |kept: &Resumable| kept.header(&shot.imported, &shot.scene, scene, &self.settings, self.info(scene));
         self.kept.as_ref().map(header).transpose()
@@ -288,7 +288,7 @@ fn report(reporter: &Reporter, settings: &Settings, accel: &dyn Accelerator, sta
         accel.description(),
     ));
     if let (Some(error), Some(target)) = (stats.estimated_error, settings.target_error) {
-        reporter.say(&format!("relative squared error about {error:.3e}, asked for {target:.3e}"));
+        reporter.say(&format!("relative squared error about {error:.3e}, target {target:.3e}"));
     }
     written.iter().for_each(|file| reporter.say(&format!("wrote {file}")));
 }

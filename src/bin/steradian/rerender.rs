@@ -7,7 +7,7 @@ use steradian::desc::OutputDesc;
 use steradian::farm::is_scene_per_frame;
 use steradian::import::scene_fingerprint;
 use steradian::output::{self, FileUses, Format};
-use steradian::render::{Frame, RenderProvenance, Settings};
+use steradian::render::{RenderProvenance, SequenceFrame, Settings};
 use steradian::{Error, Result};
 
 use crate::args::{Cli, Command, RenderArgs, RerenderArgs};
@@ -16,7 +16,7 @@ use crate::frames::{self, Shot};
 /// A picture to be made again.
 #[derive(Clone, Debug)]
 pub struct Repeat {
-    /// How it was made, with what is wanted otherwise.
+    /// How it was made, with the overrides of the command line.
     pub provenance: RenderProvenance,
     /// The file that holds it.
     pub file: PathBuf,
@@ -48,7 +48,7 @@ pub fn run(arguments: &RerenderArgs, mut uses: FileUses) -> Result<u8> {
     render.denoise.oidn.clone_from(&arguments.oidn);
     (render.import.defines, render.import.time) = (provenance.import.defines.clone(), provenance.import.time);
     render.import.allow_missing = provenance.allow_missing;
-    if let Some(Frame { number, per_second }) = provenance.frame {
+    if let Some(SequenceFrame { number, per_second }) = provenance.frame {
         let frames = number.to_string().parse();
         render.sequence.frames = Some(frames.map_err(|message| Error::Malformed { file: file.clone(), message })?);
         render.sequence.fps = per_second;
@@ -67,7 +67,7 @@ fn plain() -> Result<RenderArgs> {
     }
 }
 
-/// Where the scene is: where the user says, or at its name, from here or from where it was rendered.
+/// The scene's file: the one given, or its recorded name, relative to here or to where it was rendered.
 fn scene_file(arguments: &RerenderArgs, provenance: &RenderProvenance) -> PathBuf {
     let named = arguments.scene.clone().unwrap_or_else(|| provenance.scene_file.clone());
     if arguments.scene.is_some() || named.exists() { named } else { provenance.folder.join(named) }
@@ -91,7 +91,7 @@ pub fn provenance(arguments: &RenderArgs, shot: &Shot, settings: &Settings) -> R
     Ok(Some(RenderProvenance {
         import: arguments.import.options(),
         allow_missing: arguments.import.allow_missing,
-        frame: shot.frame.filter(|_| !is_scene_per_frame(&arguments.scene)).map(|number| Frame { number, per_second }),
+        frame: shot.frame.filter(|_| !is_scene_per_frame(&arguments.scene)).map(|number| SequenceFrame { number, per_second }),
         denoise: arguments.denoise.denoise,
         ..RenderProvenance::new(&shot.scene, scene, settings, std::env::args().skip(1).collect())
     }))

@@ -13,7 +13,7 @@ use crate::text;
 /// Lines of the summary that are shown without `-v`; more if more elements are ignored as a whole.
 const SUMMARY_LINES: usize = 12;
 
-/// Reads a scene and says on stderr what of it was approximated or ignored.
+/// Reads a scene and reports on stderr what of it was approximated or ignored.
 pub fn load(path: &Path, arguments: &ImportArgs, verbosity: Verbosity) -> Result<Imported> {
     let mut imported = import::read_scene(path, &arguments.options())?;
     if arguments.allow_missing {
@@ -48,7 +48,7 @@ fn write_report(file: &Path, imported: &Imported) -> Result<()> {
     output::write_atomically(file, |out| writeln!(out, "{json}").map_err(|e| e.to_string()))
 }
 
-/// What is said of an import: every parameter, or what was not mapped.
+/// The messages of an import: every parameter, or those not imported exactly.
 fn lines(path: &Path, imported: &Imported, verbose: bool) -> Vec<String> {
     let report = &imported.report;
     if report.entries.is_empty() {

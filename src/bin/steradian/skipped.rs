@@ -53,9 +53,9 @@ impl Skipped {
     }
 }
 
-/// Compares the frames of a sequence that are there with what they would be rendered as. `shot` gives a frame of the sequence; a scene that
-/// cannot be read leaves nothing to compare, for nothing is rendered from it. The files of a scene that are the same
-/// for all frames are read once.
+/// Compares the frames of a sequence that are there with what they would be rendered as. `shot` gives a frame of the
+/// sequence; a scene that cannot be read leaves nothing to compare, for nothing is rendered from it. The files of a
+/// scene that are the same for all frames are read once.
 pub fn warn(arguments: &RenderArgs, frames: &[i64], session: &Session, shares_files: bool, shot: impl Fn(i64) -> Option<Shot>) {
     if arguments.state.shard.is_some() || arguments.repeat.is_some() {
         return;

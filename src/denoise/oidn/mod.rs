@@ -1,6 +1,7 @@
 //! Intel Open Image Denoise, opened at run time: a device on the processor, and its filter on pictures in memory.
 //!
-//! One of the two homes of `unsafe`. The library stays loaded until the process ends, since its threads outlive its devices.
+//! One of the two homes of `unsafe`. The library stays loaded until the process ends, since its threads outlive its
+//! devices.
 
 mod sys;
 
@@ -49,13 +50,15 @@ pub struct Device {
 pub struct Unusable(pub String);
 
 impl Device {
-    /// Opens a library by its path, or by its bare name where the system looks for libraries, with `threads` threads (0: all).
+    /// Opens a library by its path, or by its bare name where the system looks for libraries, with `threads` threads
+    /// (0: all).
     pub fn open(file: &Path, threads: usize) -> Result<Self, Unusable> {
-        // SAFETY: opening runs the library's initialisers. The file is named by the user, or has the name of a library known to be fit.
+        // SAFETY: opening runs the library's initialisers. The file is named by the user, or has the name of a library
+        // known to be fit.
         let library = unsafe { Library::new(file) }.map_err(|e| Unusable(loader_message(&e)))?;
         let library = ManuallyDrop::new(library);
-        // SAFETY: the types are those of version 2, which is checked below before anything but the version is asked
-        // for; the library is never closed.
+        // SAFETY: the types are those of version 2, which is checked below before anything but the version is looked up
+        // in it; the library is never closed.
         let functions = unsafe { Functions::find(&library) }.map_err(|missing| {
             // SAFETY: the symbol is only looked for, not called.
             let old = unsafe { library.get::<unsafe extern "C" fn()>(sys::OF_VERSION_1) }.is_ok();
@@ -82,7 +85,8 @@ impl Device {
 
     fn commit(&self, threads: usize) -> Result<()> {
         let threads = c_int::try_from(threads).unwrap_or(c_int::MAX);
-        // SAFETY: the device is alive and the names end in NUL. Threads are not bound to cores: several renders share a machine.
+        // SAFETY: the device is alive and the names end in NUL. Threads are not bound to cores: several renders share a
+        // machine.
         unsafe {
             (self.functions.set_device_int)(self.handle.as_ptr(), c"numThreads".as_ptr(), threads);
             (self.functions.set_device_bool)(self.handle.as_ptr(), c"setAffinity".as_ptr(), false);
@@ -121,8 +125,9 @@ impl Device {
         let filter = Filter::new(self)?;
         let set = |name: &CStr, data: *const Triple| {
             let format = sys::FORMAT_FLOAT3;
-            // SAFETY: the filter is alive, the name ends in NUL, and the data are `width * height` triples that stay borrowed until the
-            // filter is released at the end of this function. Inputs are only read; the output is borrowed for writing.
+            // SAFETY: the filter is alive, the name ends in NUL, and the data are `width * height` triples that stay
+            // borrowed until the filter is released at the end of this function. Inputs are only read; the output is
+            // borrowed for writing.
             unsafe {
                 (self.functions.set_shared_filter_image)(
                     filter.handle.as_ptr(),
@@ -157,7 +162,7 @@ impl Device {
         self.check()
     }
 
-    /// What the library has to complain about since it was last asked on this thread.
+    /// The library's error since it was last queried on this thread.
     fn check(&self) -> Result<()> {
         match last_error(&self.functions, self.handle.as_ptr()) {
             None => Ok(()),
@@ -174,7 +179,7 @@ impl Drop for Device {
     }
 }
 
-// SAFETY: the library's calls are thread-safe, as its documentation says; the handle is a counted reference.
+// SAFETY: the library's calls are thread-safe, by its documentation; the handle is a counted reference.
 unsafe impl Send for Device {}
 // SAFETY: as above.
 unsafe impl Sync for Device {}

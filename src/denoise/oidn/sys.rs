@@ -42,7 +42,8 @@ macro_rules! functions {
             /// Finds every function, or names the first that is missing.
             ///
             /// # Safety
-            /// The library's functions of these names have these types, and the library is not closed while the result is in use.
+            /// The library's functions of these names have these types, and the library is not closed while the result
+            /// is in use.
             pub unsafe fn find(library: &Library) -> Result<Self, &'static str> {
                 // SAFETY: the caller vouches for the types and the library's life.
                 unsafe {

@@ -1,4 +1,4 @@
-//! What all analytic shapes promise. The accuracy of their hits is checked by `bench::stability`.
+//! Properties of all analytic shapes. The accuracy of their hits is checked by `bench::stability`.
 
 use std::f64::consts::TAU;
 

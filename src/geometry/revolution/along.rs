@@ -8,7 +8,8 @@ use crate::math::DVec2;
 /// Intervals of each segment whose lengths are tabulated.
 const INTERVALS: usize = 16;
 
-/// Sine of the profile's slope below which v by height counts as changing that fast: the change of the point with v stays finite.
+/// Sine of the profile's slope below which v by height counts as changing that fast: the change of the point with v
+/// stays finite.
 const LEAST_SLOPE: f64 = 1e-6;
 
 /// What v of a surface of revolution grows with.

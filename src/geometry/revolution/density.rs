@@ -66,8 +66,8 @@ impl Density {
         ProfileSample { segment, s: (i as f64 + within) / INTERVALS as f64 }
     }
 
-    /// Density of [`Density::sample`] with respect to area for an angle chosen uniformly in `[0, phi_max]`; `None` where the surface has no
-    /// width or the profile stands still, which has probability zero.
+    /// Density of [`Density::sample`] with respect to area for an angle chosen uniformly in `[0, phi_max]`; `None`
+    /// where the surface has no width or the profile stands still, which has probability zero.
     pub fn pdf_area(&self, segments: &[Segment], at: ProfileSample, phi_max: f64) -> Option<f64> {
         let position = at.s * INTERVALS as f64;
         let i = (position as usize).min(INTERVALS - 1);

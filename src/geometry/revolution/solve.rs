@@ -1,8 +1,9 @@
 //! Where a ray meets a surface of revolution about the z axis: one equation in the profile's parameter.
 //!
-//! A ray that climbs passes the height `z(s)` at `t(s) = (z(s) - o.z) / d.z`; there its distance from the axis must be `r(s)`. That is a
-//! polynomial of degree 6 in `s`, isolated by its Bernstein coefficients. For a ray (nearly) perpendicular to the axis that equation loses
-//! its meaning; there the ray passes the distance `r(s)` at `t = t_closest ± sqrt((r² - h²) / a)`, where its height must be `z(s)`.
+//! A ray that climbs passes the height `z(s)` at `t(s) = (z(s) - o.z) / d.z`; there its distance from the axis must be
+//! `r(s)`. That is a polynomial of degree 6 in `s`, isolated by its Bernstein coefficients. For a ray (nearly)
+//! perpendicular to the axis that equation loses its meaning; there the ray passes the distance `r(s)` at
+//! `t = t_closest ± sqrt((r² - h²) / a)`, where its height must be `z(s)`.
 
 use super::Sector;
 use super::segment::{Knot, Segment};
@@ -10,10 +11,12 @@ use crate::geometry::LocalHit;
 use crate::math::bernstein::{isolate_roots, sign_changes};
 use crate::math::{Bracket, RayF64, bisect, newton_in_bracket};
 
-/// Below this sine of the angle between the ray and the plane perpendicular to the axis, heights are compared instead of distances.
+/// Below this sine of the angle between the ray and the plane perpendicular to the axis, heights are compared instead
+/// of distances.
 const LEVEL: f64 = 1e-3;
 
-/// Relative slack of the tests that skip segments: far above the rounding of what they compare, far below what would cost time.
+/// Relative slack of the tests that skip segments: far above the rounding of what they compare, far below what would
+/// cost time.
 const CULL_SLACK: f64 = 1e-12;
 
 /// Rounding of the functions whose roots are isolated, relative to their terms.
@@ -83,8 +86,8 @@ impl Search<'_> {
         lo <= hi && squared(closest) <= reach * reach + slack * scale && squared(lo).max(squared(hi)) >= hole * hole - slack * scale
     }
 
-    /// Roots of `F(s) = d.z² (r² - c) - zeta (a zeta + 2 b d.z)` with `zeta = z - o.z`: `d.z²` times the surface's squared distance from
-    /// the axis less the ray's.
+    /// Roots of `F(s) = d.z² (r² - c) - zeta (a zeta + 2 b d.z)` with `zeta = z - o.z`: `d.z²` times the surface's
+    /// squared distance from the axis less the ray's.
     #[inline]
     fn climb(&mut self, segment: &Segment, index: f64, scale: f64) {
         if !self.may_meet(segment, scale) {
@@ -98,8 +101,8 @@ impl Search<'_> {
         let mut coefficients: [f64; 7] = std::array::from_fn(|k| {
             d_z_squared * segment.r_squared[k] - a * segment.z_squared[k] + linear * segment.z_raised[k] + constant
         });
-        // On the axis no ray is nearer to it than the surface, though a ray through the pole is as near: a zero there, or a rounding above
-        // it, would hide the root beside it.
+        // On the axis no ray is nearer to it than the surface, though a ray through the pole is as near: a zero there,
+        // or a rounding above it, would hide the root beside it.
         for end in [0, 6] {
             if segment.r_squared[end] == 0.0 {
                 coefficients[end] = coefficients[end].min(-f64::MIN_POSITIVE);

@@ -1,4 +1,5 @@
-//! Surfaces of revolution: level rays, sampling, profiles that are refused, orientation. Their roots are checked by `bench::stability`.
+//! Surfaces of revolution: level rays, sampling, profiles that are rejected, orientation. Their roots are checked by
+//! `bench::stability`.
 
 use std::f64::consts::TAU;
 

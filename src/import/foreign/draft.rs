@@ -130,22 +130,22 @@ impl Draft {
         file
     }
 
-    /// Says that a parameter of an element means the same in the scene.
+    /// Reports that a parameter of an element means the same in the scene.
     pub fn mapped(&mut self, place: &str, element: &str, parameter: &str) {
         self.note(place, element, parameter, Outcome::Mapped, String::new());
     }
 
-    /// Says how a parameter of an element was approximated.
+    /// Reports how a parameter of an element was approximated.
     pub fn approximated(&mut self, place: &str, element: &str, parameter: &str, how: impl Into<String>) {
         self.note(place, element, parameter, Outcome::Approximated, how.into());
     }
 
-    /// Says why a parameter of an element was ignored.
+    /// Reports why a parameter of an element was ignored.
     pub fn ignored(&mut self, place: &str, element: &str, parameter: &str, why: impl Into<String>) {
         self.note(place, element, parameter, Outcome::Ignored, why.into());
     }
 
-    /// Says what became of a parameter of an element, with a note.
+    /// Reports what became of a parameter of an element, with a note.
     pub fn note(&mut self, place: &str, element: &str, parameter: &str, outcome: Outcome, note: String) {
         self.report.entries.push(ReportEntry { place: place.into(), element: element.into(), parameter: parameter.into(), outcome, note });
     }
@@ -169,7 +169,8 @@ fn flattens(transform: &TransformDesc) -> bool {
     })
 }
 
-/// The next number of each name that was taken, by what it names: looking for it from the start would take the square of their count.
+/// The next number of each name that was taken, by what it names: looking for it from the start would take the square
+/// of their count.
 #[derive(Clone, Debug, Default)]
 struct Numbers(HashMap<(&'static str, String), u64>);
 

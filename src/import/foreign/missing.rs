@@ -11,8 +11,8 @@ use crate::desc::{LightDesc, MeshDesc, ShapeDesc, TextureDesc};
 const GREY: [f32; 3] = [0.5; 3];
 
 impl Imported {
-    /// Takes out what refers to files that are not there: meshes, measured lights and environments go, images become grey. Each is
-    /// reported as ignored. `scene` is the scene's file. The result is how many there were.
+    /// Takes out what refers to files that are not there: meshes, measured lights and environments go, images become
+    /// grey. Each is reported as ignored. `scene` is the scene's file. The result is how many there were.
     pub fn leave_out_missing(&mut self, scene: &Path) -> usize {
         let folder = scene.parent().unwrap_or(Path::new("")).to_owned();
         let assets = &self.assets;
@@ -58,7 +58,8 @@ impl Imported {
     }
 }
 
-/// Keeps what `keep` says of a list, and the places of what is kept in step with it. `keep` is given the place of each, or its path.
+/// Retains the entries of a list for which `keep` is true, and the places of what is kept in step with it. `keep` is
+/// given the place of each, or its path.
 fn retain<T>(path: &str, list: &mut Vec<T>, places: &mut BTreeMap<String, String>, mut keep: impl FnMut(&str, &T) -> bool) {
     let (mut index, mut kept) = (0, 0);
     list.retain(|item| {

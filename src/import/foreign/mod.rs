@@ -22,7 +22,7 @@ use crate::assets::{Assets, SceneSource};
 use crate::desc::SceneDesc;
 use crate::error::Result;
 
-/// What the user says beside a scene file.
+/// Options of an import beside the scene file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImportOptions {
@@ -43,7 +43,7 @@ pub struct Imported {
     pub report: ImportReport,
     /// The files beside the scene's own that were read to make it, as far as they are known by then.
     pub files: Arc<BTreeSet<PathBuf>>,
-    /// Where the file says what became `shapes[0]`, `materials.floor` and so on; empty for our own format.
+    /// The places in the file that became `shapes[0]`, `materials.floor` and so on; empty for our own format.
     pub places: Arc<BTreeMap<String, String>>,
 }
 
@@ -54,12 +54,12 @@ impl Imported {
     }
 }
 
-/// Reads a scene file of any kind that its extension names: `.json` (ours, and any other name), `.xml` (Mitsuba 3), `.pbrt` (pbrt-v4),
-/// `.gltf` and `.glb` (glTF 2.0). Files that the scene names are looked up beside it.
+/// Reads a scene file of any kind that its extension names: `.json` (ours, and any other name), `.xml` (Mitsuba 3),
+/// `.pbrt` (pbrt-v4), `.gltf` and `.glb` (glTF 2.0). Files that the scene names are looked up beside it.
 ///
 /// # Errors
 /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Parse`](crate::Error::Parse) or
-/// [`Error::Scene`](crate::Error::Scene) for what it says.
+/// [`Error::Scene`](crate::Error::Scene) for faults in it.
 pub fn read_scene(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     match extension.as_str() {

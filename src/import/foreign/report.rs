@@ -9,11 +9,11 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The scene says the same.
+    /// Imported exactly.
     Mapped,
-    /// The scene says something near to it.
+    /// Imported approximately.
     Approximated,
-    /// The scene says nothing of it.
+    /// Not imported.
     Ignored,
 }
 
@@ -50,7 +50,7 @@ impl ImportReport {
         self.entries.iter().filter(|entry| entry.outcome == outcome).count()
     }
 
-    /// Whether the scene says all that the file said.
+    /// Whether everything was imported exactly.
     pub fn is_exact(&self) -> bool {
         self.entries.iter().all(|entry| entry.outcome == Outcome::Mapped)
     }
@@ -66,8 +66,8 @@ impl ImportReport {
     pub fn kinds(&self) -> (Vec<String>, Vec<String>) {
         let mut kinds: BTreeMap<(Reverse<Outcome>, String), (usize, &str)> = BTreeMap::new();
         let mut whole = BTreeSet::new();
-        let is_told = |entry: &&ReportEntry| entry.outcome != Outcome::Mapped && entry.note != PART_OF_IGNORED;
-        for entry in self.entries.iter().filter(is_told) {
+        let is_listed = |entry: &&ReportEntry| entry.outcome != Outcome::Mapped && entry.note != PART_OF_IGNORED;
+        for entry in self.entries.iter().filter(is_listed) {
             let kind: Vec<&str> = entry.element.split(" \"").take(1).collect();
             let what =
                 [&kind.concat(), entry.parameter.as_str()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(": ");

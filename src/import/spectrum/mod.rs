@@ -1,13 +1,13 @@
 //! Spectra to linear Rec.709 RGB, through the CIE 1931 2-degree standard observer.
 //!
-//! Two meanings, two conversions. What *reflects* (or transmits, or is an index of refraction) is seen under D65, the white of Rec.709, so
-//! that a constant spectrum is grey of the same value: [`Spectrum::reflectance`]. What *emits* is seen as it is:
-//! [`Spectrum::emission`], where a constant spectrum of 1 has luminance 1 and the warm colour of equal energy, (1.2048,
-//! 0.9484, 0.9088); and D65 is white. Renderers normalise emission in different ways:
+//! Two meanings, two conversions. What *reflects* (or transmits, or is an index of refraction) is seen under D65, the
+//! white of Rec.709, so that a constant spectrum is grey of the same value: [`Spectrum::reflectance`]. What *emits* is
+//! seen as it is: [`Spectrum::emission`], where a constant spectrum of 1 has luminance 1 and the warm colour of equal
+//! energy, (1.2048, 0.9484, 0.9088); and D65 is white. Renderers normalise emission in different ways:
 //! [`Spectrum::emission_of_luminance_one`] is pbrt's.
 //!
-//! Colours that Rec.709 cannot show, such as those of single wavelengths, have negative components, which are kept: whether they are cut
-//! off is the caller's choice.
+//! Colours that Rec.709 cannot show, such as those of single wavelengths, have negative components, which are kept:
+//! whether they are cut off is the caller's choice.
 
 mod named;
 mod tables;
@@ -101,7 +101,8 @@ impl Spectrum {
         if xyz[1] > 0.0 { rgb_from_xyz(xyz.map(|x| x / xyz[1])).map(|x| x as f32) } else { [0.0; 3] }
     }
 
-    /// The mean over the visible wavelengths, weighted as the eye weights them: for numbers such as an index of refraction.
+    /// The mean over the visible wavelengths, weighted as the eye weights them: for numbers such as an index of
+    /// refraction.
     pub fn mean(&self) -> f64 {
         self.xyz()[1]
     }
@@ -135,7 +136,7 @@ fn planck(wavelength: f64, kelvin: f64) -> f64 {
     1.0 / (x.powi(5) * (SECOND_CONSTANT / (wavelength * kelvin)).exp_m1())
 }
 
-/// The integral of the spectrum times the observer, and D65 if asked for. All are straight lines between knots, so that
+/// The integral of the spectrum times the observer, and optionally D65. All are straight lines between knots, so that
 /// three points of each (Simpson's rule) give it exactly; Planck's law is smooth.
 fn integrate(spectrum: &Spectrum, under_d65: bool) -> [f64; 3] {
     let mut sum = [0.0; 3];

@@ -1,4 +1,4 @@
-//! Spectra that pbrt knows by name, as constants.
+//! pbrt's named spectra, as constants.
 
 use super::Spectrum;
 use crate::metal::{Metal, MetalNames};
@@ -50,7 +50,7 @@ const ILLUMINANTS: &[(&str, [f32; 3])] = &[
     ("illum-acesD60", [1.0466, 0.9946, 0.9159]),
 ];
 
-/// What pbrt means by the name of a spectrum, if it knows it.
+/// The spectrum of a name in pbrt, if it has one.
 pub fn named(name: &str) -> Option<Named> {
     if let Some((metal, part)) = name.strip_prefix("metal-").and_then(|rest| rest.split_once('-')) {
         let metal = Metal::find(MetalNames::Pbrt, metal)?;

@@ -105,7 +105,8 @@ fn hits_of_partial_emitters_have_the_density_of_samples() {
 
 #[test]
 fn the_area_of_a_stretched_surface_is_that_of_the_surface() {
-    // A cylinder stretched into an elliptic one: circumference by Ramanujan's second formula, which is exact to 1e-5 here.
+    // A cylinder stretched into an elliptic one: circumference by Ramanujan's second formula, which is exact to 1e-5
+    // here.
     let map = DAffine3::from_scale(DVec3::new(1.5, 1.0, 2.0));
     let geometry = place(Analytic::Frustum(Frustum::cylinder(1.0, 1.0, TAU).unwrap()), map);
     let h = (0.5f64 / 2.5).powi(2);

@@ -1,6 +1,6 @@
 //! Spheres and other analytic shapes that many vertices sample at once, the same as each of them alone.
 
-use super::{AreaLight, Form, SphereEmitter, SurfaceSample};
+use super::{AreaLight, EmitterSample, Form, SphereEmitter};
 use crate::geometry::{Geometry, PlacedSampleRows, Shape};
 use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSample};
@@ -108,7 +108,7 @@ impl EmitterRows {
 /// The sample of one of the points.
 fn sample_of_row(light: &AreaLight, views: &ViewRows, i: usize) -> Option<LightSample> {
     let (n, wi, pdf) = (views.n.get(i).as_vec3(), views.wi.get(i).as_vec3(), views.pdf[i] as f32);
-    let sample = SurfaceSample { p: views.q.get(i), n, wi, pdf }.if_valid()?;
+    let sample = EmitterSample { p: views.q.get(i), n, wi, pdf }.if_valid()?;
     let is_seen = light.emission.two_sided || matches!(light.form, Form::Sphere(_)) || wi.dot(n) < 0.0;
     is_seen.then(|| sample.with_radiance(light.emission.radiance, 0.0))
 }
@@ -129,7 +129,7 @@ fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, cou
 fn see_samples(samples: &PlacedSampleRows, views: &mut ViewRows, count: usize) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         let (q, n) = (samples.p.get(i), samples.n.get(i));
-        let (wi, pdf) = SurfaceSample::direction_and_pdf(views.p.get(i), q, n, samples.pdf_area[i]);
+        let (wi, pdf) = EmitterSample::direction_and_pdf(views.p.get(i), q, n, samples.pdf_area[i]);
         views.q.set(i, q);
         views.n.set(i, n);
         views.wi.set(i, wi);

@@ -64,17 +64,19 @@ impl Emission {
         self.texture.is_none() && self.opacity.is_none()
     }
 
-    /// The expected radiance of a point sampled on the surface: rays meet it as often as its opacity says, so this is the mean over rays.
+    /// The expected radiance of a point sampled on the surface: rays hit it with the probability of its opacity, so
+    /// this is the mean over rays.
     fn expected(&self, textures: &[Texture], point: &Footprint) -> Rgb {
         let coverage = self.opacity.map_or(1.0, |id| textures[id.index()].scalar_over(point));
         self.at(textures, || *point) * coverage
     }
 }
 
-/// An emissive analytic shape, one triangle of an emissive mesh, or a mesh of two triangles that make up a parallelogram.
+/// An emissive analytic shape, one triangle of an emissive mesh, or a mesh of two triangles that make up a
+/// parallelogram.
 ///
-/// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by area. Quads with a
-/// texture or with holes are sampled by their brightness in half of the cases.
+/// Whole spheres that are scaled evenly and rectangles are sampled by the solid angle they fill; everything else by
+/// area. Quads with a texture or with holes are sampled by their brightness in half of the cases.
 #[derive(Clone, Debug)]
 pub struct AreaLight {
     /// The shape.
@@ -88,7 +90,7 @@ pub struct AreaLight {
     form: Form,
 }
 
-/// What is known of the surface before any point asks. Meshes may have millions of triangles, so this is small.
+/// What is computed of the surface once. Meshes may have millions of triangles, so this is small.
 #[derive(Clone, Debug)]
 enum Form {
     Sphere(Box<SphereEmitter>),
@@ -104,7 +106,7 @@ enum Form {
 }
 
 /// A point of an emitter as seen from another point.
-struct SurfaceSample {
+struct EmitterSample {
     p: DVec3,
     /// Unit normal, towards the front.
     n: Vec3,
@@ -114,8 +116,9 @@ struct SurfaceSample {
     pdf: f32,
 }
 
-impl SurfaceSample {
-    /// The point `q` with the unit normal `n`, found with a density per area, as seen from `p`; `None` if it is seen edge-on.
+impl EmitterSample {
+    /// The point `q` with the unit normal `n`, found with a density per area, as seen from `p`; `None` if it is seen
+    /// edge-on.
     #[inline]
     fn from_area(p: DVec3, q: DVec3, n: DVec3, pdf_area: f64) -> Option<Self> {
         let (wi, pdf) = Self::direction_and_pdf(p, q, n, pdf_area);
@@ -171,8 +174,8 @@ impl AreaLight {
         Self { shape, prim, emission, luminance, form }
     }
 
-    /// The lights of a shape that stands in the world: one for each triangle of a mesh in their order, or a single one for an analytic
-    /// shape and for a mesh of two triangles that make up a parallelogram (without a texture or holes).
+    /// The lights of a shape that stands in the world: one for each triangle of a mesh in their order, or a single one
+    /// for an analytic shape and for a mesh of two triangles that make up a parallelogram (without a texture or holes).
     ///
     /// The `single_light` of the scene's surface is to be set if there is only one.
     pub fn for_shape(shape: ShapeId, emission: Emission, geometry: &Geometry, textures: &[Texture]) -> Vec<Self> {
@@ -214,9 +217,10 @@ impl AreaLight {
         Some(sample.with_radiance(radiance, error))
     }
 
-    /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where `p` sees the dark side.
+    /// A point of the surface, chosen without regard to a texture, and the error of its position; `None` where `p` sees
+    /// the dark side.
     #[inline(always)]
-    fn sample_surface(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(SurfaceSample, f32)> {
+    fn sample_surface(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(EmitterSample, f32)> {
         let both = self.emission.two_sided;
         Some(match &self.form {
             Form::Sphere(sphere) if both || sphere.sees_front(p) => (sphere.sample(p, u)?, 0.0),
@@ -225,7 +229,7 @@ impl AreaLight {
             Form::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return None };
                 let point = placed.sample_area(u);
-                let sample = SurfaceSample::from_area(p, point.p, point.n.as_dvec3(), point.pdf_area)?;
+                let sample = EmitterSample::from_area(p, point.p, point.n.as_dvec3(), point.pdf_area)?;
                 if !both && sample.wi.dot(sample.n) >= 0.0 {
                     return None;
                 }
@@ -237,7 +241,7 @@ impl AreaLight {
 
     /// A point of a triangle and its error; out of the way of rectangles and spheres.
     #[inline(never)]
-    fn sample_triangle(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(SurfaceSample, f32)> {
+    fn sample_triangle(&self, geometry: &Geometry, p: DVec3, u: [f32; 2]) -> Option<(EmitterSample, f32)> {
         let triangle = self.triangle(geometry)?;
         let seen = self.emission.two_sided || triangle.sees_front(p);
         Some((triangle.sample(p, u).filter(|_| seen)?, triangle.error))
@@ -261,8 +265,8 @@ impl AreaLight {
         }
     }
 
-    /// Density per solid angle with which [`sample`](Self::sample) from `p` would have chosen the direction of `ray` (unit), which starts
-    /// at `p` and hit this light at `at`; zero on the dark side.
+    /// Density per solid angle with which [`sample`](Self::sample) from `p` would have chosen the direction of `ray`
+    /// (unit), which starts at `p` and hit this light at `at`; zero on the dark side.
     #[inline]
     pub fn pdf(&self, geometry: &Geometry, p: DVec3, ray: &Ray, at: &SurfaceInteraction) -> f32 {
         if !self.emission.two_sided && at.n_g.dot(ray.direction) >= 0.0 {
@@ -271,12 +275,12 @@ impl AreaLight {
         match &self.form {
             Form::Sphere(sphere) => sphere.pdf(p, at.p),
             Form::Parallelogram(quad) => quad.pdf(p, at.p),
-            Form::Triangle { area } => SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
+            Form::Triangle { area } => EmitterSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), 1.0 / area),
             Form::TransformedShape { .. } => {
                 let Shape::Analytic(placed) = geometry.shape(self.shape) else { return 0.0 };
-                // Where the normal does not tell how densely the shape is sampled, the hit itself must.
+                // Where the normal does not determine the density, the hit itself does.
                 let pdf_area = placed.pdf_area_from_normal(at.n_g).or_else(|| placed.pdf_area(ray));
-                pdf_area.map_or(0.0, |pdf_area| SurfaceSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), pdf_area))
+                pdf_area.map_or(0.0, |pdf_area| EmitterSample::pdf_from_area(p, at.p, at.n_g.as_dvec3(), pdf_area))
             }
         }
     }
@@ -344,7 +348,8 @@ impl Form {
         let (first, second) = (mesh.triangle_points(PrimId(0)), mesh.triangle_points(PrimId(1)));
         let (corners, others) = ([first.a, first.b, first.c], [second.a, second.b, second.c]);
 
-        // The corner that the second triangle does not have, and the shared edge, run in opposite orders if both look to the same side.
+        // The corner that the second triangle does not have, and the shared edge, run in opposite orders if both look
+        // to the same side.
         let lone = (0..3).find(|&i| !others.contains(&corners[i]))?;
         let (corner, next, last) = (corners[lone], corners[(lone + 1) % 3], corners[(lone + 2) % 3]);
         let back = (0..3).find(|&i| others[i] == last && others[(i + 1) % 3] == next)?;
@@ -371,7 +376,8 @@ fn flat_normal(shape: &Shape) -> Option<Vec3> {
     }
 }
 
-/// World area of any analytic shape: where the transform keeps angles that of the shape, else the mean of its inverse density.
+/// World area of any analytic shape: where the transform keeps angles that of the shape, else the mean of its inverse
+/// density.
 fn placed_area(placed: &TransformedShape) -> f64 {
     if let Some(scale) = placed.transform.uniform_scale() {
         return placed.shape.area() * scale * scale;

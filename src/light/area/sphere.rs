@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::SurfaceSample;
+use super::EmitterSample;
 use crate::math::{DVec3, unit_circle};
 
 /// A whole sphere in the world.
@@ -27,7 +27,8 @@ impl SphereEmitter {
         distance_squared > self.radius * self.radius * (1.0 + 8.0 * f64::EPSILON)
     }
 
-    /// The cone that the sphere fills at this squared distance from its centre, without cancellation however far that is.
+    /// The cone that the sphere fills at this squared distance from its centre, without cancellation however far that
+    /// is.
     #[inline(always)]
     fn cone(&self, distance_squared: f64) -> Cone {
         let radius_squared = self.radius * self.radius;
@@ -38,13 +39,13 @@ impl SphereEmitter {
 
     /// A point of the sphere as seen from `p`: uniform by solid angle from outside, uniform by area from inside.
     #[inline]
-    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<EmitterSample> {
         let distance_squared = (p - self.center).length_squared();
         if !self.is_outside(distance_squared) {
             return self.sample_from_inside(p, u);
         }
         let OutsideSample { q, n, wi, pdf } = self.sample_from_outside(p, u);
-        Some(SurfaceSample { p: q, n: n.as_vec3(), wi: wi.as_vec3(), pdf: pdf as f32 })
+        Some(EmitterSample { p: q, n: n.as_vec3(), wi: wi.as_vec3(), pdf: pdf as f32 })
     }
 
     /// [`sample`](Self::sample) from outside, without branches, for loops over many vertices.
@@ -80,11 +81,11 @@ impl SphereEmitter {
     }
 
     #[inline]
-    fn sample_from_inside(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+    fn sample_from_inside(&self, p: DVec3, u: [f32; 2]) -> Option<EmitterSample> {
         let z = 1.0 - 2.0 * f64::from(u[0]);
         let around = unit_circle(u[1]) * ((1.0 - z) * (1.0 + z)).sqrt();
         let outward = DVec3::new(around.x, around.y, z);
-        SurfaceSample::from_area(p, self.center + outward * self.radius, outward, self.pdf_area())
+        EmitterSample::from_area(p, self.center + outward * self.radius, outward, self.pdf_area())
     }
 
     /// Density per solid angle with which `sample` from `p` finds the surface point `q`.
@@ -94,7 +95,7 @@ impl SphereEmitter {
         if self.is_outside(distance_squared) {
             return (1.0 / (TAU * self.cone(distance_squared).one_minus_cos)) as f32;
         }
-        SurfaceSample::pdf_from_area(p, q, (q - self.center) / self.radius, self.pdf_area())
+        EmitterSample::pdf_from_area(p, q, (q - self.center) / self.radius, self.pdf_area())
     }
 
     fn pdf_area(&self) -> f64 {

@@ -13,7 +13,8 @@ const LOOKUPS: usize = 3;
 /// Lookups along each side for the mean over a triangle.
 const TRIANGLE_LOOKUPS: usize = 4;
 
-/// What a texture counts at least: lookups may all meet black and miss a bright spot, and a light that counts nothing is never chosen.
+/// What a texture counts at least: lookups may all meet black and miss a bright spot, and a light that counts nothing
+/// is never chosen.
 pub(super) const LEAST_MEAN: f32 = 1e-3;
 
 /// What textures take at the point `p` of a shape that its sampling found with `u`.

@@ -1,6 +1,6 @@
 //! Triangles, sampled by area.
 
-use super::SurfaceSample;
+use super::EmitterSample;
 use crate::geometry::TrianglePoints;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DVec3, Vec3};
@@ -18,8 +18,9 @@ pub(super) struct TriangleEmitter {
     pub error: f32,
 }
 
-/// The error that [`SurfaceInteraction::error`](crate::geometry::SurfaceInteraction::error) states for a hit of a triangle, for all its
-/// points: four units of roundoff of its extent. More for a sliver, since nobody confirms that a shadow ray ends before it.
+/// The error that [`SurfaceInteraction::error`](crate::geometry::SurfaceInteraction::error) states for a hit of a
+/// triangle, for all its points: four units of roundoff of its extent. More for a sliver, since nobody confirms that a
+/// shadow ray ends before it.
 pub(super) fn triangle_error(points: &TrianglePoints) -> f32 {
     let error = 4.0 * UNIT_ROUNDOFF as f32 * points.bounds().size().max_element();
     if points.is_sliver() { error * 0.5 * points.flatness() as f32 } else { error }
@@ -56,8 +57,8 @@ impl TriangleEmitter {
 
     /// A point as seen from `p`; `None` in the plane.
     #[inline]
-    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<SurfaceSample> {
+    pub fn sample(&self, p: DVec3, u: [f32; 2]) -> Option<EmitterSample> {
         let [b, c] = warp::uniform_triangle(u);
-        SurfaceSample::from_area(p, self.corner + self.edge_u * b + self.edge_v * c, self.normal, 1.0 / self.area)
+        EmitterSample::from_area(p, self.corner + self.edge_u * b + self.edge_v * c, self.normal, 1.0 / self.area)
     }
 }

@@ -1,12 +1,13 @@
 //! Light from every direction.
 //!
-//! A lat-long image is laid around the scene with its top at +Y: the unit direction `d`, in the light's own space, looks up
-//! `u = 1/2 + atan2(d.x, -d.z) / (2 pi)` and `v = acos(d.y) / pi`, where (0, 0) is the image's upper left corner. The
-//! middle column is -Z and +X lies at three quarters of the width (Mitsuba's `envmap` after half a turn about +Y). The
-//! lookup is bilinear between texel centres, wraps in u and clamps in v.
+//! A lat-long image is laid around the scene with its top at +Y: the unit direction `d`, in the light's own space,
+//! looks up `u = 1/2 + atan2(d.x, -d.z) / (2 pi)` and `v = acos(d.y) / pi`, where (0, 0) is the image's upper left
+//! corner. The middle column is -Z and +X lies at three quarters of the width (Mitsuba's `envmap` after half a turn
+//! about +Y). The lookup is bilinear between texel centres, wraps in u and clamps in v.
 //!
-//! Beside sampling the BSDF, which finds all directions about evenly, an image is sampled by how much brighter it is than its mean (Karlik
-//! et al., "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling"): nothing of an even sky.
+//! Beside sampling the BSDF, which finds all directions about evenly, an image is sampled by how much brighter it is
+//! than its mean (Karlik et al., "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling"):
+//! nothing of an even sky.
 
 mod batch;
 
@@ -91,7 +92,7 @@ impl Environment {
 /// Why an image cannot be an environment.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EnvironmentMapError {
-    /// No texels, or not as many as the size says.
+    /// No texels, or not as many as the size requires.
     #[error("{texels} texels for an image of {width} x {height}")]
     Size {
         /// Width as stated.
@@ -116,8 +117,9 @@ pub enum EnvironmentMapError {
 
 /// A lat-long image around the scene, sampled by luminance.
 ///
-/// The cells of the density are bounded by texel centres (and the poles), like those of the bilinear lookup: wherever the lookup is not
-/// black, neither is the density zero. Within a cell it is constant per solid angle, so the poles need no care.
+/// The cells of the density are bounded by texel centres (and the poles), like those of the bilinear lookup: wherever
+/// the lookup is not black, neither is the density zero. Within a cell it is constant per solid angle, so the poles
+/// need no special case.
 #[derive(Clone, Debug)]
 pub struct EnvironmentMap {
     width: usize,
@@ -152,8 +154,8 @@ struct Chosen {
 }
 
 impl EnvironmentMap {
-    /// An environment of `width * height` texels by rows, the top row first. `rotation` maps directions of the light's own space to the
-    /// world; reflections are allowed. Each texel is multiplied by `scale`.
+    /// An environment of `width * height` texels by rows, the top row first. `rotation` maps directions of the light's
+    /// own space to the world; reflections are allowed. Each texel is multiplied by `scale`.
     ///
     /// # Errors
     /// If the count is wrong, a texel is not finite, or `rotation` is not orthonormal.
@@ -162,7 +164,7 @@ impl EnvironmentMap {
             return Err(EnvironmentMapError::Size { width, height, texels: pixels.len() });
         }
         let product = rotation.transpose() * rotation;
-        // Written so that a NaN is refused.
+        // Written so that a NaN is rejected.
         if !(product - DMat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() < 1e-6) {
             return Err(EnvironmentMapError::Rotation);
         }
@@ -182,7 +184,8 @@ impl EnvironmentMap {
         Ok(Self { width, height, texels, axes, densities: Default::default(), cosines, inverse_solid_angles })
     }
 
-    /// What is to be found in each cell: the mean of the bilinear luminance (its corners' mean) times the cell's solid angle; row by row.
+    /// What is to be found in each cell: the mean of the bilinear luminance (its corners' mean) times the cell's solid
+    /// angle; row by row.
     fn weights(&self, compensation: MisCompensation) -> Vec<f64> {
         // Negative channels (of colours out of gamut) must not cancel others: such a texel is not black.
         let brightness = |t: Rgb| f64::from(t.map(f32::abs).luminance());

@@ -136,7 +136,8 @@ fn what_is_no_environment_is_refused_and_black_gives_nothing() {
     );
 }
 
-/// With directions of even density beside it, and the balance heuristic, the density of what is brighter than the mean finds all light.
+/// With directions of even density beside it, and the balance heuristic, the density of what is brighter than the mean
+/// finds all light.
 #[test]
 fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
     const EVEN: f64 = 0.25 / PI;
@@ -163,7 +164,8 @@ fn beside_even_directions_only_what_is_brighter_than_the_mean_is_sampled() {
             strays += u32::from((at.pdf - s.pdf).abs() > 1e-5 * s.pdf);
             add(sums, light(s.wi) * response(s.wi) / (f64::from(s.pdf) + EVEN) + light(even) * response(even) / (pdf(even) + EVEN));
         }
-        // Cells are as bright as their corners in the middle, so that dark directions share a cell with bright ones at most.
+        // Cells are as bright as their corners in the middle, so that dark directions share a cell with bright ones at
+        // most.
         let at = environment.eval(even, MisCompensation::On);
         assert!(at.pdf > 0.0 || f64::from(at.radiance.luminance()) < 2.0 * mean, "{at:?}");
     }

@@ -38,7 +38,7 @@ impl Group {
 
 /// Power times extent in space and directions: how badly one estimate represents the group.
 fn cost(bounds: &LightBounds) -> f32 {
-    // Squared diagonals tell lights on a line apart, whose box has no area.
+    // Squared diagonals separate lights on a line, whose box has no area.
     bounds.intensity * bounds.bounds.size().length_squared() * bounds.cone.measure()
 }
 

@@ -1,9 +1,10 @@
-//! A tree over lights that chooses one in proportion to what about arrives at a point (Conty Estevez and Kulla, "Importance Sampling of
-//! Many Lights with Adaptive Tree Splitting").
+//! A tree over lights that chooses one in proportion to what about arrives at a point (Conty Estevez and Kulla,
+//! "Importance Sampling of Many Lights with Adaptive Tree Splitting").
 //!
-//! Nodes have eight children, whose bounds are compared side by side. Where the paper takes several lights from groups that are near, one
-//! light is chosen from the *cut*: near groups are replaced by their children until what is left is far enough for one estimate to stand
-//! for all of it. Against descending straight from the root, the error on a room with 320 lights halves at a quarter more time.
+//! Nodes have eight children, whose bounds are compared side by side. Where the paper takes several lights from groups
+//! that are near, one light is chosen from the *cut*: near groups are replaced by their children until what is left is
+//! far enough for one estimate to stand for all of it. Against descending straight from the root, the error on a room
+//! with 320 lights halves at a quarter more time.
 
 mod build;
 mod node;

@@ -13,8 +13,8 @@ const SLACK: f32 = 1e-3;
 /// Least value of a cosine that is not cut off.
 const LEAST_COSINE: f32 = 1e-3;
 
-/// A group is near if its squared distance is below this many times its squared radius. On a room with 320 lights, error times time is
-/// least between 1 and 3.
+/// A group is near if its squared distance is below this many times its squared radius. On a room with 320 lights,
+/// error times time is least between 1 and 3.
 const NEAR: f32 = 2.0;
 
 /// One number of each child.

@@ -9,7 +9,8 @@ use crate::math::{DAffine3, Rng, Transform};
 
 const CLOUD: usize = 40;
 
-/// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and lights at infinity if asked.
+/// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and lights at
+/// infinity if `sky`.
 fn cloud(seed: u64, sky: bool) -> (Geometry, LightSet) {
     let mut random = Rng::new(seed);
     let mut next = move || f64::from(random.unit_f32());

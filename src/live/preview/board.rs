@@ -1,4 +1,4 @@
-//! The newest picture, and who looks at it.
+//! The newest picture, and the pages that show it.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
@@ -6,19 +6,19 @@ use std::time::{Duration, Instant};
 use super::Snapshot;
 use crate::live::PICTURE_PERIOD;
 
-/// A page that has not asked for so long is closed.
+/// A page without a request for this time counts as closed.
 const PAGE_LIFE: Duration = Duration::from_secs(3);
 
 /// Most pages that are waited for.
 const MAX_PAGES: usize = 64;
 
-/// Most pictures in answers at a time.
+/// Most pictures in responses at a time.
 const MOST_SENT: usize = 4;
 
 /// A page open somewhere.
 struct Page {
     id: u64,
-    /// When it last asked.
+    /// When its last request came.
     seen: Instant,
     /// The picture that it has.
     version: u64,
@@ -34,7 +34,7 @@ struct State {
     shown: Option<Instant>,
     finished: bool,
     pages: Vec<Page>,
-    /// Pictures that answers hold while they are sent.
+    /// Pictures that responses hold while they are sent.
     sent: Vec<Weak<Snapshot>>,
 }
 
@@ -76,7 +76,7 @@ impl Board {
     }
 
     /// Whether a page that has the newest picture is open, and that picture is not too young.
-    pub fn wants_picture(&self) -> bool {
+    pub fn needs_picture(&self) -> bool {
         let state = self.lock();
         let is_due = state.shown.is_none_or(|shown| shown.elapsed() >= PICTURE_PERIOD);
         is_due && !state.finished && state.open_pages().any(|page| page.version >= state.version && !page.idle)
@@ -96,14 +96,15 @@ impl Board {
     }
 
     /// What there is to see.
-    pub fn look(&self) -> Shown {
+    pub fn current(&self) -> Shown {
         let state = self.lock();
         Shown { snapshot: state.snapshot.clone(), version: state.version, finished: state.finished }
     }
 
-    /// What there is to see, to be sent, which may take long; `None` if slow readers hold [`MOST_SENT`] older pictures already.
+    /// What there is to see, to be sent, which may take long; `None` if slow readers hold [`MOST_SENT`] older pictures
+    /// already.
     pub fn take(&self) -> Option<Shown> {
-        let shown = self.look();
+        let shown = self.current();
         let mut state = self.lock();
         state.sent.retain(|sent| sent.strong_count() > 0);
         if let Some(snapshot) = shown.snapshot.as_ref().map(Arc::downgrade)
@@ -129,7 +130,7 @@ impl Board {
         self.changed.notify_all();
     }
 
-    /// Waits until every page open has the newest picture, no longer than until `deadline`; says whether they have.
+    /// Waits until every page open has the newest picture, no longer than until `deadline`; returns whether they have.
     pub fn wait(&self, deadline: Instant) -> bool {
         let mut state = self.lock();
         loop {
@@ -140,7 +141,7 @@ impl Board {
             if left.is_zero() {
                 return false;
             }
-            // Pages close without a word: look again now and then.
+            // Pages close without a notification: check again now and then.
             state = self.changed.wait_timeout(state, left.min(PICTURE_PERIOD)).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
@@ -155,25 +156,25 @@ mod tests {
     fn pictures_are_wanted_only_while_somebody_waits_for_one() {
         let picture = Arc::new(Snapshot::new(&Image { size: [1, 1], crop: Crop::full([1, 1]), ..Image::default() }, 1));
         let board = Board::default();
-        assert!(!board.wants_picture());
+        assert!(!board.needs_picture());
         board.visit(7, 0, true);
-        assert!(!board.wants_picture());
+        assert!(!board.needs_picture());
         board.visit(7, 0, false);
-        assert!(board.wants_picture());
+        assert!(board.needs_picture());
         board.show(&picture, false);
-        assert!(!board.wants_picture() && !board.wait(Instant::now()));
+        assert!(!board.needs_picture() && !board.wait(Instant::now()));
         // One of two pages has fetched it.
         board.visit(8, 0, false);
         board.visit(7, 1, false);
         std::thread::sleep(PICTURE_PERIOD);
-        assert!(board.wants_picture());
+        assert!(board.needs_picture());
         assert!(!board.wait(Instant::now()));
         board.visit(8, 1, false);
         assert!(board.wait(Instant::now()));
         board.show(&picture, true);
         board.visit(8, 2, false);
         std::thread::sleep(PICTURE_PERIOD);
-        assert!(!board.wants_picture() && board.look().finished && board.look().version == 2);
+        assert!(!board.needs_picture() && board.current().finished && board.current().version == 2);
     }
 
     #[test]
@@ -191,7 +192,7 @@ mod tests {
             held.push(board.take().unwrap());
         }
         show();
-        assert!(board.take().is_none() && board.look().version == MOST_SENT as u64 + 1);
+        assert!(board.take().is_none() && board.current().version == MOST_SENT as u64 + 1);
         held.drain(..2);
         assert!(board.take().is_some());
     }

@@ -13,7 +13,7 @@ const MAX_HEADERS: usize = 64;
 /// How long readers are waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// A connection ends after this time without a request, or without a byte of an answer taken.
+    /// A connection ends after this time without a request, or without a byte of a response taken.
     pub stall: Duration,
     /// Bytes a second that a reader has to take, after a first `stall`; at least 1.
     pub least_rate: u64,
@@ -26,14 +26,14 @@ impl Default for Patience {
     }
 }
 
-/// How long what is left of a refused request is read.
+/// How long what is left of a rejected request is read.
 const LINGER: Duration = Duration::from_secs(1);
 
-/// What the page may do: show what is in it, and ask its own server.
+/// What the page may do: show what is in it, and send requests to its own server.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Why a request is not answered.
+/// Why a request is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum HttpError {
     /// Not HTTP, or without a host.
@@ -42,7 +42,7 @@ pub(crate) enum HttpError {
     TooLong,
     /// Anything but GET.
     Method,
-    /// Asked under a foreign name or by a foreign page.
+    /// A request for a foreign host or by a page of a foreign origin.
     Foreign,
     /// Too many connections.
     Busy,
@@ -60,7 +60,7 @@ impl HttpError {
     }
 }
 
-/// What is asked for.
+/// The target of a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     path: String,
@@ -84,7 +84,7 @@ impl Request {
 pub struct Connection {
     stream: TcpStream,
     patience: Patience,
-    /// When the present answer has to be sent.
+    /// When the present response has to be sent.
     deadline: Option<Instant>,
     /// What has been read and not yet been used.
     buffer: Vec<u8>,
@@ -98,7 +98,8 @@ impl Connection {
         Ok(Self { stream, patience, deadline: None, buffer: Vec::new() })
     }
 
-    /// The next request; `None` if there is none. Its head must be there in time, and it must ask for this machine or for `host`.
+    /// The next request; `None` if there is none. Its head must arrive in time, and its host must be this machine or
+    /// `host`.
     pub fn request(&mut self, host: &str) -> io::Result<Option<Result<Request, HttpError>>> {
         let deadline = Instant::now() + self.patience.stall;
         loop {
@@ -123,13 +124,13 @@ impl Connection {
         }
     }
 
-    /// Answers with a refusal, the last answer of the connection.
+    /// Responds with an error, the last response of the connection.
     pub fn refuse(&mut self, refusal: HttpError) -> io::Result<()> {
         let allow = if refusal == HttpError::Method { "Allow: GET\r\n" } else { "" };
         let (status, length) = (refusal.status(), refusal.status().len());
         let head = format!("HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n");
         self.stream.write_all(format!("{head}{status}").as_bytes())?;
-        // A connection closed before all of the request is read would take the answer with it.
+        // A connection closed before all of the request is read would take the response with it.
         self.stream.shutdown(Shutdown::Write)?;
         self.stream.set_read_timeout(Some(LINGER))?;
         let (start, mut read) = (Instant::now(), 1);
@@ -139,7 +140,7 @@ impl Connection {
         Ok(())
     }
 
-    /// Starts an answer; the body of `length` bytes follows by [`Connection::write`].
+    /// Starts a response; the body of `length` bytes follows by [`Connection::write`].
     pub fn start(&mut self, status: &str, kind: &str, length: u64) -> io::Result<()> {
         let head = format!(
             "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nCache-Control: no-store\r\n\
@@ -171,8 +172,8 @@ impl Connection {
         Ok(())
     }
 
-    /// A whole answer.
-    pub fn answer(&mut self, status: &str, kind: &str, body: &[u8]) -> io::Result<()> {
+    /// A whole response.
+    pub fn respond(&mut self, status: &str, kind: &str, body: &[u8]) -> io::Result<()> {
         self.start(status, kind, body.len() as u64)?;
         self.write(body)
     }
@@ -199,11 +200,11 @@ fn check(request: &httparse::Request, host: &str) -> Result<Request, HttpError> 
     // A request with a body would leave it where the next request is looked for.
     let has_body = values("Transfer-Encoding").next().is_some() || values("Content-Length").any(|value| value != b"0");
     let mut hosts = values("Host");
-    let (Some(asked), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(HttpError::Malformed) };
-    let asked = std::str::from_utf8(asked).map_err(|_| HttpError::Malformed)?;
-    // Browsers say which kind of page a request comes from; pages of other origins have no business here.
+    let (Some(requested), None, false) = (hosts.next(), hosts.next(), has_body) else { return Err(HttpError::Malformed) };
+    let requested = std::str::from_utf8(requested).map_err(|_| HttpError::Malformed)?;
+    // Browsers send the origin of a request's page; other origins are rejected.
     let from_elsewhere = values("Sec-Fetch-Site").any(|site| site != b"same-origin" && site != b"none");
-    if !is_own_host(asked, host) || from_elsewhere {
+    if !is_own_host(requested, host) || from_elsewhere {
         return Err(HttpError::Foreign);
     }
     let target = request.path.filter(|path| path.starts_with('/')).ok_or(HttpError::Malformed)?;
@@ -211,14 +212,14 @@ fn check(request: &httparse::Request, host: &str) -> Result<Request, HttpError> 
     Ok(Request { path: path.to_owned(), query: query.to_owned() })
 }
 
-/// Whether a Host header names this machine: by address, as localhost, or by the name asked for on the command line. A
+/// Whether a Host header names this machine: by address, as localhost, or by the name given on the command line. A
 /// foreign name that has been made to point here (DNS rebinding) is none of these. The port may be another, that of a
 /// tunnel.
-fn is_own_host(asked: &str, host: &str) -> bool {
-    let asked = asked.to_ascii_lowercase();
-    let (name, port) = match asked.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+fn is_own_host(requested: &str, host: &str) -> bool {
+    let requested = requested.to_ascii_lowercase();
+    let (name, port) = match requested.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
         Some(parts) => parts,
-        None => asked.split_at(asked.find(':').unwrap_or(asked.len())),
+        None => requested.split_at(requested.find(':').unwrap_or(requested.len())),
     };
     let is_port = port.is_empty() || port.strip_prefix(':').is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()));
     is_port && (name == "localhost" || name == host || name.parse::<IpAddr>().is_ok())
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn only_this_machine_may_be_asked_for() {
+    fn only_this_machine_is_a_valid_host() {
         for host in ["127.0.0.1:8000", "localhost", "LOCALHOST:1", "[::1]:8000", "192.168.1.7", "node7:80"] {
             assert!(is_own_host(host, "node7"), "{host}");
         }

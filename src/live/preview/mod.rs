@@ -1,8 +1,8 @@
 //! A small web page that shows the picture as it grows.
 //!
-//! The page and everything it needs are in the program. It asks for the numbers a few times a second, fetches the layer
-//! it shows when there is a newer picture, and so tells that it wants the next one; nobody looking means no pictures
-//! and no cost.
+//! The page and everything it needs are in the program. It requests the numbers a few times a second, fetches the layer
+//! it shows when there is a newer picture, and thereby requests the next one; without an open page no pictures are
+//! made, at no cost.
 
 mod board;
 mod http;
@@ -23,7 +23,7 @@ use http::{Connection, HttpError};
 /// More connections than this are turned away.
 const MAX_CONNECTIONS: usize = 64;
 
-/// After a failure to accept a connection (too many open files, say) the next attempt waits so long.
+/// The wait before the next attempt after a failure to accept a connection (too many open files, for example).
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Where the page is served.
@@ -52,7 +52,7 @@ struct Shared {
     statistics: Arc<Statistics>,
     name: String,
     view: ViewDesc,
-    /// The host asked for: requests may name it.
+    /// The host given: requests may name it.
     host: String,
     patience: Patience,
     connections: AtomicUsize,
@@ -98,8 +98,8 @@ impl Preview {
     }
 
     /// Whether a page that shows the newest picture waits for a newer one.
-    pub fn wants_picture(&self) -> bool {
-        self.shared.board.wants_picture()
+    pub fn needs_picture(&self) -> bool {
+        self.shared.board.needs_picture()
     }
 
     /// Shows a picture from now on. Never blocks.
@@ -112,7 +112,8 @@ impl Preview {
         self.shared.board.show(snapshot, true);
     }
 
-    /// Waits until every page open has fetched the finished picture, no longer than until `deadline`; says whether they have.
+    /// Waits until every page open has fetched the finished picture, no longer than until `deadline`; returns whether
+    /// they have.
     pub fn wait(&self, deadline: Instant) -> bool {
         self.shared.board.wait(deadline)
     }
@@ -153,7 +154,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
     }
 }
 
-/// Answers the requests of a connection, one after the other.
+/// Responds to the requests of a connection, one after the other.
 fn serve(stream: TcpStream, shared: &Shared, has_room: bool) -> std::io::Result<()> {
     let mut connection = Connection::new(stream, shared.patience)?;
     if !has_room {

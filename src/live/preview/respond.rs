@@ -1,10 +1,10 @@
-//! What there is to ask for.
+//! The resources of the server.
 //!
-//! | path | answer |
+//! | path | response |
 //! |---|---|
 //! | `/` | the page |
-//! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and wants the next one, not so with `idle=1` |
-//! | `/layer?index=I` | a layer: version, width, height, channels as little-endian u32, then 16-bit floats, row by row from the top |
+//! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and requests the next, not with `idle=1` |
+//! | `/layer?index=I` | a layer: version, width, height, channels (little-endian u32), then rows of 16-bit floats |
 //! | `/pixel?x=X&y=Y` | every layer's exact values at a pixel as JSON |
 
 use std::io;
@@ -26,16 +26,16 @@ const JSON: &str = "application/json";
 
 pub fn respond(connection: &mut Connection, request: &Request, shared: &Shared) -> io::Result<()> {
     match request.path() {
-        "/" => connection.answer(OK, "text/html; charset=utf-8", PAGE.as_bytes()),
+        "/" => connection.respond(OK, "text/html; charset=utf-8", PAGE.as_bytes()),
         "/state" => {
             if let (Some(page), Some(version)) = (request.number("page"), request.number("have")) {
                 shared.board.visit(page, version, request.number("idle") == Some(1));
             }
-            connection.answer(OK, JSON, state(shared).to_string().as_bytes())
+            connection.respond(OK, JSON, state(shared).to_string().as_bytes())
         }
         "/layer" => layer(connection, request, shared),
         "/pixel" => match pixel(request, shared) {
-            Some(value) => connection.answer(OK, JSON, value.to_string().as_bytes()),
+            Some(value) => connection.respond(OK, JSON, value.to_string().as_bytes()),
             None => not_found(connection),
         },
         _ => not_found(connection),
@@ -43,11 +43,11 @@ pub fn respond(connection: &mut Connection, request: &Request, shared: &Shared) 
 }
 
 fn not_found(connection: &mut Connection) -> io::Result<()> {
-    connection.answer("404 Not Found", "text/plain", b"not found")
+    connection.respond("404 Not Found", "text/plain", b"not found")
 }
 
 fn state(shared: &Shared) -> Value {
-    let shown = shared.board.look();
+    let shown = shared.board.current();
     let snapshot = shown.snapshot.as_deref();
     let layers = snapshot.map(|snapshot| {
         let layer = |names: &[String]| json!({ "name": Snapshot::title(names), "channels": names });
@@ -69,7 +69,7 @@ fn state(shared: &Shared) -> Value {
 /// The connection holds its picture while it sends.
 fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io::Result<()> {
     let Some(shown) = shared.board.take() else {
-        return connection.answer("503 Service Unavailable", "text/plain", b"too many slow readers");
+        return connection.respond("503 Service Unavailable", "text/plain", b"too many slow readers");
     };
     let index = request.number("index").and_then(|index| usize::try_from(index).ok());
     let (Some(snapshot), Some(index)) = (shown.snapshot, index) else { return not_found(connection) };
@@ -90,7 +90,7 @@ fn layer(connection: &mut Connection, request: &Request, shared: &Shared) -> io:
 }
 
 fn pixel(request: &Request, shared: &Shared) -> Option<Value> {
-    let shown = shared.board.look();
+    let shown = shared.board.current();
     let snapshot = shown.snapshot?;
     let [x, y] = [request.number("x")?, request.number("y")?];
     let [width, height] = snapshot.size().map(u64::from);
@@ -119,10 +119,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_told_exactly() {
+    fn values_are_sent_exactly() {
         for value in [0.1f32, -1.5e-30, 16_777_217.0, f32::MAX, 1.0 / 3.0] {
-            let told = number(value).to_string();
-            assert_eq!(told.parse::<f32>().unwrap(), value, "{told}");
+            let printed = number(value).to_string();
+            assert_eq!(printed.parse::<f32>().unwrap(), value, "{printed}");
         }
         assert_eq!(number(0.1), json!(0.1));
         assert_eq!([number(f32::NAN), number(f32::INFINITY), number(f32::NEG_INFINITY)], [json!("NaN"), json!("inf"), json!("-inf")]);

@@ -16,7 +16,7 @@ use super::{PICTURE_PERIOD, Snapshot};
 use queue::Queue;
 use sender::Sender;
 
-/// Where tev listens unless told otherwise.
+/// Where tev listens by default.
 pub const DEFAULT_ADDRESS: &str = "127.0.0.1:14158";
 
 /// Where tev listens, and how patient to be with it.
@@ -52,7 +52,8 @@ pub struct Tev {
 }
 
 impl Tev {
-    /// Starts the thread that sends, or sends nothing where no thread can be had; in the viewer the picture is called `name`.
+    /// Starts the thread that sends, or sends nothing where no thread can be had; in the viewer the picture is called
+    /// `name`.
     pub fn new(options: TevOptions, name: &str) -> Self {
         let queue = Arc::new(Queue::new(options.update_period));
         let sender = Sender::new(options, name.replace('\0', "_"), Arc::clone(&queue));
@@ -66,8 +67,8 @@ impl Tev {
     }
 
     /// Whether tev is connected and could be sent a picture at once.
-    pub fn wants_picture(&self) -> bool {
-        self.queue.wants_picture()
+    pub fn needs_picture(&self) -> bool {
+        self.queue.needs_picture()
     }
 
     /// Hands over a picture; one that still waits is replaced. Never blocks.
@@ -80,7 +81,8 @@ impl Tev {
         self.queue.offer_final(snapshot);
     }
 
-    /// Waits until the last picture is sent, no longer than until `deadline`, and not at all if nobody is there; says whether it was sent.
+    /// Waits until the last picture is sent, no longer than until `deadline`, and not at all without a connection;
+    /// returns whether it was sent.
     pub fn wait(&self, deadline: Instant) -> bool {
         self.queue.wait(deadline)
     }

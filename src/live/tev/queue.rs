@@ -83,7 +83,7 @@ impl Queue {
         self.lock().viewer == Viewer::Connected
     }
 
-    pub fn wants_picture(&self) -> bool {
+    pub fn needs_picture(&self) -> bool {
         let state = self.lock();
         let is_due = state.offered.is_none_or(|last| last.elapsed() >= self.period);
         state.viewer == Viewer::Connected && state.waiting.is_none() && is_due && !state.finishing
@@ -121,7 +121,7 @@ impl Queue {
         let mut state = self.lock();
         state.finishing = true;
         if let Some(socket) = state.socket.take().filter(|_| !state.delivered) {
-            // A write under way ends with an error; there is nobody left to tell.
+            // A write under way ends with an error, which is no longer reported.
             let _ = socket.shutdown(Shutdown::Both);
         }
         self.changed.notify_all();
@@ -154,8 +154,8 @@ impl Queue {
         self.changed.notify_all();
     }
 
-    /// For the sender: waits for a picture and takes it, not before `earliest` unless the render has ended. If none waits, `unsent` is it.
-    /// `None` when there is nothing left to send.
+    /// For the sender: waits for a picture and takes it, not before `earliest` unless the render has ended. If none
+    /// waits, `unsent` is it. `None` when there is nothing left to send.
     pub fn next(&self, earliest: Instant, unsent: Option<&Arc<Snapshot>>) -> Option<Arc<Snapshot>> {
         let left = earliest.saturating_duration_since(Instant::now());
         let (mut state, _) =
@@ -184,7 +184,8 @@ impl Queue {
         state.delivered = state.finishing && state.waiting.is_none();
     }
 
-    /// For the sender: waits before the next attempt to connect; says whether the render has ended, which ends the wait.
+    /// For the sender: waits before the next attempt to connect; returns whether the render has ended, which ends the
+    /// wait.
     pub fn pause(&self, period: Duration) -> bool {
         let waited = self.changed.wait_timeout_while(self.lock(), period, |state| !state.finishing);
         waited.unwrap_or_else(PoisonError::into_inner).0.finishing

@@ -1,4 +1,4 @@
-//! The thread that talks to tev.
+//! The thread that sends to tev.
 
 use std::io::{self, ErrorKind};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -123,7 +123,7 @@ impl Sender {
     }
 }
 
-/// Whether the other side has hung up: tev never says anything, so whatever can be read is the end.
+/// Whether the connection is closed: tev never sends anything, so whatever can be read is the end.
 fn is_closed(stream: &TcpStream) -> bool {
     let peek = || {
         stream.set_nonblocking(true)?;
@@ -145,7 +145,8 @@ fn tiles(size: [u32; 2]) -> impl Iterator<Item = Crop> {
     starts(size[1]).flat_map(move |y| starts(size[0]).map(move |x| tile(x, y).intersection(&full)))
 }
 
-/// The rows of a tile in the data of a layer with `channels` channels; `tile` counts from the corner of the part that layers hold.
+/// The rows of a tile in the data of a layer with `channels` channels; `tile` counts from the corner of the part that
+/// layers hold.
 fn rows(data: &[f32], width: u32, channels: usize, tile: Crop) -> impl Iterator<Item = &[f32]> {
     let start = move |y: u32| (y as usize * width as usize + tile.x as usize) * channels;
     (tile.y..tile.y + tile.height).map(move |y| &data[start(y)..start(y) + tile.width as usize * channels])

@@ -60,7 +60,7 @@ fn places_of(file: &ExrFile, name: &str) -> Vec<((usize, usize), Place)> {
     places
 }
 
-/// The channels whose pixels are looked at, each once.
+/// The channels whose pixels are read, each once.
 pub fn places(file: &ExrFile) -> Vec<Place> {
     let mut places: Vec<Place> = Vec::new();
     for (_, place) in distinct(file).iter().filter_map(Matte::name).flat_map(|name| places_of(file, name)) {

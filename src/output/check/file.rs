@@ -1,4 +1,4 @@
-//! What a file says of itself.
+//! The headers of a file.
 
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -9,15 +9,16 @@ use exr::meta::header::Header;
 use super::crypto_pixels;
 use crate::error::{Error, Result};
 use crate::file;
-use crate::file::exr_blocks::{Place, Row, allocate, read_rows};
+use crate::file::exr_blocks::{ChannelRow, Place, allocate, read_rows};
 use crate::file::exr_headers::read_headers;
 use crate::output::role::Role;
 
-/// A file's headers, and the pixels that rules look at.
+/// A file's headers, and the pixels that rules check.
 pub struct ExrFile {
     pub path: PathBuf,
     pub headers: Vec<Header>,
-    /// The samples of channels of mattes; empty if the file is deep or of a compression that the library does not know.
+    /// The samples of channels of mattes; empty if the file is deep or of a compression that the library does not
+    /// support.
     planes: Vec<(Place, Vec<f32>)>,
 }
 
@@ -42,16 +43,16 @@ impl ExrFile {
         let mut file = Self { path: path.into(), headers, planes: Vec::new() };
         // Flat files are decoded as a whole, so that a truncated one is not called clean.
         if file.headers.iter().all(|header| !header.deep) {
-            let wanted = crypto_pixels::places(&file);
+            let requested = crypto_pixels::places(&file);
             let plane = |place: &Place| allocate(path, &file.headers[place.part], 1, 0.0);
-            let mut planes = wanted.iter().map(plane).collect::<Result<Vec<Vec<f32>>>>()?;
-            let keep = |row: Row| row.write(planes[row.wanted][row.start..].iter_mut(), |v| v);
-            match read_rows(BufReader::new(source), &file.headers, &wanted, true, keep) {
-                // Of a compression that the library does not know, the headers can still be checked.
+            let mut planes = requested.iter().map(plane).collect::<Result<Vec<Vec<f32>>>>()?;
+            let keep = |row: ChannelRow| row.write(planes[row.requested][row.start..].iter_mut(), |v| v);
+            match read_rows(BufReader::new(source), &file.headers, &requested, true, keep) {
+                // With an unsupported compression, the headers can still be checked.
                 Err(exr::error::Error::NotSupported(_)) => {}
                 result => {
                     result.map_err(|e| malformed(e.to_string()))?;
-                    file.planes = wanted.into_iter().zip(planes).collect();
+                    file.planes = requested.into_iter().zip(planes).collect();
                 }
             }
         }

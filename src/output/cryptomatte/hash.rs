@@ -1,4 +1,5 @@
-//! Names to ids: MurmurHash3 of 32 bits (Austin Appleby, public domain) with the seed 0, bent so that its bits are an ordinary `f32`.
+//! Names to ids: MurmurHash3 of 32 bits (Austin Appleby, public domain) with the seed 0, bent so that its bits are an
+//! ordinary `f32`.
 
 /// The id of a name, as bits of a float. Exponents of all zeros or all ones, which encode zero, denormals,
 /// infinities and NaN, have their lowest bit flipped.

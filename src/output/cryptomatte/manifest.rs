@@ -14,7 +14,8 @@ pub fn manifest<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
 /// The names and ids of a manifest, in the order of the names.
 ///
 /// # Errors
-/// What is wrong with the text: it is not JSON, not an object, or an id has not eight hexadecimal digits of an ordinary float.
+/// What is wrong with the text: it is not JSON, not an object, or an id has not eight hexadecimal digits of an ordinary
+/// float.
 pub fn parse_manifest(text: &str) -> Result<BTreeMap<String, u32>, String> {
     let entries: BTreeMap<String, serde_json::Value> = serde_json::from_str(text).map_err(|e| format!("it is no JSON object: {e}"))?;
     entries

@@ -1,5 +1,6 @@
-//! Cryptomatte 1.2.0 (Friedman and Jones, "Fully automatic ID mattes with support for motion blur and transparency", and the specification
-//! that Psyop publishes): for each pixel, what covers it and how much of it, under names that survive compositing.
+//! Cryptomatte 1.2.0 (Friedman and Jones, "Fully automatic ID mattes with support for motion blur and transparency",
+//! and the specification that Psyop publishes): for each pixel, what covers it and how much of it, under names that
+//! survive compositing.
 
 mod hash;
 mod manifest;

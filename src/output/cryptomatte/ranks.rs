@@ -1,7 +1,8 @@
 //! What covers a pixel, largest first, in pairs of id and coverage.
 
-/// Fills a pixel's ranks: pairs of id and coverage, the largest coverage first. Entries of the same id are added up, what covers nothing or
-/// has no id is left out, what no rank is left for is dropped, and ranks that nothing is left for are zero. `entries` is used up.
+/// Fills a pixel's ranks: pairs of id and coverage, the largest coverage first. Entries of the same id are added up,
+/// what covers nothing or has no id is left out, what no rank is left for is dropped, and ranks that nothing is left
+/// for are zero. `entries` is used up.
 pub fn fill_ranks(entries: &mut Vec<(u32, f32)>, ranks: &mut [f32]) {
     entries.retain(|(bits, coverage)| *bits != 0 && *coverage > 0.0);
     entries.sort_by_key(|(bits, _)| *bits);

@@ -27,7 +27,7 @@ const LEVEL: i32 = 2;
 /// Writes a file. Its bytes do not depend on the number of threads.
 ///
 /// # Errors
-/// What the system or the library says.
+/// The error of the system or the library.
 pub fn write_image(image: &FlatImage, out: &mut BufWriter<&mut File>) -> Result<(), String> {
     let headers = image.layer_data.infer_headers(&image.attributes);
     let layers = image.layer_data.create_writer(&headers);
@@ -114,7 +114,8 @@ impl Zip {
     }
 }
 
-/// The first bytes of all pairs and then the second ones, each less the one before it, plus 128. Blocks have an even number of bytes.
+/// The first bytes of all pairs and then the second ones, each less the one before it, plus 128. Blocks have an even
+/// number of bytes.
 fn predict(block: &[u8], out: &mut Vec<u8>) {
     out.resize(block.len(), 0);
     let pairs = block.as_chunks::<2>().0;

@@ -1,15 +1,15 @@
 //! What the library that writes files leaves out of their headers: attributes in the order of their names, as other
 //! programs write them, since equal pictures would come in different files; and the mark of files with long names,
-//! without which OpenEXR refuses to read them.
+//! without which OpenEXR does not read them.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
 /// Magic number and version.
 const PREFIX: u64 = 8;
-/// The bit of the version that says that there are several parts.
+/// The bit of the version for several parts.
 const SEVERAL: u32 = 1 << 12;
 
-/// The bit of the version that says that names of attributes, their types or channels are longer than [`SHORT`].
+/// The bit of the version for names of attributes, their types or channels longer than [`SHORT`].
 const LONG_NAMES: u32 = 1 << 10;
 /// The most bytes of a name in files without that bit.
 const SHORT: usize = 31;

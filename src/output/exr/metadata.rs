@@ -25,7 +25,7 @@ fn put(attributes: &mut LayerAttributes, name: &str, value: AttributeValue) {
     attributes.other.insert(text(name), value);
 }
 
-/// What is said of the mattes of a file.
+/// The metadata of the mattes of a file.
 pub struct Mattes<'a> {
     /// The mattes.
     pub mattes: &'a [Matte],
@@ -78,7 +78,8 @@ pub struct Common<'a> {
     pub original: Option<IntegerBounds>,
 }
 
-/// The attributes of a part: the first has those of the whole file, since some programs read no other; every part describes the mattes.
+/// The attributes of a part: the first has those of the whole file, since some programs read no other; every part
+/// describes the mattes.
 pub fn part_attributes(common: &Common, part: PartKind, first: bool, comments: &[&str]) -> LayerAttributes {
     let Common { output, info, .. } = common;
     let own = output.comments.iter().map(String::as_str).filter(|_| first);

@@ -4,10 +4,10 @@ use exr::compression::Compression;
 
 use crate::desc::{CompressionDesc, ExrProfileDesc, LayerKind, OutputDesc, PixelTypeDesc};
 use crate::error::{Error, Result};
-use crate::film::{LayerInfo, Source};
+use crate::film::{LayerInfo, LayerSource};
 use crate::output::role::Role;
 
-/// Ranks of Cryptomatte if nothing is said.
+/// Ranks of Cryptomatte by default.
 const DEFAULT_DEPTH: u32 = 6;
 /// The most ranks: what two digits of a layer's number allow would be 200, what anyone uses is 16.
 const MAX_DEPTH: u32 = 64;
@@ -46,7 +46,8 @@ pub struct OutputFault {
     pub message: String,
 }
 
-/// Checks that an EXR output makes sense: no lossy compression of data, no 16 bits where 32 are needed, an even number of ranks.
+/// Checks that an EXR output makes sense: no lossy compression of data, no 16 bits where 32 are needed, an even number
+/// of ranks.
 ///
 /// # Errors
 /// [`Error::Usage`] naming the output and the layer.
@@ -123,7 +124,7 @@ fn is_lossy(compression: CompressionDesc) -> bool {
 
 fn is_data(layer: LayerKind) -> bool {
     let info = LayerInfo::of(layer);
-    matches!(info.source, Source::Coverage) || info.channels.iter().any(|name| Role::of(name).is_data())
+    matches!(info.source, LayerSource::Coverage) || info.channels.iter().any(|name| Role::of(name).is_data())
 }
 
 fn layer_name(layer: LayerKind) -> &'static str {

@@ -19,7 +19,7 @@ pub struct Plane {
 }
 
 /// Where values are taken from: pixels whose channels lie side by side.
-pub struct Source<'a> {
+pub struct SampleSource<'a> {
     /// Full names of the channels, in the order of the data.
     pub names: Vec<String>,
     /// Values, pixel by pixel.
@@ -32,21 +32,21 @@ pub struct Source<'a> {
 #[derive(Clone, Copy)]
 pub struct Region {
     /// The pixels that there are.
-    pub have: Crop,
+    pub available: Crop,
     /// The pixels to store.
-    pub want: Crop,
+    pub written: Crop,
 }
 
 impl Region {
     /// The values of one channel out of `stride` in the pixels to store.
     fn values(self, data: &[f32], channel: usize, stride: usize) -> impl Iterator<Item = f32> + '_ {
-        let Self { have, want } = self;
-        (want.y..want.y + want.height).flat_map(move |y| {
-            (want.x..want.x + want.width).map(move |x| {
-                if !have.contains(x, y) {
+        let Self { available, written } = self;
+        (written.y..written.y + written.height).flat_map(move |y| {
+            (written.x..written.x + written.width).map(move |x| {
+                if !available.contains(x, y) {
                     return 0.0;
                 }
-                let pixel = (y - have.y) as usize * have.width as usize + (x - have.x) as usize;
+                let pixel = (y - available.y) as usize * available.width as usize + (x - available.x) as usize;
                 data.get(pixel * stride + channel).copied().unwrap_or(0.0)
             })
         })
@@ -54,13 +54,13 @@ impl Region {
 }
 
 /// The channels of all sources, in parallel. Numbers beyond what 16 bits hold become their largest, 65504.
-pub fn planes(sources: &[Source], region: Region) -> Vec<Plane> {
-    let jobs: Vec<(&Source, usize)> = sources.iter().flat_map(|source| (0..source.names.len()).map(move |i| (source, i))).collect();
+pub fn planes(sources: &[SampleSource], region: Region) -> Vec<Plane> {
+    let jobs: Vec<(&SampleSource, usize)> = sources.iter().flat_map(|source| (0..source.names.len()).map(move |i| (source, i))).collect();
     jobs.into_par_iter()
         .map(|(source, i)| {
             let name = source.names[i].clone();
             let stride = source.names.len();
-            let samples = if region.have == region.want {
+            let samples = if region.available == region.written {
                 let values = source.data.iter().skip(i).step_by(stride).copied();
                 collect(values, source.half)
             } else {

@@ -9,18 +9,20 @@ use exr::prelude::Vec2;
 use super::metadata::{SETTINGS, text};
 use crate::error::{Error, Result};
 use crate::file;
-use crate::file::exr_blocks::{Place, Row, allocate, read_rows};
+use crate::file::exr_blocks::{ChannelRow, Place, allocate, read_rows};
 use crate::file::exr_headers::read_headers;
 use crate::film::{Crop, Image, Layer, LayerKind};
 
-/// Reads the colour of any EXR file: bare channels R, G, B (in upper or lower case), else a layer with such channels (the one with the
-/// shortest name, a "Combined" first), else Y as gray. Alpha is that of the same layer, or 1. The picture is the data window; where that
-/// reaches beyond the display window, the data window is taken as the full picture.
+/// Reads the colour of any EXR file: bare channels R, G, B (in upper or lower case), else a layer with such channels
+/// (the one with the shortest name, a "Combined" first), else Y as gray. Alpha is that of the same layer, or 1. The
+/// picture is the data window; where that reaches beyond the display window, the data window is taken as the full
+/// picture.
 ///
 /// Only the channels of the colour are kept in memory.
 ///
 /// # Errors
-/// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no such picture or too large, [`Error::OutOfMemory`].
+/// [`Error::Missing`] if the file cannot be read, [`Error::Malformed`] if it is no such picture or too large,
+/// [`Error::OutOfMemory`].
 pub fn read_exr(path: &Path) -> Result<Image> {
     let source = file::open(path).map_err(|e| Error::Missing { file: path.to_owned(), message: e.to_string() })?;
     let malformed = |message: String| Error::Malformed { file: path.to_owned(), message };
@@ -32,18 +34,18 @@ pub fn read_exr(path: &Path) -> Result<Image> {
         return Err(malformed(format!("there are no channels R, G and B and no Y{deep}; it has {}", names.join(", "))));
     };
     let header = &headers[part];
-    let (mut wanted, mut components) = (Vec::new(), Vec::new());
+    let (mut requested, mut components) = (Vec::new(), Vec::new());
     for (component, channel) in choice.into_iter().enumerate().filter_map(|(component, channel)| Some((component, channel?))) {
         let channel_header = &header.channels.list[channel];
         if channel_header.sampling != Vec2(1, 1) {
             return Err(malformed(format!("channel {} is subsampled", channel_header.name)));
         }
-        wanted.push(Place { part, channel });
+        requested.push(Place { part, channel });
         components.push(component);
     }
     let mut data = allocate(path, header, 4, 1.0)?;
-    let keep = |row: Row| row.write(data[4 * row.start + components[row.wanted]..].iter_mut().step_by(4), |v| v);
-    read_rows(BufReader::new(source), &headers, &wanted, false, keep).map_err(|e| malformed(e.to_string()))?;
+    let keep = |row: ChannelRow| row.write(data[4 * row.start + components[row.requested]..].iter_mut().step_by(4), |v| v);
+    read_rows(BufReader::new(source), &headers, &requested, false, keep).map_err(|e| malformed(e.to_string()))?;
     let (size, crop) = windows(&header.shared_attributes.display_window, header.own_attributes.layer_position, header.layer_size);
     Ok(Image { size, crop, layers: vec![Layer::new(LayerKind::Color, data)], ..Image::default() })
 }

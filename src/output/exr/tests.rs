@@ -80,7 +80,7 @@ fn files_come_back_exactly() {
 }
 
 #[test]
-fn only_the_layers_asked_for_are_written() {
+fn only_the_requested_layers_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let desc = OutputDesc { layers: vec![LayerKind::Z], ..OutputDesc::new("a.exr") };
@@ -200,7 +200,7 @@ fn full_picture() -> Image {
     // A quarter torus, half bunny in every pixel; the rest shows nothing.
     let weights = vec![(key(0), 1.0), (key(1), 2.0), (ShapeKey::NONE, 1.0)];
     let mut layers = Vec::new();
-    for info in LayerInfo::ALL.iter().filter(|info| !matches!(info.source, crate::film::Source::Coverage)) {
+    for info in LayerInfo::ALL.iter().filter(|info| !matches!(info.source, crate::film::LayerSource::Coverage)) {
         let data: Vec<f32> = (0..pixels * info.channels.len()).map(|i| (i % 101) as f32 / 64.0).collect();
         let groups: &[Option<&str>] = if info.kind == LayerKind::LightGroups { &[Some("key light"), Some("default")] } else { &[None] };
         layers.extend(groups.iter().map(|group| Layer { kind: info.kind, group: group.map(str::to_owned), data: data.clone() }));
@@ -304,7 +304,7 @@ fn parts_hold_colour_data_and_mattes() {
 }
 
 #[test]
-fn pixels_around_a_crop_are_black_if_asked_for() {
+fn pixels_around_a_crop_are_black_if_uncropped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let image = picture();

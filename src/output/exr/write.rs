@@ -12,7 +12,7 @@ use super::coverage::{self, Matte};
 use super::metadata::{Common, Mattes, part_attributes, text};
 use super::names::{channel_name, motion_channels, plain_word};
 use super::plan::{self, PartKind};
-use super::plane::{Plane, Region, Source, planes};
+use super::plane::{Plane, Region, SampleSource, planes};
 use crate::desc::{CryptoManifestDesc, ExrProfileDesc, OutputDesc};
 use crate::error::Result;
 use crate::film::{Crop, Identities, Image, Layer, LayerInfo, LayerKind, LayerSet};
@@ -63,31 +63,31 @@ impl Windows {
     fn new(image: &Image, output: &OutputDesc) -> Self {
         let [width, height] = image.size.map(|side| side.saturating_sub(2 * image.overscan).max(1));
         let shown = Crop { x: image.overscan, y: image.overscan, width, height };
-        let want = if output.uncropped { shown } else { image.crop };
+        let written = if output.uncropped { shown } else { image.crop };
         // Coordinates of a film fit: memory ends long before.
         let bounds = |crop: Crop| {
             let corner = [crop.x, crop.y].map(|x| x as i32 - image.overscan as i32);
             IntegerBounds::new(Vec2(corner[0], corner[1]), Vec2(crop.width as usize, crop.height as usize))
         };
-        let original = (want != image.crop).then(|| bounds(image.crop));
-        Self { display: bounds(shown), data: bounds(want), original, region: Region { have: image.crop, want } }
+        let original = (written != image.crop).then(|| bounds(image.crop));
+        Self { display: bounds(shown), data: bounds(written), original, region: Region { available: image.crop, written } }
     }
 }
 
 /// What goes into a file.
 struct Contents<'a> {
-    sources: Vec<Source<'a>>,
+    sources: Vec<SampleSource<'a>>,
     mattes: Vec<Matte>,
     texts: Vec<(String, String)>,
-    /// What is said of layers, by the part that they go to.
+    /// Descriptions of layers, by the part that they go to.
     comments: Vec<(PartKind, &'static str)>,
 }
 
 impl<'a> Contents<'a> {
     fn new(image: &'a Image, output: &OutputDesc, info: &RenderInfo) -> Self {
-        let wanted: LayerSet = output.layers.iter().collect();
+        let selected: LayerSet = output.layers.iter().collect();
         let mut contents = Self { sources: Vec::new(), mattes: Vec::new(), texts: Vec::new(), comments: Vec::new() };
-        for layer in image.layers.iter().filter(|layer| wanted.contains(layer.kind) || layer.kind == LayerKind::Noisy) {
+        for layer in image.layers.iter().filter(|layer| selected.contains(layer.kind) || layer.kind == LayerKind::Noisy) {
             if layer.kind == LayerKind::Motion && motion_channels(output.profile).is_some() {
                 contents.add_motion(layer, output);
                 continue;
@@ -100,7 +100,7 @@ impl<'a> Contents<'a> {
             contents.add(layer.kind, names, Cow::Borrowed(&layer.data), output);
         }
         if let (Some(coverage), Some(identities)) = (&image.coverage, &info.identities) {
-            contents.add_covered(wanted, coverage, identities, output);
+            contents.add_covered(selected, coverage, identities, output);
         }
         contents
     }
@@ -115,11 +115,11 @@ impl<'a> Contents<'a> {
             if names.len() == 2 { vec![x, y] } else { halves.to_vec() }
         });
         self.comments.push((PartKind::Utility, comment));
-        self.sources.push(Source { names: names.iter().map(|name| (*name).to_owned()).collect(), data: data.collect(), half: false });
+        self.sources.push(SampleSource { names: names.iter().map(|name| (*name).to_owned()).collect(), data: data.collect(), half: false });
     }
 
-    fn add_covered(&mut self, wanted: LayerSet, coverage: &crate::film::Coverage, identities: &Identities, output: &OutputDesc) {
-        for layer in wanted.iter().filter(|layer| matches!(layer.source, crate::film::Source::Coverage)) {
+    fn add_covered(&mut self, selected: LayerSet, coverage: &crate::film::Coverage, identities: &Identities, output: &OutputDesc) {
+        for layer in selected.iter().filter(|layer| matches!(layer.source, crate::film::LayerSource::Coverage)) {
             if let Some(mut matte) = coverage::matte(layer.kind, coverage, identities, plan::crypto_depth(output)) {
                 self.add(layer.kind, matte.channels.clone(), Cow::Owned(std::mem::take(&mut matte.data)), output);
                 self.mattes.push(matte);
@@ -137,7 +137,7 @@ impl<'a> Contents<'a> {
             self.comments.push((part, LayerInfo::of(kind).comment));
         }
         let names = names.iter().map(|name| channel_name(output.profile, name)).collect();
-        self.sources.push(Source { names, data, half: plan::is_half(output, kind) });
+        self.sources.push(SampleSource { names, data, half: plan::is_half(output, kind) });
     }
 }
 

@@ -1,15 +1,15 @@
 //! Adaptive sampling: samples go where the picture's relative squared error needs them, until that is below a target.
 //!
 //! Blocks of 4 x 4 pixels get samples in groups of eight, a stretch of each pixel's own sequence. The means of a
-//! pixel's groups tell their variance, which is that of well-spread samples (single ones would tell of independent
-//! samples and overestimate it). With `v` a block's variance of a group over `color² + 0.01` and `n` its groups, the
-//! picture's error is the mean of `v / n`, and for a given cost it is least with `n` in proportion to `sqrt(v)`
-//! (Neyman).
+//! pixel's groups estimate their variance, which is that of well-spread samples (single ones would estimate that of
+//! independent samples, which is larger). With `v` a block's variance of a group over `color² + 0.01` and `n` its
+//! groups, the picture's error is the mean of `v / n`, and for a given cost it is least with `n` in proportion to
+//! `sqrt(v)` (Neyman).
 //!
 //! A block that met a bright path by luck must not get more samples for it, for that would take weight from the path:
 //! the picture would be too dark where such paths are rare. So what a block gets depends on the blocks around it alone.
 //! In the first stage its samples are thus independent of their number; later ones depend on it only through how
-//! precisely its neighbours know their variance.
+//! precisely the variance of its neighbours is estimated.
 
 use crate::film::{Crop, Film, FilmTile};
 use crate::render::tile_renderer::{TileRenderer, TileWorkspace};
@@ -24,7 +24,7 @@ const PILOT: u32 = 2;
 /// By this factor a block's groups may grow in one stage: estimates get better on the way.
 const GROWTH: u32 = 8;
 
-/// Blocks this far away tell how much a block needs. Nearer ones alone would tell of chance.
+/// Blocks up to this distance enter the estimate of what a block needs. Nearer ones alone would be too noisy.
 const REACH: u32 = 2;
 
 /// How much of what a block seems to need is what blocks need on average: rare bright paths are still to be met where
@@ -57,7 +57,7 @@ pub(in crate::render) struct AdaptivePlanner {
     /// Groups that each block has had.
     done: Vec<u32>,
     /// Groups that each block is to have.
-    wanted: Vec<u32>,
+    planned: Vec<u32>,
     /// Of the picture's relative squared error.
     target: f64,
     /// The error by the samples so far, if it was estimated since the last pass.
@@ -81,23 +81,23 @@ impl AdaptivePlanner {
         let last = [(crop.x + crop.width - 1) / BLOCK_SIZE, (crop.y + crop.height - 1) / BLOCK_SIZE];
         let count = [last[0] - first[0] + 1, last[1] - first[1] + 1];
         let blocks = count[0] as usize * count[1] as usize;
-        Self { first, count, done: vec![0; blocks], wanted: vec![PILOT; blocks], target, error: None }
+        Self { first, count, done: vec![0; blocks], planned: vec![PILOT; blocks], target, error: None }
     }
 
     /// As bytes: what each block has and is to have, little endian.
     pub fn save(&self) -> Vec<u8> {
-        self.done.iter().chain(&self.wanted).flat_map(|groups| groups.to_le_bytes()).collect()
+        self.done.iter().chain(&self.planned).flat_map(|groups| groups.to_le_bytes()).collect()
     }
 
     /// Takes what [`save`](Self::save) gave for a picture of the same crop; `None` if it is of another.
     pub fn load(&mut self, bytes: &[u8]) -> Option<()> {
         let (numbers, rest) = bytes.as_chunks();
-        let (done, wanted) = numbers.split_at_checked(self.done.len())?;
-        if !rest.is_empty() || wanted.len() != done.len() {
+        let (done, planned) = numbers.split_at_checked(self.done.len())?;
+        if !rest.is_empty() || planned.len() != done.len() {
             return None;
         }
         let numbers = |bytes: &[[u8; 4]]| bytes.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
-        (self.done, self.wanted) = (numbers(done), numbers(wanted));
+        (self.done, self.planned) = (numbers(done), numbers(planned));
         Some(())
     }
 
@@ -170,7 +170,7 @@ impl AdaptivePlanner {
         Estimate { variances, error, deviation: (spread + actual).sqrt() }
     }
 
-    /// Sets what is wanted so that the error becomes `goal`, as far as one stage may go; the most groups of a block are
+    /// Plans groups so that the error becomes `goal`, as far as one stage may go; the most groups of a block are
     /// `most`.
     fn distribute(&mut self, variances: &[f64], goal: f64, most: u32) {
         let roots: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
@@ -193,25 +193,25 @@ impl AdaptivePlanner {
             let middle = 0.5 * (low + high);
             if error(middle.exp()) > goal { low = middle } else { high = middle }
         }
-        let wanted: Vec<u32> = (0..shares.len()).map(|i| groups(i, high.exp())).collect();
-        self.wanted = wanted;
+        let planned: Vec<u32> = (0..shares.len()).map(|i| groups(i, high.exp())).collect();
+        self.planned = planned;
     }
 
     /// Gives every block some more: where there is no better plan.
     fn add_to_all(&mut self, most: u32) {
-        for (wanted, done) in self.wanted.iter_mut().zip(&self.done) {
-            *wanted = (done + done.div_ceil(8)).min(most).max(*done);
+        for (planned, done) in self.planned.iter_mut().zip(&self.done) {
+            *planned = (done + done.div_ceil(8)).min(most).max(*done);
         }
     }
 
-    /// Samples done and wanted.
+    /// Samples done and planned.
     fn samples(&self, film: &Film) -> [u64; 2] {
         let mut sums = [0; 2];
         for tile in film.tiles() {
             for index in self.of_tile(tile) {
                 let pixels = block_area(tile, self.place(index)).area() * u64::from(GROUP);
                 sums[0] += pixels * u64::from(self.done[index]);
-                sums[1] += pixels * u64::from(self.wanted[index]);
+                sums[1] += pixels * u64::from(self.planned[index]);
             }
         }
         sums
@@ -250,7 +250,8 @@ impl PixelStatistics {
                 let count = block.area() as f64;
                 for ((x, y), (mean, variance)) in block.pixels().zip(statistics()) {
                     let weight = [0, 1, 2].map(|k| {
-                        // What makes a pixel uncertain may make it bright: the others of its block know better.
+                        // What makes a pixel uncertain may make it bright: the mean of the others of its block is the
+                        // better estimate.
                         let others = (totals[k] - mean[k]) / (count - 1.0).max(1.0);
                         let color = if count > 1.0 { mean[k].abs().min(others.abs()) } else { mean[k] };
                         1.0 / (color * color + FLOOR)
@@ -276,11 +277,11 @@ impl AdaptivePlanner {
     /// Reports what is planned at first, and what is there from an earlier run.
     pub fn start(&self, film: &Film, progress: &dyn Progress) {
         progress.start(PILOT * GROUP, film.sampled().area());
-        let [done, wanted] = self.samples(film);
+        let [done, planned] = self.samples(film);
         if done > 0 {
             progress.resumed(done);
             if self.has_pilot() {
-                progress.plan(wanted, self.estimate(film).error, self.target);
+                progress.plan(planned, self.estimate(film).error, self.target);
             }
         }
     }
@@ -294,7 +295,7 @@ impl AdaptivePlanner {
     /// would get more samples than `spp`.
     pub fn plan(&mut self, film: &Film, spp: u32, progress: &dyn Progress) -> bool {
         let most = spp.div_ceil(GROUP).max(PILOT);
-        while self.done.iter().zip(&self.wanted).all(|(done, wanted)| done >= wanted) {
+        while self.done.iter().zip(&self.planned).all(|(done, planned)| done >= planned) {
             let estimate = self.estimate(film);
             self.error = Some(estimate.error);
             let is_reached = estimate.error + CONFIDENCE * estimate.deviation <= self.target;
@@ -305,13 +306,13 @@ impl AdaptivePlanner {
             let deviation = (estimate.deviation / estimate.error).min(0.1);
             let goal = (0.97 * self.target / (1.0 + CONFIDENCE * deviation)).max(estimate.error / STEP);
             self.distribute(&estimate.variances, goal, most);
-            let [mut done, mut wanted] = self.samples(film);
-            if wanted < done + done / 50 {
+            let [mut done, mut planned] = self.samples(film);
+            if planned < done + done / 50 {
                 self.add_to_all(most);
-                [done, wanted] = self.samples(film);
+                [done, planned] = self.samples(film);
             }
-            debug_assert!(wanted >= done, "samples are never taken back");
-            progress.plan(wanted, estimate.error, self.target);
+            debug_assert!(planned >= done, "samples are never taken back");
+            progress.plan(planned, estimate.error, self.target);
         }
         true
     }
@@ -320,8 +321,8 @@ impl AdaptivePlanner {
     /// pixel.
     pub fn complete_pass(&mut self, film: &Film, groups: u32) -> u32 {
         self.error = None;
-        for (done, wanted) in self.done.iter_mut().zip(&self.wanted) {
-            *done = (*done + groups).min(*wanted);
+        for (done, planned) in self.done.iter_mut().zip(&self.planned) {
+            *done = (*done + groups).min(*planned);
         }
         (self.samples(film)[0] as f64 / film.sampled().area() as f64).round() as u32
     }
@@ -334,7 +335,7 @@ impl AdaptivePlanner {
     /// Renders at most `most` more groups of every block of a tile that lacks them; the result is how many samples are
     /// in the picture.
     pub fn render_tile(&self, renderer: &TileRenderer, tile: &mut FilmTile, most: u32, workspace: &mut TileWorkspace) -> u64 {
-        let missing = |index: usize| self.done[index]..(self.done[index] + most).min(self.wanted[index]);
+        let missing = |index: usize| self.done[index]..(self.done[index] + most).min(self.planned[index]);
         let of_block = |index: usize| missing(index).map(move |group| (self.place(index), group));
         let groups: Vec<([u32; 2], u32)> = self.of_tile(tile).flat_map(of_block).collect();
         groups.chunks(BATCH_GROUPS).map(|groups| render_groups(renderer, tile, groups, workspace)).sum()
@@ -350,7 +351,7 @@ fn render_groups(renderer: &TileRenderer, tile: &mut FilmTile, groups: &[([u32; 
         (group * GROUP..(group + 1) * GROUP).flat_map(of_sample)
     };
     renderer.render_samples(groups.iter().flat_map(of_group), None, workspace);
-    if renderer.context.has_given_up() {
+    if renderer.context.is_cancelled() {
         return 0;
     }
     let active = tile.active();

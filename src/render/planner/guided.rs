@@ -1,6 +1,6 @@
 //! Guided renders: every iteration has as many samples as all before it, whose incident radiance guides its paths.
 //!
-//! Later iterations are better than earlier ones, so [`IterationWeights`] weigh them.
+//! Later iterations are better than earlier ones, so they are averaged with [`IterationWeights`].
 
 use super::iteration_weights::{IterationWeights, mean};
 use super::training_schedule::{is_refinement, iteration_end, iteration_start, next_refinement};
@@ -11,8 +11,8 @@ use crate::guiding::Guide;
 use crate::math::Aabb;
 use crate::render::TILE_SIZE;
 
-/// Iterations of at least this many samples decide whether guiding goes on: their variance times rays must be so much less
-/// than without.
+/// Iterations of at least this many samples decide whether guiding goes on: their variance times rays must be so much
+/// less than without.
 const MIN_GAINS: [(u32, f64); 2] = [(8, 1.2), (16, GUIDED_COST)];
 
 /// Time of a ray of a guided path over that of another, about, learning included: from 2.5 in a room seen through a
@@ -22,7 +22,7 @@ const GUIDED_COST: f64 = 2.5;
 /// The guide, and the samples that have no weight yet.
 #[derive(Clone, Debug)]
 pub(in crate::render) struct GuidedPlanner {
-    /// `None` once guiding was given up.
+    /// `None` once guiding has ended.
     pub guide: Option<Guide>,
     /// The samples of the iteration under way; all before are in the film of the render.
     pub iteration: Film,
@@ -70,7 +70,7 @@ impl GuidedPlanner {
         }
     }
 
-    /// Adds the iteration to the film, and gives up guiding if it is not worth its cost.
+    /// Adds the iteration to the film, and ends guiding if it is not worth its cost.
     fn complete_iteration(&mut self, film: &mut Film, done: u32) {
         let samples = done - self.merged;
         let gain = self.weights.add(film, &self.iteration, samples, self.rays);
@@ -80,7 +80,7 @@ impl GuidedPlanner {
         }
         let is_worth_it = MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain >= min_gain);
         if self.merged > 0 && !is_worth_it && self.guide.take().is_some() {
-            tracing::info!("guiding does not pay and is given up after {done} samples per pixel");
+            tracing::info!("guiding does not pay and ends after {done} samples per pixel");
         }
         self.merged = done;
         self.clear_iteration();
@@ -92,7 +92,7 @@ impl GuidedPlanner {
     }
 
     /// Drops the samples of the iteration under way; the result is how many samples every pixel has left.
-    pub fn give_up_iteration(&mut self) -> u32 {
+    pub fn discard_iteration(&mut self) -> u32 {
         self.clear_iteration();
         self.merged
     }

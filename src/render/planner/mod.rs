@@ -147,12 +147,12 @@ impl RenderState {
         }
     }
 
-    /// The pass under way was given up: tiles differ in their samples.
-    pub(super) fn give_up_pass(&mut self) {
+    /// The pass under way was cancelled: tiles differ in their samples.
+    pub(super) fn cancel_pass(&mut self) {
         self.torn = true;
         if let Planner::Guided(planner) = &mut self.planner {
             // The guide has learned from only some of the samples, and their weights are unknown.
-            (self.done, self.tiles_ahead) = (planner.give_up_iteration(), 0);
+            (self.done, self.tiles_ahead) = (planner.discard_iteration(), 0);
         }
     }
 

@@ -13,7 +13,7 @@ pub struct Checkpoints {
     file: StateFile,
     header: Header,
     every: Duration,
-    asked: Arc<AtomicBool>,
+    requested: Arc<AtomicBool>,
     /// When the state in the file was taken, or the render began.
     last: Instant,
     /// How long the last one took to be written.
@@ -23,9 +23,10 @@ pub struct Checkpoints {
 }
 
 impl Checkpoints {
-    /// At least `every` so often, and between the next two passes whenever `asked` becomes true (it becomes false again).
-    pub fn new(file: StateFile, header: Header, every: Duration, asked: Arc<AtomicBool>) -> Self {
-        Self { file, header, every, asked, last: Instant::now(), cost: Duration::ZERO, failed: false }
+    /// At least this often (`every`), and between the next two passes whenever `requested` becomes true (it becomes
+    /// false again).
+    pub fn new(file: StateFile, header: Header, every: Duration, requested: Arc<AtomicBool>) -> Self {
+        Self { file, header, every, requested, last: Instant::now(), cost: Duration::ZERO, failed: false }
     }
 
     /// The interval.
@@ -36,8 +37,8 @@ impl Checkpoints {
     /// A pass is done, `elapsed` after this run began, and the next one is expected to take `next`: writes the state if
     /// the interval would be over when that is in the file.
     pub(in crate::render) fn pass_done(&mut self, state: &RenderState, elapsed: Duration, next: Duration, progress: &dyn Progress) {
-        let asked = self.asked.swap(false, Ordering::Relaxed);
-        if asked || self.last.elapsed() + next + self.cost >= self.every {
+        let requested = self.requested.swap(false, Ordering::Relaxed);
+        if requested || self.last.elapsed() + next + self.cost >= self.every {
             self.save(state, elapsed, progress);
         }
     }

@@ -10,7 +10,7 @@
 //! 32 bytes  BLAKE3 of everything before
 //! ```
 //!
-//! SampleRows are little endian. The checksum is looked at before anything else is believed.
+//! Numbers are little endian. The checksum is verified before anything else is read.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Take, Write};
@@ -100,7 +100,7 @@ impl Reader {
         Self::begin(path, file, length)
     }
 
-    /// The header of a file, read without a look at the rest; of one that is damaged it may be wrong.
+    /// The header of a file, read without the rest; of one that is damaged it may be wrong.
     ///
     /// # Errors
     /// As [`open`](Self::open), as far as the damage shows.
@@ -111,7 +111,7 @@ impl Reader {
         let known = length > START + TRAILER;
         match if known { Self::begin(path, file, length).ok() } else { None } {
             Some(reader) if reader.is_ours => Ok(reader.header),
-            // Whatever is wrong, a look at the whole file says it best.
+            // Reading the whole file gives the most precise error.
             _ => Self::open(path).map(|reader| reader.header),
         }
     }
@@ -132,7 +132,7 @@ impl Reader {
         Ok(reader)
     }
 
-    /// What the file says of itself.
+    /// The file's header.
     pub fn header(&self) -> &Header {
         &self.header
     }
@@ -151,7 +151,7 @@ impl Reader {
     /// # Errors
     /// [`Error::Checkpoint`] otherwise.
     pub fn finish(&self) -> Result<()> {
-        if self.left == 0 { Ok(()) } else { Err(self.fault("there is more in the file than its header says")) }
+        if self.left == 0 { Ok(()) } else { Err(self.fault("the file is longer than its header states")) }
     }
 
     /// The error for a file that is whole but makes no sense.
@@ -189,7 +189,7 @@ fn check(path: &Path, file: &mut Take<File>, length: u64) -> Result<()> {
     let cut = || fault("the file is cut short");
     let version = u32::from_le_bytes(version.try_into().map_err(|_| cut())?);
     if version != VERSION {
-        return Err(fault(&format!("the format has the version {version}; this program knows version {VERSION}")));
+        return Err(fault(&format!("the format has the version {version}; this program reads version {VERSION}")));
     }
     if length < start.len() as u64 + 4 + TRAILER {
         return Err(cut());

@@ -1,4 +1,5 @@
-//! The file of a checkpoint: one writer at a time, each state written aside, brought to the disk and only then put into its place.
+//! The file of a checkpoint: one writer at a time, each state written to a temporary file, synced to the disk and only
+//! then renamed.
 
 use std::fs::File;
 use std::io::BufWriter;

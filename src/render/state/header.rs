@@ -1,4 +1,4 @@
-//! What a checkpoint or shard says of itself, and whether it fits.
+//! The header of a checkpoint or shard, and whether it is compatible.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -67,7 +67,7 @@ const LEAST_BYTES: u64 = 48;
 /// A bound for the width and height of pictures, far above those that can be rendered.
 const MOST_PIXELS: u64 = 1 << 30;
 
-/// What a checkpoint or shard says of itself.
+/// The header of a checkpoint or shard.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Header {
     /// Name and version of the program.
@@ -92,7 +92,7 @@ pub struct Header {
     pub film: FilmShape,
     /// The files that the picture is to be written to.
     pub outputs: Vec<OutputDesc>,
-    /// What these tell of the rendering.
+    /// The metadata of the render that these files hold.
     pub info: RenderInfo,
     /// Rays so far: from the camera, indirect, and to lights.
     pub rays: [u64; 3],
@@ -115,7 +115,7 @@ impl Header {
         }
     }
 
-    /// That of a file, without a look at the rest of it.
+    /// That of a file, without reading the rest of it.
     ///
     /// # Errors
     /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Checkpoint`](crate::Error::Checkpoint)
@@ -129,7 +129,8 @@ impl Header {
         self.settings.get("integrator.guiding").is_some_and(|value| value == "true")
     }
 
-    /// What of it makes no sense in itself, so that no render can have written it; `None` if all does. `bytes` are those behind the header.
+    /// What of it makes no sense in itself, so that no render can have written it; `None` if all does. `bytes` are
+    /// those behind the header.
     pub(super) fn fault(&self, bytes: u64) -> Option<String> {
         let Shard { index, count } = self.shard;
         let Crop { x, y, width, height } = self.film.crop;
@@ -159,7 +160,8 @@ impl Header {
         }
     }
 
-    /// In what it belongs to another picture than `other`, in words; empty if it does not. `these` and `those` name the two.
+    /// In what it belongs to another picture than `other`, in words; empty if it does not. `these` and `those` name the
+    /// two.
     pub fn differences(&self, other: &Self, these: &str, those: &str) -> Vec<String> {
         let mut found = Vec::new();
         if self.program != other.program {
@@ -182,7 +184,8 @@ impl Header {
     }
 }
 
-/// The settings that the picture depends on, by their names. More samples can be added, unless the others depend on their number.
+/// The settings that the picture depends on, by their names. More samples can be added, unless the others depend on
+/// their number.
 fn compared(settings: &Settings, scene: &Scene) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     put(&mut found, "", &serde_json::to_value(settings).unwrap_or_default());

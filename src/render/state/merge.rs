@@ -15,7 +15,7 @@ use crate::render::planner::{GuidedPlanner, Planner};
 pub struct Merged {
     /// All samples.
     pub state: RenderState,
-    /// What is said of the picture: as the first shard has it.
+    /// The header of the first shard.
     pub header: Header,
     /// Which shards or samples are missing, such as `shards 1,3 of 4`; `None` if none are.
     pub partial: Option<String>,

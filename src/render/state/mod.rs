@@ -45,8 +45,8 @@ pub struct RenderState {
     pub done: u32,
     /// How many tiles, the first of the film, have one sample more.
     pub tiles_ahead: usize,
-    /// Whether a pass was given up: some tiles have samples that others lack, which no file can say. The picture is
-    /// whole.
+    /// Whether a pass was cancelled: some tiles have samples that others lack, which no file can represent. The picture
+    /// is whole.
     pub torn: bool,
     /// Whether no sample is missing.
     pub complete: bool,
@@ -178,17 +178,18 @@ fn rays([camera, indirect, shadow]: [u64; 3]) -> RayCounts {
     RayCounts { camera, indirect, shadow }
 }
 
-/// Whether the state in a file can be continued to what `wanted` describes.
-fn fits(reader: &Reader, wanted: &Header) -> Result<()> {
+/// Whether the state in a file can be continued to what `requested` describes.
+fn fits(reader: &Reader, requested: &Header) -> Result<()> {
     let there = reader.header();
-    let mut differences = there.differences(wanted, "in the checkpoint", "asked for");
-    if there.shard != wanted.shard {
-        differences.push(format!("shard: {} in the checkpoint, {} asked for", there.shard, wanted.shard));
-    } else if there.shard != Shard::WHOLE && there.spp != wanted.spp {
+    let mut differences = there.differences(requested, "in the checkpoint", "requested");
+    if there.shard != requested.shard {
+        differences.push(format!("shard: {} in the checkpoint, {} requested", there.shard, requested.shard));
+    } else if there.shard != Shard::WHOLE && there.spp != requested.spp {
         // Other samples would belong to it.
-        differences.push(format!("spp: {} in the checkpoint, {} asked for, and shards are parts of a fixed number", there.spp, wanted.spp));
-    } else if there.done + u32::from(there.tiles_ahead > 0) > wanted.spp {
-        differences.push(format!("spp: pixels have {} samples already, {} asked for", there.done, wanted.spp));
+        differences
+            .push(format!("spp: {} in the checkpoint, {} requested, and shards are parts of a fixed number", there.spp, requested.spp));
+    } else if there.done + u32::from(there.tiles_ahead > 0) > requested.spp {
+        differences.push(format!("spp: pixels have {} samples already, {} requested", there.done, requested.spp));
     }
     if differences.is_empty() {
         return Ok(());
@@ -208,9 +209,7 @@ pub fn check_kept(settings: &Settings, shard: Shard) -> Result<()> {
         ));
     }
     if shard != Shard::WHOLE && settings.target_error.is_some() {
-        return Err(Error::Usage(
-            "--shard: not with --target-error, for each part would need to know the others' samples; give --spp".into(),
-        ));
+        return Err(Error::Usage("--shard: not with --target-error, for each part would need the others' samples; give --spp".into()));
     }
     if shard.samples(settings.spp).is_empty() {
         return Err(Error::Usage(format!("--shard {shard}: there are only {} samples per pixel to share out", settings.spp)));

@@ -1,10 +1,10 @@
-//! Numbers for many samples at once, the same as for each of them alone.
+//! Sample values in batches, the same as for each sample alone.
 
 use super::{PixelSeed, SOBOL_COLUMNS, Sampler, SamplerKind, SobolSeeds, owen_scramble, pcg_4d, unit};
 use crate::math::rows::BATCH;
 use crate::math::vectorize::vectorize;
 
-/// Samples of pixels for which numbers are wanted.
+/// The pixel samples of a batch.
 #[derive(Clone, Debug)]
 pub struct SampleIdRows {
     /// Seeds of the pixels.
@@ -82,8 +82,8 @@ fn draw<const SOBOL: bool>(requests: &SampleIdRows, count: usize, set: u32, numb
     }
 }
 
-/// Adds, to the points of the second to fourth dimension, the columns of the given bits of the index: what a loop does, laid out since
-/// loops within loops are not turned into vector code.
+/// Adds, to the points of the second to fourth dimension, the columns of the given bits of the index: what a loop does,
+/// laid out since loops within loops are not turned into vector code.
 macro_rules! add_columns {
     ($point:ident, $index:ident, $($bit:literal)*) => { $(
         let chosen = 0u32.wrapping_sub($index >> $bit & 1);

@@ -1,5 +1,6 @@
-//! Makes meshes of `scenes/` (a knot of 72,000 triangles and a coarse one of 1,920, a terrain of 131,072, a vase of 320, plants, an island, the beams
-//! of a gate), a sky, and the scene `shrine.json`, in which more than a thousand of the plants stand.
+//! Makes meshes of `scenes/` (a knot of 72,000 triangles and a coarse one of 1,920, a terrain of 131,072, a vase of
+//! 320, plants, an island, the beams of a gate), a sky, and the scene `shrine.json`, in which more than a thousand of
+//! the plants stand.
 //!
 //! `cargo xtask make_meshes` overwrites them, byte for byte the same.
 
@@ -47,7 +48,8 @@ pub struct Mesh {
     pub polygons: Vec<Vec<u32>>,
 }
 
-/// A mesh over a grid of `nu` x `nv` cells from a surface over the unit square; a closed one joins its ends in both directions.
+/// A mesh over a grid of `nu` x `nv` cells from a surface over the unit square; a closed one joins its ends in both
+/// directions.
 pub fn grid(nu: u32, nv: u32, closed: bool, surface: impl Fn(f32, f32) -> V) -> Mesh {
     let (rows, columns) = if closed { (nu, nv) } else { (nu + 1, nv + 1) };
     let mut mesh = Mesh::default();
@@ -144,7 +146,8 @@ pub fn ply(mesh: &Mesh) -> Vec<u8> {
     out
 }
 
-/// A clear sky as a lat-long image: blue above, pale at the horizon, a glow around a sun at 35 degrees, dark earth below.
+/// A clear sky as a lat-long image: blue above, pale at the horizon, a glow around a sun at 35 degrees, dark earth
+/// below.
 fn write_sky(path: &Path) -> std::result::Result<(), Box<dyn Error>> {
     let (width, height) = (512, 256);
     let sun = vec3(-0.55, 0.573_576, 0.607).normalize();

@@ -44,7 +44,8 @@ pub fn sensitivities(pixels_per_degree: f64) -> [Vec<Kernel>; 3] {
 /// Makes the kernel that finds something along a row, for a number of pixels per degree.
 type Detector = fn(f64) -> Kernel;
 
-/// Detectors of edges and of points: the first and second derivative of a Gaussian; positive weights sum to 1, negative ones to -1.
+/// Detectors of edges and of points: the first and second derivative of a Gaussian; positive weights sum to 1, negative
+/// ones to -1.
 pub const DETECTORS: [Detector; 2] = [|ppd| detector(ppd, |x, _| -x), |ppd| detector(ppd, |x, deviation| (x / deviation).powi(2) - 1.0)];
 
 fn detector(pixels_per_degree: f64, factor: impl Fn(f64, f64) -> f64) -> Kernel {

@@ -34,7 +34,8 @@ const SHOWN: f64 = 0.85;
 /// (Narkowicz) without its exposure.
 const TONE: [f64; 5] = [0.36 * 2.51, 0.6 * 0.03, 0.36 * 2.43, 0.6 * 0.59, 0.14];
 
-/// The difference by pixel of two pictures in linear light, row by row from the top; what is negative or not finite counts as black.
+/// The difference by pixel of two pictures in linear light, row by row from the top; what is negative or not finite
+/// counts as black.
 ///
 /// # Errors
 /// [`Error::Usage`] if they differ in size or have no colour.

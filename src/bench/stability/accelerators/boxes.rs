@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{asked, count, differing};
+use super::{count, differing, oracle_hits};
 use crate::accel::LinearAccel;
 use crate::bench::stability::geometry::{Rng, cube, meshes, ray, ray_through, soup, transform, world};
 use crate::bench::stability::scenes::{all, own};
@@ -16,9 +16,9 @@ fn corner(mesh: &Mesh, i: usize) -> DVec3 {
 
 /// The answers of our accelerators that differ from the oracle's.
 fn judged(outcome: Outcome, geometry: &Geometry, rays: Vec<Ray>) -> Outcome {
-    let rays = asked(&LinearAccel::new(geometry), rays);
+    let rays = oracle_hits(&LinearAccel::new(geometry), rays);
     let hits = rays.iter().filter(|(_, hit)| hit.is_some()).count();
-    let outcome = outcome.tell("rays", rays.len() as f64).at_least("share of rays that hit", hits as f64 / rays.len() as f64, 0.4);
+    let outcome = outcome.record("rays", rays.len() as f64).at_least("share of rays that hit", hits as f64 / rays.len() as f64, 0.4);
     let lost = |outcome: Outcome, name: &str, lost| outcome.none(format!("answers of {name} that differ in a bit"), lost);
     own(geometry).into_iter().fold(outcome, |outcome, (name, accel)| lost(outcome, name, differing(&*accel, &rays)))
 }
@@ -78,7 +78,7 @@ pub(super) fn f5_extreme_points(effort: Effort) -> Outcome {
         };
         let rays: Vec<Ray> = (0..effort.pick(2_000, 150_000)).map(|_| grazing()).collect();
         let geometry = world(rounds.into_iter().map(|round| Shape::Analytic(round.placed)).collect());
-        let rays = asked(&LinearAccel::new(&geometry), rays);
+        let rays = oracle_hits(&LinearAccel::new(&geometry), rays);
         let hits = rays.iter().filter(|(_, hit)| hit.is_some()).count();
         outcome = outcome.at_least(format!("hits at distance {distance}"), hits as f64, 0.2 * rays.len() as f64);
         let differ: usize = all(&geometry).iter().map(|(_, accel)| differing(&**accel, &rays)).sum();
@@ -98,7 +98,7 @@ pub(super) fn f6_far_cameras(effort: Effort) -> Outcome {
         let distance = 10f64.powi(exponent);
         let mut at_sphere = || ray_through(distance * rng.direction(), 0.9 * rng.unit().cbrt() * rng.direction());
         let rays = (0..effort.pick(1_000, 100_000)).map(|_| at_sphere()).collect();
-        let rays = asked(&LinearAccel::new(&geometry), rays);
+        let rays = oracle_hits(&LinearAccel::new(&geometry), rays);
         let wrong: usize = accels.iter().map(|(_, accel)| differing(&**accel, &rays)).sum();
         differ += wrong;
         curve.push((distance, wrong as f64 / (accels.len() * rays.len()) as f64));
@@ -123,7 +123,8 @@ pub(super) fn f6_far_cameras(effort: Effort) -> Outcome {
         })
 }
 
-/// A ray along an axis or in a plane of two, from a point with coordinates of two vertices: in planes of the faces of boxes.
+/// A ray along an axis or in a plane of two, from a point with coordinates of two vertices: in planes of the faces of
+/// boxes.
 fn axis_parallel(rng: &mut Rng, mesh: &Mesh) -> Ray {
     let vertex = |rng: &mut Rng| Vec3::from(mesh.positions()[rng.below(mesh.positions().len())]);
     let zero = |rng: &mut Rng| if rng.unit() < 0.5 { 0.0 } else { -0.0 };

@@ -51,15 +51,15 @@ fn differing(accel: &dyn Accelerator, rays: &[(Ray, Option<Hit>)]) -> usize {
     count(rays, |(ray, expected)| accel.intersect(ray) != *expected || accel.occluded(ray) != expected.is_some())
 }
 
-/// What the oracle answers.
-fn asked(oracle: &dyn Accelerator, rays: Vec<Ray>) -> Vec<(Ray, Option<Hit>)> {
+/// The oracle's hits.
+fn oracle_hits(oracle: &dyn Accelerator, rays: Vec<Ray>) -> Vec<(Ray, Option<Hit>)> {
     rays.into_par_iter().map(|ray| (ray, oracle.intersect(&ray))).collect()
 }
 
-/// A scene with rays and what the oracle says of them.
+/// A scene with rays and the oracle's hits.
 struct Case {
     geometry: Geometry,
-    asked: Vec<(Ray, Option<Hit>)>,
+    expected: Vec<(Ray, Option<Hit>)>,
 }
 
 /// The scenes of F1 with rays of each kind.
@@ -70,8 +70,8 @@ fn cases(count: usize) -> Vec<Case> {
     let mut with_rays = |geometry: Geometry| {
         let mut rays = path_rays(&geometry, &mut rng, count).concat();
         rays.extend(test_rays(&mut rng, &geometry, 4 * count));
-        let asked = asked(&LinearAccel::new(&geometry), at_times(&mut rng, rays));
-        Case { geometry, asked }
+        let expected = oracle_hits(&LinearAccel::new(&geometry), at_times(&mut rng, rays));
+        Case { geometry, expected }
     };
     geometries.into_iter().map(&mut with_rays).collect()
 }
@@ -105,31 +105,31 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
     let mut ours: Vec<(&str, usize)> = Vec::new();
     let mut rounding = [Agreement::default(), Agreement::default()];
-    for Case { geometry, asked } in &cases {
-        let found = asked.iter().filter(|(_, hit)| hit.is_some()).count();
-        rays += asked.len();
+    for Case { geometry, expected } in &cases {
+        let found = expected.iter().filter(|(_, hit)| hit.is_some()).count();
+        rays += expected.len();
         hits += found;
-        poor += usize::from(100 * found < asked.len() && !geometry.shapes.is_empty());
+        poor += usize::from(100 * found < expected.len() && !geometry.shapes.is_empty());
         for (name, accel) in own(geometry) {
-            let lost = differing(&*accel, asked);
+            let lost = differing(&*accel, expected);
             match ours.iter_mut().find(|(n, _)| *n == name) {
                 Some((_, count)) => *count += lost,
                 None => ours.push((name, lost)),
             }
         }
         for (sum, accel) in rounding.iter_mut().zip([build(AccelKind::EMBREE, geometry), packets(geometry)]) {
-            let Agreement { flags, distances, ties } = Agreement::of(&*accel, geometry, asked);
+            let Agreement { flags, distances, ties } = Agreement::of(&*accel, geometry, expected);
             *sum = Agreement { flags: sum.flags + flags, distances: sum.distances + distances, ties: sum.ties + ties };
         }
     }
-    let outcome = Outcome::new().tell("rays", rays as f64).tell("hits", hits as f64).none("scenes hardly hit", poor);
+    let outcome = Outcome::new().record("rays", rays as f64).record("hits", hits as f64).none("scenes hardly hit", poor);
     let outcome =
         ours.into_iter().fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
     ["Embree", "packets"].iter().zip(rounding).fold(outcome, |outcome, (name, Agreement { flags, distances, ties })| {
         outcome
             .none(format!("distances of {name} beyond their rounding"), distances)
             .none(format!("rays that only {name}, or only the oracle, says to hit"), flags)
-            .tell(format!("other primitives of {name} at the same distance"), ties as f64)
+            .record(format!("other primitives of {name} at the same distance"), ties as f64)
     })
 }
 
@@ -162,7 +162,7 @@ fn f2_ties(_: Effort) -> Outcome {
     Outcome::new()
         .none("ties of ours not won by the lowest ids", wrong)
         .at_most("error of Embree's distance in ulp", farthest / f64::from(f32::EPSILON), 2.0)
-        .tell("rays at ties that Embree hits", hits.len() as f64 / points.len() as f64)
+        .record("rays at ties that Embree hits", hits.len() as f64 / points.len() as f64)
 }
 
 /// How often any-hit and closest-hit queries contradict each other on one ray, alone or in a batch, cut around the hit.
@@ -199,14 +199,14 @@ fn f3_any_hit(effort: Effort) -> Outcome {
     }
     // A ray through an edge, nearly parallel to a side of the box around the triangle, may enter that box some ulp
     // behind the triangle's own distance.
-    let told = Outcome::new().tell("rays", total as f64);
-    let judged = |told: Outcome, (name, wrong): (&str, usize)| {
+    let result = Outcome::new().record("rays", total as f64);
+    let judged = |result: Outcome, (name, wrong): (&str, usize)| {
         match (name, wrong) {
-        ("embree", 1..) => told
+        ("embree", 1..) => result
             .at_most("contradictions of embree in a million rays", 1e6 * wrong as f64 / total as f64, 10.0)
             .short(format!("{wrong} of {total} rays pass an edge nearly parallel to a side of the box around its triangle, a fraction of a rounding outside: Embree enters the box behind the distance of its own hit (by 75 ulp on one ray), so that an interval cut there leaves the hit out; wished for is none")),
-        _ => told.none(format!("contradictions of {name}"), wrong),
+        _ => result.none(format!("contradictions of {name}"), wrong),
     }
     };
-    outcome.into_iter().fold(told, judged)
+    outcome.into_iter().fold(result, judged)
 }

@@ -7,7 +7,8 @@ use crate::bench::stability::scenes::{build, path_rays};
 use crate::bench::stability::{Effort, Outcome};
 use crate::math::Ray;
 
-/// Nodes and primitives of camera and of bounce rays as recorded, to notice a change; with the most that is acceptable for camera rays.
+/// Nodes and primitives of camera and of bounce rays as recorded, to notice a change; with the most that is acceptable
+/// for camera rays.
 const RECORDED: [(&str, [f64; 2], f64); 4] =
     [("bvh", [8.50, 25.0], 40.0), ("bvh:binary", [17.2, 48.8], 40.0), ("kdtree", [36.0, 96.7], 64.0), ("octree", [10.3, 32.7], 64.0)];
 
@@ -31,7 +32,7 @@ pub(super) fn f9_visits(effort: Effort) -> Outcome {
             .at_most(format!("{name}, camera rays"), camera, most)
             .within(format!("{name}, camera rays over the recorded figure"), camera / of_camera, 0.9, 1.1)
             .within(format!("{name}, bounce rays over the recorded figure"), bounce / of_bounce, 0.9, 1.1)
-            .tell(format!("{name}, bounce rays"), bounce);
+            .record(format!("{name}, bounce rays"), bounce);
     }
     outcome
 }

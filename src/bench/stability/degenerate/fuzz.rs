@@ -127,13 +127,13 @@ impl Tally {
         tally
     }
 
-    fn told(&self, outcome: Outcome, what: &str) -> Outcome {
+    fn report(&self, outcome: Outcome, what: &str) -> Outcome {
         outcome
-            .tell(format!("{what} read"), self.read as f64)
-            .tell(format!("{what} refused"), self.refused as f64)
+            .record(format!("{what} read"), self.read as f64)
+            .record(format!("{what} refused"), self.refused as f64)
             .none(format!("{what} refused as they are"), self.unread)
             .none(format!("{what} refused without a reason"), self.silent)
-            .tell(format!("seconds of the slowest of {what}"), self.slowest)
+            .record(format!("seconds of the slowest of {what}"), self.slowest)
     }
 }
 
@@ -164,5 +164,5 @@ pub(super) fn e10_mutated_files(effort: Effort) -> Outcome {
     ];
     parts
         .into_iter()
-        .fold(Outcome::new(), |outcome, (what, count, seeds, read)| Tally::of(&mut rng, count, seeds, read).told(outcome, what))
+        .fold(Outcome::new(), |outcome, (what, count, seeds, read)| Tally::of(&mut rng, count, seeds, read).report(outcome, what))
 }

@@ -54,15 +54,16 @@ fn leaks(effort: Effort, rng: &mut Rng) -> usize {
     kinds.map(|(kind, _)| lost(&*build(kind, &geometry))).sum()
 }
 
-/// Answers of three accelerators, asked in turn, that are not those each gives alone.
+/// Hits of three accelerators, traced in turn, that differ from those of each alone.
 fn disturbed(rng: &mut Rng) -> usize {
     let geometries = [10, 100, 300].map(|count| meshes(vec![soup(rng, count, 0.4)]));
     let rays = test_rays(rng, &geometries[0], 1_000);
     let alone =
         geometries.each_ref().map(|g| rays.iter().map(|ray| build(AccelKind::EMBREE, g).intersect(ray)).take(50).collect::<Vec<_>>());
     let together = geometries.each_ref().map(|geometry| build(AccelKind::EMBREE, geometry));
-    let asked = |(i, ray): (usize, &Ray)| (0..3).filter(|&k| alone[k].get(i).is_some_and(|hit| *hit != together[k].intersect(ray))).count();
-    rays.iter().enumerate().map(asked).sum()
+    let differing =
+        |(i, ray): (usize, &Ray)| (0..3).filter(|&k| alone[k].get(i).is_some_and(|hit| *hit != together[k].intersect(ray))).count();
+    rays.iter().enumerate().map(differing).sum()
 }
 
 pub(super) fn e8_life_of_scenes(effort: Effort) -> Outcome {
@@ -113,9 +114,9 @@ pub(super) fn e9_memory(effort: Effort) -> Outcome {
         }
     }
     Outcome::new()
-        .tell("accelerators built", f64::from(built))
+        .record("accelerators built", f64::from(built))
         .none("that could not be built", failed)
-        .tell("most bytes held", most as f64)
+        .record("most bytes held", most as f64)
         .none("large scenes that hold less than their corners", unaccounted)
         .none("bytes held after the release", kept.unsigned_abs())
 }

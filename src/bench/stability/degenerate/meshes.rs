@@ -80,12 +80,12 @@ pub(super) fn e3_garbage_meshes(effort: Effort) -> Outcome {
         infinite += usize::from(!is_finite(&accel.bounds()) || accel.bounds().is_empty());
     }
     let outcome = Outcome::new()
-        .tell("meshes of random bits accepted", accepted as f64)
-        .tell("refused, with the vertex or triangle at fault", refused as f64)
+        .record("meshes of random bits accepted", accepted as f64)
+        .record("refused, with the vertex or triangle at fault", refused as f64)
         .none("accepted with a number or an index that no mesh may hold", wrong)
         .none("accelerators with bounds that are not finite", infinite)
         .none("hits at distances that are none", outside)
-        .tell("hits that Embree, whose products overflow, finds at infinity", endless as f64)
+        .record("hits that Embree, whose products overflow, finds at infinity", endless as f64)
         .none("rays through degenerate triangles that lose the proper one", lost)
         .none("rays that hit a degenerate triangle, or at a wrong distance", disturbed);
     if worst == 0.0 { outcome } else { outcome.short(INEXACT_RECIPROCALS) }
@@ -113,7 +113,7 @@ pub(super) fn e4_identical_triangles(effort: Effort) -> Outcome {
     let embree: Vec<_> = (0..3).map(|_| first(&*build(AccelKind::EMBREE, &geometry))).collect();
     let unstable = embree.iter().filter(|found| found.is_none() || **found != embree[0]).count();
     Outcome::new()
-        .tell("triangles", count as f64)
+        .record("triangles", count as f64)
         .none("accelerators of ours, with the oracle, that do not hit the first", others)
         .none("builds of Embree with a miss, or another triangle than the first build", unstable)
         .at_most("levels of the deepest tree", f64::from(depth), 65.0)

@@ -109,7 +109,7 @@ pub(super) fn e1_invalid_rays(effort: Effort) -> Outcome {
         }
     }
     Outcome::new()
-        .tell("invalid rays", (invalid.len() + wild_invalid.len()) as f64)
+        .record("invalid rays", (invalid.len() + wild_invalid.len()) as f64)
         .none("valid among those made to be invalid", invalid.iter().filter(|ray| ray.is_valid()).count())
         .at_least("valid rays among the wild", (wild.len() - wild_invalid.len()) as f64, 0.4 * wild.len() as f64)
         .none("invalid rays that hit", struck)
@@ -139,7 +139,7 @@ pub(super) fn e2_zero_directions(effort: Effort) -> Outcome {
         }
     }
     Outcome::new()
-        .tell("rays of direction zero", tried as f64)
+        .record("rays of direction zero", tried as f64)
         .none("of those, hits", struck)
         .none("distances of the shortest directions outside of the interval", beyond)
 }
@@ -173,7 +173,7 @@ pub(super) fn e5_ends_of_intervals(_: Effort) -> Outcome {
         judge(Ray { t_max: SMALLEST_NORMAL, ..on }, true);
         judge(Ray { t_min: SMALLEST_NORMAL, ..on }, false);
     }
-    let outcome = Outcome::new().tell("queries", cases as f64).none("answered wrongly", wrong);
+    let outcome = Outcome::new().record("queries", cases as f64).none("answered wrongly", wrong);
     if worst == 0.0 { outcome } else { outcome.short(INEXACT_RECIPROCALS) }
 }
 
@@ -220,7 +220,7 @@ pub(super) fn e6_steps_past_hits(effort: Effort) -> Outcome {
         }
     }
     Outcome::new()
-        .tell("walks", walks as f64)
+        .record("walks", walks as f64)
         .none("walks that find more hits than there are planes", endless)
         .none("steps back", backward)
         .none("walks at normal distances that miss a plane", incomplete)

@@ -14,7 +14,8 @@ use crate::render::Overrides;
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 48;
 
-/// Everything a renderer's tolerances could be about, `s` times as large and moved by `offset`; lights give the same irradiance.
+/// Everything a renderer's tolerances could be about, `s` times as large and moved by `offset`; lights give the same
+/// irradiance.
 fn scene(s: f64, offset: [f64; 3]) -> Value {
     let along = |p: [f64; 3]| p.map(|x| x * s);
     let at = |p: [f64; 3]| [0, 1, 2].map(|k| offset[k] + p[k] * s);

@@ -23,7 +23,7 @@ fn picture(rng: &mut Rng) -> Image {
     Image { size: [40, 30], crop, layers: LayerInfo::ALL.iter().map(&mut layer).collect(), ..Image::default() }
 }
 
-/// How many of the pictures end in a PNG of other bytes than the first. (An EXR tells the seconds it took.)
+/// How many of the pictures end in a PNG of other bytes than the first. (An EXR holds the render time.)
 pub(super) fn differing_files(images: &[Image]) -> usize {
     let Ok(folder) = tempfile::tempdir() else { return images.len() };
     let written = |image: &Image| {

@@ -41,7 +41,7 @@ pub(super) fn m1_integrals(effort: Effort) -> Outcome {
         outside += places.into_iter().filter(|&p| filter.evaluate(p) != 0.0).count();
     }
     Outcome::new()
-        // Midpoints of 256 steps err by some h^2 / 24 of the second derivative: far below the percent that pbrt asks for.
+        // Midpoints of 256 steps err by some h^2 / 24 of the second derivative: far below the percent of pbrt's test.
         .at_most("relative error of the integral", worst, 1e-3)
         .none("values outside of the radius", outside)
 }
@@ -54,7 +54,8 @@ fn integral(filter: &Filter, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     (0..STEPS).map(|i| f(filter.evaluate(Vec2::new(at(i), 0.0))) * h).sum()
 }
 
-/// The largest difference between the weight of the samples in a half pixel and the filter's integral there, both over the whole.
+/// The largest difference between the weight of the samples in a half pixel and the filter's integral there, both over
+/// the whole.
 fn mass_error(filter: &Filter, draws: u32) -> f64 {
     let r = f64::from(filter.radius());
     let cells = (4.0 * r).ceil() as usize;

@@ -232,7 +232,7 @@ fn m5_no_clamping(effort: Effort) -> Outcome {
     Outcome::new()
         .at_most("error of one bright sample in a million", (rare - 1.0).abs(), 0.0)
         .at_most("relative error of means of Pareto samples", heavy, 1e-6)
-        .tell("mean of lights of mean 100", mean)
+        .record("mean of lights of mean 100", mean)
         .at_least("p-value of that mean", p_value, sidak_level(1))
 }
 
@@ -270,14 +270,14 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
     let first = film.dropped().first().copied();
     let replayable = first.is_some_and(|d| d.x < 8 && d.y < 8);
     Outcome::new()
-        .tell("spoilt samples", bad as f64)
+        .record("spoilt samples", bad as f64)
         .none("spoilt samples taken", taken)
         .none("good samples refused", refused)
         .none("difference of the count of dropped samples", film.dropped_count().abs_diff(bad) as usize)
         .none("numbers of the picture that are not finite", infinite)
         .none("pixels that are not the mean of their good samples", wrong)
         .none("first dropped samples without a place to replay", usize::from(!replayable))
-        .tell("mean of samples -1 and 3, kept as they are", mean_by_film([-1.0, 3.0].into_iter()))
+        .record("mean of samples -1 and 3, kept as they are", mean_by_film([-1.0, 3.0].into_iter()))
         .short("negative samples are kept, where the catalogue asks to drop them: images of an environment may hold negative numbers, as those \
                 from wide gamuts do, and a mean without them would be biased")
 }

@@ -49,7 +49,8 @@ fn beyond_turn(p: DVec3, phi_max: f64) -> f64 {
     rho(p) * (angle - phi_max).max(0.0).min(TAU - angle)
 }
 
-/// The profile of the emitter of revolution: straight, so that area has a closed form, though its parameter is not the height.
+/// The profile of the emitter of revolution: straight, so that area has a closed form, though its parameter is not the
+/// height.
 const STRAIGHT: [[f64; 2]; 4] = [[0.3, 0.0], [0.3, 0.0], [0.7, 0.8], [0.9, 1.2]];
 
 /// Part of a frustum's area below a height, for radii at both ends.
@@ -133,8 +134,8 @@ impl View<'_> {
         found
     }
 
-    /// The integral of the density over the directions of a cone around the emitter, over the share of samples that it stands for: both
-    /// without the silhouettes.
+    /// The integral of the density over the directions of a cone around the emitter, over the share of samples in the
+    /// cone: both without the silhouettes.
     fn integral(&self, n: u32, rng: &mut Rng) -> f64 {
         let bounds = self.geometry.shape(ShapeId(0)).bounds();
         let center = 0.5 * (bounds.min + bounds.max).as_dvec3();
@@ -161,14 +162,16 @@ impl View<'_> {
         TAU * (1.0 - cos_max) * sum / f64::from(share)
     }
 
-    /// The largest difference between the density of a sample and of the hit of a ray along it, and how many were compared.
+    /// The largest difference between the density of a sample and of the hit of a ray along it, and how many were
+    /// compared.
     fn densities(&self, count: u32, rng: &mut Rng) -> (f64, usize) {
         let (mut worst, mut compared) = (0f64, 0);
         for _ in 0..count {
             let Some(s) = self.light.sample(self.geometry, &[], self.p, rng.pair()) else { continue };
             let distance = (target(&s) - self.p).length();
             for (ray, at) in self.hits(s.wi.as_dvec3()) {
-                // The rounding of the direction moves the point by distance / cos, and the cosine on a curved surface by as much.
+                // The rounding of the direction moves the point by distance / cos, and the cosine on a curved surface
+                // by as much.
                 let cos = f64::from(at.n_g.dot(s.wi));
                 if (at.p - target(&s)).length() <= 1e-5 * distance && cos * cos >= 4e-3 * distance {
                     let pdf = self.light.pdf(self.geometry, self.p, &ray, &at);

@@ -90,8 +90,8 @@ fn grid(n: u32) -> impl Iterator<Item = [f32; 2]> {
     (0..n * n).map(move |i| [middle(i % n), middle(i / n)])
 }
 
-/// Points of a low-discrepancy sequence in the unit cube of four dimensions (Roberts, "The Unreasonable Effectiveness of Quasirandom
-/// Sequences").
+/// Points of a low-discrepancy sequence in the unit cube of four dimensions (Roberts, "The Unreasonable
+/// Effectiveness of Quasirandom Sequences").
 fn quasi_random(count: u32) -> impl Iterator<Item = [f64; 4]> {
     // The root of x^5 = x + 1.
     const G: f64 = 1.167_303_978_261_418_7;

@@ -31,7 +31,8 @@ fn quad_solid_angle(p: DVec3, corner: DVec3, u: DVec3, v: DVec3) -> f64 {
     triangle_solid_angle([a, a + u, a + u + v]) + triangle_solid_angle([a, a + u + v, a + v])
 }
 
-/// Irradiance at the origin from a polygon of radiance 1 above the horizon: E = 1/2 sum acos(a·b) n·(a x b) / |a x b| (Lambert).
+/// Irradiance at the origin from a polygon of radiance 1 above the horizon: E = 1/2 sum acos(a·b) n·(a x b) / |a x b|
+/// (Lambert).
 pub(in crate::bench::stability) fn lambert(corners: &[DVec3], n: DVec3) -> f64 {
     let around = corners.iter().zip(corners.iter().cycle().skip(1));
     let sum: f64 = around.map(|(a, b)| a.angle_between(*b) * n.dot(a.cross(*b).normalize())).sum();
@@ -79,7 +80,8 @@ fn irradiances(side: u32) -> f64 {
     worst
 }
 
-/// Points that see the rectangle from (-1, -0.5, 0) to (2, 1.5, 0) from above, from aside, from far, and from almost within it.
+/// Points that see the rectangle from (-1, -0.5, 0) to (2, 1.5, 0) from above, from aside, from far, and from almost
+/// within it.
 const POINTS: [[f64; 3]; 10] = [
     [0.3, 0.4, 1.0],
     [0.3, 0.4, 0.02],
@@ -125,7 +127,8 @@ pub(super) fn l6_polygons(effort: Effort) -> Outcome {
         tests.counts(&format!("from {p}"), &counts, &(0..CELLS * CELLS).map(cell).collect::<Vec<_>>());
     }
 
-    // On the axis: 4 atan(a² / (h sqrt(2 a² + h²))), a face of a cube from its middle among them: a sixth of the sphere.
+    // On the axis: 4 atan(a² / (h sqrt(2 a² + h²))), a face of a cube from its middle among them: a sixth of the
+    // sphere.
     let (mut sizes, mut by_area) = (0f64, 0f64);
     for size in [1e-9, 1e-3, 1.0, 2.0, 1e3, 1e9] {
         let (geometry, light) = quad_light(DVec3::new(-0.5 * size, -0.5 * size, 1.0), DVec3::X * size, DVec3::Y * size);

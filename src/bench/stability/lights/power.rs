@@ -137,7 +137,8 @@ fn at_infinity() -> Vec<Lamp> {
     let constant = Environment::Constant(Rgb::splat(0.5));
     lamps.push(lamp("constant sky".into(), Light::Environment(constant), TAU));
 
-    // Rows of equal texels: the bilinear lookup is linear in the polar angle between row centres, and constant beyond the outermost.
+    // Rows of equal texels: the bilinear lookup is linear in the polar angle between row centres, and constant beyond
+    // the outermost.
     let rows = [1.0f32, 3.0, 0.5, 2.0];
     let pixels = rows.iter().flat_map(|&r| [Rgb::splat(r); 6]).collect();
     let turned = DMat3::from_rotation_x(1.0) * DMat3::from_rotation_y(0.3);
@@ -176,5 +177,5 @@ pub(super) fn l1_power(effort: Effort) -> Outcome {
     Outcome::new()
         .at_most(format!("relative error of closed forms ({})", closed.1), closed.0, 1e-6)
         .at_most(format!("relative error of the flux ({})", flow.1), flow.0, effort.pick(1e-2, 3e-3))
-        .tell("relative error of the power of a map of 6 x 4 texels, which only weighs it against other lights", gathered)
+        .record("relative error of the power of a map of 6 x 4 texels, which only weighs it against other lights", gathered)
 }

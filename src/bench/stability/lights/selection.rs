@@ -13,7 +13,8 @@ use crate::light::{
 };
 use crate::math::{DMat3, DVec3, Rng, Vec3};
 
-/// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and a sky if asked.
+/// Lights of every kind that is not at infinity, of sizes and powers that differ by orders of magnitude, and optionally
+/// a sky.
 fn cloud(seed: u64, sky: bool, selection: LightSelection) -> LightSet {
     let mut rng = Rng::new(seed);
     let (mut geometry, mut lights, mut corners) = (Geometry::default(), Vec::new(), Vec::new());
@@ -78,7 +79,8 @@ fn probabilities(set: &LightSet, from: &LightSampleContext) -> Vec<f64> {
     (0..set.lights().len()).map(|i| f64::from(set.pmf(LightId::new(i), from, MisCompensation::Off))).collect()
 }
 
-/// Where every light reaches every point, no choice may be without a light: how far sums are from 1. Elsewhere: how far they exceed 1.
+/// Where every light reaches every point, no choice may be without a light: how far sums are from 1. Elsewhere: how far
+/// they exceed 1.
 fn sums(seed: u64) -> [f64; 2] {
     let mut rng = Rng::new(seed);
     let set = points(&mut rng);
@@ -102,7 +104,7 @@ fn sums(seed: u64) -> [f64; 2] {
 struct Choices {
     /// By light, and last how often there was none.
     counts: Vec<u32>,
-    /// Largest relative difference of a probability told and asked for.
+    /// Largest relative difference of the probability of a sample and that of its query.
     difference: f64,
     /// Mean of 1 / (n p) over n lights that can be chosen, and how many standard deviations it lies from 1.
     mean: f64,
@@ -154,7 +156,8 @@ pub(super) fn l8_choice(effort: Effort) -> Outcome {
         }
     }
 
-    // The mean over points of one over the probability, as pbrt takes it: there are a hundred lights of about the same power around them.
+    // The mean over points of one over the probability, as pbrt takes it: there are a hundred lights of about the same
+    // power around them.
     let set = points(&mut rng);
     let (from, n) = (receivers(&mut rng, effort.pick(20, 50)), effort.pick(60_000, 200_000));
     let means: Vec<f64> = from

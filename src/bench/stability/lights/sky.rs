@@ -80,7 +80,8 @@ struct Found {
     counts: Vec<u32>,
     /// Radiance over density, least and most.
     weights: Option<[f64; 2]>,
-    /// Samples whose density is another than that of their direction: rounding takes directions at a limit to the next cell.
+    /// Samples whose density is another than that of their direction: rounding takes directions at a limit to the next
+    /// cell.
     strays: usize,
     radiance: f64,
     invalid: usize,
@@ -106,7 +107,8 @@ fn sample(sky: &Sky, count: u32) -> Found {
     found
 }
 
-/// A ramp of the column's number read between its texels, as a shift in texels; and the largest step at the seam and next to the poles.
+/// A ramp of the column's number read between its texels, as a shift in texels; and the largest step at the seam and
+/// next to the poles.
 fn lookups() -> [f64; 3] {
     let ramp = Sky::new("columns", [64, 32], DMat3::IDENTITY, |x, _| x as f32);
     let rows = Sky::new("rows", [64, 32], DMat3::IDENTITY, |_, y| y as f32);
@@ -132,7 +134,8 @@ fn lookups() -> [f64; 3] {
     [shift, seam, pole]
 }
 
-/// Directions along the axes and at corners of texels where the density or the light is not a number, or zero where there is light.
+/// Directions along the axes and at corners of texels where the density or the light is not a number, or zero where
+/// there is light.
 fn bad_corners() -> usize {
     let sky = Sky::new("corners", [16, 8], DMat3::IDENTITY, |x, y| (1 + x + y) as f32);
     let near_poles = [Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::X, Vec3::new(1e-20, 1.0, 0.0), Vec3::new(0.0, -1.0, -1e-30)];

@@ -38,7 +38,7 @@ pub(super) fn l2_solid_angles(effort: Effort) -> Outcome {
         let sum: f64 = grid(n).filter_map(|u| light.sample(&geometry, &[], p, u)).map(|s| 1.0 / f64::from(s.pdf)).sum();
         sum / f64::from(n * n)
     };
-    // One density for all directions: few tell it.
+    // One density for all directions: a few samples give it.
     let relative = |d: f64| (mean(d, 8) / solid_angle(d) - 1.0).abs();
     let curve: Vec<(f64, f64)> = distances(effort.pick(100, 1000)).map(|d| (d - 1.0, relative(d))).collect();
     let outside = curve.iter().fold(0.0, |worst, &(_, e)| e.max(worst));
@@ -79,7 +79,7 @@ pub(super) fn l3_far_spheres(effort: Effort) -> Outcome {
                 curve.push((d, error));
             }
 
-            // A hit asks for the density by another way, from the point alone.
+            // The density of a hit is computed by another way, from the point alone.
             let ray = Ray::new(p.as_vec3(), s.wi);
             let Some(hit) = geometry.shape(ShapeId(0)).intersect_prim(&ray, ShapeId(0), PrimId(0)) else { continue };
             let Some(at) = geometry.interaction(&ray, &hit) else { continue };

@@ -82,7 +82,7 @@ pub(super) fn l9_tables(effort: Effort) -> Outcome {
             let cell = density.sample_cell(rng.pair());
             counts[cell.y * width + cell.x] += 1;
             let exact = f64::from(weights[cell.y * width + cell.x]) / total;
-            // Tables count in 2^-32, and each cell and each row has one unit at least; what is told rounds to f32.
+            // Tables count in 2^-32, and each cell and each row has one unit at least; the pdf is rounded to f32.
             let unit = (width + height) as f64 / f64::from(u32::MAX) + exact * f64::from(f32::EPSILON);
             cells = cells.max((f64::from(cell.pmf) - exact).abs() / unit);
         }

@@ -46,7 +46,7 @@ pub(super) fn r5_convergence(effort: Effort) -> Outcome {
     let outcome = Outcome::new()
         .within("slope of independent samples", slope(&independent.all), -1.05, -0.95)
         .within("slope without the largest thousandth of pixels", slope(&independent.without_largest), -1.05, -0.95)
-        .tell("slope of Sobol samples", slope(&sobol.all));
+        .record("slope of Sobol samples", slope(&sobol.all));
     outcome.plot(Plot {
         caption: "Relative squared error of a room with a metal ball".into(),
         x: "samples a pixel".into(),

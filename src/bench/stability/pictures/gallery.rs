@@ -44,7 +44,8 @@ fn fireflies(image: &Image) -> Vec<bool> {
             around.extend(&light[row * width + x.saturating_sub(2)..row * width + (x + 3).min(width)]);
         }
         around.sort_by(f64::total_cmp);
-        // Of an odd number or the upper of both middle ones; a black surrounding has no fireflies but what is seen directly.
+        // Of an odd number or the upper of both middle ones; a black surrounding has no fireflies but what is seen
+        // directly.
         let median = around[around.len() / 2];
         median > 0.0 && light[i] > FIREFLY * median
     };
@@ -103,17 +104,17 @@ pub(super) fn r8_gallery(effort: Effort) -> Outcome {
     let mut outcome = Outcome::new()
         .at_least("scenes rendered", scenes.len() as f64, BUILT_IN.len() as f64)
         .none("scenes that end in an error", all - scenes.len())
-        .tell("of them from the folder scenes", from_folder as f64)
+        .record("of them from the folder scenes", from_folder as f64)
         .at_most("samples and pixels that are not finite", invalid as f64, 0.0);
     // What R5 leaves out of its error too: a thousandth.
     for (caustics, what) in [(false, "without mirrors and smooth glass"), (true, "with them")] {
         let shares: Vec<f64> = scenes.iter().filter(|(_, found)| found.caustics == caustics).map(|(_, found)| share(found)).collect();
         let mean = shares.iter().sum::<f64>() / shares.len().max(1) as f64;
         let what = format!("share of pixels that are fireflies, {} scenes {what}", shares.len());
-        outcome = if caustics { outcome.tell(what, mean) } else { outcome.at_most(what, mean, 1e-3) };
+        outcome = if caustics { outcome.record(what, mean) } else { outcome.at_most(what, mean, 1e-3) };
     }
     for (name, found) in scenes.iter().filter(|(_, found)| found.fireflies > 0) {
-        outcome = outcome.tell(format!("fireflies of {} pixels of {name}", found.pixels), found.fireflies as f64);
+        outcome = outcome.record(format!("fireflies of {} pixels of {name}", found.pixels), found.fireflies as f64);
     }
     outcome
 }

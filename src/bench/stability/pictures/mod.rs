@@ -77,7 +77,7 @@ fn room() -> Value {
     }))
 }
 
-/// A scene with so many samples a pixel.
+/// A scene with a number of samples per pixel.
 fn prepared(scene: &Value, spp: u32) -> Prepared {
     prepare(scene, &Overrides { threads: Some(2), spp: Some(spp), ..Overrides::default() })
 }

@@ -55,7 +55,8 @@ pub(super) fn r7_pay_for_use(_: Effort) -> Outcome {
     ];
     let other = cases.iter().filter(|(scene, expected)| registered(scene).0 != *expected).count();
 
-    // By chance alone there are no shadow rays, nor towards an even sky; neither normals nor light that is seen directly need a second ray.
+    // By chance alone there are no shadow rays, nor towards an even sky; neither normals nor light that is seen
+    // directly need a second ray.
     let normals: u64 = rays(&plain()).iter().sum();
     let mut lit = plain();
     lit["lights"] = json!([{ "type": "environment", "radiance": [1, 1, 1] }]);

@@ -113,8 +113,8 @@ fn compensation(accel: &dyn accel::Accelerator, geometry: &Geometry, ray: &Ray) 
     closest(accel, geometry, ray).found.map(|at| (at.p, at.n_g))
 }
 
-/// Tallies of the shape alone, through Embree, and through Embree among others; there, of rays that pass the edge of the box so
-/// closely that the rounding of their origin is more, apart.
+/// Tallies of the shape alone, through Embree, and through Embree among others; there, of rays that pass the
+/// edge of the box so closely that the rounding of their origin is more, apart.
 #[derive(Clone, Copy, Default)]
 struct Tallies {
     alone: Tally,
@@ -123,7 +123,7 @@ struct Tallies {
     among_at_rims: Tally,
 }
 
-/// Spheres behind the start of a ray, so that the accelerator has boxes to tell apart.
+/// Spheres behind the start of a ray, so that the accelerator has several boxes.
 fn bystanders(ray: &Ray, unit: f64) -> impl Iterator<Item = Shape> + '_ {
     let back = -ray.direction.as_dvec3().normalize();
     (1..=3).map(move |i| {
@@ -246,12 +246,13 @@ pub(super) fn c1_hit_accuracy(effort: Effort) -> Outcome {
         .at_most("error through Embree", all.embree.error.max(all.among.error).max(all.among_at_rims.error), 1.0)
         .at_most("distance from the tangent plane in half-ulp boxes", all.alone.off_surface, 1.0)
         .at_most("share of rays that cannot be decided", share, 1e-3)
-        .tell("rays", all.alone.rays as f64)
+        .record("rays", all.alone.rays as f64)
         .plot(error_plot("Error of hits by distance", "distance of the origin / size", by_distance))
         .plot(error_plot("Error of hits by scale", "size of the shape", by_scale))
 }
 
-/// The largest error of the textbook's formulas in `f32`, in the units of [`Tally::error`]; of rays that they hit at all.
+/// The largest error of the textbook's formulas in `f32`, in the units of [`Tally::error`]; of rays that they hit at
+/// all.
 fn naive_error(rng: &mut Rng, case: &Case, setting: Setting, rays: usize) -> f64 {
     let mut worst = 0f64;
     for _ in 0..rays {
@@ -329,7 +330,7 @@ pub(super) fn c7_partial_shapes(effort: Effort) -> Outcome {
         .at_most("error of the point in 2^-24 max|p|", all.alone.error, 1.0)
         .at_most("sine between normal and radius of spheres", normals, 1e-6)
         .at_most("share of rays that cannot be decided", all.alone.undecidable as f64 / all.alone.rays as f64, 1e-3)
-        .tell("rays", all.alone.rays as f64)
+        .record("rays", all.alone.rays as f64)
 }
 
 pub(super) fn c13_stored_vectors(_: Effort) -> Outcome {
@@ -369,6 +370,6 @@ pub(super) fn c13_stored_vectors(_: Effort) -> Outcome {
         .none("other answers of the oracle of 106 bits", oracle)
         .at_most("relative error of that oracle in 2^-53", oracle_error * 2f64.powi(53), 2.0)
         .at_most("share of rays left out as undecidable", excluded as f64 / (excluded + shapes.rays) as f64, 1e-3)
-        .tell("largest condition of a point", worst_condition)
-        .tell("rays", shapes.rays as f64)
+        .record("largest condition of a point", worst_condition)
+        .record("rays", shapes.rays as f64)
 }

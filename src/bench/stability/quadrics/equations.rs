@@ -62,7 +62,8 @@ pub(super) fn c10_quadratic_solver(effort: Effort) -> Outcome {
     Outcome::new()
         .none("other number of roots", other_count)
         .at_most("error of a difference of products in units in the last place", difference, 2.0)
-        // Of the discriminant 3, half of that and 1 of its root, 1 of the sum, 1 of the quotient; and 1 of the reference.
+        // Of the discriminant 3, half of that and 1 of its root, 1 of the sum, 1 of the quotient; and 1 of the
+        // reference.
         .at_most("relative error of a root in 2^-53", error * 2f64.powi(53), 5.5)
         .none("wrong for vanishing coefficients", right.iter().filter(|right| !**right).count())
 }

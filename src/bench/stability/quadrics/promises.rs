@@ -1,4 +1,5 @@
-//! What every analytic shape promises: which root, derivatives, parameters, singular points, bounds, one answer for both queries.
+//! Properties of every analytic shape: which root, derivatives, parameters, singular points, bounds, one answer for
+//! both queries.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -141,7 +142,7 @@ pub(super) fn c3_grid_of_rays(effort: Effort) -> Outcome {
             }
         }
     }
-    Outcome::new().none("hit outside or missed inside", wrong).tell("rays", f64::from(rays))
+    Outcome::new().none("hit outside or missed inside", wrong).record("rays", f64::from(rays))
 }
 
 pub(super) fn c4_derivatives(effort: Effort) -> Outcome {
@@ -171,7 +172,7 @@ pub(super) fn c4_derivatives(effort: Effort) -> Outcome {
         .at_most("error of the change of u and v", change, 2e-2)
         .at_most("sine between derivatives and tangent plane", slope, 1e-9)
         .none("shapes with few points tried", few)
-        .tell("points", tried as f64)
+        .record("points", tried as f64)
 }
 
 pub(super) fn c5_parameters_round_trip(effort: Effort) -> Outcome {
@@ -183,7 +184,7 @@ pub(super) fn c5_parameters_round_trip(effort: Effort) -> Outcome {
         let geometry = placed(shape, rng.rotation(), rng.cube());
         let Shape::Analytic(on) = geometry.shape(crate::id::ShapeId(0)) else { return };
         let p = on.transform.point(at);
-        // From a side that sees the point: the normal found in the shape's own space tells.
+        // From a side that sees the point, by the normal in the shape's own space.
         let (u, v) = (at.cross(DVec3::Z), at);
         let normal = [u, v, DVec3::Z, DVec3::X].into_iter().find_map(|n| {
             let n = if n.length() > 0.1 { n.normalize() } else { DVec3::Z };
@@ -345,7 +346,7 @@ pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
         .none("closest hit, any hit and batches disagree", differ)
         .none("hits outside the interval", late)
         .none("hits lost or kept one float from the end of the interval", lost)
-        .tell("rays", f64::from(rays))
+        .record("rays", f64::from(rays))
 }
 
 pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {

@@ -116,13 +116,13 @@ fn d1_all_roots_are_found(effort: Effort) -> Outcome {
     let outcome = Outcome::new()
         .none("rays whose number of hits is odd where it is even, or the reverse", odd)
         .at_least("share of rays with the right number", equal.iter().sum::<usize>() as f64 / rays as f64, 0.999)
-        .tell("rays that lose hits", lost as f64)
-        .tell("rays with too many", invented as f64);
+        .record("rays that lose hits", lost as f64)
+        .record("rays with too many", invented as f64);
     KINDS.iter().zip(equal).fold(outcome, |outcome, (kind, equal)| outcome.at_least(*kind, equal as f64 / (4 * per_kind) as f64, 0.99))
 }
 
-/// The equation of D1 at a point of the surface: the squared distance of the surface from the axis less that of the ray at the same height,
-/// times the squared height of the unit direction.
+/// The equation of D1 at a point of the surface: the squared distance of the surface from the axis less that of the ray
+/// at the same height, times the squared height of the unit direction.
 fn equation(ray: &RayF64, p: DVec3) -> f64 {
     let (o, d) = (ray.origin, ray.direction.normalize());
     let (a, b, c) = (d.x * d.x + d.z * d.z, o.x * d.x + o.z * d.z, o.x * o.x + o.z * o.z);
@@ -154,7 +154,7 @@ fn d2_roots_are_accurate(effort: Effort) -> Outcome {
         outcome = outcome
             .short("a distance near a tangent is known as well as the residual over the slope; the catalogue asks for 1e-11 of fewer rays");
     }
-    KINDS.iter().zip(distance).fold(outcome, |outcome, (kind, error)| outcome.tell(format!("error, {kind}"), error))
+    KINDS.iter().zip(distance).fold(outcome, |outcome, (kind, error)| outcome.record(format!("error, {kind}"), error))
 }
 
 fn d8_stored_vectors(_: Effort) -> Outcome {
@@ -183,7 +183,7 @@ fn d8_stored_vectors(_: Effort) -> Outcome {
         // A hundredth of what it judges.
         .at_most("the same of the reference", oracle_error, 1e-13)
         .at_most("share of rays left out as undecidable", excluded as f64 / (excluded + rays) as f64, 1e-3)
-        .tell("rays", rays as f64)
+        .record("rays", rays as f64)
 }
 
 fn d9_nearest_first(effort: Effort) -> Outcome {

@@ -45,7 +45,7 @@ fn cubic(c: [f64; 4]) -> Polynomial {
 }
 
 /// Parameters in `[0, 1]` where the sign of a polynomial changes, ascending. Zero counts as positive, but the ends as
-/// negative that are said to be so.
+/// negative that are reported as such.
 fn sign_changes(p: &[TwoFloat], negative_ends: [bool; 2]) -> Vec<f64> {
     if p.len() < 2 {
         return Vec::new();

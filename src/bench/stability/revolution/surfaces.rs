@@ -139,7 +139,8 @@ pub(super) fn d6_areas(_: Effort) -> Outcome {
     ];
     let lines = cases.iter().map(|(points, expected)| (turned(points).area() / expected - 1.0).abs()).fold(0.0, f64::max);
 
-    // The way of the curve's centre of mass times its length, both by small chords whose error falls with the square of their number.
+    // The way of the curve's centre of mass times its length, both by small chords whose error falls with the square of
+    // their number.
     let torus: Vec<[f64; 2]> =
         CIRCLE.iter().map(|p| [p[0] + 2.0, p[1]]).chain(CIRCLE.iter().rev().skip(1).map(|p| [2.0 - p[0], p[1]])).collect();
     let profile = Profile::bezier(&torus).expect(VALID);

@@ -12,7 +12,7 @@ use crate::sampling::statistics::{DirectionTest, compare_directions_on};
 /// Rows and columns of cells (pbrt, bsdfs_test.cpp).
 const GRID: [usize; 2] = [80, 160];
 
-/// Every view if `all`, else one of each `stride`, so many of which are as good a mixture of materials as of directions.
+/// Every view if `all`, else one of each `stride`, which is as good a mixture of materials as of directions.
 fn selected(all: bool, stride: usize, first: usize) -> Vec<View> {
     let stride = if all { 1 } else { stride };
     views(rough()).into_iter().skip(if all { 0 } else { first }).step_by(stride).collect()

@@ -114,7 +114,7 @@ impl White {
     }
 }
 
-/// White materials that share what a furnace promises for them.
+/// White materials with the same bounds in a furnace.
 struct Family {
     name: &'static str,
     members: Vec<White>,

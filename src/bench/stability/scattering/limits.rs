@@ -14,13 +14,13 @@ use crate::math::Vec3;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::sampling::statistics::random_points;
 
-/// Light from everywhere that tells directions apart.
+/// Incident radiance that differs by direction.
 fn sky(w: Vec3) -> f64 {
     f64::from(1.0 + 0.5 * w.x + 0.3 * w.y - 0.4 * w.z)
 }
 
-/// Light that one sample brings.
-fn brought(bsdf: &Bsdf, wo: Vec3, u: [f32; 4]) -> f64 {
+/// The contribution of one sample.
+fn contribution(bsdf: &Bsdf, wo: Vec3, u: [f32; 4]) -> f64 {
     bsdf.sample(wo, u[2], [u[0], u[1]]).map_or(0.0, |s| f64::from(s.weight.g) * sky(s.wi))
 }
 
@@ -36,9 +36,10 @@ fn estimate(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (mean, squares / (n * (n - 1.0)))
 }
 
-/// p-value of Welch's test of two materials by different random numbers, and the relative difference of their means by the same.
+/// p-value of Welch's test of two materials by different random numbers, and the relative difference of their means by
+/// the same.
 fn welch(a: &Bsdf, b: &Bsdf, wo: Vec3, count: u32) -> (f64, f64) {
-    let of = |bsdf: &Bsdf, seed: u32| estimate(random_points(seed, count).map(|u| brought(bsdf, wo, u)));
+    let of = |bsdf: &Bsdf, seed: u32| estimate(random_points(seed, count).map(|u| contribution(bsdf, wo, u)));
     let ((mean_a, variance_a), (mean_b, variance_b)) = (of(a, 1), of(b, 2));
     let t = (mean_a - mean_b) / (variance_a + variance_b).sqrt();
     let freedom = (variance_a + variance_b).powi(2) / (variance_a.powi(2) + variance_b.powi(2)) * f64::from(count - 1);
@@ -69,7 +70,8 @@ fn is_sound(value: Rgb, pdf: f32) -> bool {
     value.is_finite() && value.to_array().iter().all(|&v| v >= 0.0) && pdf.is_finite() && pdf >= 0.0
 }
 
-/// Samples and evaluations of a material, from all directions down to the smallest cosine, that are no numbers or negative.
+/// Samples and evaluations of a material, from all directions down to the smallest cosine, that are no numbers or
+/// negative.
 fn unsound(bsdf: &Bsdf) -> usize {
     const COSINES: [f32; 7] = [1.0, 1e-3, 1e-6, 1e-12, 1e-30, 1e-45, 0.0];
     const COSINES_I: [f32; 7] = [1.0, 1e-3, 1e-12, 1e-30, -1e-6, -1.0, 0.0];

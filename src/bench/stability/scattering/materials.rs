@@ -185,8 +185,8 @@ pub fn white() -> Vec<Material> {
     list
 }
 
-/// A corner of the unit cube of ten parameters of the principled model, for a white base; from bit 10 on: a thin sheet, half diffuse
-/// transmission.
+/// A corner of the unit cube of ten parameters of the principled model, for a white base; from bit 10 on: a thin sheet,
+/// half diffuse transmission.
 pub fn corner(bits: u32) -> Material {
     let parameters = PrincipledParameters::white_corner(bits);
     // Glass has an index of at least 1.05.
@@ -207,7 +207,8 @@ impl View {
     }
 }
 
-/// Every material from ahead, at 45 degrees, grazing and from behind; those that let light pass at the same angles from inside.
+/// Every material from ahead, at 45 degrees, grazing and from behind; those that let light pass at the same angles from
+/// inside.
 pub fn views(materials: Vec<Material>) -> Vec<View> {
     const OUTSIDE: [f32; 4] = [1.0, std::f32::consts::FRAC_1_SQRT_2, 0.05, 0.001];
     const BEHIND: [f32; 1] = [-0.6];

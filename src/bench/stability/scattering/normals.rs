@@ -27,7 +27,8 @@ fn sample_by_disk(ggx: &Ggx, o: Vec3, u: [f32; 2]) -> Vec3 {
 const ROWS: usize = 16;
 const COLUMNS: usize = 32;
 
-/// The cell of a normal after alpha is divided out, where the distribution is broad however narrow its lobe: by height and azimuth.
+/// The cell of a normal after alpha is divided out, where the distribution is broad however narrow its lobe: by height
+/// and azimuth.
 fn cell(ggx: &Ggx, m: Vec3) -> usize {
     let [ax, ay] = ggx.alpha().map(f64::from);
     let n = crate::math::dvec3(f64::from(m.x) / ax, f64::from(m.y) / ay, f64::from(m.z)).normalize();
@@ -36,7 +37,8 @@ fn cell(ggx: &Ggx, m: Vec3) -> usize {
     row * COLUMNS + ((turns * COLUMNS as f64) as usize).min(COLUMNS - 1)
 }
 
-/// p-value of the hypothesis that two sets of as many draws have the same distribution; cells with few draws are pooled.
+/// p-value of the hypothesis that two sets of as many draws have the same distribution; cells with few draws are
+/// pooled.
 fn two_sample_p_value(a: &[u32], b: &[u32]) -> f64 {
     let (mut statistic, mut cells) = (0.0, 0u32);
     let mut pool = [0f64; 2];
@@ -111,7 +113,7 @@ pub(super) fn g8_visible_normals(effort: Effort) -> Outcome {
         .at_least("smallest p-value against the density", densities.iter().copied().fold(1.0, f64::min), sidak_level(densities.len()))
         .none("normals that are no unit vectors of the upper side", found.iter().map(|n| n.broken).sum())
         .at_least("least cosine with the direction", found.iter().map(|n| n.least_cos).fold(1.0, f64::min), 0.0)
-        .tell("fraction of normals seen from behind", hidden);
+        .record("fraction of normals seen from behind", hidden);
     if worst.p_value >= level {
         return outcome;
     }

@@ -8,7 +8,8 @@ use super::super::{Effort, Outcome};
 use crate::integrator::{facing_normal, terminator_factor};
 use crate::math::Vec3;
 
-/// The quad `[-1, 1]^2` at z = 0 whose shading normal leans by an angle towards +x: by a normal map, or by the normals of a mesh's corners.
+/// The quad `[-1, 1]^2` at z = 0 whose shading normal leans by an angle towards +x: by a normal map, or by the normals
+/// of a mesh's corners.
 fn tilted(degrees: f64, by_map: bool, material: Value) -> Value {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let code = [0.5 + 0.5 * sin, 0.5, 0.5 + 0.5 * cos];
@@ -66,7 +67,7 @@ fn cases() -> impl Iterator<Item = (bool, Value, [f64; 3])> {
 }
 
 /// Pixels that are not black where all light comes from below the quad but from above the plane of its shading normal.
-/// Only with a normal map: vertex normals stand for a smooth surface, which may see below the plane of a facet that
+/// Only with a normal map: vertex normals approximate a smooth surface, which may see below the plane of a facet that
 /// nothing covers.
 fn leaks() -> usize {
     let below = json!([{ "type": "directional", "direction": [-0.95, 0, 0.3], "irradiance": [9, 9, 9] }]);
@@ -74,8 +75,9 @@ fn leaks() -> usize {
     cases().filter(|case| case.0).map(|case| pixels(&lit(case)).filter(|p| *p != [0.0; 3]).count()).sum()
 }
 
-/// Largest step of the radiance of a leaning white quad from one height of the light to the next, times the number of heights, over the
-/// radiance at full light: a hard edge anywhere would give that number, a slope one of the order of the slope of the cosine.
+/// Largest step of the radiance of a leaning white quad from one height of the light to the next, times the number of
+/// heights, over the radiance at full light: a hard edge anywhere would give that number, a slope one of the order of
+/// the slope of the cosine.
 fn steepest(effort: Effort) -> f64 {
     let heights = effort.pick(32, 256u32);
     let mut last: Option<f64> = None;

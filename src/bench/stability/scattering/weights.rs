@@ -6,8 +6,8 @@ use super::materials::{Material, direction, rough, smooth};
 use crate::bsdf::Bsdf;
 use crate::math::Vec3;
 
-/// How far each component of a direction may be from what it stands for: it is the sum of a few products of numbers up to 2, each of which
-/// is rounded.
+/// How far each component of a direction may be from its exact value: it is the sum of a few products of numbers up to
+/// 2, each of which is rounded.
 const ROUNDING: f32 = 1.0 / (1 << 22) as f32;
 
 /// Relative difference of two numbers.
@@ -51,7 +51,7 @@ pub struct Weights {
     pub unexplained: f64,
     /// Where that is.
     pub worst: String,
-    /// Samples that leave on another side than they say, or by a lobe that is a delta and yet has a density.
+    /// Samples on another side than that of their lobe, or by a lobe that is a delta and yet has a density.
     pub wrong: usize,
 }
 
@@ -94,7 +94,7 @@ impl Weights {
                 1e-4,
             )
             .none("samples with a wrong side or index", self.wrong)
-            .tell("relative difference in all", self.raw)
+            .record("relative difference in all", self.raw)
     }
 }
 
@@ -146,7 +146,7 @@ pub(super) fn g4_reciprocity(effort: Effort) -> Outcome {
     }
     Outcome::new()
         .at_most(format!("relative difference beyond what rounding the directions by 2^-22 changes ({worst})"), unexplained, 1e-4)
-        .tell("relative difference in all", raw)
+        .record("relative difference in all", raw)
         .at_least("pairs on the same side", compared[0] as f64, 1e4)
         .at_least("pairs on opposite sides", compared[1] as f64, 1e4)
 }

@@ -88,7 +88,8 @@ fn seen(accel: &dyn Accelerator, geometry: &Geometry, ray: &Ray) -> Option<Surfa
     closest(accel, geometry, ray).found
 }
 
-/// Half of the time a random direction to the side `n`, else a grazing one down to 1e-5. It stays on that side when it is rounded.
+/// Half of the time a random direction to the side `n`, else a grazing one down to 1e-5. It stays on that side when it
+/// is rounded.
 fn leaving(rng: &mut Rng, n: DVec3) -> DVec3 {
     let d = rng.direction_around(n);
     let along = (d - n * d.dot(n)).normalize();
@@ -100,7 +101,8 @@ fn either(rng: &mut Rng, n: Vec3) -> DVec3 {
     n.as_dvec3() * if rng.unit() < 0.5 { -1.0 } else { 1.0 }
 }
 
-/// The segment to a point `distance` away in `direction`; `None` where rounding may take that point to the other side of the tangent plane.
+/// The segment to a point `distance` away in `direction`; `None` where rounding may take that point to the other side
+/// of the tangent plane.
 fn free_segment(si: &SurfaceInteraction, direction: DVec3, distance: f64) -> Option<Ray> {
     let p = si.p + direction * distance;
     let n = si.n_g.as_dvec3().abs();

@@ -1,4 +1,5 @@
-//! Ways to start a ray at a surface, side by side: how often it finds its own face again, and how often it leaks out of a closed box.
+//! Ways to start a ray at a surface, side by side: how often it finds its own face again, and how often it leaks out of
+//! a closed box.
 
 use super::{Effort, Outcome, accelerators};
 use crate::accel::Accelerator;
@@ -10,14 +11,14 @@ use crate::math::{DMat3, DVec3, Ray, Vec3};
 /// A way to start a ray.
 #[derive(Clone, Copy, PartialEq)]
 enum Scheme {
-    /// Moved by the bound of the error, and false hits refused in `f64`.
+    /// Moved by the bound of the error, and false hits rejected in `f64`.
     Ours,
     /// Not moved at all.
     None,
     /// A smallest distance in scene units.
     FixedStart,
-    /// Some floats away along each axis; near zero, some scene units (Wächter and Binder, "A Fast and Robust Method for Avoiding
-    /// Self-Intersection").
+    /// Some floats away along each axis; near zero, some scene units (Wächter and Binder, "A Fast and Robust Method for
+    /// Avoiding Self-Intersection").
     Floats,
     /// Along the normal, in proportion to the largest coordinate and at least some scene units, as Mitsuba does.
     AlongNormal,
@@ -125,8 +126,8 @@ pub(super) fn b13_schemes(effort: Effort) -> Outcome {
                 .at_most("ours: leaks over distance, largest fraction", leaks[1], 5e-4)
         } else {
             outcome
-                .tell(format!("{name}: false hits, largest fraction"), again)
-                .tell(format!("{name}: leaks, largest fraction"), leaks[0].max(leaks[1]))
+                .record(format!("{name}: false hits, largest fraction"), again)
+                .record(format!("{name}: leaks, largest fraction"), leaks[0].max(leaks[1]))
         };
     }
     let [a, b] = sweep("half size", &by_scale);

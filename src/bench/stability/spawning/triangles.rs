@@ -69,7 +69,7 @@ pub(super) fn b5_slivers(effort: Effort) -> Outcome {
             outcome = report(outcome, &what, &tally);
             let retraces = tally[0].retraces_per_ray();
             let what = format!("{what}, embree: retraces per ray");
-            outcome = if aspect == 1.0 { outcome.at_most(what, retraces, 0.002) } else { outcome.tell(what, retraces) };
+            outcome = if aspect == 1.0 { outcome.at_most(what, retraces, 0.002) } else { outcome.record(what, retraces) };
         }
     }
     outcome

@@ -17,7 +17,8 @@ const COUNT: usize = (WIDTH * WIDTH) as usize;
 /// Samples of each pixel in a batch.
 const AT_ONCE: u32 = 64;
 
-/// A sum that keeps what rounding takes from it (Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher Summen").
+/// A sum that keeps what rounding takes from it (Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation
+/// endlicher Summen").
 #[derive(Clone, Copy, Default)]
 struct Sum {
     sum: f64,

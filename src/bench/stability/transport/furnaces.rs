@@ -24,7 +24,8 @@ pub(super) fn glowing_sphere(spp: u32, max_depth: u32, rr_depth: u32) -> Value {
     scene
 }
 
-/// [`grey_sphere`] with lights of intensity pi together in its middle: irradiance pi everywhere, radiance 1/2 / (1 - 1/2) = 1.
+/// [`grey_sphere`] with lights of intensity pi together in its middle: irradiance pi everywhere, radiance 1/2 / (1 -
+/// 1/2) = 1.
 fn lit_sphere(spp: u32, lights: u32) -> Value {
     let intensity = [PI / f64::from(lights); 3];
     let light = json!({ "type": "point", "position": [0.0, 0.0, 0.0], "intensity": intensity });

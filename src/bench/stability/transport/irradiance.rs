@@ -25,7 +25,7 @@ fn compare(tests: &mut Tests, effort: Effort, name: &str, mut scene: Value, expe
     worst
 }
 
-/// The catalogue asks for a relative error below 0.2 %, which scattering alone would need hours for.
+/// The catalogue requires a relative error below 0.2 %, which scattering alone would need hours for.
 fn judge(tests: Tests, effort: Effort, worst: f64) -> Outcome {
     let outcome = Outcome::new().at_most("relative error where lights are sampled", worst, effort.pick(0.02, 0.002));
     tests.judge_means(outcome, effort.pick(0.06, 0.01))

@@ -6,7 +6,8 @@ use crate::bench::stability::render::Estimate;
 use crate::bench::stability::verdict::estimate;
 use crate::render::Overrides;
 
-/// Meshes of two triangles each, with opacity one half, before a sky of radiance 1: the diagonal runs from corner to corner of the picture.
+/// Meshes of two triangles each, with opacity one half, before a sky of radiance 1: the diagonal runs from corner to
+/// corner of the picture.
 fn stack(spp: u32, layers: u32) -> Value {
     let layer = |i: u32| {
         let z = 0.1 * f64::from(i);

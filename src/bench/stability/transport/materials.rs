@@ -21,7 +21,7 @@ fn with(mut m: Value, rest: Value) -> Value {
     json!({ "m": m })
 }
 
-/// Every material at its whitest, with what `docs/materials.md` says of it; the object has the material `m`.
+/// Every material at its whitest, with the bound of `docs/materials.md`; the object has the material `m`.
 fn materials() -> Vec<(&'static str, Whiteness, Value)> {
     let metal = |rest: Value| with(json!({ "type": "conductor", "eta": [0.01, 0.01, 0.01], "k": [1e4, 1e4, 1e4] }), rest);
     let glass = |rest: Value| with(json!({ "type": "dielectric", "ior": 1.5 }), rest);
@@ -119,8 +119,8 @@ pub(super) fn i3_white_furnace(effort: Effort) -> Outcome {
     let outcome = gains.judge(Outcome::new());
     tests
         .judge_means(outcome, effort.pick(0.03, 0.005))
-        .tell(format!("largest distance from 1 with tabulated energies ({})", tabulated.1), tabulated.0)
-        .tell(format!("radiance of the darkest that is not compensated ({})", lossy.1), lossy.0)
+        .record(format!("largest distance from 1 with tabulated energies ({})", tabulated.1), tabulated.0)
+        .record(format!("radiance of the darkest that is not compensated ({})", lossy.1), lossy.0)
         .short(
             "1 ± 4 standard errors is asked of all compensated materials: energies of rough surfaces come from tables, with the slack that \
              docs/materials.md states (plastic 0.2 %, coats 0.5 %, metal 1 %, glass 3 %); anisotropic glass, principled, phong and cook_torrance \

@@ -57,7 +57,7 @@ const SIDE: u32 = 32;
 /// Pixels of such a picture.
 const PIXELS: usize = (SIDE * SIDE) as usize;
 
-/// A scene of so many samples a pixel, seen through a narrow angle from 6 along z unless it says otherwise.
+/// A scene with a number of samples per pixel, seen through a narrow angle from 6 along z by default.
 fn scene(spp: u32, rest: Value) -> Value {
     let mut scene = json!({
         "film": { "width": SIDE, "height": SIDE, "filter": { "type": "box" } },

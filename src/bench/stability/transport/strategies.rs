@@ -40,8 +40,8 @@ pub(super) fn i7_strategies(effort: Effort) -> Outcome {
             if bsdf.error < 0.05 * bsdf.mean {
                 tests.same(&format!("{name}: both and scattering"), mis, bsdf, pixels);
             }
-            // Two samples, one of each strategy, exceed the better strategy's variance by half of the squared mean at most (Veach and
-            // Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering").
+            // Two samples, one of each strategy, exceed the better strategy's variance by half of the squared mean at
+            // most (Veach and Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering").
             let samples = pixels as f64 * f64::from(spp);
             let [mis, light, bsdf] = [mis, light, bsdf].map(|e| samples * (e.error / e.mean).powi(2));
             let lesser = light.min(bsdf);
@@ -60,7 +60,7 @@ pub(super) fn i7_strategies(effort: Effort) -> Outcome {
     tests
         .judge(Outcome::new())
         .at_most(format!("variance of both over its bound ({at})"), worst, noise)
-        .tell(format!("variance of both over the lesser of one ({ratio_at})"), ratio)
+        .record(format!("variance of both over the lesser of one ({ratio_at})"), ratio)
         .short(
             "1.1 times the lesser variance is asked everywhere: a strategy that is good already is exceeded by more, since light sampling gets \
              its share of the weight where both densities are alike, as in the tail of a sharp lobe within a large lamp",

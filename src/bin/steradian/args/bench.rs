@@ -9,7 +9,7 @@ use super::import::ImportArgs;
 use super::{accel_help, bench_error, bench_scale, parse_size};
 
 const BENCH_REPORTS_ABOUT: &str = "\
-Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
+Reproduce the comparisons of linear loops, octree, kd-tree and BVH in course reports, and explain the ratios
 
 Three pictures of normals on one thread: a head of 968 triangles (\"120 s linear, 3.5 s octree, 0.5 s Embree\"), a mesh of 1,000 triangles (\"kd-tree \
 about 10 times faster\"), one of 70,000 (\"BVH 17.61 times faster\"). Each is drawn with the accelerators as the reports wrote them, with ours and with \
@@ -24,10 +24,10 @@ Examples:
   steradian bench accel --scaling 1e3..1e7 --accel embree,bvh,kdtree,octree --out growth
       Cost over the number of triangles of a generated mesh.
   steradian bench accel scene.json --accel linear,embree --ray=0,0,5,0,0,-1
-      What each accelerator says of one ray: origin, direction, and optionally t_min, t_max, time.
+      The hit of each accelerator for one ray: origin, direction, and optionally t_min, t_max, time.
 
 Rays are recorded once from a render of the scene with one sample a pixel: camera, shadow (any hit), first bounce, deep bounce, ambient occlusion
-(any hit). Every accelerator traces the very same rays, in turn, round after round. Answers are compared with those of linear.
+(any hit). Every accelerator traces the very same rays, in turn, round after round. Hits are compared with those of linear.
 Ctrl-C ends after the present step and reports what there is.";
 
 /// What to measure.
@@ -39,7 +39,7 @@ pub enum BenchCommand {
     /// Measure error against time: variants of a render, and other renderers, beside a reference
     #[command(long_about = bench_error::ABOUT, after_help = bench_error::EXAMPLES)]
     Error(Box<bench_error::BenchErrorArgs>),
-    /// Repeat what course reports say of linear loops, octree, kd-tree and BVH, and explain the ratios
+    /// Reproduce the comparisons of linear loops, octree, kd-tree and BVH in course reports, and explain the ratios
     #[command(long_about = BENCH_REPORTS_ABOUT)]
     Reports(BenchReportsArgs),
     /// Measure time and memory as pictures and scenes grow
@@ -57,8 +57,8 @@ const BENCH_STABILITY_ABOUT: &str = "\
 Check numerical stability: every check with its criterion and what was measured.
 
 Shapes from a thousandth to a million radii away, rays that leave surfaces of every size anywhere, closed meshes that must not leak, accelerators \
-against testing everything, sampled directions against their densities, lights, cameras and films against closed forms. A check that falls short says \
-why; one that fails ends the run with exit code 1 and leaves pictures of what it found in DIR/evidence.";
+against testing everything, sampled directions against their densities, lights, cameras and films against closed forms. A check that falls short gives \
+the reason; one that fails ends the run with exit code 1 and leaves pictures of what it found in DIR/evidence.";
 
 const BENCH_STABILITY_EXAMPLES: &str = "\
 Examples:
@@ -89,7 +89,7 @@ pub struct BenchStabilityArgs {
     /// Without --out: print JSON instead of a table
     #[arg(long)]
     pub json: bool,
-    /// Say nothing but results and errors
+    /// Print only results and errors
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -112,7 +112,7 @@ pub struct BenchReportsArgs {
     /// Without --out: print JSON instead of tables
     #[arg(long)]
     pub json: bool,
-    /// Say nothing but results and errors
+    /// Print only results and errors
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -145,10 +145,10 @@ pub struct BenchAccelArgs {
     /// Without --out: print JSON instead of tables
     #[arg(long)]
     pub json: bool,
-    /// Trace only this ray and print each accelerator's answer
+    /// Trace only this ray and print each accelerator's hit
     #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN[,TMAX[,TIME]]]", allow_hyphen_values = true)]
     pub ray: Option<String>,
-    /// Say nothing but results and errors
+    /// Print only results and errors
     #[arg(short, long)]
     pub quiet: bool,
 }

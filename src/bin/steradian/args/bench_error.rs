@@ -51,7 +51,8 @@ pub struct BenchErrorArgs {
     /// Repetitions, each with another seed
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: u32,
-    /// Also record all rays of a short render and trace them again by bare calls of Embree: how much of the time is tracing
+    /// Also record all rays of a short render and trace them again by bare calls of Embree: how much of the time is
+    /// tracing
     #[arg(long)]
     pub tax: bool,
 
@@ -83,10 +84,10 @@ pub struct BenchErrorArgs {
     /// Largest number of segments from the camera
     #[arg(long, value_name = "N", help_heading = "Render")]
     pub max_depth: Option<u32>,
-    /// Limit what a single path of indirect light brings
+    /// Clamp the contribution of a single path of indirect light
     #[arg(long, value_name = "LIMIT", help_heading = "Render")]
     pub clamp: Option<f32>,
-    /// Number of threads; 0 stands for all
+    /// Number of threads; 0 means all
     #[arg(long, value_name = "N", help_heading = "Render")]
     pub threads: Option<usize>,
     /// Seed of the first repeat
@@ -99,7 +100,7 @@ pub struct BenchErrorArgs {
     /// Without --out: print JSON instead of tables
     #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// Say nothing but results and errors
+    /// Print only results and errors
     #[arg(short, long, help_heading = "Output")]
     pub quiet: bool,
     #[command(flatten)]

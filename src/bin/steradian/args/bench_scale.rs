@@ -41,7 +41,7 @@ pub struct BenchScaleArgs {
     /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub spp: u32,
-    /// Number of threads; 0 stands for all
+    /// Number of threads; 0 means all
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1024))]
     pub threads: u32,
     /// The most triangles. Default: 20e6, 1e6 with --quick
@@ -62,7 +62,7 @@ pub struct BenchScaleArgs {
     /// Without --out: print JSON instead of tables
     #[arg(long)]
     pub json: bool,
-    /// Say nothing but results and errors
+    /// Print only results and errors
     #[arg(short, long)]
     pub quiet: bool,
 }

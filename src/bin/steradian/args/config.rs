@@ -21,7 +21,7 @@ Examples:
   steradian config show --origin room.json       Also where each value comes from
   steradian config show --json room.json";
 
-/// What the environment and configuration files say.
+/// The settings of the environment and of configuration files.
 #[derive(Debug, Subcommand)]
 pub enum ConfigCommand {
     /// Print the options that render has for a scene without a command line

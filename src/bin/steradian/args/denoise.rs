@@ -23,7 +23,7 @@ Examples:
   steradian denoise frame.####.exr clean.####.exr
       All frames of a sequence, each by itself.
 
-The library is loaded when it is needed: `pip install pyoidn` brings it.";
+The library is loaded when it is needed: `pip install pyoidn` installs it.";
 
 /// Where the denoiser is.
 #[derive(Clone, Debug, Default, Args)]
@@ -36,14 +36,14 @@ pub struct OidnArgs {
     pub oidn_library: Option<PathBuf>,
 }
 
-/// What `render` is asked to do with the picture.
+/// Denoising options of `render`.
 #[derive(Clone, Debug, Default, Args)]
 pub struct RenderDenoiseArgs {
     /// Denoise the picture with Intel Open Image Denoise; EXR files keep the original as layer noisy
     ///
-    /// The render also makes the layers feature_albedo and feature_normal, which are stored only if asked for. Light
-    /// groups are denoised so that they still sum to the picture. Shards are denoised when they are merged, by
-    /// `steradian denoise`.
+    /// The render also makes the layers feature_albedo and feature_normal, which are stored only if --layers names
+    /// them. Light groups are denoised so that they still sum to the picture. Shards are denoised when they are merged,
+    /// by `steradian denoise`.
     #[arg(long, conflicts_with = "shard", help_heading = "Picture")]
     pub denoise: bool,
     #[command(flatten)]
@@ -53,9 +53,9 @@ pub struct RenderDenoiseArgs {
 /// Arguments of `denoise`.
 #[derive(Debug, Args)]
 pub struct DenoiseArgs {
-    /// The file to denoise; #### stands for the number of a frame
+    /// The file to denoise; #### is replaced by the number of a frame
     pub input: PathBuf,
-    /// The file to write, .exr; the same number takes the place of ####
+    /// The file to write, .exr; #### is replaced by the same number
     pub output: PathBuf,
     /// Write the denoised picture as .png, too; repeat for several
     #[arg(short = 'o', long = "png", value_name = "FILE")]
@@ -75,7 +75,7 @@ pub struct DenoiseArgs {
     /// PNG: how light becomes colours of the display
     #[arg(long, value_name = "NAME", default_value = ViewDesc::default().name(), value_parser = names::plain::<ViewDesc>())]
     pub view: ViewDesc,
-    /// Number of threads; 0 stands for all
+    /// Number of threads; 0 means all
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     pub threads: usize,
     #[command(flatten)]
@@ -83,7 +83,7 @@ pub struct DenoiseArgs {
     /// Print what was done as JSON, an object a file
     #[arg(long, help_heading = "Run")]
     pub json: bool,
-    /// Say nothing but errors
+    /// Print only errors
     #[arg(short, long, help_heading = "Run")]
     pub quiet: bool,
 }

@@ -43,7 +43,7 @@ pub struct ExrArgs {
     /// EXR: store the whole picture, black around the crop, for programs that ignore data windows
     #[arg(long)]
     pub uncropped: bool,
-    /// EXR: how many objects Cryptomatte tells apart in a pixel; 6 unless given
+    /// EXR: Cryptomatte ranks, the number of objects stored per pixel. Default: 6
     #[arg(long, value_name = "N")]
     pub crypto_depth: Option<u32>,
     /// EXR: where Cryptomatte's names are stored: in the file or beside it
@@ -52,7 +52,7 @@ pub struct ExrArgs {
     /// EXR: the attribute owner
     #[arg(long, value_name = "TEXT")]
     pub owner: Option<String>,
-    /// EXR: text before what the attribute comments says of the layers
+    /// EXR: text before the description of layers in the attribute comments
     #[arg(long, value_name = "TEXT")]
     pub comments: Option<String>,
 }
@@ -112,12 +112,12 @@ pub struct RerenderArgs {
     /// Other samples per pixel
     #[arg(long, value_name = "N")]
     pub spp: Option<u32>,
-    /// Number of threads; 0 stands for all
+    /// Number of threads; 0 means all
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
     #[command(flatten)]
     pub oidn: OidnArgs,
-    /// Say nothing but errors
+    /// Print only errors
     #[arg(short, long)]
     pub quiet: bool,
 }

@@ -11,7 +11,7 @@ Write a job for Slurm: an array of shards for every frame, and a job that merges
 The folder gets render.sh (one task of the array renders one shard), merge.sh and submit.sh, which submits both for each frame; all may be edited. \
 Scene, folder and outputs have to mean the same on every node. Every shard has samples of its own of every pixel; merged, they are the picture of one \
 machine bit for bit. A task whose node is lost, which is preempted or reaches its time limit is queued again and goes on from its checkpoint; one that \
-fails is rendered again up to --retries times, unless the exit code says that this is of no use (2, 3, 4, 6). submit.sh, run again, submits what is missing.";
+fails is rendered again up to --retries times, unless the exit code is that of a permanent failure (2, 3, 4, 6). submit.sh, run again, submits what is missing.";
 
 const SLURM_EXAMPLES: &str = "\
 Examples:
@@ -58,13 +58,14 @@ pub struct JobArgs {
     /// Samples per pixel, all shards together
     #[arg(long, value_name = "N")]
     pub spp: Option<u32>,
-    /// Folder for shards and checkpoints; has to be the same for all machines. Default: SCENE.farm in the working directory
+    /// Folder for shards and checkpoints; has to be the same for all machines. Default: SCENE.farm in the working
+    /// directory
     #[arg(long, value_name = "DIR")]
     pub dir: Option<PathBuf>,
     /// Seconds between checkpoints
     #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     pub every: u32,
-    /// The program as the machines know it. Default: this one
+    /// The program's path on the machines. Default: this one
     #[arg(long, value_name = "FILE")]
     pub program: Option<PathBuf>,
     /// Render frames whose files exist, too; they are skipped otherwise

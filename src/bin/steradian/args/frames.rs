@@ -4,10 +4,10 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use steradian::farm::{FORMATS, FrameList, ProgressFormat};
 
-/// How progress is told, and which frames are rendered.
+/// The format of progress, and which frames are rendered.
 #[derive(Clone, Debug, Default, Args)]
 pub struct SequenceArgs {
-    /// How progress is told on stderr. Default: human on a terminal, plain elsewhere
+    /// The format of progress on stderr. Default: human on a terminal, plain elsewhere
     #[arg(long, value_name = "FORMAT", value_parser = formats(), long_help = progress_help(), help_heading = "Messages")]
     pub progress: Option<&'static ProgressFormat>,
     /// Render these frames: 1-100, 1-100x5 (every fifth), 3,7,9-12
@@ -36,7 +36,7 @@ fn formats() -> impl TypedValueParser<Value = &'static ProgressFormat> {
 
 fn progress_help() -> String {
     let lines: Vec<_> = FORMATS.iter().map(|format| format!("  {:<10}{}", format.name, format.readers)).collect();
-    format!("How progress is told on stderr. Default: human on a terminal, plain elsewhere\n\n{}", lines.join("\n"))
+    format!("The format of progress on stderr. Default: human on a terminal, plain elsewhere\n\n{}", lines.join("\n"))
 }
 
 fn parse_fps(text: &str) -> Result<f64, String> {

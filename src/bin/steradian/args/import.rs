@@ -14,7 +14,7 @@ pub struct ImportArgs {
     /// glTF: seconds into the animations
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Import")]
     pub time: f64,
-    /// Write what became of every parameter as JSON to this file; - stands for stdout
+    /// Write what became of every parameter as JSON to this file; - for stdout
     #[arg(long, value_name = "FILE", help_heading = "Import")]
     pub report: Option<PathBuf>,
     /// End with exit code 3 if anything of the file was approximated or ignored
@@ -35,7 +35,7 @@ impl ImportArgs {
 pub const CONVERT_EXAMPLES: &str = "\
 Examples:
   steradian convert scene.pbrt scene.json          Writes scene.json, and its files into scene_files/
-  steradian convert scene.glb out.json --report -  Says what became of every parameter
+  steradian convert scene.glb out.json --report -  Reports what became of every parameter
   steradian convert scene.xml out.json --link      Refers to the original meshes and images in place of copying them";
 
 /// Arguments of `convert`.
@@ -50,10 +50,10 @@ pub struct ConvertArgs {
     pub link: bool,
     #[command(flatten)]
     pub import: ImportArgs,
-    /// Say nothing but errors
+    /// Print only errors
     #[arg(short, long, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Say what became of every parameter
+    /// Report what became of every parameter
     #[arg(short, long, action = ArgAction::Count)]
     pub verbose: u8,
 }

@@ -7,19 +7,20 @@ use steradian::Result;
 use steradian::live::{DEFAULT_ADDRESS, Live, Options, PreviewOptions, TevOptions};
 use steradian::render::Settings;
 
-/// Who can watch a render.
+/// The live viewers of a render.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Live view")]
 pub struct LiveArgs {
     /// Send the picture with its layers to the viewer tev as it grows [default: 127.0.0.1:14158]
     ///
-    /// A viewer that is not there, comes later, is slow or ends does no harm: what it shows is brought up to date when it is there.
+    /// A viewer that is not there, comes later, is slow or ends does not disturb the render; it gets the newest picture
+    /// once it is connected.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = DEFAULT_ADDRESS, value_parser = parse_address)]
     pub tev: Option<String>,
-    /// Serve a web page that shows the picture as it grows, at this port; 0 stands for any that is free
+    /// Serve a web page that shows the picture as it grows, at this port; 0 for any free port
     ///
-    /// The address is told on stderr. The page shows every layer, with exposure, views, zoom, the exact values of
-    /// pixels and what is left to do. It is there for this machine alone unless --preview-bind says otherwise.
+    /// The address is printed to stderr. The page shows every layer, with exposure, views, zoom, the exact values of
+    /// pixels and what is left to do. It is served to this machine alone unless --preview-bind is given.
     #[arg(long, value_name = "PORT")]
     pub preview: Option<u16>,
     /// Serve the page at this address of this machine, such as 0.0.0.0: everyone who reaches it sees the picture

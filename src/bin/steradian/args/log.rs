@@ -10,10 +10,10 @@ pub struct LogArgs {
     /// Messages as text, or as one JSON object a line. Default: text; json with --progress json
     #[arg(long, global = true, value_name = "FORMAT", help_heading = "Messages")]
     pub log_format: Option<LogFormat>,
-    /// Also add messages to this file, those of -v too and whatever --quiet says, each with its time
+    /// Also add messages to this file, those of -v too and regardless of --quiet, each with its time
     #[arg(long, global = true, value_name = "FILE", help_heading = "Messages")]
     pub log_file: Option<PathBuf>,
-    /// Colours: auto stands for on a terminal, unless NO_COLOR is set or TERM is dumb, and wherever CLICOLOR_FORCE is set
+    /// Colours: auto means on a terminal, unless NO_COLOR is set or TERM is dumb, and wherever CLICOLOR_FORCE is set
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto", help_heading = "Messages")]
     pub color: ColorChoice,
 }

@@ -71,7 +71,7 @@ Examples:
   steradian render cornell.json --shard 2/8
       An eighth of the samples into cornell.2-of-8.shard, for steradian merge.
   steradian render cornell.json --pixel 120,80 --sample 7
-      What exactly one sample brings; nothing is written.
+      The values of exactly one sample; nothing is written.
   steradian render cornell.json -q --json - | jq .mrays_per_second
       Statistics for scripts.
 
@@ -95,10 +95,10 @@ pub enum Command {
     /// Render a scene to files
     #[command(after_help = RENDER_EXAMPLES)]
     Render(Box<RenderArgs>),
-    /// Say what is in a scene
+    /// Print what is in a scene
     ///
-    /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info without an error
-    /// renders without an error.
+    /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info
+    /// without an error renders without an error.
     Info(InfoArgs),
     /// Turn a scene of another renderer into one of ours, with its meshes and images beside it
     #[command(after_help = import::CONVERT_EXAMPLES)]
@@ -110,7 +110,8 @@ pub enum Command {
     Schema,
     /// Merge shards into the picture
     ///
-    /// Shards are what `render --shard` writes. All of them together are the picture of one run bit for bit, in every layer.
+    /// Shards are what `render --shard` writes. All of them together are the picture of one run bit for bit, in every
+    /// layer.
     #[command(after_help = MERGE_EXAMPLES)]
     Merge(MergeArgs),
     /// Check EXR files against what the programs that read them expect
@@ -121,14 +122,14 @@ pub enum Command {
     /// Render the picture of an EXR file again
     ///
     /// The file names its scene with all settings; the picture is the same bit for bit. A scene or file of it that has
-    /// changed is named and refused. Nothing that the file says is loaded, written or connected to.
+    /// changed is an error that names it. No other path or address in the file is loaded, written or connected to.
     #[command(after_help = exr::RERENDER_EXAMPLES)]
     Rerender(RerenderArgs),
     /// Compare a picture with its reference
     ///
-    /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of (test - reference)² /
-    /// (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels, psnr relates mse to the
-    /// reference's peak, mean ratio is the test's mean over the reference's.
+    /// Both are EXR files; the linear colour is compared. mse is the mean of (test - reference)², relmse that of
+    /// (test - reference)² / (reference² + 0.01), relmse trimmed the same without the worst thousandth of the pixels,
+    /// psnr relates mse to the reference's peak, mean ratio is the test's mean over the reference's.
     #[command(after_help = "Example:\n  steradian compare reference.exr test.exr --json | jq .relmse")]
     Compare(CompareArgs),
     /// Write jobs for render farms
@@ -149,7 +150,7 @@ pub enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
         arguments: Vec<String>,
     },
-    /// What the environment and configuration files say
+    /// Show the settings of the environment and of configuration files
     #[command(subcommand)]
     Config(ConfigCommand),
     /// Print the manual page, or write those of all commands into a folder
@@ -182,9 +183,10 @@ pub struct RenderArgs {
     pub spp: Option<u32>,
     /// Render until the picture's relative squared error is below this, with samples where they are needed
     ///
-    /// The error is the mean of (picture - truth)² / (truth² + 0.01) over pixels and channels, as far as the samples show it: 0.01 is a
-    /// rough picture, 0.001 a good one. The render ends when the error is below the target by two standard deviations; --spp is then the
-    /// most samples of a pixel. Store the layers "variance" and "samples" to see where they went.
+    /// The error is the mean of (picture - truth)² / (truth² + 0.01) over pixels and channels, as far as the samples
+    /// show it: 0.01 is a rough picture, 0.001 a good one. The render ends when the error is below the target by two
+    /// standard deviations; --spp is then the most samples of a pixel. Store the layers "variance" and "samples" to see
+    /// where they went.
     #[arg(long, value_name = "ERROR", help_heading = "Picture")]
     pub target_error: Option<f64>,
     /// Width and height in pixels, such as 1920x1080
@@ -193,7 +195,8 @@ pub struct RenderArgs {
     /// Render only this part, in pixels from the upper left corner
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_list::<u32, 4>, help_heading = "Picture")]
     pub crop: Option<[u32; 4]>,
-    /// Render this many pixels more on each side: EXR files hold them around the picture (their data window), PNG files do not
+    /// Render this many pixels more on each side: EXR files hold them around the picture (their data window), PNG files
+    /// do not
     #[arg(long, value_name = "PIXELS", help_heading = "Picture")]
     pub overscan: Option<u32>,
     /// EXR: layers (AOVs) to store beside the picture; `all` for every one
@@ -222,17 +225,18 @@ pub struct RenderArgs {
     /// How directions towards lights are found
     #[arg(long, value_name = "NAME", value_parser = names::plain::<StrategyDesc>(), help_heading = "Algorithm")]
     pub strategy: Option<StrategyDesc>,
-    /// Limit what a single path of indirect light brings: less noise, but biased (too dark). Off unless given; inf for no limit
+    /// Clamp the contribution of a single path of indirect light: less noise, but biased (too dark). Off by default;
+    /// inf for no limit
     #[arg(long, value_name = "LIMIT", help_heading = "Algorithm")]
     pub clamp: Option<f32>,
     /// Make surfaces that a path meets after a rough one at least as rough as this alpha, falling with the samples:
     /// less noise of caustics, but biased. Off by default; 0 for off
     #[arg(long, value_name = "ALPHA", help_heading = "Algorithm")]
     pub regularize: Option<f32>,
-    /// Whether paths learn from earlier ones where light comes from: on or off
+    /// Path guiding: sample directions by the incident radiance learned from earlier paths: on or off
     ///
     /// For scenes whose light comes by few ways, such as through a door ajar. Iterations double; each is guided by the
-    /// samples of those before, and weighted by its inverse variance. Guiding is given up where it does not pay. With
+    /// samples of those before, and weighted by its inverse variance. Guiding ends where it does not pay. With
     /// --checkpoint and --resume the picture is the same bit for bit. Unsupported with --shard: each part would have to
     /// render nearly all samples to train the guide.
     #[arg(long, value_name = "SWITCH", value_parser = parse_switch, help_heading = "Algorithm")]
@@ -253,16 +257,16 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME", long_help = accel_help(), help_heading = "Algorithm")]
     pub accel: Option<AccelKind>,
 
-    /// Number of threads; 0 stands for all. The picture does not depend on it
+    /// Number of threads; 0 means all. The picture does not depend on it
     #[arg(long, value_name = "N", help_heading = "Run")]
     pub threads: Option<usize>,
     /// End after this time even if samples are missing
     #[arg(long, value_name = "SECONDS", help_heading = "Run")]
     pub time_limit: Option<f64>,
-    /// Write statistics as JSON to this file; - stands for stdout
+    /// Write statistics as JSON to this file; - for stdout
     #[arg(long, value_name = "STATS", help_heading = "Run")]
     pub json: Option<PathBuf>,
-    /// Replay samples of this pixel alone and print what they bring; nothing is written
+    /// Replay samples of this pixel alone and print their values; nothing is written
     #[arg(long, value_name = "X,Y", value_parser = parse_list::<u32, 2>, requires = "sample", help_heading = "Run")]
     pub pixel: Option<[u32; 2]>,
     /// The sample to replay, counted from 0
@@ -287,13 +291,13 @@ pub struct RenderArgs {
     pub verbosity: Verbosity,
 }
 
-/// How much is said on stderr.
+/// The verbosity of messages on stderr.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct Verbosity {
-    /// Say nothing but errors
+    /// Print only errors
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Run")]
     pub quiet: bool,
-    /// Say more; repeat for even more
+    /// Print more messages; repeat for even more
     #[arg(short, long, action = ArgAction::Count, help_heading = "Run")]
     pub verbose: u8,
 }
@@ -325,7 +329,7 @@ pub struct CompareArgs {
 }
 
 impl Command {
-    /// How much is said, where a command leaves it to the user.
+    /// The verbosity, where a command has options for it.
     pub fn verbosity(&self) -> Verbosity {
         let only = |quiet: bool| Verbosity { quiet, verbose: 0 };
         match self {
@@ -339,7 +343,7 @@ impl Command {
         }
     }
 
-    /// Messages are JSON where progress is, unless the user wants another form.
+    /// Messages are JSON where progress is, unless --log-format selects another form.
     pub fn log_format(&self) -> LogFormat {
         let progress = if let Self::Render(arguments) = self { arguments.sequence.progress } else { None };
         if progress.is_some_and(|format| format.name == "json") { LogFormat::Json } else { LogFormat::Text }

@@ -20,7 +20,7 @@ Examples:
 pub struct StateArgs {
     /// Keep the state of the render in this file, for --resume
     ///
-    /// It is replaced as a whole, so a render killed at any moment loses at most what the last interval brought.
+    /// It is replaced as a whole, so a render killed at any moment loses at most the samples of the last interval.
     /// SIGUSR1 writes it at once; Ctrl-C and SIGTERM write it before the picture. It stays when the picture is done:
     /// --resume with a larger --spp adds the missing samples (not with --guiding on, where they depend on how many
     /// there are).
@@ -50,10 +50,10 @@ pub struct MergeArgs {
     /// File to write, .exr or .png; repeat for several. Without it, what the render would have written
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<String>,
-    /// Merge what is there though shards or samples are missing; an EXR says so in its attribute steradian/partial
+    /// Merge what is there though shards or samples are missing; an EXR lists them in its attribute steradian/partial
     #[arg(long)]
     pub partial: bool,
-    /// Say nothing but errors
+    /// Print only errors
     #[arg(short, long)]
     pub quiet: bool,
 }

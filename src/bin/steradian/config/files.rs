@@ -105,11 +105,12 @@ mod tests {
             ("frames = \"1-2\"", "s.toml:1: \"frames\" belongs to the command line"),
         ] {
             let error = parsed(text).unwrap_err();
-            assert!(matches!(&error, Error::Usage(told) if told.starts_with(message)), "{error}");
+            assert!(matches!(&error, Error::Usage(found) if found.starts_with(message)), "{error}");
         }
     }
 
-    /// Whatever the bytes are, they are settings or an error with its line: damaged files, and those that fuzzing found.
+    /// Whatever the bytes are, they are settings or an error with its line: damaged files, and those that fuzzing
+    /// found.
     #[test]
     fn damaged_files_are_read_or_refused() {
         const TEXT: &str =
@@ -117,7 +118,7 @@ mod tests {
         let options = Options::new(&Cli::command());
         let check = |text: &str| {
             if let Err(error) = parse(&options, Trust::Project, text) {
-                assert!(matches!(&error, Error::Usage(told) if told.starts_with("s.toml:")), "{text}: {error}");
+                assert!(matches!(&error, Error::Usage(found) if found.starts_with("s.toml:")), "{text}: {error}");
             }
         };
         let mut rng = steradian::math::Rng::new(5);

@@ -1,4 +1,5 @@
-//! Where the options of `render` come from: the command line, the environment, files of the project and of the user, the machine's limits.
+//! Where the options of `render` come from: the command line, the environment, files of the project and of the user,
+//! the machine's limits.
 
 mod files;
 mod show;
@@ -17,7 +18,7 @@ use crate::args::Cli;
 use crate::log;
 pub use show::run as show;
 
-/// Variables in which farms say how many processors a task may use.
+/// Variables in which farms store how many processors a task may use.
 const FARM_THREADS: [&str; 2] = ["SLURM_CPUS_PER_TASK", "CUE_THREADS"];
 
 /// Where a value comes from, the strongest first.
@@ -43,13 +44,13 @@ impl std::fmt::Display for Origin {
 pub struct Setting {
     /// The option's name without its dashes.
     pub key: String,
-    /// Its values, as the command line would have them; none stands for a switch that is off.
+    /// Its values, as the command line would have them; empty for a switch that is off.
     pub values: Vec<String>,
-    /// Where this is said.
+    /// The origin of the setting.
     pub origin: Origin,
 }
 
-/// The command line with what the environment and the files add to `render`; and what to say of that.
+/// The command line with what the environment and the files add to `render`; and messages about that.
 pub struct Parsed {
     /// The command line.
     pub cli: Cli,
@@ -61,7 +62,8 @@ pub struct Parsed {
     pub files: Vec<PathBuf>,
 }
 
-/// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help with 0.
+/// Reads the command line, and what is to be added to it. A faulty command line ends the program with exit code 2, help
+/// with 0.
 pub fn parse() -> Result<Parsed> {
     let line: Vec<OsString> = std::env::args_os().collect();
     check_utf8(&line)?;
@@ -74,7 +76,7 @@ pub fn parse() -> Result<Parsed> {
     let options = Options::new(&command);
     let Found { settings, files, warnings } = settings(&options, &scene)?;
     let given = |key: &str| options.find(key).is_some_and(|arg| is_given(render, &matches, arg));
-    // Who asks for more on the command line does not want the quiet of a file.
+    // --verbose on the command line overrides `quiet` in a file.
     let opposed = |key: &str| (key == "quiet" && given("verbose")) || (key == "verbose" && given("quiet"));
     let added: Vec<Setting> = settings.into_iter().filter(|setting| !given(&setting.key) && !opposed(&setting.key)).collect();
     let command =
@@ -83,7 +85,8 @@ pub fn parse() -> Result<Parsed> {
     Ok(Parsed { cli: typed(&matches), warnings, added, files })
 }
 
-/// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals nor farms.
+/// Ends the program with what is wrong with the command line, or with help. Words of the line steer neither terminals
+/// nor farms.
 fn exit(error: &clap::Error) -> ! {
     let text = error.to_string();
     let harmless = message_lines(&text);
@@ -174,7 +177,7 @@ impl Options {
         }
     }
 
-    /// A setting of which the words are those of a variable or a file; `Err` says what is wrong.
+    /// A setting of which the words are those of a variable or a file; `Err` is the message.
     fn setting(&self, key: &str, words: Words, origin: Origin) -> Result<Setting, String> {
         let key = key.replace('_', "-");
         let arg = self.find(&key).ok_or_else(|| self.unknown(&key))?;
@@ -219,7 +222,7 @@ pub struct Found {
     pub settings: Vec<Setting>,
     /// The files that were read.
     pub files: Vec<PathBuf>,
-    /// What the user should know of it.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
@@ -252,7 +255,7 @@ pub fn settings(options: &Options, scene: &Path) -> Result<Found> {
     Ok(Found { settings: kept, files, warnings })
 }
 
-/// What variables such as `STERADIAN_SPP` say; an empty one says nothing.
+/// The values of variables such as `STERADIAN_SPP`; an empty one counts as unset.
 fn environment(
     options: &Options,
     variables: impl Iterator<Item = (OsString, OsString)>,

@@ -28,7 +28,7 @@ const IN_SCENES: [(&str, &[&str]); 11] = [
 ];
 
 /// A value and where it comes from.
-struct Row {
+struct SettingRow {
     key: String,
     value: String,
     origin: String,
@@ -41,18 +41,18 @@ pub fn run(arguments: &ConfigShowArgs) -> Result<()> {
     let found = settings(&options, arguments.scene.as_ref().unwrap_or(&nowhere))?;
     found.warnings.iter().for_each(|warning| log::message(Level::Warning, warning));
     let of_scene = scene_rows(arguments.scene.as_deref())?;
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<SettingRow> = Vec::new();
     for name in options.names() {
         let setting = found.settings.iter().find(|setting| setting.key == name).map(|setting| {
             let value = if setting.values.is_empty() { "false".to_owned() } else { setting.values.join(",") };
-            Row { key: name.to_owned(), value, origin: setting.origin.to_string() }
+            SettingRow { key: name.to_owned(), value, origin: setting.origin.to_string() }
         });
         let built_in = || {
             let value = options.default_of(name)?;
-            Some(Row { key: name.to_owned(), value, origin: "built-in".to_owned() })
+            Some(SettingRow { key: name.to_owned(), value, origin: "built-in".to_owned() })
         };
         let in_scene = || {
-            of_scene.iter().find(|row| row.key == name).map(|row| Row {
+            of_scene.iter().find(|row| row.key == name).map(|row| SettingRow {
                 key: row.key.clone(),
                 value: row.value.clone(),
                 origin: row.origin.clone(),
@@ -61,20 +61,20 @@ pub fn run(arguments: &ConfigShowArgs) -> Result<()> {
         rows.extend(setting.or_else(in_scene).or_else(built_in));
     }
     if arguments.json {
-        let entry = |row: &Row| (row.key.clone(), json!({ "value": row.value, "origin": row.origin }));
+        let entry = |row: &SettingRow| (row.key.clone(), json!({ "value": row.value, "origin": row.origin }));
         return text::print_json(&Value::Object(rows.iter().map(entry).collect::<Map<_, _>>()));
     }
-    let width = |column: fn(&Row) -> &str| rows.iter().map(|row| column(row).chars().count()).max().unwrap_or(0);
+    let width = |column: fn(&SettingRow) -> &str| rows.iter().map(|row| column(row).chars().count()).max().unwrap_or(0);
     let (keys, values) = (width(|row| &row.key), width(|row| &row.value));
-    let line = |row: &Row| match arguments.origin {
+    let line = |row: &SettingRow| match arguments.origin {
         true => format!("{:keys$}  {:values$}  {}", row.key, row.value, row.origin),
         false => format!("{:keys$}  {}", row.key, row.value),
     };
     text::print(&rows.iter().map(line).collect::<Vec<_>>().join("\n"))
 }
 
-/// What the scene says, and what holds if it does not.
-fn scene_rows(scene: Option<&Path>) -> Result<Vec<Row>> {
+/// The scene's values, and the defaults of those it does not have.
+fn scene_rows(scene: Option<&Path>) -> Result<Vec<SettingRow>> {
     let as_json = |desc: &steradian::desc::SceneDesc| serde_json::to_value(desc).map_err(|e| Error::Internal(e.to_string()));
     let bare = as_json(&import::parse_scene(r#"{ "camera": {} }"#, Path::new("scene.json"))?)?;
     let (desc, written) = match scene {
@@ -90,17 +90,18 @@ fn scene_rows(scene: Option<&Path>) -> Result<Vec<Row>> {
         if values.len() < places.len() || values.iter().any(|value| value.as_array().is_some_and(Vec::is_empty)) {
             continue;
         }
-        // A scene of ours says it or not; in a scene of another kind, what differs from the default was said.
-        let said = match &written {
+        // A scene in our format has the key or not; in an imported scene, a value that differs from the default was
+        // given.
+        let is_given = match &written {
             Some(written) => places.iter().any(|place| written.pointer(place).is_some()),
             None => places.iter().any(|place| desc.pointer(place) != bare.pointer(place)),
         };
         let origin = match scene {
-            Some(path) if said => format!("scene: {}", path.display()),
+            Some(path) if is_given => format!("scene: {}", path.display()),
             _ => "built-in".to_owned(),
         };
         let separator = if key == "size" { "x" } else { "," };
-        rows.push(Row { key: key.to_owned(), value: values.into_iter().map(word).collect::<Vec<_>>().join(separator), origin });
+        rows.push(SettingRow { key: key.to_owned(), value: values.into_iter().map(word).collect::<Vec<_>>().join(separator), origin });
     }
     Ok(rows)
 }

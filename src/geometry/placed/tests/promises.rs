@@ -1,4 +1,4 @@
-//! What every analytic shape promises: derivatives, parameters, singular points, bounds, sampling, placement.
+//! Properties of every analytic shape: derivatives, parameters, singular points, bounds, sampling, placement.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -71,7 +71,8 @@ fn samples_are_hit_where_they_are_with_the_same_density() {
     }
 }
 
-/// Coordinates of a point that are uniform if the point is uniform by area; `None` for shapes without such a closed form.
+/// Coordinates of a point that are uniform if the point is uniform by area; `None` for shapes without such a closed
+/// form.
 fn uniform_coordinates(shape: &Analytic, p: DVec3) -> Option<[f64; 2]> {
     let s = hit_from_above(shape, p, normal_at(shape, p)?)?;
     let v = match shape {
@@ -204,7 +205,8 @@ fn placed_normals_stay_perpendicular_and_outside() {
 
 #[test]
 fn placed_densities_integrate_to_one() {
-    // Midpoints of a grid in the sampler's own square: the mean of 1 / pdf is the area, found here from derivatives of the placed map.
+    // Midpoints of a grid in the sampler's own square: the mean of 1 / pdf is the area, found here from derivatives of
+    // the placed map.
     const SIDE: usize = 200;
     for shape in shapes() {
         for transform in transforms() {

@@ -1,4 +1,5 @@
-//! Accessors: numbers in buffers, read element by element after one check of their bounds. Bytes need no alignment to be read.
+//! Accessors: numbers in buffers, read element by element after one check of their bounds. Bytes need no alignment to
+//! be read.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +7,7 @@ use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, accessor};
 
-use super::Source;
+use super::GltfSource;
 use crate::error::Result;
 
 /// The elements of an accessor.
@@ -43,7 +44,8 @@ impl Column<'_> {
         }
     }
 
-    /// The first numbers of an element as floats, whole ones in proportion if they are normalized; zero where there are none.
+    /// The first numbers of an element as floats, whole ones in proportion if they are normalized; zero where there are
+    /// none.
     pub fn floats<const N: usize>(&self, i: usize) -> [f32; N] {
         let element = self.element(i);
         std::array::from_fn(|k| if k < self.width { self.float(element, k) } else { 0.0 })
@@ -81,24 +83,24 @@ fn bytes_at<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     bytes.get(at..at + N).and_then(|bytes| bytes.try_into().ok()).unwrap_or([0; N])
 }
 
-/// What an accessor is wanted for.
+/// The use of an accessor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wanted {
+pub enum AccessorUse {
     Floats,
     Indices,
 }
 
-impl<'a> Source<'a> {
+impl<'a> GltfSource<'a> {
     /// The elements of an accessor that `path` names, which must be of one of these types.
-    pub fn column(&self, path: &str, index: Index<accessor::Accessor>, types: &[Type], wanted: Wanted) -> Result<Column<'a>> {
+    pub fn column(&self, path: &str, index: Index<accessor::Accessor>, types: &[Type], accessor_use: AccessorUse) -> Result<Column<'a>> {
         let place = format!("{path} (accessors[{}])", index.value());
-        self.checked_column(index, types, wanted).map_err(|message| self.fault(&place, message))
+        self.checked_column(index, types, accessor_use).map_err(|message| self.fault(&place, message))
     }
 
-    fn checked_column(&self, index: Index<accessor::Accessor>, types: &[Type], wanted: Wanted) -> Result<Column<'a>, String> {
+    fn checked_column(&self, index: Index<accessor::Accessor>, types: &[Type], accessor_use: AccessorUse) -> Result<Column<'a>, String> {
         let accessor = self.root.get(index).ok_or("there is no such accessor")?;
         let (Checked::Valid(kind), Checked::Valid(type_)) = (accessor.component_type, accessor.type_) else {
-            return Err("the type is not one that glTF knows".into());
+            return Err("the type is not one of glTF".into());
         };
         let kind = kind.0;
         if !types.contains(&type_) {
@@ -108,7 +110,7 @@ impl<'a> Source<'a> {
                 types.iter().map(|t| name(*t)).collect::<Vec<_>>().join(" or ")
             ));
         }
-        if wanted == Wanted::Indices && !matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
+        if accessor_use == AccessorUse::Indices && !matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
             return Err("has numbers that are no indices".into());
         }
         let (width, size) = (type_.multiplicity(), kind.size());
@@ -153,7 +155,7 @@ impl<'a> Source<'a> {
             return Err(format!("replaces {replaced} of {count} elements"));
         }
         let Checked::Valid(kind) = sparse.indices.component_type else {
-            return Err("the type of its sparse indices is not one that glTF knows".into());
+            return Err("the type of its sparse indices is not one of glTF".into());
         };
         let size = kind.0.size();
         let (indices, index_stride) = self.elements(sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0, replaced, size)?;

@@ -6,8 +6,8 @@ use gltf::json::accessor::Type;
 use gltf::json::animation::{Interpolation, Property, Sampler};
 use gltf::json::validation::Checked;
 
-use super::Source;
-use super::accessors::{Column, Wanted};
+use super::GltfSource;
+use super::accessors::{AccessorUse, Column};
 use super::nodes::unit;
 use crate::error::Result;
 use crate::import::Draft;
@@ -24,7 +24,7 @@ pub(crate) struct Motion {
 
 /// All animations at a time in seconds. Where several move the same property of a node the first counts: what a file
 /// has as one animation for each of its parts moves together, and of several for the same parts one is seen.
-pub fn evaluate(source: Source, time: f64, draft: &mut Draft) -> Result<Motion> {
+pub fn evaluate(source: GltfSource, time: f64, draft: &mut Draft) -> Result<Motion> {
     let mut motion = Motion::default();
     let mut taken: BTreeSet<(usize, u8)> = BTreeSet::new();
     for (a, animation) in source.root.animations.iter().enumerate() {
@@ -101,11 +101,11 @@ struct Moment {
 }
 
 impl<'a> Curve<'a> {
-    fn new(source: Source<'a>, path: &str, sampler: &Sampler, type_: Type) -> Result<Self> {
-        let times = source.column(&format!("{path}: input"), sampler.input, &[Type::Scalar], Wanted::Floats)?;
-        let values = source.column(&format!("{path}: output"), sampler.output, &[type_], Wanted::Floats)?;
+    fn new(source: GltfSource<'a>, path: &str, sampler: &Sampler, type_: Type) -> Result<Self> {
+        let times = source.column(&format!("{path}: input"), sampler.input, &[Type::Scalar], AccessorUse::Floats)?;
+        let values = source.column(&format!("{path}: output"), sampler.output, &[type_], AccessorUse::Floats)?;
         let Checked::Valid(interpolation) = sampler.interpolation else {
-            return Err(source.fault(path, "the interpolation is not one that glTF knows"));
+            return Err(source.fault(path, "the interpolation is not one of glTF"));
         };
         let mut curve = Self { times, values, interpolation, width: 1 };
         let (slots, count) = (curve.slots(), curve.values.count());

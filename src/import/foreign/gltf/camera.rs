@@ -3,7 +3,7 @@
 use gltf::json::camera::{Camera, Type};
 use gltf::json::validation::Checked;
 
-use super::Source;
+use super::GltfSource;
 use super::meshes::transform;
 use super::nodes::{Pose, Tree, label};
 use crate::desc::{CameraDesc, CameraKindDesc};
@@ -11,12 +11,12 @@ use crate::error::Result;
 use crate::import::Draft;
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// Width of the picture in pixels, and its height where the file says nothing of its shape.
+/// Width of the picture in pixels, and its height where the file gives no aspect ratio.
 const WIDTH: u32 = 1280;
 const HEIGHT: u32 = 720;
 
 /// Sets camera and film from the first camera among the scene's nodes; whether there is one.
-pub fn add(source: Source, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Result<bool> {
+pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Result<bool> {
     (draft.desc.film.width, draft.desc.film.height) = (WIDTH, HEIGHT);
     let mut found = false;
     for &i in &tree.shown {
@@ -39,7 +39,7 @@ pub fn add(source: Source, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Resul
 }
 
 /// What a camera sees, and the shape of the picture.
-fn lens(source: Source, place: &str, camera: &Camera, draft: &mut Draft) -> Result<CameraDesc> {
+fn lens(source: GltfSource, place: &str, camera: &Camera, draft: &mut Draft) -> Result<CameraDesc> {
     let within = |name: &str, value: f32, most: f64| {
         let value = f64::from(value);
         let is_sound = value > 0.0 && value < most;

@@ -83,7 +83,7 @@ pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
     check_positions(&root).map_err(|path| fault(&path, NO_ELEMENT.into()))?;
     let mut flaws = Vec::new();
     root.validate(&root, JsonPath::new, &mut |path, flaw| {
-        // Bounds of accessors are not needed; required extensions have been looked at.
+        // Bounds of accessors are not needed; required extensions have been checked.
         let path = path().0;
         let is_bound = flaw == Flaw::Missing && (path.ends_with(".min") || path.ends_with(".max"));
         if !is_bound && flaw != Flaw::Unsupported && flaws.len() < 10 {
@@ -98,13 +98,13 @@ pub fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Document<'a>> {
                 Flaw::IndexOutOfBounds => NO_ELEMENT.into(),
                 Flaw::Missing => "is needed, but not there".into(),
                 Flaw::Oversize => "is too large".into(),
-                _ => "the value is not one that glTF knows".into(),
+                _ => "the value is not one of glTF".into(),
             },
         )),
     }
 }
 
-/// That the accessors of positions are there: validation looks into them before it knows. The error is the place.
+/// That the accessors of positions are there: validation reads them before it checks this. The error is the place.
 fn check_positions(root: &Root) -> Result<(), String> {
     for (i, mesh) in root.meshes.iter().enumerate() {
         for (k, primitive) in mesh.primitives.iter().enumerate() {
@@ -147,13 +147,13 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     Ok((json.ok_or("there is no JSON chunk")?, bin))
 }
 
-/// Says which extensions of the file are not read.
+/// Reports which extensions of the file are not read.
 pub fn report_extensions(root: &Root, draft: &mut Draft) {
     for name in &root.extensions_used {
         if READ.contains(&name.as_str()) {
             draft.mapped("extensionsUsed", &format!("extension {name}"), "");
         } else {
-            draft.ignored("extensionsUsed", &format!("extension {name}"), "", "not read; what the file says beside it counts");
+            draft.ignored("extensionsUsed", &format!("extension {name}"), "", "unsupported; the rest of the file is read without it");
         }
     }
 }

@@ -1,14 +1,14 @@
-//! What extensions say, as plain structs: each field with the default of its extension.
+//! Extensions as plain structs: each field with the default of its extension.
 
 use gltf::json::Root;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use super::Source;
+use super::GltfSource;
 use crate::error::Result;
 
-impl Source<'_> {
+impl GltfSource<'_> {
     /// The extension `name` of the object at `path`, if it has it.
     pub fn extension<T: DeserializeOwned>(&self, path: &str, extensions: Option<&Map<String, Value>>, name: &str) -> Result<Option<T>> {
         let Some(value) = extensions.and_then(|extensions| extensions.get(name)) else { return Ok(None) };

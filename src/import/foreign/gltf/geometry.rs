@@ -5,8 +5,8 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, accessor};
 
-use super::Source;
-use super::accessors::{Column, Wanted};
+use super::GltfSource;
+use super::accessors::{AccessorUse, Column};
 use super::skins;
 use crate::assets::MeshData;
 use crate::error::Result;
@@ -54,14 +54,14 @@ pub fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Index<acce
 }
 
 /// Reads the triangles of a primitive; `None` if there are none.
-pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation: Deformation) -> Result<Option<Triangles>> {
+pub fn triangles(source: GltfSource, path: &str, primitive: &Primitive, deformation: Deformation) -> Result<Option<Triangles>> {
     let Some(positions) = attribute(primitive, Semantic::Positions) else {
         return Err(source.fault(path, "has no positions"));
     };
-    let positions = source.column(&format!("{path}.attributes.POSITION"), positions, &[Type::Vec3], Wanted::Floats)?;
+    let positions = source.column(&format!("{path}.attributes.POSITION"), positions, &[Type::Vec3], AccessorUse::Floats)?;
     let count = positions.count();
     let Checked::Valid(mode) = primitive.mode else {
-        return Err(source.fault(&format!("{path}.mode"), "is not one that glTF knows"));
+        return Err(source.fault(&format!("{path}.mode"), "is not one of glTF"));
     };
     let reader = PrimitiveReader { source, path, primitive, count };
     let corners = reader.corners()?;
@@ -72,8 +72,8 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
     }
     let used = compact(&mut triangles, count);
 
-    let normals = reader.column("NORMAL", Semantic::Normals, &[Type::Vec3], Wanted::Floats)?;
-    let colors = reader.column("COLOR_0", Semantic::Colors(0), &[Type::Vec3, Type::Vec4], Wanted::Floats)?;
+    let normals = reader.column("NORMAL", Semantic::Normals, &[Type::Vec3], AccessorUse::Floats)?;
+    let colors = reader.column("COLOR_0", Semantic::Colors(0), &[Type::Vec3, Type::Vec4], AccessorUse::Floats)?;
     let colors: Option<Vec<[f32; 4]>> = colors.map(|colors| used.iter().map(|&i| color(&colors, i as usize)).collect());
     let mut data = MeshData {
         positions: used.iter().map(|&i| positions.floats(i as usize)).collect(),
@@ -92,10 +92,10 @@ pub fn triangles(source: Source, path: &str, primitive: &Primitive, deformation:
 
 impl Triangles {
     /// Reads the uv of one set, if the primitive has it.
-    pub fn read_uvs(&mut self, source: Source, path: &str, primitive: &Primitive, set: u32) -> Result<()> {
+    pub fn read_uvs(&mut self, source: GltfSource, path: &str, primitive: &Primitive, set: u32) -> Result<()> {
         let name = format!("TEXCOORD_{set}");
         let reader = PrimitiveReader { source, path, primitive, count: self.count };
-        let uvs = reader.column(&name, Semantic::TexCoords(set), &[Type::Vec2], Wanted::Floats)?;
+        let uvs = reader.column(&name, Semantic::TexCoords(set), &[Type::Vec2], AccessorUse::Floats)?;
         // Their origin is the upper left corner; ours is the lower left one.
         let flipped = |uvs: Column| self.used.iter().map(|&i| uvs.floats::<2>(i as usize)).map(|[u, v]| [u, 1.0 - v]).collect();
         self.data.uvs = uvs.map(flipped);
@@ -105,7 +105,7 @@ impl Triangles {
 
 /// Reads the data of a primitive with `count` vertices.
 struct PrimitiveReader<'a, 'p> {
-    source: Source<'a>,
+    source: GltfSource<'a>,
     path: &'p str,
     primitive: &'p Primitive,
     count: usize,
@@ -113,11 +113,11 @@ struct PrimitiveReader<'a, 'p> {
 
 impl<'a> PrimitiveReader<'a, '_> {
     /// An attribute that has an element for each vertex, if the primitive has it.
-    fn column(&self, name: &str, semantic: Semantic, types: &[Type], wanted: Wanted) -> Result<Option<Column<'a>>> {
+    fn column(&self, name: &str, semantic: Semantic, types: &[Type], accessor_use: AccessorUse) -> Result<Option<Column<'a>>> {
         let Self { source, path, primitive, count } = *self;
         let Some(index) = attribute(primitive, semantic) else { return Ok(None) };
         let place = format!("{path}.attributes.{name}");
-        let column = source.column(&place, index, types, wanted)?;
+        let column = source.column(&place, index, types, accessor_use)?;
         if column.count() != count {
             return Err(source.fault(&place, format!("has {} elements, but there are {count} positions", column.count())));
         }
@@ -132,7 +132,7 @@ impl<'a> PrimitiveReader<'a, '_> {
             let count = u32::try_from(count).map_err(|_| source.fault(&path, "more vertices than 32-bit numbers can name"))?;
             return Ok((0..count).collect());
         };
-        let indices = source.column(&path, index, &[Type::Scalar], Wanted::Indices)?;
+        let indices = source.column(&path, index, &[Type::Scalar], AccessorUse::Indices)?;
         let corners: Vec<u32> = (0..indices.count()).map(|i| indices.indices::<1>(i)[0]).collect();
         match corners.iter().position(|&i| i as usize >= count) {
             Some(at) => Err(source.fault(&path, format!("index {at} is {}, but there are {count} vertices", corners[at]))),
@@ -153,7 +153,7 @@ impl<'a> PrimitiveReader<'a, '_> {
             {
                 let (Some(index), Some(moved)) = (index, moved) else { continue };
                 let place = format!("{path}.targets[{t}].{name}");
-                let steps = source.column(&place, index, &[Type::Vec3], Wanted::Floats)?;
+                let steps = source.column(&place, index, &[Type::Vec3], AccessorUse::Floats)?;
                 if steps.count() != count {
                     return Err(source.fault(&place, format!("has {} elements, but there are {count} positions", steps.count())));
                 }
@@ -174,8 +174,8 @@ impl<'a> PrimitiveReader<'a, '_> {
             if attribute(primitive, Semantic::Joints(set)).is_none() {
                 break;
             }
-            let indices = self.column(&format!("JOINTS_{set}"), Semantic::Joints(set), &[Type::Vec4], Wanted::Indices)?;
-            let weights = self.column(&format!("WEIGHTS_{set}"), Semantic::Weights(set), &[Type::Vec4], Wanted::Floats)?;
+            let indices = self.column(&format!("JOINTS_{set}"), Semantic::Joints(set), &[Type::Vec4], AccessorUse::Indices)?;
+            let weights = self.column(&format!("WEIGHTS_{set}"), Semantic::Weights(set), &[Type::Vec4], AccessorUse::Floats)?;
             let (Some(indices), Some(weights)) = (indices, weights) else {
                 return Err(source.fault(path, format!("has JOINTS_{set}, but not WEIGHTS_{set}")));
             };

@@ -1,6 +1,6 @@
 //! Lights of `KHR_lights_punctual`.
 
-use super::Source;
+use super::GltfSource;
 use super::extensions::{Light, LightIndex, LightKind, Lights, of_root};
 use super::nodes::{Pose, Tree, label};
 use crate::desc::{DirectionalLightDesc, LightDesc, PointLightDesc, SpotLightDesc};
@@ -11,7 +11,7 @@ use crate::math::{DAffine3, DVec3};
 const NAME: &str = "KHR_lights_punctual";
 
 /// Adds the lights of the scene's nodes; whether there are any.
-pub fn add(source: Source, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Result<bool> {
+pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Result<bool> {
     let lights: Lights = source.extension("", of_root(source.root), NAME)?.unwrap_or_default();
     let mut found = false;
     for &i in &tree.shown {
@@ -44,7 +44,7 @@ pub fn add(source: Source, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Resul
     Ok(found)
 }
 
-fn desc(source: Source, path: &str, light: &Light, world: &DAffine3) -> Result<LightDesc> {
+fn desc(source: GltfSource, path: &str, light: &Light, world: &DAffine3) -> Result<LightDesc> {
     let intensity = light.color.map(|c| c * light.intensity);
     if !intensity.iter().all(|i| i.is_finite() && *i >= 0.0) {
         return Err(source.fault(path, "the light's intensity is not finite, or negative"));

@@ -6,8 +6,8 @@ use gltf::json::Index;
 use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mesh, Primitive, Semantic};
 
-use super::Source;
-use super::accessors::{Column, Wanted};
+use super::GltfSource;
+use super::accessors::{AccessorUse, Column};
 use super::extensions::Instancing;
 use super::geometry::{self, Deformation};
 use super::materials::MaterialSet;
@@ -44,7 +44,7 @@ struct Shapes {
 }
 
 struct Builder<'a, 'b> {
-    source: Source<'a>,
+    source: GltfSource<'a>,
     draft: &'b mut Draft,
     materials: MaterialSet,
     /// Bytes that meshes may still take.
@@ -52,12 +52,13 @@ struct Builder<'a, 'b> {
     gives_light: bool,
 }
 
-/// Bytes of meshes for each byte of the file's buffers, and what any file may have: parts of buffers may be used more than once.
+/// Bytes of meshes for each byte of the file's buffers, and what any file may have: parts of buffers may be used more
+/// than once.
 const EXPANSION: usize = 64;
 const LEAST_BUDGET: usize = 1 << 28;
 
 /// Adds the meshes of the scene's nodes.
-pub fn add(source: Source, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Result<Placed> {
+pub fn add(source: GltfSource, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Result<Placed> {
     let mut forms: Vec<(Form, Vec<(usize, DAffine3)>)> = Vec::new();
     let mut places: BTreeMap<Form, usize> = BTreeMap::new();
     for &i in &tree.shown {
@@ -99,7 +100,7 @@ pub fn add(source: Source, tree: &Tree, pose: &Pose, draft: &mut Draft) -> Resul
 }
 
 /// What a node shows of a mesh.
-fn form(source: Source, node: usize, mesh: Index<Mesh>, pose: &Pose) -> Result<Form> {
+fn form(source: GltfSource, node: usize, mesh: Index<Mesh>, pose: &Pose) -> Result<Form> {
     let (index, json) = (mesh.value(), source.root.nodes.get(node));
     let targets = |primitive: &Primitive| primitive.targets.as_ref().map_or(0, Vec::len);
     let mesh = source.root.get(mesh).ok_or_else(|| source.fault(&format!("nodes[{node}].mesh"), "there is no such mesh"))?;
@@ -113,8 +114,8 @@ fn form(source: Source, node: usize, mesh: Index<Mesh>, pose: &Pose) -> Result<F
     Ok(Form { mesh: index, weights, skinned_node: is_skinned.then_some(node) })
 }
 
-/// Where a node's mesh stands: once, unless an extension says more.
-fn placements(source: Source, path: &str, node: usize, world: DAffine3, draft: &mut Draft) -> Result<Vec<DAffine3>> {
+/// Where a node's mesh stands: once, unless an extension instances it.
+fn placements(source: GltfSource, path: &str, node: usize, world: DAffine3, draft: &mut Draft) -> Result<Vec<DAffine3>> {
     const NAME: &str = "EXT_mesh_gpu_instancing";
     let json = source.root.nodes.get(node);
     let extensions = json.and_then(|json| json.extensions.as_ref()).map(|extensions| &extensions.others);
@@ -123,7 +124,7 @@ fn placements(source: Source, path: &str, node: usize, world: DAffine3, draft: &
         Some(&index) => {
             let place = format!("{path}.extensions.{NAME}.attributes.{name}");
             let index = u32::try_from(index).map_err(|_| source.fault(&place, "there is no such accessor"))?;
-            source.column(&place, Index::new(index), &[type_], Wanted::Floats).map(Some)
+            source.column(&place, Index::new(index), &[type_], AccessorUse::Floats).map(Some)
         }
         None => Ok(None),
     };
@@ -175,36 +176,36 @@ impl Builder<'_, '_> {
             self.draft.ignored(path, "primitive", "", "has no triangles");
             return Ok(());
         };
-        let look = self.materials.look(source, self.draft, primitive.material, triangles.colors)?;
-        if let Some(set) = look.uv_set {
+        let material = self.materials.convert(source, self.draft, primitive.material, triangles.colors)?;
+        if let Some(set) = material.uv_set {
             triangles.read_uvs(source, path, primitive, set)?;
         }
         let mut data = triangles.data;
-        data.attributes.retain(|_, _| look.vertex_colors);
-        if look.uv_set.is_some() && data.uvs.is_none() {
+        data.attributes.retain(|_, _| material.vertex_colors);
+        if material.uv_set.is_some() && data.uvs.is_none() {
             self.draft.approximated(path, "primitive", "TEXCOORD", "there is no uv for the textures: they show the colour of one corner");
             data.uvs = Some(vec![[0.0, 1.0]; data.positions.len()]);
         }
         self.report(path, primitive);
-        self.gives_light |= look.emission.as_ref().is_some_and(|emission| emission.radiance.iter().any(|r| *r > 1.0));
+        self.gives_light |= material.emission.as_ref().is_some_and(|emission| emission.radiance.iter().any(|r| *r > 1.0));
 
         for p in data.positions.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
             shapes.grow(DVec3::from(p.map(f64::from)));
         }
-        let bytes = data.positions.len() * (32 + if look.vertex_colors { 12 } else { 0 }) + data.triangles.len() * 12;
+        let bytes = data.positions.len() * (32 + if material.vertex_colors { 12 } else { 0 }) + data.triangles.len() * 12;
         self.budget = self.budget.checked_sub(bytes).ok_or_else(|| {
             source.fault(path, "the meshes of the file are far larger than its buffers: the same data is used again and again")
         })?;
         let mut desc = MeshDesc::from_file(self.draft.keep_mesh(name, data));
         desc.name = Some(name.into());
-        desc.material = look.material;
-        desc.opacity = look.opacity;
-        desc.emission = look.emission;
+        desc.material = material.material;
+        desc.opacity = material.opacity;
+        desc.emission = material.emission;
         shapes.list.push((path.into(), ShapeDesc::Mesh(desc)));
         Ok(())
     }
 
-    /// Says what became of the attributes.
+    /// Reports what became of the attributes.
     fn report(&mut self, path: &str, primitive: &Primitive) {
         self.draft.mapped(path, "primitive", "attributes");
         let material = primitive.material.and_then(|index| self.source.root.get(index));

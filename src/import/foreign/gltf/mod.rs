@@ -1,7 +1,8 @@
 //! glTF 2.0 scenes, `.gltf` and `.glb`.
 //!
-//! The JSON and the indices in it are checked by the crate `gltf`; buffers, images and all that extensions say are read here. A path tracer
-//! shows both sides of every surface, whatever `doubleSided` says; only light is given off by one side of what is not double-sided.
+//! The JSON and the indices in it are checked by the crate `gltf`; buffers, images and extensions are read here. A path
+//! tracer shows both sides of every surface, whatever `doubleSided` is; only light is given off by one side of what is
+//! not double-sided.
 
 mod accessors;
 mod animation;
@@ -29,15 +30,15 @@ use self::nodes::Tree;
 use super::{Draft, ImportOptions, Imported};
 use crate::error::{Error, Result};
 
-/// What is read: the JSON and the bytes that it speaks of.
+/// What is read: the JSON and its buffers.
 #[derive(Clone, Copy, Debug)]
-struct Source<'a> {
+struct GltfSource<'a> {
     file: &'a Path,
     root: &'a Root,
     buffers: &'a Buffers<'a>,
 }
 
-impl Source<'_> {
+impl GltfSource<'_> {
     /// An error at a place in the JSON.
     fn fault(&self, path: &str, message: impl Into<String>) -> Error {
         Error::Scene { file: self.file.into(), path: path.into(), message: message.into() }
@@ -47,12 +48,13 @@ impl Source<'_> {
 /// Reads a `.gltf` or `.glb` file.
 ///
 /// # Errors
-/// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for what it says.
+/// [`Error::Missing`] if it or one of its buffers cannot be read, [`Error::Parse`] or [`Error::Scene`] for faults in
+/// it.
 pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
     let bytes = crate::file::read_stream(path).map_err(|e| Error::Missing { file: path.into(), message: e.to_string() })?;
     let document = document::parse(path, &bytes)?;
     let buffers = Buffers::load(path, &document.root, document.bin)?;
-    let source = Source { file: path, root: &document.root, buffers: &buffers };
+    let source = GltfSource { file: path, root: &document.root, buffers: &buffers };
 
     let mut draft = Draft::of_files(&buffers.files);
     document::report_extensions(source.root, &mut draft);

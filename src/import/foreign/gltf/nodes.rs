@@ -2,7 +2,7 @@
 
 use gltf::json::{Index, scene};
 
-use super::Source;
+use super::GltfSource;
 use super::animation::Motion;
 use crate::error::Result;
 use crate::import::Draft;
@@ -31,7 +31,7 @@ impl Tree {
     ///
     /// # Errors
     /// If a node has two parents or is below itself.
-    pub fn new(source: Source, draft: &mut Draft) -> Result<Self> {
+    pub fn new(source: GltfSource, draft: &mut Draft) -> Result<Self> {
         let nodes = &source.root.nodes;
         let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
         for (i, node) in nodes.iter().enumerate() {
@@ -60,7 +60,7 @@ impl Tree {
     }
 
     /// Where all nodes stand.
-    pub fn pose(&self, source: Source, motion: &Motion) -> Result<Pose> {
+    pub fn pose(&self, source: GltfSource, motion: &Motion) -> Result<Pose> {
         let nodes = &source.root.nodes;
         let mut world = vec![DAffine3::IDENTITY; nodes.len()];
         for &i in &self.order {
@@ -76,7 +76,7 @@ impl Tree {
 }
 
 /// The roots of the scene that the file means.
-fn shown_roots(source: Source, parents: &[Option<usize>], roots: Vec<usize>, draft: &mut Draft) -> Result<Vec<usize>> {
+fn shown_roots(source: GltfSource, parents: &[Option<usize>], roots: Vec<usize>, draft: &mut Draft) -> Result<Vec<usize>> {
     let scenes = &source.root.scenes;
     let chosen = source.root.scene.map_or(0, |index| index.value());
     let Some(scene) = scenes.get(chosen) else {
@@ -122,7 +122,7 @@ fn below(nodes: &[scene::Node], roots: &[usize]) -> Vec<usize> {
 }
 
 /// Parent from node.
-fn local(source: Source, path: &str, node: &scene::Node, motion: &Motion, index: usize) -> Result<DAffine3> {
+fn local(source: GltfSource, path: &str, node: &scene::Node, motion: &Motion, index: usize) -> Result<DAffine3> {
     let given = match &node.matrix {
         Some(m) => {
             let column = |k: usize| DVec3::new(f64::from(m[k]), f64::from(m[k + 1]), f64::from(m[k + 2]));

@@ -4,18 +4,18 @@ use gltf::json::Index;
 use gltf::json::accessor::Type;
 use gltf::json::skin::Skin;
 
-use super::Source;
-use super::accessors::Wanted;
+use super::GltfSource;
+use super::accessors::AccessorUse;
 use super::nodes::Pose;
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// World from mesh as each joint of a skin says it.
-pub fn joints(source: Source, index: Index<Skin>, pose: &Pose) -> Result<Vec<DAffine3>> {
+/// World from mesh by each joint of a skin.
+pub fn joints(source: GltfSource, index: Index<Skin>, pose: &Pose) -> Result<Vec<DAffine3>> {
     let path = format!("skins[{}]", index.value());
     let skin = source.root.get(index).ok_or_else(|| source.fault(&path, "there is no such skin"))?;
     let binds = match skin.inverse_bind_matrices {
-        Some(accessor) => Some(source.column(&format!("{path}.inverseBindMatrices"), accessor, &[Type::Mat4], Wanted::Floats)?),
+        Some(accessor) => Some(source.column(&format!("{path}.inverseBindMatrices"), accessor, &[Type::Mat4], AccessorUse::Floats)?),
         None => None,
     };
     if let Some(binds) = binds.as_ref().filter(|binds| binds.count() < skin.joints.len()) {

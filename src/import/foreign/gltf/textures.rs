@@ -6,7 +6,7 @@ use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
 use serde_json::{Map, Value};
 
-use super::Source;
+use super::GltfSource;
 use super::buffers::Uri;
 use super::extensions::{TextureInfo, TextureTransform};
 use crate::assets::read_image_bytes;
@@ -36,8 +36,8 @@ pub struct TextureSet {
 }
 
 impl TextureRef {
-    /// A texture with what extensions say about it.
-    pub fn new(source: Source, place: &str, index: usize, uv_set: u32, extensions: Option<&Map<String, Value>>) -> Result<Self> {
+    /// A texture with its extensions.
+    pub fn new(source: GltfSource, place: &str, index: usize, uv_set: u32, extensions: Option<&Map<String, Value>>) -> Result<Self> {
         let transform: TextureTransform = source.extension(place, extensions, "KHR_texture_transform")?.unwrap_or_default();
         let numbers = [transform.offset, transform.scale].concat();
         if !numbers.iter().all(|x| x.is_finite()) || !transform.rotation.is_finite() {
@@ -47,16 +47,17 @@ impl TextureRef {
     }
 
     /// A texture that an extension names.
-    pub fn of_extension(source: Source, place: &str, info: Option<&TextureInfo>) -> Result<Option<Self>> {
+    pub fn of_extension(source: GltfSource, place: &str, info: Option<&TextureInfo>) -> Result<Option<Self>> {
         info.map(|info| Self::new(source, place, info.index, info.tex_coord, info.extensions.as_ref())).transpose()
     }
 }
 
 impl TextureSet {
-    /// Adds a texture: one channel of it, or its colour. `None` if there is no image that can be read, which the report says.
+    /// Adds a texture: one channel of it, or its colour. `None` if there is no image that can be read, which is
+    /// reported.
     pub fn add(
         &mut self,
-        source: Source,
+        source: GltfSource,
         draft: &mut Draft,
         texture: &TextureRef,
         color_space: ColorSpaceDesc,
@@ -111,7 +112,7 @@ impl TextureSet {
     }
 
     /// The file of an image.
-    fn image(&mut self, source: Source, draft: &mut Draft, index: usize) -> Result<String> {
+    fn image(&mut self, source: GltfSource, draft: &mut Draft, index: usize) -> Result<String> {
         if let Some(file) = self.files.get(&index) {
             return Ok(file.clone());
         }
@@ -129,7 +130,7 @@ enum Location {
     Bytes(Vec<u8>),
 }
 
-fn location(source: Source, index: usize) -> Result<Location> {
+fn location(source: GltfSource, index: usize) -> Result<Location> {
     let path = format!("images[{index}]");
     let image = source.root.images.get(index).ok_or_else(|| source.fault(&path, "there is no such image"))?;
     match (&image.uri, image.buffer_view) {
@@ -146,7 +147,7 @@ fn location(source: Source, index: usize) -> Result<Location> {
     }
 }
 
-fn decode(source: Source, index: usize, bytes: &[u8]) -> Result<ImageData> {
+fn decode(source: GltfSource, index: usize, bytes: &[u8]) -> Result<ImageData> {
     read_image_bytes(bytes).map_err(|e| source.fault(&format!("images[{index}]"), e.to_string()))
 }
 
@@ -168,8 +169,9 @@ fn lookup(sampler: &Sampler) -> (TextureFilterDesc, WrapDesc) {
 
 /// A transform of uv whose v runs down, for uv whose v runs up: offset, scale and rotation (radians).
 ///
-/// With v down the lookup is `offset + M (scale * uv)`, where M turns counter-clockwise as the image is seen: from u against v. Putting
-/// `1 - v` for v before and after turns that rotation into one from u towards v by the same angle and moves the offset.
+/// With v down the lookup is `offset + M (scale * uv)`, where M turns counter-clockwise as the image is seen: from u
+/// against v. Putting `1 - v` for v before and after turns that rotation into one from u towards v by the same angle
+/// and moves the offset.
 fn flipped(transform: &TextureTransform) -> ([f32; 2], [f32; 2], f64) {
     let rotation = f64::from(transform.rotation);
     let (sin, cos) = rotation.sin_cos();

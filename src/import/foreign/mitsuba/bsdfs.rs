@@ -14,7 +14,7 @@ use crate::suggestion::did_you_mean;
 
 /// What a BSDF has become.
 #[derive(Clone, Debug)]
-pub(crate) struct Look {
+pub(crate) struct BsdfBinding {
     /// The material by name.
     pub material: String,
     /// Whether Mitsuba's is black from behind, and ours not.
@@ -36,23 +36,23 @@ impl<'a> Reader<'a> {
             }
             return Ok((name.into(), None));
         };
-        let look = self.look(id, uv)?;
-        if !look.one_sided {
-            return Ok((look.material, look.opacity));
+        let binding = self.convert(id, uv)?;
+        if !binding.one_sided {
+            return Ok((binding.material, binding.opacity));
         }
         if let Some(name) = self.surfaces.get(&(id, uv)) {
-            return Ok((name.clone(), look.opacity));
+            return Ok((name.clone(), binding.opacity));
         }
-        let name = self.front_only(&look, place);
+        let name = self.front_only(&binding, place);
         self.surfaces.insert((id, uv), name.clone());
-        Ok((name, look.opacity))
+        Ok((name, binding.opacity))
     }
 
     /// A material with a black back.
-    fn front_only(&mut self, look: &Look, place: &str) -> String {
+    fn front_only(&mut self, binding: &BsdfBinding, place: &str) -> String {
         let back = self.black(place);
-        let sides = MaterialDesc::TwoSided { front: look.material.clone(), back };
-        self.draft.add_material(&format!("{}_front_only", look.material), place, sides)
+        let sides = MaterialDesc::TwoSided { front: binding.material.clone(), back };
+        self.draft.add_material(&format!("{}_front_only", binding.material), place, sides)
     }
 
     /// The material that reflects nothing.
@@ -67,24 +67,26 @@ impl<'a> Reader<'a> {
     }
 
     /// What a BSDF becomes.
-    pub(super) fn look(&mut self, id: PluginId, uv: UvOrigin) -> Result<Look> {
-        if let Some(look) = self.looks.get(&(id, uv)) {
-            return Ok(look.clone());
+    pub(super) fn convert(&mut self, id: PluginId, uv: UvOrigin) -> Result<BsdfBinding> {
+        if let Some(binding) = self.bindings.get(&(id, uv)) {
+            return Ok(binding.clone());
         }
         self.guard(id)?;
         let mut element = Element::new(self.document, id);
         if element.plugin.class != "bsdf" {
             return Err(element.place().error(format!("a {} is no bsdf", element.plugin.class)));
         }
-        let look = match element.kind() {
+        let binding = match element.kind() {
             "twosided" => self.two_sided(&mut element, uv)?,
             "mask" => self.mask(&mut element, uv)?,
             "blendbsdf" => self.blend(&mut element, uv)?,
             "normalmap" | "bumpmap" => self.relief(&mut element, uv)?,
             "principledthin" => self.principled_thin(&mut element, uv)?,
-            "null" => {
-                Look { opacity: Some(OpacityDesc::Number(0.0)), material: self.black(&element.place().to_string()), one_sided: false }
-            }
+            "null" => BsdfBinding {
+                opacity: Some(OpacityDesc::Number(0.0)),
+                material: self.black(&element.place().to_string()),
+                one_sided: false,
+            },
             _ => {
                 let (material, one_sided) = self.material(&mut element, uv)?;
                 self.add(&element, material, one_sided)
@@ -92,11 +94,11 @@ impl<'a> Reader<'a> {
         };
         element.finish(&mut self.draft);
         self.open.pop();
-        self.looks.insert((id, uv), look.clone());
-        Ok(look)
+        self.bindings.insert((id, uv), binding.clone());
+        Ok(binding)
     }
 
-    pub(super) fn add(&mut self, element: &Element, material: MaterialDesc, one_sided: bool) -> Look {
+    pub(super) fn add(&mut self, element: &Element, material: MaterialDesc, one_sided: bool) -> BsdfBinding {
         let has_relief = match &material {
             MaterialDesc::Relief { .. } => true,
             MaterialDesc::TwoSided { front, back } => self.reliefs.contains(front) || self.reliefs.contains(back),
@@ -108,7 +110,7 @@ impl<'a> Reader<'a> {
         if has_relief {
             self.reliefs.insert(name.clone());
         }
-        Look { material: name, one_sided, opacity: None }
+        BsdfBinding { material: name, one_sided, opacity: None }
     }
 
     /// A BSDF that does not consist of others, and whether its back is black.
@@ -238,19 +240,19 @@ impl<'a> Reader<'a> {
     }
 
     /// The BSDFs inside of one.
-    fn parts(&mut self, element: &mut Element<'a>, counts: std::ops::RangeInclusive<usize>, uv: UvOrigin) -> Result<Vec<Look>> {
+    fn parts(&mut self, element: &mut Element<'a>, counts: std::ops::RangeInclusive<usize>, uv: UvOrigin) -> Result<Vec<BsdfBinding>> {
         let parts = element.all("bsdf")?;
         if !counts.contains(&parts.len()) {
             let message = format!("{} needs {} bsdfs inside, not {}", element.kind(), counts.end(), parts.len());
             return Err(element.place().error(message));
         }
-        parts.into_iter().map(|(id, _)| self.look(id, uv)).collect()
+        parts.into_iter().map(|(id, _)| self.convert(id, uv)).collect()
     }
 
-    fn two_sided(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+    fn two_sided(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<BsdfBinding> {
         let parts = self.parts(element, 1..=2, uv)?;
         let [front, back] = match &parts[..] {
-            [one] => return Ok(Look { one_sided: false, ..one.clone() }),
+            [one] => return Ok(BsdfBinding { one_sided: false, ..one.clone() }),
             [front, back] => [front.clone(), back.clone()],
             _ => return Err(element.place().error("twosided needs one or two bsdfs inside")),
         };
@@ -260,7 +262,7 @@ impl<'a> Reader<'a> {
         Ok(self.add(element, MaterialDesc::TwoSided { front: front.material, back: back.material }, false))
     }
 
-    fn mask(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+    fn mask(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<BsdfBinding> {
         let inner = self.one_part(element, uv)?;
         let opacity = match self.scalar(element, "opacity", 0.5, 1.0, uv)? {
             ScalarDesc::Constant(v) => OpacityDesc::Number(v),
@@ -269,10 +271,10 @@ impl<'a> Reader<'a> {
         if inner.opacity.is_some() {
             element.ignored("", "the holes of the bsdf inside are left out");
         }
-        Ok(Look { opacity: Some(opacity), ..inner })
+        Ok(BsdfBinding { opacity: Some(opacity), ..inner })
     }
 
-    fn one_part(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+    fn one_part(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<BsdfBinding> {
         let parts = self.parts(element, 1..=1, uv)?;
         parts.into_iter().next().ok_or_else(|| element.place().error(format!("{} needs a bsdf inside", element.kind())))
     }
@@ -289,7 +291,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn blend(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+    fn blend(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<BsdfBinding> {
         let parts = self.parts(element, 2..=2, uv)?;
         let amount = self.scalar(element, "weight", 0.5, 1.0, uv)?;
         let place = element.place().to_string();
@@ -306,7 +308,7 @@ impl<'a> Reader<'a> {
         Ok(self.add(element, MaterialDesc::Mix { materials, amount }, one_sided))
     }
 
-    fn relief(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+    fn relief(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<BsdfBinding> {
         let inner = self.one_part(element, uv)?;
         let is_normal_map = element.kind() == "normalmap";
         let textures = element.all("texture")?;
@@ -348,8 +350,8 @@ impl<'a> Reader<'a> {
         } else {
             (None, Some(BumpMapDesc { texture, height: height as f32 }))
         };
-        let look = self.add(element, MaterialDesc::Relief { material: inner.material, normal_map, bump_map }, inner.one_sided);
-        Ok(Look { opacity: inner.opacity, ..look })
+        let binding = self.add(element, MaterialDesc::Relief { material: inner.material, normal_map, bump_map }, inner.one_sided);
+        Ok(BsdfBinding { opacity: inner.opacity, ..binding })
     }
 }
 

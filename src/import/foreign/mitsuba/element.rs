@@ -7,14 +7,15 @@ use crate::import::foreign::report::PART_OF_IGNORED;
 use crate::import::{Draft, Outcome};
 use crate::math::DAffine3;
 
-/// A plugin while it is read. Parameters that are read count as mapped unless something else is reported; those never read are ignored.
+/// A plugin while it is read. Parameters that are read count as mapped unless something else is reported; those never
+/// read are ignored.
 #[derive(Debug)]
 pub(crate) struct Element<'a> {
     /// The plugin.
     pub plugin: &'a Plugin,
     document: &'a Document,
     outcomes: Vec<Option<(Outcome, String)>>,
-    /// What is said of the plugin as a whole.
+    /// The outcome of the plugin as a whole.
     notes: Vec<(Outcome, String)>,
 }
 
@@ -147,12 +148,12 @@ impl<'a> Element<'a> {
         self.set(name, Outcome::Mapped, how.into());
     }
 
-    /// Says how a parameter (or, if there is none of that name, the plugin's default) was approximated.
+    /// Reports how a parameter (or, if there is none of that name, the plugin's default) was approximated.
     pub fn approximated(&mut self, name: &str, how: impl Into<String>) {
         self.set(name, Outcome::Approximated, how.into());
     }
 
-    /// Says why a parameter was ignored.
+    /// Reports why a parameter was ignored.
     pub fn ignored(&mut self, name: &str, why: impl Into<String>) {
         self.set(name, Outcome::Ignored, why.into());
     }
@@ -196,7 +197,7 @@ impl<'a> Element<'a> {
             match outcome {
                 Some((outcome, note)) => draft.note(&place, &title, &name, outcome, note),
                 None if is_ignored => draft.ignored(&place, &title, &name, PART_OF_IGNORED),
-                None => draft.ignored(&place, &title, &name, format!("not a parameter that this reader knows of a {}", self.plugin.kind)),
+                None => draft.ignored(&place, &title, &name, format!("unsupported parameter of a {}", self.plugin.kind)),
             }
         }
     }

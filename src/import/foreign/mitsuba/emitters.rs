@@ -177,8 +177,8 @@ impl<'a> Reader<'a> {
         }))
     }
 
-    /// The width over the height of the image that a texture is; 1 for what is none, or cannot be read, which is found when the scene is
-    /// compiled.
+    /// The width over the height of the image that a texture is; 1 for what is none, or cannot be read, which is found
+    /// when the scene is compiled.
     fn aspect(&self, texture: &str) -> f64 {
         let Some(TextureDesc::Image { file, .. }) = self.draft.desc.textures.get(texture) else { return 1.0 };
         let ratio = |image: &ImageData| image.width as f64 / image.height as f64;

@@ -6,7 +6,7 @@ use super::tree::PluginId;
 use crate::desc::IntegratorDesc;
 use crate::error::Result;
 
-/// Stands for paths of any length.
+/// The depth for paths of any length.
 const UNLIMITED: u32 = 65_536;
 
 /// What a scene without an integrator is rendered with.
@@ -34,7 +34,7 @@ impl Reader<'_> {
                 }
                 // Moments are beside the picture, which is that of the integrator inside.
                 if kind != "moment" {
-                    element.approximated("", "only the integrator inside counts; layers are asked for by outputs");
+                    element.approximated("", "only the integrator inside is read; layers are selected by outputs");
                 }
                 element.finish(&mut self.draft);
                 return Ok(());

@@ -1,8 +1,8 @@
 //! Mitsuba 3 scenes.
 //!
-//! What Mitsuba does when it renders in RGB is what is meant. Its surfaces are black from behind unless `twosided`, its images have their
-//! origin at the top left, its cameras look along +Z with +X to the left; light that rough surfaces scatter twice between their microfacets
-//! is lost.
+//! What Mitsuba does when it renders in RGB is what is meant. Its surfaces are black from behind unless `twosided`, its
+//! images have their origin at the top left, its cameras look along +Z with +X to the left; light that rough surfaces
+//! scatter twice between their microfacets is lost.
 
 mod bsdfs;
 mod element;
@@ -30,7 +30,7 @@ use std::path::Path;
 
 use super::{Draft, ImportOptions, Imported};
 use crate::error::Result;
-use bsdfs::Look;
+use bsdfs::BsdfBinding;
 use textures::{Role, TextureValue, UvOrigin};
 use tree::{Document, PluginId, Value};
 
@@ -42,7 +42,7 @@ pub fn read(path: &Path, options: &ImportOptions) -> Result<Imported> {
         scene: path,
         draft: Draft::of_files(&document.files),
         textures: BTreeMap::new(),
-        looks: BTreeMap::new(),
+        bindings: BTreeMap::new(),
         surfaces: BTreeMap::new(),
         groups: BTreeMap::new(),
         reliefs: BTreeSet::new(),
@@ -61,7 +61,7 @@ struct Reader<'a> {
     /// What textures have become.
     textures: BTreeMap<(PluginId, Role, UvOrigin), TextureValue>,
     /// What BSDFs have become.
-    looks: BTreeMap<(PluginId, UvOrigin), Look>,
+    bindings: BTreeMap<(PluginId, UvOrigin), BsdfBinding>,
     /// The materials of shapes with these BSDFs.
     surfaces: BTreeMap<(PluginId, UvOrigin), String>,
     /// Objects of shape groups; none where a group is empty.
@@ -120,13 +120,13 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Says that a plugin is ignored with all that is in it.
+    /// Reports that a plugin is ignored with all that is in it.
     fn whole(&mut self, id: PluginId, why: &str) {
         let plugin = &self.document.plugins[id.0];
         self.draft.ignored(&plugin.place.to_string(), &plugin.title(), "", why);
     }
 
-    /// Refuses a plugin that is a part of itself, or lies too deep. `open.pop()` ends what this begins.
+    /// Rejects a plugin that is a part of itself, or lies too deep. `open.pop()` ends what this begins.
     fn guard(&mut self, id: PluginId) -> Result<()> {
         let plugin = &self.document.plugins[id.0];
         if self.open.contains(&id) {

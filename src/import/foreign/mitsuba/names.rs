@@ -1,4 +1,4 @@
-//! Names that Mitsuba 3 knows: plugins and indices of refraction.
+//! Names in Mitsuba 3: plugins and indices of refraction.
 
 use crate::suggestion::did_you_mean;
 
@@ -103,7 +103,7 @@ const PLUGINS: &[(&str, &[&str])] = &[
     ("spectrum", &["uniform", "regular", "irregular", "srgb", "d65", "blackbody", "rawconstant"]),
 ];
 
-/// Refuses the name of a plugin that does not exist; the error says what is wrong.
+/// Rejects the name of a plugin that does not exist, with an error message.
 pub fn check(class: &str, kind: &str) -> Result<(), String> {
     let known = PLUGINS.iter().find(|(name, _)| *name == class).map_or(&[][..], |(_, kinds)| *kinds);
     if known.contains(&kind) {
@@ -140,7 +140,7 @@ pub const INDICES: &[(&str, f64)] = &[
     ("diamond", 2.419),
 ];
 
-/// The index of refraction of a name; the error says what is wrong.
+/// The index of refraction of a name; or an error message.
 pub fn index(name: &str) -> Result<f64, String> {
     let lower = name.to_lowercase();
     let found = INDICES.iter().find(|(known, _)| *known == lower).map(|(_, index)| *index);

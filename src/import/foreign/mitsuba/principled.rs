@@ -1,7 +1,7 @@
 //! The principled BSDFs.
 
 use super::Reader;
-use super::bsdfs::Look;
+use super::bsdfs::BsdfBinding;
 use super::element::Element;
 use super::textures::UvOrigin;
 use crate::desc::{MaterialDesc, PrincipledDesc, PrincipledModelDesc, RangedDesc, ScalarDesc};
@@ -61,8 +61,9 @@ impl<'a> Reader<'a> {
         Ok((MaterialDesc::Principled(Box::new(desc)), is_opaque))
     }
 
-    /// The thin one: what is not `spec_trans` has no highlights in Mitsuba, so that it is a mix of a sheet without any and a pane.
-    pub(super) fn principled_thin(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<Look> {
+    /// The thin one: what is not `spec_trans` has no highlights in Mitsuba, so that it is a mix of a sheet without any
+    /// and a pane.
+    pub(super) fn principled_thin(&mut self, element: &mut Element<'a>, uv: UvOrigin) -> Result<BsdfBinding> {
         let base = self.principled_base(element, uv)?;
         let sheet = PrincipledDesc {
             thin: true,

@@ -111,7 +111,7 @@ impl Reader<'_> {
             element.ignored("pixel_format", "the picture has red, green and blue");
         }
         if element.text("file_format")?.is_some_and(|format| format != "openexr") {
-            element.ignored("file_format", "the extension of the output says the format");
+            element.ignored("file_format", "the format follows from the extension of the output");
         }
         if element.text("component_format")?.is_some_and(|format| format != "float16") {
             let stem = self.scene.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());

@@ -1,4 +1,5 @@
-//! Mitsuba's serialized meshes: several of them in a file, each compressed by zlib, with a table of their offsets at the end.
+//! Mitsuba's serialized meshes: several of them in a file, each compressed by zlib, with a table of their offsets at
+//! the end.
 
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -17,7 +18,7 @@ const IS_DOUBLE: u32 = 0x2000;
 /// No mesh has so little in it that it takes this many times less when compressed.
 const MAX_EXPANSION: u64 = 100;
 
-/// Bytes of a mesh that are asked for at once: its counts are believed only as far as its data goes.
+/// Bytes of a mesh that are allocated at once: memory for its counts grows only as its data is read.
 const CHUNK: usize = 1 << 16;
 
 /// A mesh of a file by its index.

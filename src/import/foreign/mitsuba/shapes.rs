@@ -250,7 +250,8 @@ impl<'a> Reader<'a> {
         }
         desc.smooth_by = if kind == "obj" { SmoothByDesc::Position } else { SmoothByDesc::Index };
         desc.shading = if is_flat { MeshShadingDesc::Flat } else { MeshShadingDesc::Smooth };
-        // Mitsuba leaves the order of the corners as it is: given normals keep their side, found ones turn with the mirrored faces.
+        // Mitsuba leaves the order of the corners as it is: given normals keep their side, found ones turn with the
+        // mirrored faces.
         let reversed = map.matrix3.determinant() < 0.0 && (is_flat || !has_normals);
         Ok(Form { shape: ShapeDesc::Mesh(desc), map, uv, reversed })
     }

@@ -1,8 +1,8 @@
 //! The sky and the sun of a clear day, for `sunsky`: an image and a directional light.
 //!
-//! The sky is that of Preetham, Shirley and Smits, "A Practical Analytic Model for Daylight". Mitsuba's is that of Hosek and Wilkie, which
-//! is darker: Preetham's times 0.6 gives about the same light on the ground for turbidities of 2 to 4. The sun is one exponential for each
-//! colour, fitted to Mitsuba's within a twentieth.
+//! The sky is that of Preetham, Shirley and Smits, "A Practical Analytic Model for Daylight". Mitsuba's is that of
+//! Hosek and Wilkie, which is darker: Preetham's times 0.6 gives about the same light on the ground for turbidities of
+//! 2 to 4. The sun is one exponential for each colour, fitted to Mitsuba's within a twentieth.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,7 +20,8 @@ const HEIGHT: usize = 256;
 /// From Preetham's sky to one as bright as Hosek and Wilkie's.
 const BRIGHTNESS: f64 = 0.6;
 
-/// Radiance of the sun without air for red, green and blue, and how much of it is lost in the air: without turbidity, and by it.
+/// Radiance of the sun without air for red, green and blue, and how much of it is lost in the air: without turbidity,
+/// and by it.
 const SUN: [[f64; 3]; 3] = [[24_470.0, 0.0247, 0.0242], [22_070.0, 0.0874, 0.0264], [21_520.0, 0.2801, 0.0251]];
 
 impl<'a> Reader<'a> {

@@ -23,7 +23,7 @@ pub enum UvOrigin {
     Swapped,
 }
 
-/// What a texture is asked for.
+/// The use of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Role {
     /// A colour.
@@ -106,7 +106,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// As [`Self::scalar`], where one number is wanted: of a texture the first that is said of it.
+    /// As [`Self::scalar`], where one number is needed: of a texture its first one.
     pub(super) fn constant(&mut self, element: &mut Element<'a>, name: &str, uv: UvOrigin) -> Result<Option<[f32; 3]>> {
         let Some(property) = element.take(name) else {
             return Ok(None);
@@ -227,7 +227,7 @@ impl<'a> Reader<'a> {
             *color = self.constant(element, name, uv)?.unwrap_or(*color);
         }
         if role == Role::Number {
-            // Where a number is asked for, Mitsuba (3.9) takes the other colour.
+            // Where a number is needed, Mitsuba (3.9) takes the other colour.
             colors.swap(0, 1);
         }
         let map = element.transform("to_uv")? * uv.to_mitsuba();

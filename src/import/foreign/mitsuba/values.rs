@@ -2,7 +2,7 @@
 
 use crate::math::{DAffine3, DMat3, DVec3, dvec3};
 
-/// What is wrong with a value; the caller knows where it stands.
+/// What is wrong with a value; the caller adds its place.
 pub type Fault = String;
 
 /// A finite number.
@@ -95,7 +95,8 @@ pub fn rows(map: &DAffine3) -> [[f64; 4]; 4] {
     [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// A frame about a unit normal: Mitsuba's choice of two tangents (Duff et al., "Building an Orthonormal Basis, Revisited").
+/// A frame about a unit normal: Mitsuba's choice of two tangents (Duff et al., "Building an Orthonormal Basis,
+/// Revisited").
 pub fn tangents(n: DVec3) -> (DVec3, DVec3) {
     let sign = 1.0f64.copysign(n.z);
     let a = -1.0 / (sign + n.z);

@@ -53,7 +53,8 @@ const MAX_TEXT: usize = 1 << 17;
 /// Reads a scene file and what it includes. `defines` replace defaults.
 ///
 /// # Errors
-/// [`Error::Missing`] if a file cannot be read, [`Error::Parse`] for what it says, [`Error::Usage`] for a define that nothing uses.
+/// [`Error::Missing`] if a file cannot be read, [`Error::Parse`] for faults in it, [`Error::Usage`] for a define that
+/// nothing uses.
 pub fn read(path: &Path, defines: &[(String, String)]) -> Result<Document> {
     let mut parser = Parser {
         scene: path.into(),
@@ -126,14 +127,14 @@ fn crowded_line(text: &str) -> Option<usize> {
 }
 
 /// An XML file with the starts of its lines.
-struct Source {
+struct XmlFile {
     path: Rc<Path>,
     lines: Vec<usize>,
     /// Whether names are those of Mitsuba 0.6, such as `toWorld`.
     camel_case: bool,
 }
 
-impl Source {
+impl XmlFile {
     fn place(&self, node: Node) -> Place {
         let offset = node.range().start;
         let line = self.lines.partition_point(|&start| start <= offset).max(1);
@@ -179,7 +180,7 @@ impl Parser {
         let root = xml.root_element();
         let version = root.attribute("version").unwrap_or("3.0.0");
         let camel_case = version.split('.').next().is_some_and(|major| matches!(major.trim().parse::<u32>(), Ok(0 | 1)));
-        let source = Source { path: file, lines, camel_case };
+        let source = XmlFile { path: file, lines, camel_case };
         if root.tag_name().name() != "scene" {
             return Err(source.place(root).error(format!("expected <scene>, found <{}>", root.tag_name().name())));
         }
@@ -197,16 +198,16 @@ impl Parser {
     }
 
     /// An attribute with `$name` replaced.
-    fn attribute(&mut self, source: &Source, node: Node, name: &str) -> Result<Option<String>> {
+    fn attribute(&mut self, source: &XmlFile, node: Node, name: &str) -> Result<Option<String>> {
         node.attribute(name).map(|text| self.substitute(source, node, text)).transpose()
     }
 
-    fn needed(&mut self, source: &Source, node: Node, name: &str) -> Result<String> {
+    fn needed(&mut self, source: &XmlFile, node: Node, name: &str) -> Result<String> {
         let missing = || source.place(node).error(format!("<{}> needs the attribute \"{name}\"", node.tag_name().name()));
         self.attribute(source, node, name)?.ok_or_else(missing)
     }
 
-    fn substitute(&mut self, source: &Source, node: Node, text: &str) -> Result<String> {
+    fn substitute(&mut self, source: &XmlFile, node: Node, text: &str) -> Result<String> {
         let mut result = String::with_capacity(text.len());
         let mut rest = text;
         while let Some(at) = rest.find('$') {
@@ -235,7 +236,7 @@ impl Parser {
     }
 
     /// A plugin and what it contains; contained ones are added to the document.
-    fn plugin(&mut self, source: &Source, node: Node, kind: String, depth: usize) -> Result<Plugin> {
+    fn plugin(&mut self, source: &XmlFile, node: Node, kind: String, depth: usize) -> Result<Plugin> {
         let place = source.place(node);
         if depth > MAX_DEPTH {
             return Err(place.error(format!("elements are nested more than {MAX_DEPTH} deep")));
@@ -260,7 +261,7 @@ impl Parser {
         Ok(Plugin { class: class.into(), kind, id, place, properties })
     }
 
-    fn child(&mut self, source: &Source, node: Node, outer: &str, properties: &mut Vec<Property>, depth: usize) -> Result<()> {
+    fn child(&mut self, source: &XmlFile, node: Node, outer: &str, properties: &mut Vec<Property>, depth: usize) -> Result<()> {
         let tag = node.tag_name().name();
         let place = source.place(node);
         match tag {
@@ -303,7 +304,7 @@ impl Parser {
     }
 
     /// The value of a property; `None` for other elements.
-    fn value(&mut self, source: &Source, node: Node) -> Result<Option<Value>> {
+    fn value(&mut self, source: &XmlFile, node: Node) -> Result<Option<Value>> {
         let place = source.place(node);
         let fault = |message: Fault| place.error(message);
         Ok(Some(match node.tag_name().name() {
@@ -333,7 +334,7 @@ impl Parser {
     }
 
     /// A plugin in a plugin.
-    fn nested(&mut self, source: &Source, node: Node, name: String, properties: &mut Vec<Property>, depth: usize) -> Result<()> {
+    fn nested(&mut self, source: &XmlFile, node: Node, name: String, properties: &mut Vec<Property>, depth: usize) -> Result<()> {
         let place = source.place(node);
         let kind = self.needed(source, node, "type")?;
         names::check(node.tag_name().name(), &kind).map_err(|message| place.error(message))?;
@@ -347,7 +348,7 @@ impl Parser {
         Ok(())
     }
 
-    fn include(&mut self, source: &Source, node: Node, properties: &mut Vec<Property>) -> Result<()> {
+    fn include(&mut self, source: &XmlFile, node: Node, properties: &mut Vec<Property>) -> Result<()> {
         let name = self.needed(source, node, "filename")?;
         let file = self.document.find_file(&self.scene, &name);
         let path = self.scene.parent().unwrap_or(Path::new("")).join(file);
@@ -362,7 +363,7 @@ impl Parser {
     }
 
     /// `value`, or `x`, `y` and `z`.
-    fn vector(&mut self, source: &Source, node: Node) -> Result<[f64; 3]> {
+    fn vector(&mut self, source: &XmlFile, node: Node) -> Result<[f64; 3]> {
         let mut read = |node: Node, name: &str| self.attribute(source, node, name);
         transforms::vector(node, 0.0, &mut read, &|node, message| source.place(node).error(message))
     }

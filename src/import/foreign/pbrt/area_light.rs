@@ -8,7 +8,8 @@ use crate::import::foreign::Draft;
 
 /// An `AreaLightSource`.
 ///
-/// pbrt divides each light by what its spectrum measures in nits and the film takes a nit as 1, so that an `rgb L` of 1 is a pixel of 1.
+/// pbrt divides each light by what its spectrum measures in nits and the film takes a nit as 1, so that an `rgb L` of 1
+/// is a pixel of 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AreaLight {
     radiance: [f32; 3],

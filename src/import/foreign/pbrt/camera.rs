@@ -18,7 +18,8 @@ pub struct CameraDirective {
     pub camera_from_world: Ctm,
 }
 
-/// The part of the film that the camera's rays go through: from `min` to `max`, where the shorter side of the picture goes from -1 to 1.
+/// The part of the film that the camera's rays go through: from `min` to `max`, where the shorter side of the picture
+/// goes from -1 to 1.
 #[derive(Clone, Copy, Debug)]
 struct Screen {
     min: [f64; 2],
@@ -135,7 +136,7 @@ fn set_projection(draft: &mut Draft, camera: &mut CameraDesc, directive: &Camera
     Ok(())
 }
 
-/// Sets the camera; the result says how the world becomes ours.
+/// Sets the camera; the result is the map from its world to ours.
 pub fn set_camera(draft: &mut Draft, directive: &CameraDirective, size: [u32; 2], times: Times) -> Result<World> {
     let params = &directive.params;
     let Some(world_from_camera) = directive.camera_from_world.inverse() else {

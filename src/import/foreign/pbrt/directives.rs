@@ -12,7 +12,7 @@ use super::materials::Materials;
 use super::options::{self, Typed};
 use super::params::{Params, Values};
 use super::shapes::Shapes;
-use super::state::{Ctm, Graphics, Look, MAX_DEPTH, Material, Times, World};
+use super::state::{Ctm, Graphics, MAX_DEPTH, Material, ShapeMaterial, Times, World};
 use super::textures::{TextureDirective, Textures};
 use super::tokens::{Lexer, Position, TokenKind};
 use super::transforms::{self, Change};
@@ -58,7 +58,7 @@ pub(crate) struct Reader {
     exposure: f64,
     in_world: bool,
     textures: Textures,
-    materials: BTreeMap<String, Rc<Look>>,
+    materials: BTreeMap<String, Rc<ShapeMaterial>>,
     /// Names in the scene by those in the file; `None` if nothing of the object can be seen.
     objects: BTreeMap<String, Option<String>>,
     object: Option<Object>,
@@ -381,7 +381,7 @@ impl Reader {
         let first = quoted(lexer, at, "a name or type")?;
         if directive == "NamedMaterial" {
             let known = self.materials.get(&first).cloned();
-            self.graphics.look = Some(known.ok_or_else(|| {
+            self.graphics.material = Some(known.ok_or_else(|| {
                 let hint = crate::suggestion::did_you_mean(&first, self.materials.keys().map(String::as_str), ["\"", "\""]);
                 lexer.error(at, format!("no material named \"{first}\"{hint}"))
             })?);
@@ -400,24 +400,24 @@ impl Reader {
                 (first, kind)
             }
         };
-        let look = if matches!(kind.as_str(), "interface" | "none" | "") {
+        let material = if matches!(kind.as_str(), "interface" | "none" | "") {
             params.report(&mut self.draft);
-            Look::Interface
+            ShapeMaterial::Interface
         } else {
             self.new_material(&name, &kind, &params)?
         };
-        let look = Rc::new(look);
+        let material = Rc::new(material);
         if directive == "Material" {
-            self.graphics.look = Some(look);
+            self.graphics.material = Some(material);
         } else {
-            self.materials.insert(name, look);
+            self.materials.insert(name, material);
         }
         Ok(())
     }
 
-    fn new_material(&mut self, name: &str, kind: &str, params: &Params) -> Result<Look> {
+    fn new_material(&mut self, name: &str, kind: &str, params: &Params) -> Result<ShapeMaterial> {
         let known = |name: &str| match self.materials.get(name).map(Rc::as_ref) {
-            Some(Look::Material(material)) => Some(material.clone()),
+            Some(ShapeMaterial::Material(material)) => Some(material.clone()),
             _ => None,
         };
         let parts: Vec<Material> = match params.get("materials").map(|param| &param.values) {
@@ -427,7 +427,7 @@ impl Reader {
         let colors = Colors { folder: &self.folder, space: self.graphics.color_space };
         let mut materials = Materials { textures: &self.textures, colors, draft: &mut self.draft };
         let ours = materials.add(name, kind, params, |name| known(name).map(|material| material.name))?;
-        Ok(Look::Material(Material {
+        Ok(ShapeMaterial::Material(Material {
             name: ours,
             is_textured: params.names_textures() || params.has("normalmap") || parts.iter().any(|part| part.is_textured),
             has_inside: kind == "dielectric" || parts.iter().any(|part| part.has_inside),

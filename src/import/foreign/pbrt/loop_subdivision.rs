@@ -31,7 +31,7 @@ pub fn possible_levels(triangles: usize, levels: u32) -> u32 {
     (0..=levels.min(30)).rev().find(|&levels| made(levels) <= MAX_TRIANGLES).unwrap_or(0)
 }
 
-/// Subdivides a mesh, by at most [`possible_levels`]. The error says why it is no surface.
+/// Subdivides a mesh, by at most [`possible_levels`]. The error is the reason why it is no surface.
 pub fn subdivide(positions: &[[f32; 3]], triangles: &[[u32; 3]], levels: u32) -> Result<MeshData, String> {
     let levels = possible_levels(triangles.len(), levels);
     let positions = positions.iter().map(|p| DVec3::from(p.map(f64::from))).collect();
@@ -198,7 +198,8 @@ mod tests {
             let (p, n) = (DVec3::from(p.map(f64::from)), DVec3::from(n.map(f64::from)));
             assert!(p.normalize().dot(n) > 0.9, "{p} {n}");
         }
-        // The limit at a corner of valence 4: gamma = 1 / (4 + 3 / (8 * 3 / 32)) = 1/8, so half of it and nothing of its neighbours.
+        // The limit at a corner of valence 4: gamma = 1 / (4 + 3 / (8 * 3 / 32)) = 1/8, so half of it and nothing of
+        // its neighbours.
         let corner = subdivide(&positions, &triangles, 0).unwrap().positions[0];
         assert!((corner[0] - 0.5).abs() < 1e-6 && corner[1].abs() < 1e-6, "{corner:?}");
     }

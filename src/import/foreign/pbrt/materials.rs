@@ -26,7 +26,8 @@ pub struct Materials<'a> {
 }
 
 impl Materials<'_> {
-    /// Adds a material of a kind under a name like `name`; the result is its name. `find` gives materials by pbrt's names.
+    /// Adds a material of a kind under a name like `name`; the result is its name. `find` gives materials by pbrt's
+    /// names.
     pub fn add(&mut self, name: &str, kind: &str, params: &Params, find: impl Fn(&str) -> Option<String>) -> Result<String> {
         let desc = self.desc(name, kind, params, find)?;
         let desc = self.with_relief(name, params, desc)?;

@@ -1,5 +1,5 @@
-//! The equal-area octahedral map of the sphere (Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD"): how pbrt stores
-//! environments.
+//! The equal-area octahedral map of the sphere (Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD"):
+//! how pbrt stores environments.
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -37,8 +37,8 @@ pub fn direction_from_square([s, t]: [f64; 2]) -> DVec3 {
     DVec3::new(phi.cos().copysign(u) * side, phi.sin().copysign(v) * side, z)
 }
 
-/// A square equal-area image as a lat-long image of our convention, in which pbrt's z is up (our y) and its x stays. With `mirrored`, x is
-/// negated.
+/// A square equal-area image as a lat-long image of our convention, in which pbrt's z is up (our y) and its x stays.
+/// With `mirrored`, x is negated.
 pub fn lat_long(image: &RgbImage, mirrored: bool) -> RgbImage {
     // Twice as many pixels as the square has, whatever its shape.
     let height = (image.width as f64 * image.height as f64).sqrt().round().clamp(1.0, MAX_ROWS) as usize;

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::import::foreign::Draft;
 use crate::import::foreign::report::Outcome;
 
-/// No directive knows a tenth of them.
+/// No directive has a tenth of them.
 const MAX_PARAMS: usize = 256;
 
 /// Numbers, or text.
@@ -133,7 +133,7 @@ impl Params {
         Some(param)
     }
 
-    /// Whether a parameter is given; says nothing of what becomes of it.
+    /// Whether a parameter is given; without marking it as used.
     pub fn has(&self, name: &str) -> bool {
         self.list.iter().any(|param| param.name == name)
     }
@@ -236,21 +236,21 @@ impl Params {
         }
     }
 
-    /// Says that a parameter, if it is given, was approximated.
+    /// Reports that a parameter, if it is given, was approximated.
     pub fn approximate(&self, name: &str, how: impl Into<String>) {
         if let Some(param) = self.get(name) {
             param.settle(Outcome::Approximated, how.into());
         }
     }
 
-    /// Says that a parameter, if it is given, was ignored.
+    /// Reports that a parameter, if it is given, was ignored.
     pub fn ignore(&self, name: &str, why: impl Into<String>) {
         if let Some(param) = self.get(name) {
             param.settle(Outcome::Ignored, why.into());
         }
     }
 
-    /// Tells the draft what became of each; those that nobody asked for mean nothing here.
+    /// Reports the outcome of each to the draft; those that were never read are unsupported.
     pub fn report(&self, draft: &mut Draft) {
         for param in &self.list {
             match param.outcome.borrow().as_ref() {

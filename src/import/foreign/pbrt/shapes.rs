@@ -8,7 +8,7 @@ use super::bilinear::Patches;
 use super::colors::Colors;
 use super::loop_subdivision;
 use super::params::Params;
-use super::state::{Graphics, Look, World};
+use super::state::{Graphics, ShapeMaterial, World};
 use super::textures::Textures;
 use super::triangles;
 use crate::assets::{MeshData, read_ply_attributes};
@@ -52,16 +52,16 @@ impl Shapes<'_> {
             draft.ignored(&params.place, &params.element, "AreaLightSource", "instances give off no light, as in pbrt");
             light = None;
         }
-        let material = match graphics.look.as_deref() {
-            Some(Look::Interface) if light.is_none() => {
+        let material = match graphics.material.as_deref() {
+            Some(ShapeMaterial::Interface) if light.is_none() => {
                 params.report(draft);
                 return Ok(None);
             }
-            Some(Look::Interface) => {
+            Some(ShapeMaterial::Interface) => {
                 draft.approximated(&params.place, &params.element, "Material", "black, for what gives off light is no mere boundary");
                 Some(black(draft, &params.place))
             }
-            Some(Look::Material(material)) => Some(material.name.clone()),
+            Some(ShapeMaterial::Material(material)) => Some(material.name.clone()),
             None => None,
         };
         let alpha = self.textures.number(params, &self.colors, "alpha", 1.0)?;
@@ -103,8 +103,8 @@ impl Shapes<'_> {
     }
 
     fn needs(&self, graphics: &Graphics, light: Option<&AreaLight>, cut_out: bool) -> Needs {
-        let material = match graphics.look.as_deref() {
-            Some(Look::Material(material)) => Some(material),
+        let material = match graphics.material.as_deref() {
+            Some(ShapeMaterial::Material(material)) => Some(material),
             _ => None,
         };
         Needs {

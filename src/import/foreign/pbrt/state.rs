@@ -41,9 +41,9 @@ impl Ctm {
     }
 }
 
-/// What a shape looks like.
+/// The material of a shape.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Look {
+pub(crate) enum ShapeMaterial {
     /// A material of the scene.
     Material(Material),
     /// Nothing: a boundary of media only.
@@ -70,8 +70,8 @@ pub struct Graphics {
     pub active: [bool; 2],
     /// Whether surfaces' fronts are turned.
     pub reverse_orientation: bool,
-    /// What shapes look like; `None` is pbrt's default, diffuse of 0.5.
-    pub look: Option<Rc<Look>>,
+    /// The material of shapes; `None` is pbrt's default, diffuse of 0.5.
+    pub material: Option<Rc<ShapeMaterial>>,
     /// What shapes emit.
     pub area_light: Option<Rc<AreaLight>>,
     /// Of `rgb` parameters.
@@ -86,7 +86,7 @@ impl Default for Graphics {
             ctm: Ctm::default(),
             active: [true; 2],
             reverse_orientation: false,
-            look: None,
+            material: None,
             area_light: None,
             color_space: ColorSpace::default(),
             attributes: Rc::default(),
@@ -161,8 +161,8 @@ pub fn matrix(map: &DAffine3) -> TransformDesc {
     TransformDesc(vec![TransformStepDesc::Matrix([row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z), [0.0, 0.0, 0.0, 1.0]])])
 }
 
-/// The rotation nearest to a map that ought to be one, and its scale: x and y are turned least where they are not at right angles to z.
-/// `None` if it is singular.
+/// The rotation nearest to a map that ought to be one, and its scale: x and y are turned least where they are not at
+/// right angles to z. `None` if it is singular.
 pub fn rotation_and_scale(map: &DMat3) -> Option<(DMat3, f64)> {
     let z = map.z_axis.try_normalize()?;
     let y = (map.y_axis - z * map.y_axis.dot(z)).try_normalize()?;
@@ -171,7 +171,7 @@ pub fn rotation_and_scale(map: &DMat3) -> Option<(DMat3, f64)> {
     (scale > 0.0 && scale.is_finite()).then_some((DMat3::from_cols(x, y, z), scale))
 }
 
-/// Whether a map is a rotation (or mirrored one) times a scale, as far as six digits in a file can say.
+/// Whether a map is a rotation (or mirrored one) times a scale, within the precision of six digits in a file.
 pub fn is_similar(map: &DMat3) -> bool {
     let Some((rotation, scale)) = rotation_and_scale(map) else { return false };
     let error = (0..3).map(|i| (map.col(i) / scale - rotation.col(i)).length()).fold(0.0, f64::max);

@@ -101,7 +101,7 @@ pub struct Textures {
 }
 
 impl Textures {
-    /// What a parameter says: a texture by name, a number or a colour; `None` if it is not given.
+    /// The value of a parameter: a texture by name, a number or a colour; `None` if it is not given.
     pub fn get(&self, params: &Params, colors: &Colors, name: &str, meaning: Meaning, of_numbers: bool) -> Result<Option<Texture>> {
         let Some(param) = params.get(name) else { return Ok(None) };
         if param.kind != "texture" {

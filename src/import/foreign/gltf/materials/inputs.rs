@@ -1,6 +1,6 @@
 //! Factors and textures to colours and numbers, and the sets of uv that they use.
 
-use super::super::Source;
+use super::super::GltfSource;
 use super::super::textures::{TextureRef, TextureSet};
 use crate::desc::{ChannelDesc, ColorDesc, ColorSpaceDesc, PrincipledDesc, ScalarDesc, TextureDesc};
 use crate::error::Result;
@@ -43,7 +43,7 @@ impl<'b> Inputs<'b> {
     /// A texture of colours by name, or of one channel of them.
     pub fn image(
         &mut self,
-        source: Source,
+        source: GltfSource,
         draft: &mut Draft,
         texture: &TextureRef,
         channel: Option<ChannelDesc>,
@@ -55,7 +55,7 @@ impl<'b> Inputs<'b> {
     /// A texture of linear numbers by name.
     pub fn data(
         &mut self,
-        source: Source,
+        source: GltfSource,
         draft: &mut Draft,
         texture: &TextureRef,
         channel: Option<ChannelDesc>,
@@ -65,7 +65,7 @@ impl<'b> Inputs<'b> {
     }
 
     /// A colour: a factor, times a texture if there is one.
-    pub fn color(&mut self, source: Source, draft: &mut Draft, texture: Option<&TextureRef>, factor: [f32; 3]) -> Result<ColorDesc> {
+    pub fn color(&mut self, source: GltfSource, draft: &mut Draft, texture: Option<&TextureRef>, factor: [f32; 3]) -> Result<ColorDesc> {
         let factor = factor.map(|f| self.share(f));
         let Some(texture) = texture.filter(|_| factor != [0.0; 3]) else { return Ok(ColorDesc::Rgb(factor)) };
         let Some(image) = self.image(source, draft, texture, None)? else { return Ok(ColorDesc::Rgb(factor)) };
@@ -90,7 +90,7 @@ impl<'b> Inputs<'b> {
     /// A number: a factor, times a channel of a texture if there is one.
     pub fn scalar(
         &mut self,
-        source: Source,
+        source: GltfSource,
         draft: &mut Draft,
         texture: Option<&TextureRef>,
         channel: ChannelDesc,

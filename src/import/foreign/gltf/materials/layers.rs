@@ -1,4 +1,5 @@
-//! Extensions of materials: index of refraction, specular colour, sheen, anisotropy, transmission, volume and clear coat.
+//! Extensions of materials: index of refraction, specular colour, sheen, anisotropy, transmission, volume and clear
+//! coat.
 
 use super::super::extensions as ext;
 use super::super::textures::TextureRef;

@@ -12,7 +12,7 @@ use gltf::json::validation::Checked;
 use serde_json::{Map, Value};
 
 use self::inputs::Inputs;
-use super::Source;
+use super::GltfSource;
 use super::extensions as ext;
 use super::geometry::VertexColors;
 use super::textures::{TextureRef, TextureSet};
@@ -24,7 +24,7 @@ const UNLIT: &str = "KHR_materials_unlit";
 
 /// What a shape gets from a material.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Look {
+pub(crate) struct PrimitiveMaterial {
     pub material: Option<String>,
     pub opacity: Option<OpacityDesc>,
     pub emission: Option<EmissionDesc>,
@@ -38,12 +38,12 @@ pub(crate) struct Look {
 #[derive(Debug, Default)]
 pub struct MaterialSet {
     textures: TextureSet,
-    done: BTreeMap<(Option<usize>, [u32; 4], bool, bool), Look>,
+    done: BTreeMap<(Option<usize>, [u32; 4], bool, bool), PrimitiveMaterial>,
 }
 
 /// A material while it is read.
 struct Builder<'a, 'b> {
-    source: Source<'a>,
+    source: GltfSource<'a>,
     draft: &'b mut Draft,
     inputs: Inputs<'b>,
     json: &'a Material,
@@ -62,13 +62,13 @@ struct Builder<'a, 'b> {
 
 impl MaterialSet {
     /// What a material comes to.
-    pub fn look(
+    pub fn convert(
         &mut self,
-        source: Source,
+        source: GltfSource,
         draft: &mut Draft,
         index: Option<Index<Material>>,
         colors: Option<VertexColors>,
-    ) -> Result<Look> {
+    ) -> Result<PrimitiveMaterial> {
         let default = Material::default();
         let path = index.map_or_else(|| "materials".into(), |index| format!("materials[{}]", index.value()));
         let json = match index {
@@ -82,8 +82,8 @@ impl MaterialSet {
             colors.map_or([1.0; 4], |VertexColors { mean: [r, g, b, a], .. }| if is_colored { [1.0, 1.0, 1.0, a] } else { [r, g, b, a] });
         let mixes_alpha = colors.is_some_and(|colors| colors.differ_in_alpha);
         let key = (index.map(|index| index.value()), tint.map(f32::to_bits), is_colored, mixes_alpha);
-        if let Some(look) = self.done.get(&key) {
-            return Ok(look.clone());
+        if let Some(material) = self.done.get(&key) {
+            return Ok(material.clone());
         }
         let name = match (&json.name, index) {
             (Some(name), _) => name.clone(),
@@ -107,9 +107,9 @@ impl MaterialSet {
             color_factor: pbr.base_color_factor.0,
             color_texture,
         };
-        let look = builder.build()?;
-        self.done.insert(key, look.clone());
-        Ok(look)
+        let material = builder.build()?;
+        self.done.insert(key, material.clone());
+        Ok(material)
     }
 }
 
@@ -122,7 +122,7 @@ struct Glossy {
 }
 
 /// A texture that the core of the format names.
-fn texture_of(source: Source, place: &str, info: &gltf::json::texture::Info) -> Result<TextureRef> {
+fn texture_of(source: GltfSource, place: &str, info: &gltf::json::texture::Info) -> Result<TextureRef> {
     TextureRef::new(source, place, info.index.value(), info.tex_coord, info.extensions.as_ref().map(|e| &e.others))
 }
 
@@ -148,7 +148,7 @@ impl<'a> Builder<'a, '_> {
         self.draft.ignored(&self.path, &self.element, parameter, why);
     }
 
-    fn build(&mut self) -> Result<Look> {
+    fn build(&mut self) -> Result<PrimitiveMaterial> {
         let is_unlit = self.extensions().is_some_and(|all| all.contains_key(UNLIT));
         if is_unlit && self.tint != [1.0; 4] {
             self.approximated("COLOR_0", "the mean of the vertices' colours is a factor on the light given off");
@@ -183,7 +183,7 @@ impl<'a> Builder<'a, '_> {
         if self.inputs.was_clamped() {
             self.approximated("factors", "numbers outside of 0 to 1 became the nearest within");
         }
-        Ok(Look { material, opacity, emission, uv_set, vertex_colors: self.is_colored && !is_medium })
+        Ok(PrimitiveMaterial { material, opacity, emission, uv_set, vertex_colors: self.is_colored && !is_medium })
     }
 
     /// The material of a surface without coat and relief.

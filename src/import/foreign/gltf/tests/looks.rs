@@ -72,7 +72,7 @@ fn roughness_is_green_metal_is_blue_and_colour_is_srgb() {
 }
 
 #[test]
-fn alpha_counts_as_its_mode_says() {
+fn alpha_counts_by_its_mode() {
     let look = |mode: &str, factor: f32, texture: bool| {
         let mut pbr = json!({ "baseColorFactor": [1, 1, 1, factor] });
         if texture {

@@ -39,7 +39,8 @@ fn keyframes_are_joined_as_they_say() {
     let step = moving("translation", "STEP", &[1.0, 2.0, 4.0], &values);
     assert_eq!(x(&step, 1.99), [0.0, 0.0, 0.0]);
     assert_eq!(x(&step, 2.0), [4.0, 0.0, 0.0]);
-    // In-tangent, value, out-tangent, the tangents per second: p(t) = t³ - t² + t from 0 to 2, whose slopes are 1 and 9.
+    // In-tangent, value, out-tangent, the tangents per second: p(t) = t³ - t² + t from 0 to 2, whose slopes are 1 and
+    // 9.
     let (none, first, last) = ([0.0; 3], [1.0, 0.0, 0.0], [9.0, 0.0, 0.0]);
     let cubic = moving("translation", "CUBICSPLINE", &[0.0, 2.0], &[none, none, first, last, [6.0, 0.0, 0.0], none]);
     for t in [0.0f64, 0.5, 1.0, 1.75, 2.0] {

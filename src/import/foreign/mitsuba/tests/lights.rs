@@ -97,7 +97,7 @@ fn emitted_spectra_are_seen_as_they_are() {
 }
 
 #[test]
-fn a_sky_is_an_image_and_a_sun_and_says_so() {
+fn a_sky_is_an_image_and_a_sun_and_is_reported() {
     let text = r#"<emitter type="sunsky"><vector name="sun_direction" value="0 0.6 0.8"/><float name="sky_scale" value="2"/></emitter>"#;
     let imported = try_scene(text).unwrap();
     assert_eq!((imported.assets.environments.len(), imported.desc.lights.len()), (1, 2));

@@ -159,7 +159,7 @@ fn attributes_of_meshes_are_colours_of_vertices() {
     };
     let shape = |bsdf: &str| format!(r#"<shape type="ply"><string name="filename" value="m.ply"/>{bsdf}</shape>"#);
     let desc = scene(&shape(&attribute("vertex_color", "")));
-    let is_attribute = |desc: &SceneDesc, wanted: &str, factor: f32| matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::MeshAttribute { name, scale }] if name == wanted && *scale == factor);
+    let is_attribute = |desc: &SceneDesc, expected: &str, factor: f32| matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::MeshAttribute { name, scale }] if name == expected && *scale == factor);
     assert!(is_attribute(&desc, "vertex_color", 1.0));
     let scaled = scene(&shape(&attribute("vertex_color", r#"<float name="scale" value="0.5"/>"#)));
     assert!(is_attribute(&scaled, "vertex_color", 0.5));
@@ -261,7 +261,7 @@ fn parts_and_textures_may_be_references() {
 }
 
 #[test]
-fn where_a_number_is_asked_for_checkers_have_the_other_colour() {
+fn where_a_number_is_needed_checkers_have_the_other_colour() {
     // As in Mitsuba 3.9.
     let checker =
         r#"<texture type="checkerboard" name="NAME"><float name="color0" value="0.1"/><float name="color1" value="0.9"/></texture>"#;

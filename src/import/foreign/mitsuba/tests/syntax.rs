@@ -13,7 +13,7 @@ const WITH_DEFAULT: &str = r#"<scene version="3.0.0"><default name="r" value="2"
 <default name="kind" value="perspective"/><sensor type="$kind"/><shape type="sphere"><float name="radius" value="$r"/></shape></scene>"#;
 
 #[test]
-fn the_first_default_counts_unless_the_user_says_another_value() {
+fn the_first_default_counts_unless_the_user_defines_another_value() {
     assert_eq!(sphere_radius(&read_with(WITH_DEFAULT, &[], &[]).unwrap()), 2.0);
     assert_eq!(sphere_radius(&read_with(WITH_DEFAULT, &[("r", "5")], &[]).unwrap()), 5.0);
     let error = read_with(WITH_DEFAULT, &[("q", "5")], &[]).unwrap_err();

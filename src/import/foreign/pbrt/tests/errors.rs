@@ -84,7 +84,7 @@ fn spectra_come_from_files() {
 }
 
 #[test]
-fn the_report_says_what_became_of_each_parameter() {
+fn the_report_lists_the_outcome_of_each_parameter() {
     let imported = world(
         "Material \"coateddiffuse\" \"rgb reflectance\" [1 2 0.5] \"float thickness\" 0.1 \"float madeup\" 1
          Shape \"sphere\" \"float radius\" 2 Shape \"curve\" Shape \"plymesh\" \"string filename\" \"a.ply\" \"float edgelength\" 1",

@@ -52,7 +52,7 @@ fn shape(imported: &Imported) -> &ShapeDesc {
 fn outcome(imported: &Imported, element: &str, parameter: &str) -> Outcome {
     let entries = &imported.report.entries;
     let entry = entries.iter().find(|entry| entry.element.starts_with(element) && entry.parameter == parameter);
-    entry.unwrap_or_else(|| panic!("nothing is said of {parameter}: {entries:#?}")).outcome
+    entry.unwrap_or_else(|| panic!("no report on {parameter}: {entries:#?}")).outcome
 }
 
 /// Where a scene is wrong.
