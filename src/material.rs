@@ -226,9 +226,14 @@ impl TexturedMaterial {
         }
     }
 
-    /// Whether nothing but colours comes from textures.
-    pub fn varies_in_colors(&self) -> bool {
-        matches!(self, Self::Plastic { coat, .. } if coat.textures().is_empty())
+    /// Whether those of its BSDFs that [can vary](Bsdf::can_vary) can be one group of queries.
+    #[inline]
+    pub fn can_be_grouped(&self) -> bool {
+        match self {
+            Self::Plastic { coat, .. } => coat.textures().is_empty(),
+            Self::Principled(_) => true,
+            _ => false,
+        }
     }
 
     /// Whether it is diffuse reflection, rough or not.

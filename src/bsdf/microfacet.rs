@@ -65,7 +65,7 @@ pub trait Microfacets: Copy {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ggx {
     /// Width of the distribution of slopes along x and y: both zero, or both within `[SMOOTH_ALPHA, 1]`.
-    alpha: [f32; 2],
+    pub(super) alpha: [f32; 2],
 }
 
 /// Alpha below which a surface counts as smooth. The rounding of a direction, 1e-7, turns a microfacet normal by as much: of a lobe of
@@ -96,6 +96,12 @@ impl Ggx {
     /// The distribution for `alpha` within `[0, 1]`; smooth if both are below [`SMOOTH_ALPHA`].
     pub fn new(alpha: [f32; 2]) -> Self {
         Self { alpha: clamp_alpha(alpha) }
+    }
+
+    /// The distribution with an alpha that another one has along an axis.
+    #[inline(always)]
+    pub(super) fn isotropic(alpha: f32) -> Self {
+        Self { alpha: [alpha; 2] }
     }
 
     /// Length of `w` stretched by alpha.

@@ -3,7 +3,7 @@
 use super::conductor::SingleScattering as Metal;
 use super::dielectric::{SingleScattering as Glass, Smooth as SmoothGlass};
 use super::plastic::{IsotropicPlastic, PlasticLayers, SmoothPlastic};
-use super::{Bsdf, BsdfEval, BsdfSample, Plastic, SingleScatteringBsdf};
+use super::{Bsdf, BsdfEval, BsdfSample, Plastic, Principled, SingleScatteringBsdf};
 use crate::color::Rgb;
 use crate::math::Vec3;
 use crate::math::rows::{BATCH, soa};
@@ -24,8 +24,20 @@ soa! {
         v: f32,
         /// Of BSDFs that vary, the colour of the base
         color: Rgb,
-        /// and the factor on what a coat reflects.
+        /// and the factor on what a coat reflects;
         tint: Rgb,
+        /// of principled ones, the reflectance of the dielectric layer ahead,
+        specular: Rgb,
+        /// the colour of light scattered several times,
+        multiple: Rgb,
+        /// the share of metal,
+        metallic: f32,
+        /// the roughness,
+        roughness: f32,
+        /// the index of refraction,
+        ior: f32,
+        /// and alpha.
+        alpha: f32,
     }
 }
 
@@ -88,6 +100,7 @@ impl BsdfQueryRows {
         match bsdf {
             Bsdf::Plastic(plastic) => self.set_plastic(i, plastic),
             Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(plastic)) => self.set_plastic(i, plastic),
+            Bsdf::Principled(principled) => principled.set_parameters(i, self),
             _ => {}
         }
     }
@@ -135,6 +148,20 @@ impl<'a, D: Copy, B: LaneBsdf, F: Fn(PlasticLayers<'a, D>) -> B> LaneBsdfs for P
     }
 }
 
+/// Principled BSDFs of one model.
+struct Principleds<'a, F> {
+    first: &'a Principled,
+    queries: &'a BsdfQueryRows,
+    lane_bsdf: F,
+}
+
+impl<B: LaneBsdf, F: Fn(&Principled) -> B> LaneBsdfs for Principleds<'_, F> {
+    #[inline(always)]
+    fn lane(&self, i: usize) -> impl LaneBsdf {
+        (self.lane_bsdf)(&self.first.with_parameters(i, self.queries))
+    }
+}
+
 /// `$body` with BSDFs that are fit for vector code as `$lanes`, else `$otherwise`.
 macro_rules! lanes {
     ($bsdf:expr, $varying:expr, $lanes:ident => $body:expr, $otherwise:expr) => {{
@@ -152,7 +179,17 @@ macro_rules! lanes {
                 }
             };
         }
+        macro_rules! with_principled {
+            ($principled:expr, $basic:expr) => {
+                match $varying {
+                    None => with!(Uniform($basic($principled))),
+                    Some(queries) => with!(Principleds { first: $principled, queries, lane_bsdf: $basic }),
+                }
+            };
+        }
         match $bsdf {
+            Bsdf::Principled(bsdf) if bsdf.is_basic() && bsdf.is_mitsuba() => with_principled!(bsdf, Principled::basic::<true>),
+            Bsdf::Principled(bsdf) if bsdf.is_basic() => with_principled!(bsdf, Principled::basic::<false>),
             Bsdf::Conductor(bsdf) if bsdf.is_rough_single() => with!(Uniform(Metal(bsdf))),
             Bsdf::Dielectric(bsdf) if bsdf.flags().is_delta() => with!(Uniform(SmoothGlass(bsdf))),
             Bsdf::Dielectric(bsdf) if bsdf.is_rough_single() => with!(Uniform(Glass(bsdf))),
@@ -170,11 +207,13 @@ macro_rules! lanes {
 }
 
 impl Bsdf {
-    /// Whether the BSDFs of a material with this one that differ in colours alone can be one group of queries.
+    /// Whether BSDFs of one material that are like this one, and of plastics those that differ in colours alone, can be one
+    /// group of queries.
     pub fn can_vary(&self) -> bool {
         match self {
             Self::Plastic(bsdf) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),
             Self::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),
+            Self::Principled(bsdf) => bsdf.is_basic(),
             _ => false,
         }
     }

@@ -2,7 +2,7 @@
 
 use super::layer::MAX_MEANS;
 use super::sum::SumPlane;
-use super::{Layout, LightAovSample, PlacedSample};
+use super::{Layout, LightAovSample, WorldSample};
 use crate::bytes::{ByteReader, ByteWriter};
 use crate::color::Rgb;
 
@@ -92,7 +92,7 @@ impl Accumulator {
 
     /// Adds one average of samples; a sample's entry is its pixel.
     #[inline(always)]
-    pub fn add_average<'a>(&mut self, index: usize, values: impl Iterator<Item = (&'a PlacedSample, Rgb)>) {
+    pub fn add_average<'a>(&mut self, index: usize, values: impl Iterator<Item = (&'a WorldSample, Rgb)>) {
         for (at, value) in values.filter(|(_, value)| !value.is_black()) {
             let weight = f64::from(at.weight);
             self.average_mut(index).add(at.pixel as usize, value.to_array().map(|value| weight * f64::from(value)));

@@ -3,8 +3,8 @@ use super::*;
 use crate::color::Rgb;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
 use crate::film::{
-    FilmTile, Filter, LayerKind, LightAovRequest, LightAovRows, LightAovSample, PixelSample, PlacedSample, Sample, SampleBatch, Splats,
-    SurfaceSample,
+    FilmTile, Filter, LayerKind, LightAovRequest, LightAovRows, LightAovSample, PixelSample, Sample, SampleBatch, Splats, SurfaceSample,
+    WorldSample,
 };
 use crate::math::Vec3;
 
@@ -278,9 +278,9 @@ fn batches_have_the_bits_of_single_samples() {
                 Some(pixel) => batch.surfaces[pixel].uv[1] = f32::INFINITY,
                 None => {}
             }
-            let placed = |i: u32| PlacedSample { slot: i, pixel: 63 - i, sample, weight: 1.0 };
+            let placed = |i: u32| WorldSample { slot: i, pixel: 63 - i, sample, weight: 1.0 };
             let (one, mut all) = (&mut alone.tiles_mut()[0], (0..64).map(placed).collect::<Vec<_>>());
-            for PlacedSample { slot, pixel, sample, weight } in all.clone() {
+            for WorldSample { slot, pixel, sample, weight } in all.clone() {
                 if one.add(pixel as usize, sample, batch.sample(slot as usize), weight) {
                     one.add_moments(pixel as usize, batch.radiance(slot as usize));
                 }

@@ -29,7 +29,7 @@ pub use layer::{Filtering, LayerInfo, LayerSet, LayerSource};
 pub use sample::{LightAov, LightAovRequest, LightAovRows, LightAovSample, PixelSample, Sample, SampleBatch, ShapeKey, SurfaceSample};
 pub use splats::Splats;
 pub use sum::SumPlane;
-pub use tile::{DroppedSample, FilmTile, PlacedSample};
+pub use tile::{DroppedSample, FilmTile, WorldSample};
 pub use tiles::{Film, FilmGrid, FilmShape, bytes_per_pixel};
 
 use tiles::Layout;

@@ -25,7 +25,7 @@ pub struct DroppedSample {
 
 /// Where a sample of a batch belongs.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct PlacedSample {
+pub struct WorldSample {
     /// Index in the batch.
     pub slot: u32,
     /// Index of the pixel (row by row within the tile).
@@ -140,7 +140,7 @@ impl FilmTile {
 
     /// As [`add`](Self::add) for samples of a batch, each of which is a [group](Self::add_moments) of its own.
     /// `samples` keeps those that were not dropped.
-    pub fn add_batch(&mut self, batch: &SampleBatch, samples: &mut Vec<PlacedSample>) {
+    pub fn add_batch(&mut self, batch: &SampleBatch, samples: &mut Vec<WorldSample>) {
         if !self.layout.beside_color() || self.layout.signed || !batch.light_aovs.are_bounded() {
             samples.retain(|at| self.add(at.pixel as usize, at.sample, batch.sample(at.slot as usize), at.weight));
         } else {
@@ -160,13 +160,13 @@ impl FilmTile {
     }
 
     /// Adds the averages of samples one after the other, so that the sums of each stay in the cache.
-    fn add_averages(&mut self, batch: &SampleBatch, samples: &[PlacedSample]) {
+    fn add_averages(&mut self, batch: &SampleBatch, samples: &[WorldSample]) {
         for (k, row) in batch.light_aovs.rows() {
             self.filtered.add_average(k, samples.iter().map(|at| (at, row[at.slot as usize])));
         }
         let (first, means) = (self.layout.light_aovs.count(), self.layout.means);
         for (k, read) in means.readers().enumerate() {
-            let value = |at: &PlacedSample| {
+            let value = |at: &WorldSample| {
                 let mut value = [0.0; 3];
                 read(&batch.surfaces[at.slot as usize], &mut value);
                 Rgb::from(value)

@@ -10,7 +10,7 @@
 
 mod points;
 
-pub use points::{PlacedNormalRows, PlacedPointRows, PlacedSampleRows};
+pub use points::{WorldNormalRows, WorldPointRows, WorldSampleRows};
 
 use super::{Detail, Disk, Frustum, Hit, Quad, Revolution, Sphere, SurfaceInteraction};
 use crate::math::float::{F64_CHAIN_ERROR, UNIT_ROUNDOFF};
@@ -269,14 +269,7 @@ impl TransformedShape {
     }
 
     /// The points of the [interactions](Self::interaction) for hits of the first `count` rays at the distances `t`.
-    pub fn resolve_rows(
-        &self,
-        rays: &RayRows,
-        t: &[f32; BATCH],
-        count: usize,
-        points: &mut PlacedPointRows,
-        normals: &mut PlacedNormalRows,
-    ) {
+    pub fn resolve_rows(&self, rays: &RayRows, t: &[f32; BATCH], count: usize, points: &mut WorldPointRows, normals: &mut WorldNormalRows) {
         points::resolve(self, rays, t, count, points, normals);
     }
 
@@ -344,7 +337,7 @@ impl TransformedShape {
     }
 
     /// [`sample_area`](Self::sample_area) with each of the first `count` pairs, at most [`BATCH`].
-    pub fn sample_area_rows(&self, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+    pub fn sample_area_rows(&self, u: &[Row; 2], count: usize, out: &mut WorldSampleRows) {
         points::sample(self, u, count, out);
     }
 

@@ -6,7 +6,7 @@ use super::pixel_order::{pixel_of_slot, slots};
 use super::{FINEST_SPP, Settings, TILE_SIZE, film_shape};
 use crate::accel::Accelerator;
 use crate::desc::IntegratorDesc;
-use crate::film::{FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, PlacedSample, Splats};
+use crate::film::{FilmGrid, FilmTile, Filter, FilterSample, Filtering, LayerKind, LightAovRequest, Splats, WorldSample};
 use crate::guiding::Guide;
 use crate::integrator::{
     self, CameraBatch, CameraBlock, Integrator, PassContext, RenderContext, Setup, SurfaceAovs, Workspace, World, dimensions,
@@ -37,7 +37,7 @@ pub(super) struct TileWorkspace {
     /// Of each sample, its place in the pixel and its weight.
     places: Vec<FilterSample>,
     /// Samples to be added to the film.
-    placed: Vec<PlacedSample>,
+    placed: Vec<WorldSample>,
     pub splats: Splats,
     pixels: [[u32; 2]; BATCH],
     /// Points of the film.
@@ -194,7 +194,7 @@ impl<'a> TileRenderer<'a> {
                 let (x, y) = (origin[0] + dx, origin[1] + dy);
                 if active.contains(x, y) {
                     let (pixel, weight) = (tile.index(x, y) as u32, workspace.places[slot].weight);
-                    workspace.placed.push(PlacedSample { slot: slot as u32, pixel, sample, weight });
+                    workspace.placed.push(WorldSample { slot: slot as u32, pixel, sample, weight });
                 }
             }
             self.add_batch(tile, workspace);
@@ -209,7 +209,7 @@ impl<'a> TileRenderer<'a> {
             return;
         }
         for i in 0..workspace.placed.len() {
-            let PlacedSample { slot, pixel, sample, .. } = workspace.placed[i];
+            let WorldSample { slot, pixel, sample, .. } = workspace.placed[i];
             let (slot, pixel) = (slot as usize, pixel as usize);
             if self.add(tile, pixel, sample, slot, workspace) {
                 tile.add_moments(pixel, workspace.radiance(slot));

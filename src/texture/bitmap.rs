@@ -146,7 +146,7 @@ impl Bitmap {
                 }
                 TextureFilter::Bilinear | TextureFilter::Trilinear => {
                     let around = self.around(image, uv);
-                    image.weigh(around.texels, around.weights, decoding)
+                    image.weighted_sum(around.texels, around.weights, decoding)
                 }
             },
         };

@@ -190,7 +190,7 @@ impl TextureImage {
 
     /// The sum of `weights` times the colours of four pixels (column, row).
     #[inline]
-    pub fn weigh(&self, pixels: [[usize; 2]; 4], weights: [f32; 4], decoding: Decoding) -> Rgb {
+    pub fn weighted_sum(&self, pixels: [[usize; 2]; 4], weights: [f32; 4], decoding: Decoding) -> Rgb {
         let (width, channels) = (self.data.width, self.data.channels);
         let at = |k: usize| (pixels[k][1] * width + pixels[k][0]) * channels;
         macro_rules! sum {

@@ -105,7 +105,7 @@ impl Texture {
         }
     }
 
-    /// Whether a footprint has a say in it.
+    /// Whether the value depends on the footprint.
     pub fn is_filtered(&self) -> bool {
         match self {
             Self::Constant(_) | Self::Checker(_) | Self::Attribute(..) | Self::Step(..) => false,
@@ -114,7 +114,7 @@ impl Texture {
         }
     }
 
-    /// Whether uv have a say in it.
+    /// Whether the value depends on uv.
     pub fn uses_uv(&self) -> bool {
         match self {
             Self::Constant(_) | Self::Attribute(..) => false,
@@ -124,7 +124,7 @@ impl Texture {
         }
     }
 
-    /// The attributes of meshes that have a say in it, with their factors.
+    /// The attributes of meshes that the value depends on, with their factors.
     pub fn attributes(&self) -> Vec<(AttributeId, f32)> {
         match self {
             Self::Constant(_) | Self::Checker(_) | Self::Bitmap(_) => Vec::new(),

@@ -4,28 +4,11 @@ use super::wide::{Block, Wide, WideNode};
 use super::*;
 use crate::accel::Accelerator;
 use crate::accel::inspect::{Inspect, Item, StructureStats};
+use crate::accel::tree::testing::Sequence;
 use crate::accel::tree::{SlabRay, TwoLevel};
 use crate::geometry::{Geometry, Hit, Mesh, Shape, TrianglePoints, TriangleRay};
 use crate::id::{PrimId, ShapeId};
 use crate::math::{Ray, Vec3};
-
-/// A fixed sequence in place of random numbers.
-struct Sequence(u64);
-
-impl Sequence {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
-    }
-
-    fn vec(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        ((self.next() * 0.5 + 0.5) * n as f32) as usize % n
-    }
-}
 
 /// Fewer where an interpreter looks for undefined behaviour.
 fn many(n: usize) -> usize {

@@ -6,29 +6,11 @@ use pulp::{Scalar, Simd, WithSimd};
 use super::traverse::{Closest, Occluded};
 use super::*;
 use crate::accel::LinearAccel;
-use crate::accel::tree::testing::mesh_geometry;
+use crate::accel::tree::testing::{Sequence, mesh_geometry};
 use crate::geometry::{Analytic, Disk, Mesh, Sphere, TransformedShape, TrianglePoints};
 use crate::id::ShapeId;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::{DAffine3, DVec3, Transform, Vec3};
-
-/// A fixed sequence in place of random numbers.
-struct Sequence(u64);
-
-impl Sequence {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
-    }
-
-    fn vec(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        ((self.next() * 0.5 + 0.5) * n as f32) as usize % n
-    }
-}
 
 /// A cube of corners at ±1, of two triangles a side, with the inner edges and the first corners anywhere.
 fn cube(turns: usize) -> Vec<TrianglePoints> {

@@ -59,21 +59,21 @@ impl Block {
     }
 
     /// The value at a node.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, node: usize) -> f32 {
         let at = 2 * (self.start + node);
         self.low + self.scale * f32::from(u16::from_le_bytes([DATA[at], DATA[at + 1]]))
     }
 
     /// Between two neighbouring nodes.
-    #[inline]
+    #[inline(always)]
     pub fn linear(&self, node: usize, part: f32) -> f32 {
         let (before, after) = (self.at(node), self.at(node + 1));
         before + (after - before) * part
     }
 
     /// Between nodes of two axes, the second with `columns` nodes, in the part of the block that begins at `start`.
-    #[inline]
+    #[inline(always)]
     pub fn bilinear_from(&self, start: usize, columns: usize, first: TableCoordinate, second: TableCoordinate) -> f32 {
         let row = |node: usize| self.linear(start + node * columns + second.node, second.part);
         let (before, after) = (row(first.node), row(first.node + 1));
@@ -134,15 +134,15 @@ pub struct TableCoordinate {
 
 impl TableCoordinate {
     /// On an axis of `count` nodes, where `x` runs from 0 to 1.
-    #[inline]
+    #[inline(always)]
     pub fn new(x: f32, count: usize) -> Self {
         let at = x * (count - 1) as f32;
-        let node = (at as usize).min(count - 2);
+        let node = (at as i32).clamp(0, count as i32 - 2) as usize;
         Self { node, part: (at - node as f32).clamp(0.0, 1.0) }
     }
 
     /// On the axis of alpha.
-    #[inline]
+    #[inline(always)]
     pub fn of_alpha(alpha: f32) -> Self {
         Self::new(alpha.sqrt(), ALPHAS)
     }
@@ -155,7 +155,7 @@ impl TableCoordinate {
     }
 
     /// On the axis of the cosine.
-    #[inline]
+    #[inline(always)]
     pub fn of_cosine(cos: f32, alpha: f32) -> Self {
         Self::new(cosine_axis(cos, alpha), COSINES)
     }
@@ -163,7 +163,7 @@ impl TableCoordinate {
 
 /// Where a cosine lies on its axis: half of the nodes follow its square root; the others are dense where the cosine is of the order of
 /// alpha, since there masking sets in.
-#[inline]
+#[inline(always)]
 pub fn cosine_axis(cos: f32, alpha: f32) -> f32 {
     0.5 * (cos * (1.0 + alpha) / (cos + alpha).max(f32::MIN_POSITIVE) + cos.sqrt())
 }
@@ -180,14 +180,14 @@ pub fn across(cos_squared: f32, sin_squared: f32, aspect: f32) -> f32 {
 
 /// A cosine that stays away from grazing by about alpha, where microfacets are not seen at grazing angles: what is left to tabulate after
 /// Fresnel's reflectance there is smooth.
-#[inline]
+#[inline(always)]
 pub fn smoothed(cos: f32, alpha: f32) -> f32 {
     let apart = 2.25 * alpha * alpha;
     ((cos * cos + apart) / (1.0 + apart)).sqrt().min(1.0)
 }
 
 /// `(1 - cos)^5`.
-#[inline]
+#[inline(always)]
 pub fn schlick_weight(cos: f32) -> f32 {
     let rest = 1.0 - cos;
     let squared = rest * rest;

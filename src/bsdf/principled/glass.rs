@@ -23,7 +23,7 @@ impl Principled {
     }
 
     /// Mitsuba's specular reflectance of the dielectric layer at a cosine: exact Fresnel, mixed with Schlick's by the tint.
-    #[inline]
+    #[inline(always)]
     pub(super) fn mitsuba_specular(&self, cos: f32) -> Rgb {
         let exact = fresnel::dielectric(cos, self.p.ior).reflectance;
         if self.p.specular_tint == 0.0 {

@@ -26,6 +26,7 @@
 mod corners;
 mod glass;
 mod parameters;
+mod rows;
 pub(super) mod shapes;
 mod split;
 
@@ -108,36 +109,36 @@ impl Principled {
     }
 
     /// Whether the lobes are Mitsuba's.
-    #[inline]
-    fn is_mitsuba(&self) -> bool {
+    #[inline(always)]
+    pub(super) fn is_mitsuba(&self) -> bool {
         self.p.model == PrincipledModel::Mitsuba
     }
 
     /// Weight of the diffuse base with its layer.
-    #[inline]
+    #[inline(always)]
     fn dielectric(&self) -> f32 {
         (1.0 - self.p.metallic - self.glass).max(0.0)
     }
 
     /// Reflectance of metal and layer together, at Schlick's weight 0.
-    #[inline]
+    #[inline(always)]
     fn f0(&self) -> Rgb {
         self.p.base_color * self.p.metallic + self.specular * self.dielectric()
     }
 
-    #[inline]
+    #[inline(always)]
     fn sheen_color(&self) -> Rgb {
         mix(Rgb::WHITE, tint(self.p.base_color, self.p.model), self.p.sheen_tint) * self.p.sheen
     }
 
     /// Reflection by the microfacets of metal and layer, all but the Fresnel factor.
-    #[inline]
+    #[inline(always)]
     fn facet(&self, o: Vec3, i: Vec3) -> FacetReflection {
         if self.is_mitsuba() { SeparableGgx::from(self.ggx).reflection(o, i) } else { self.ggx.reflection(o, i) }
     }
 
     /// Reflectance of the microfacets of metal and layer at a cosine.
-    #[inline]
+    #[inline(always)]
     fn reflectance(&self, cos: f32) -> Rgb {
         let weight = schlick_weight(cos);
         let schlick = |f0: Rgb, f90: f32| f0 * (1.0 - weight) + Rgb::splat(f90 * weight);
@@ -147,29 +148,29 @@ impl Principled {
         schlick(self.p.base_color, 1.0) * self.p.metallic + self.mitsuba_specular(cos) * self.dielectric()
     }
 
-    #[inline]
-    fn albedos(&self, w: Vec3) -> LobeAlbedos {
+    /// `ISOTROPIC` where it is known that the microfacets are.
+    #[inline(always)]
+    fn albedos<const ISOTROPIC: bool>(&self, w: Vec3) -> LobeAlbedos {
         let cos = w.z.clamp(0.0, 1.0);
-        let energy = Energy::new(&self.ggx);
+        let energy = if ISOTROPIC { Energy::isotropic(self.ggx.alpha()[0]) } else { Energy::new(&self.ggx) };
         let facets = energy.directional_albedo(w);
-        let dielectric = self.dielectric() > 0.0;
         LobeAlbedos {
             facets,
-            schlick: energy.schlick(w).clamp(0.0, facets),
+            schlick: energy.schlick(w).max(0.0).min(facets),
             clearcoat: if self.p.clearcoat > 0.0 { self.p.clearcoat * principled_clear_coat(self.p.clearcoat_gloss, cos) } else { 0.0 },
-            sheen: if dielectric && self.p.sheen > 0.0 { principled_sheen(cos) } else { 0.0 },
-            diffuse: if dielectric { principled_diffuse(self.p.roughness, self.p.subsurface, cos) } else { 0.0 },
+            sheen: if self.p.sheen > 0.0 { principled_sheen(cos) } else { 0.0 },
+            diffuse: principled_diffuse(self.p.roughness, self.p.subsurface, cos),
         }
     }
 
     /// What the dielectric layer reflects, several times scattered light included.
-    #[inline]
+    #[inline(always)]
     fn layer_albedo(&self, at: &LobeAlbedos) -> Rgb {
         self.specular.map(|f| facets_albedo(f, at))
     }
 
     /// What diffuse base and sheen would scatter without a layer.
-    #[inline]
+    #[inline(always)]
     fn base_albedo(&self, at: &LobeAlbedos) -> Rgb {
         let diffuse = at.diffuse + (1.0 - at.diffuse) * self.p.diffuse_transmission;
         let base = self.p.base_color * diffuse;
@@ -177,7 +178,7 @@ impl Principled {
     }
 
     /// What would be scattered without a clear coat, at most.
-    #[inline]
+    #[inline(always)]
     fn uncoated_albedo(&self, at: &LobeAlbedos) -> Rgb {
         let layer = self.layer_albedo(at);
         let base = rgb_min(self.base_albedo(at), Rgb::WHITE - layer);
@@ -187,11 +188,11 @@ impl Principled {
     /// What the layer of a black base reflects, for a direction of the upper side: the closed form for tests.
     #[cfg(test)]
     pub(super) fn layer_albedo_at(&self, w: Vec3) -> f32 {
-        self.layer_albedo(&self.albedos(w)).g
+        self.layer_albedo(&self.albedos::<false>(w)).g
     }
 
     /// Probabilities for a direction: by what the lobes scatter, about.
-    #[inline]
+    #[inline(always)]
     fn lobe_pmf(&self, at: &LobeAlbedos) -> LobePmf {
         let below = 1.0 - at.clearcoat;
         let f0 = self.f0().mean();
@@ -216,16 +217,20 @@ impl Principled {
     /// All lobes.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        if wo.z.abs().min(wi.z.abs()) <= MIN_COSINE {
-            return BsdfEval::default();
-        }
-        let at_o = self.albedos(vec3(wo.x, wo.y, wo.z.abs()));
-        self.eval_from(wo, wi, &at_o, &self.lobe_pmf(&at_o))
+        self.eval_with::<false>(wo, wi)
     }
 
-    fn eval_from(&self, wo: Vec3, wi: Vec3, at_o: &LobeAlbedos, pmf: &LobePmf) -> BsdfEval {
+    #[inline(always)]
+    fn eval_with<const ISOTROPIC: bool>(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        let at_o = self.albedos::<ISOTROPIC>(vec3(wo.x, wo.y, wo.z.abs()));
+        let eval = self.eval_from::<ISOTROPIC>(wo, wi, &at_o, &self.lobe_pmf(&at_o));
+        if wo.z.abs().min(wi.z.abs()) > MIN_COSINE { eval } else { BsdfEval::default() }
+    }
+
+    #[inline(always)]
+    fn eval_from<const ISOTROPIC: bool>(&self, wo: Vec3, wi: Vec3, at_o: &LobeAlbedos, pmf: &LobePmf) -> BsdfEval {
         let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
-        let at_i = self.albedos(i);
+        let at_i = self.albedos::<ISOTROPIC>(i);
         let reflects = wo.z * wi.z > 0.0;
         let mut value = Rgb::BLACK;
         let mut coat = 0.0;
@@ -274,7 +279,7 @@ impl Principled {
     }
 
     /// The diffuse base below its layer.
-    #[inline]
+    #[inline(always)]
     fn base_value(&self, o: Vec3, i: Vec3, reflects: bool, at_o: &LobeAlbedos, at_i: &LobeAlbedos) -> Rgb {
         let layer = [self.layer_albedo(at_o), self.layer_albedo(at_i)];
         let below_layer = self.base_attenuation(layer, [self.base_albedo(at_o), self.base_albedo(at_i)]);
@@ -295,30 +300,29 @@ impl Principled {
     /// A direction from one of the lobes.
     #[inline]
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        if wo.z.abs() <= MIN_COSINE {
-            return None;
-        }
+        self.sample_with::<false>(wo, u_lobe, u)
+    }
+
+    #[inline(always)]
+    fn sample_with<const ISOTROPIC: bool>(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         let o = vec3(wo.x, wo.y, wo.z.abs());
-        let at_o = self.albedos(o);
+        let at_o = self.albedos::<ISOTROPIC>(o);
         let pmf = self.lobe_pmf(&at_o);
-        let wi = self.sample_direction(wo, o, &pmf, u_lobe, u)?;
-        if wi.z.abs() <= MIN_COSINE {
-            return None;
-        }
-        let BsdfEval { value, pdf } = self.eval_from(wo, wi, &at_o, &pmf);
-        if pdf <= 0.0 {
-            return None;
-        }
+        let direction = self.sample_direction(wo, o, &pmf, u_lobe, u);
+        let wi = direction.unwrap_or(Vec3::ZERO);
+        let BsdfEval { value, pdf } = self.eval_from::<ISOTROPIC>(wo, wi, &at_o, &pmf);
+        let is_valid = (wo.z.abs() > MIN_COSINE) & (wi.z.abs() > MIN_COSINE) & (pdf > 0.0);
         let is_transmission = wo.z * wi.z < 0.0;
         let eta = match (is_transmission && !self.p.thin, wo.z > 0.0) {
             (false, _) => 1.0,
             (true, true) => self.p.ior,
             (true, false) => 1.0 / self.p.ior,
         };
-        Some(BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission, eta })
+        is_valid.then_some(BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission, eta })
     }
 
     /// A direction with the density of the chosen lobe.
+    #[inline(always)]
     fn sample_direction(&self, wo: Vec3, o: Vec3, pmf: &LobePmf, u_lobe: f32, u: [f32; 2]) -> Option<Vec3> {
         let side = 1f32.copysign(wo.z);
         // A reflection keeps its side, or is lost.
@@ -328,7 +332,7 @@ impl Principled {
             u_lobe -= probability;
             u_lobe < 0.0
         };
-        if is_chosen(pmf.clearcoat) {
+        if self.p.clearcoat > 0.0 && is_chosen(pmf.clearcoat) {
             return above(ClearCoat::new(self.p.clearcoat_gloss).sample(o, u));
         }
         if is_chosen(pmf.specular) {
@@ -338,10 +342,10 @@ impl Principled {
         if is_chosen(pmf.diffuse) {
             return above(warp::cosine_hemisphere(u));
         }
-        if is_chosen(pmf.diffuse_transmission) {
+        if self.p.diffuse_transmission > 0.0 && is_chosen(pmf.diffuse_transmission) {
             return above(warp::cosine_hemisphere(u)).map(|i| vec3(i.x, i.y, -i.z));
         }
-        if pmf.glass <= 0.0 {
+        if self.glass <= 0.0 || pmf.glass <= 0.0 {
             return None;
         }
         let u_glass = (u_lobe / pmf.glass).min(crate::math::float::ONE_MINUS_EPSILON);
@@ -353,17 +357,21 @@ impl Principled {
     }
 
     /// The share of what is below a layer that is left for a pair of directions: the layer's albedos for both, and those of what is below.
-    #[inline]
+    #[inline(always)]
     fn base_attenuation(&self, layer: [Rgb; 2], below: [Rgb; 2]) -> Rgb {
         if self.is_mitsuba() {
             return Rgb::WHITE;
         }
-        let left = |layer: [f32; 2], below: [f32; 2]| {
-            let (rest, wanted) = ((1.0 - layer[0].max(layer[1])).max(0.0), below[0].max(below[1]));
+        let ([layer_o, layer_i], [below_o, below_i]) = (layer, below);
+        let left = |layer_o: f32, layer_i: f32, below_o: f32, below_i: f32| {
+            let (rest, wanted) = ((1.0 - layer_o.max(layer_i)).max(0.0), below_o.max(below_i));
             if wanted > rest { rest / wanted } else { 1.0 }
         };
-        let channel = |of: fn(Rgb) -> f32| left(layer.map(of), below.map(of));
-        Rgb::new(channel(|c| c.r), channel(|c| c.g), channel(|c| c.b))
+        Rgb::new(
+            left(layer_o.r, layer_i.r, below_o.r, below_i.r),
+            left(layer_o.g, layer_i.g, below_o.g, below_i.g),
+            left(layer_o.b, layer_i.b, below_o.b, below_i.b),
+        )
     }
 
     /// Alpha along both tangents.
@@ -386,7 +394,7 @@ impl Principled {
 
     /// What all lobes scatter together, about.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
-        let at = self.albedos(vec3(wo.x, wo.y, wo.z.abs()));
+        let at = self.albedos::<false>(vec3(wo.x, wo.y, wo.z.abs()));
         let glass = if self.p.thin { self.p.base_color } else { self.p.base_color.map(f32::sqrt) };
         let below = self.uncoated_albedo(&at) - (Rgb::WHITE - glass) * self.glass;
         rgb_min(below + Rgb::splat(at.clearcoat), Rgb::WHITE)
@@ -394,19 +402,19 @@ impl Principled {
 }
 
 /// What microfacets with Schlick's reflectance `f` ahead scatter, at most.
-#[inline]
+#[inline(always)]
 fn facets_albedo(f: f32, at: &LobeAlbedos) -> f32 {
     let average = f + (1.0 - f) / 21.0;
     f * (at.facets - at.schlick) + at.schlick + (1.0 - at.facets) * average * average
 }
 
-#[inline]
+#[inline(always)]
 fn rgb_min(a: Rgb, b: Rgb) -> Rgb {
     Rgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b))
 }
 
 /// A colour without its brightness: over its largest channel, so that none exceeds 1, or in Mitsuba over its luminance.
-#[inline]
+#[inline(always)]
 fn tint(color: Rgb, model: PrincipledModel) -> Rgb {
     let brightness = match model {
         PrincipledModel::Burley => color.max_channel(),
@@ -415,7 +423,7 @@ fn tint(color: Rgb, model: PrincipledModel) -> Rgb {
     if brightness > 0.0 { color / brightness } else { Rgb::WHITE }
 }
 
-#[inline]
+#[inline(always)]
 fn mix(a: Rgb, b: Rgb, amount: f32) -> Rgb {
     a * (1.0 - amount) + b * amount
 }

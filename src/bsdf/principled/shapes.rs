@@ -7,13 +7,13 @@ use super::super::microfacet::reflect;
 use crate::math::{Vec3, sin_cos_turns, vec3};
 
 /// Square of the cosine between either direction and the half vector.
-#[inline]
+#[inline(always)]
 fn half_cos_squared(o: Vec3, i: Vec3) -> f32 {
     (0.5 * (1.0 + o.dot(i))).clamp(0.0, 1.0)
 }
 
 /// The diffuse lobe with its retro-reflection at grazing angles (Burley, "Physically Based Shading at Disney").
-#[inline]
+#[inline(always)]
 pub fn diffuse(o: Vec3, i: Vec3, roughness: f32) -> f32 {
     let fd90 = 2.0 * roughness * half_cos_squared(o, i) - 0.5;
     FRAC_1_PI * i.z * (1.0 + fd90 * schlick_weight(o.z)) * (1.0 + fd90 * schlick_weight(i.z))

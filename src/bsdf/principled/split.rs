@@ -12,7 +12,7 @@ impl Principled {
             return Rgb::BLACK;
         }
         let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
-        let (at_o, at_i) = (self.albedos(o), self.albedos(i));
+        let (at_o, at_i) = (self.albedos::<false>(o), self.albedos::<false>(i));
         let mut base = self.base_value(o, i, true, &at_o, &at_i) * self.dielectric();
         if self.p.clearcoat > 0.0 {
             let coats = [at_o.clearcoat, at_i.clearcoat].map(Rgb::splat);

@@ -14,7 +14,24 @@ fn bsdfs() -> Vec<Bsdf> {
         let made = [gold(alpha), glass(alpha), separable_gold(alpha), separable_glass(alpha), beckmann_gold(alpha), beckmann_glass(alpha)];
         made.into_iter().chain([single(gold(alpha)), single(glass(alpha))])
     });
-    rough.chain([gold([0.0; 2]), glass([0.0; 2])]).chain(plastics()).collect()
+    rough.chain([gold([0.0; 2]), glass([0.0; 2])]).chain(plastics()).chain(principled()).collect()
+}
+
+fn principled() -> impl Iterator<Item = Bsdf> {
+    let with = |metallic, roughness, model, multiscatter| PrincipledParameters {
+        base_color: Rgb::new(0.2, 0.5, 0.9),
+        metallic,
+        roughness,
+        model,
+        multiscatter,
+        ..PrincipledParameters::default()
+    };
+    let models = [(PrincipledModel::Burley, true), (PrincipledModel::Burley, false), (PrincipledModel::Mitsuba, false)];
+    let basic = models.into_iter().flat_map(move |(model, multiscatter)| {
+        [(0.0, 0.0), (0.0, 0.5), (0.3, 0.2), (1.0, 1.0)].map(|(metallic, roughness)| with(metallic, roughness, model, multiscatter))
+    });
+    let coated = PrincipledParameters { clearcoat: 0.7, sheen: 0.2, ..with(0.2, 0.4, PrincipledModel::Burley, true) };
+    basic.chain([coated]).map(|parameters| Bsdf::Principled(Principled::new(&parameters)))
 }
 
 fn plastics() -> impl Iterator<Item = Bsdf> {
@@ -36,6 +53,17 @@ fn recolored(bsdf: &Bsdf, random: &mut Rng) -> Bsdf {
         Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(plastic)) => {
             Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(recolor(plastic, random)))
         }
+        Bsdf::Principled(principled) => {
+            let model = if principled.is_mitsuba() { PrincipledModel::Mitsuba } else { PrincipledModel::Burley };
+            Bsdf::Principled(Principled::new(&PrincipledParameters {
+                base_color: Rgb::from(std::array::from_fn(|_| random.unit_f32())),
+                metallic: random.unit_f32(),
+                roughness: random.unit_f32(),
+                ior: 1.0 + random.unit_f32(),
+                model,
+                ..PrincipledParameters::default()
+            }))
+        }
         other => other.clone(),
     }
 }
@@ -43,7 +71,7 @@ fn recolored(bsdf: &Bsdf, random: &mut Rng) -> Bsdf {
 #[test]
 fn queries_in_rows_have_the_bits_of_single_ones() {
     let varying: Vec<Bsdf> = bsdfs().into_iter().filter(Bsdf::can_vary).collect();
-    assert!(varying.len() >= 8);
+    assert!(varying.len() >= 18);
     for (bsdf, varies) in bsdfs().into_iter().map(|bsdf| (bsdf, false)).chain(varying.into_iter().map(|bsdf| (bsdf, true))) {
         check_rows(&bsdf, varies);
     }

@@ -9,7 +9,7 @@ use crate::math::{DVec3, Ray, RayF64, RayRows, Vec2, Vec3};
 
 soa! {
     /// Points of a surface.
-    pub struct PlacedPointRows {
+    pub struct WorldPointRows {
         /// The point, in the space the shape is placed in.
         p: DVec3,
         /// Distance in units of the ray's direction.
@@ -19,7 +19,7 @@ soa! {
 
 soa! {
     /// What else is found of them.
-    pub struct PlacedNormalRows {
+    pub struct WorldNormalRows {
         /// Unit normal.
         n: Vec3,
         /// Change of the point with u; as the next one, zero for other shapes than quads.
@@ -33,7 +33,7 @@ soa! {
 
 soa! {
     /// Points as [`SurfacePoint`](super::SurfacePoint) has them.
-    pub struct PlacedSampleRows {
+    pub struct WorldSampleRows {
         /// The point, in the space the shape is placed in.
         p: DVec3,
         /// Unit normal.
@@ -44,12 +44,12 @@ soa! {
 }
 
 /// Samples the first `count` points, at most [`BATCH`]. Surfaces of revolution are sampled alone.
-pub(super) fn sample(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+pub(super) fn sample(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut WorldSampleRows) {
     vectorize!(sample_rows(placed, u, count, out));
 }
 
 #[inline(always)]
-fn sample_rows(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+fn sample_rows(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut WorldSampleRows) {
     match &placed.shape {
         Analytic::Sphere(sphere) => sample_on(placed, sphere, u, count, out),
         Analytic::Quad(quad) => sample_on(placed, quad, u, count, out),
@@ -60,7 +60,7 @@ fn sample_rows(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut 
 }
 
 #[inline(always)]
-fn sample_on<S: LaneShape>(placed: &TransformedShape, shape: &S, u: &[Row; 2], count: usize, out: &mut PlacedSampleRows) {
+fn sample_on<S: LaneShape>(placed: &TransformedShape, shape: &S, u: &[Row; 2], count: usize, out: &mut WorldSampleRows) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         let sample = shape.sample(pair(u, i).map(f64::from));
         let point = placed.place(sample.p, sample.n, sample.pdf_area);
@@ -77,8 +77,8 @@ pub(super) fn resolve(
     rays: &RayRows,
     t: &[f32; BATCH],
     count: usize,
-    points: &mut PlacedPointRows,
-    normals: &mut PlacedNormalRows,
+    points: &mut WorldPointRows,
+    normals: &mut WorldNormalRows,
 ) {
     vectorize!(resolve_rows(placed, rays, t, count, points, normals));
 }
@@ -119,8 +119,8 @@ fn resolve_rows(
     rays: &RayRows,
     t: &[f32; BATCH],
     count: usize,
-    points: &mut PlacedPointRows,
-    normals: &mut PlacedNormalRows,
+    points: &mut WorldPointRows,
+    normals: &mut WorldNormalRows,
 ) {
     match &placed.shape {
         Analytic::Sphere(sphere) => resolve_on(placed, sphere, rays, t, count, points, normals),
@@ -138,8 +138,8 @@ fn resolve_on<S: LaneShape>(
     rays: &RayRows,
     t: &[f32; BATCH],
     count: usize,
-    points: &mut PlacedPointRows,
-    normals: &mut PlacedNormalRows,
+    points: &mut WorldPointRows,
+    normals: &mut WorldNormalRows,
 ) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         let ray = Ray { t_min: rays.t_min[i], ..Ray::new(rays.origin.get(i), rays.direction.get(i)) };

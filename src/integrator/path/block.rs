@@ -4,7 +4,7 @@ use super::Context;
 use super::materials::BsdfTable;
 use crate::bsdf::{BsdfEval, Lambert};
 use crate::color::Rgb;
-use crate::geometry::{PlacedNormalRows, PlacedPointRows, SpawnPoint, SurfaceInteraction};
+use crate::geometry::{SpawnPoint, SurfaceInteraction, WorldNormalRows, WorldPointRows};
 use crate::id::{InstanceId, PrimId, ShapeId};
 use crate::integrator::light_events::LobeWeights;
 use crate::light::{LightSampleContext, LightSampleRows};
@@ -175,8 +175,8 @@ pub(super) struct AnalyticScratch {
     pub lanes: Vec<u8>,
     pub rays: RayRows,
     pub t: Row,
-    pub points: PlacedPointRows,
-    pub normals: PlacedNormalRows,
+    pub points: WorldPointRows,
+    pub normals: WorldNormalRows,
 }
 
 impl Default for AnalyticScratch {
@@ -185,8 +185,8 @@ impl Default for AnalyticScratch {
             lanes: Vec::with_capacity(BATCH),
             rays: RayRows::default(),
             t: [0.0; BATCH],
-            points: PlacedPointRows::default(),
-            normals: PlacedNormalRows::default(),
+            points: WorldPointRows::default(),
+            normals: WorldNormalRows::default(),
         }
     }
 }

@@ -101,7 +101,7 @@ fn eval_diffuse(rows: &VertexRows, lights: &LightSampleRows, direct: &mut Direct
 }
 
 #[inline(always)]
-fn illuminate<const RELIEF: bool>(
+fn illuminate<const PERTURBED: bool>(
     rows: &VertexRows,
     points: &PointRows,
     lights: &LightSampleRows,
@@ -114,7 +114,7 @@ fn illuminate<const RELIEF: bool>(
         let cos = direction.dot(rows.n_g.get(i));
         let cos_local = direct.wi.0[2][i];
         let test = HemisphereTest::new([rows.wo.0[2][i], cos_local], [rows.cos_geometric[i], cos]);
-        let factor = shadowing::<RELIEF>(test, [cos, cos_local, rows.cos_normals[i]]);
+        let factor = shadowing::<PERTURBED>(test, [cos, cos_local, rows.cos_normals[i]]);
         let pdf = lights.pdf[i];
         let weight = if is_mis & (lights.is_delta[i] == 0) { power_heuristic(pdf, direct.scatter_pdf[i]) } else { 1.0 };
         let value = direct.value.get(i) * factor;
@@ -138,8 +138,8 @@ fn illuminate<const RELIEF: bool>(
 /// The factor on light from a direction under a normal or bump map, for the cosines of the direction with the geometric
 /// and the shading normal and of these.
 #[inline(always)]
-pub(super) fn shadowing<const RELIEF: bool>(test: HemisphereTest, [cos, cos_local, cos_normals]: [f32; 3]) -> f32 {
-    if RELIEF & test.in_frame & test.in_geometry & (cos_normals != 0.0) { terminator_factor(cos, cos_local, cos_normals) } else { 1.0 }
+pub(super) fn shadowing<const PERTURBED: bool>(test: HemisphereTest, [cos, cos_local, cos_normals]: [f32; 3]) -> f32 {
+    if PERTURBED & test.in_frame & test.in_geometry & (cos_normals != 0.0) { terminator_factor(cos, cos_local, cos_normals) } else { 1.0 }
 }
 
 /// Whether a ray may start above the facet that hides its direction. Under a normal or bump map the factor has darkened

@@ -137,7 +137,7 @@ fn evaluate_textured(context: &Context, vertices: &mut Vertices) {
             Bsdf::Lambert(Lambert { albedo }) => set_diffuse(vertices, lane, albedo),
             bsdf => {
                 set_non_diffuse(&mut vertices.rows, &mut vertices.non_diffuse, lane, &bsdf);
-                let group = if textured.varies_in_colors() && bsdf.can_vary() { Some(VARYING | vertices.bsdfs.ids[lane]) } else { None };
+                let group = if textured.can_be_grouped() && bsdf.can_vary() { Some(VARYING | vertices.bsdfs.ids[lane]) } else { None };
                 vertices.bsdfs.set_made(lane, bsdf);
                 if let Some(group) = group {
                     vertices.bsdfs.groups[lane] = group;

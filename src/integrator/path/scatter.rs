@@ -106,7 +106,7 @@ fn survival_probability(max_throughput: f32, rr_scale: f32) -> f32 {
 }
 
 #[inline(always)]
-fn spawn_rays<const RELIEF: bool>(
+fn spawn_rays<const PERTURBED: bool>(
     rows: &VertexRows,
     points: &PointRows,
     scatter: &mut ScatterRows,
@@ -120,7 +120,7 @@ fn spawn_rays<const RELIEF: bool>(
         let direction = frame.to_world(wi);
         let cos = direction.dot(rows.n_g.get(i));
         let test = HemisphereTest::new([rows.wo.0[2][i], wi.z], [rows.cos_geometric[i], cos]);
-        let factor = shadowing::<RELIEF>(test, [cos, wi.z, rows.cos_normals[i]]);
+        let factor = shadowing::<PERTURBED>(test, [cos, wi.z, rows.cos_normals[i]]);
         let factor = if scatter.is_delta[i] == 0 { factor } else { 1.0 };
         let weight = scatter.weight.get(i) * factor;
         scatter.weight.set(i, weight);

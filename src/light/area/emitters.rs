@@ -1,7 +1,7 @@
 //! Spheres and other analytic shapes that many vertices sample at once, the same as each of them alone.
 
 use super::{AreaLight, EmitterSample, Form, SphereEmitter};
-use crate::geometry::{Geometry, PlacedSampleRows, Shape};
+use crate::geometry::{Geometry, Shape, WorldSampleRows};
 use crate::id::LightId;
 use crate::light::{Light, LightContext, LightQueries, LightSample};
 use crate::math::DVec3;
@@ -31,12 +31,12 @@ pub(in crate::light) struct EmitterQueue {
 struct EmitterRows {
     u: [Row; 2],
     views: ViewRows,
-    samples: PlacedSampleRows,
+    samples: WorldSampleRows,
 }
 
 impl Default for EmitterQueue {
     fn default() -> Self {
-        let rows = EmitterRows { u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: PlacedSampleRows::default() };
+        let rows = EmitterRows { u: [[0.0; BATCH]; 2], views: ViewRows::default(), samples: WorldSampleRows::default() };
         Self { entries: Vec::with_capacity(BATCH), rows }
     }
 }
@@ -126,7 +126,7 @@ fn sample_sphere(sphere: &SphereEmitter, u: &[Row; 2], views: &mut ViewRows, cou
 }
 
 #[inline(always)]
-fn see_samples(samples: &PlacedSampleRows, views: &mut ViewRows, count: usize) {
+fn see_samples(samples: &WorldSampleRows, views: &mut ViewRows, count: usize) {
     for i in 0..count.next_multiple_of(16).min(BATCH) {
         let (q, n) = (samples.p.get(i), samples.n.get(i));
         let (wi, pdf) = EmitterSample::direction_and_pdf(views.p.get(i), q, n, samples.pdf_area[i]);

@@ -259,7 +259,7 @@ fn points_resolved_in_rows_are_those_of_single_hits() {
                 t[found.len()] = hit.t as f32;
                 found.push(Hit { t: hit.t as f32, u: 0.0, v: 0.0, shape: ShapeId(0), prim: PrimId(0), instance: Hit::NO_INSTANCE });
             }
-            let (mut points, mut normals) = (PlacedPointRows::default(), PlacedNormalRows::default());
+            let (mut points, mut normals) = (WorldPointRows::default(), WorldNormalRows::default());
             placed.resolve_rows(&rays, &t, count, &mut points, &mut normals);
             for (i, hit) in found.iter().enumerate().filter(|&(i, _)| normals.is_resolved[i] != 0) {
                 let at = placed.interaction(&rays.get(i), hit).unwrap();
