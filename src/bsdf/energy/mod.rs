@@ -83,19 +83,23 @@ impl Energy {
         }
     }
 
+    /// [`MIRRORS`] at a node along the aspect, above one of the axes.
+    #[inline(always)]
+    fn mirrors(&self, aspect: usize, axis: usize, cosine: TableCoordinate) -> f32 {
+        const AXIS: usize = ALPHAS * COSINES;
+        MIRRORS.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, cosine)
+    }
+
     /// The albedo of perfectly reflecting microfacets.
     #[inline(always)]
     pub fn directional_albedo(&self, w: Vec3) -> f32 {
         let coordinates = self.coordinates(w);
-        const AXIS: usize = ALPHAS * COSINES;
-        let lookup =
-            |aspect: usize, axis: usize| MIRRORS.bilinear_from((2 * aspect + axis) * AXIS, COSINES, self.at_alpha, coordinates.cosine);
         if self.aspect == 1.0 {
-            return lookup(ASPECTS - 1, 0);
+            return self.mirrors(ASPECTS - 1, 0, coordinates.cosine);
         }
         let at = TableCoordinate::new(self.aspect.sqrt(), ASPECTS);
         let of = |axis: usize| {
-            let (before, after) = (lookup(at.node, axis), lookup(at.node + 1, axis));
+            let (before, after) = (self.mirrors(at.node, axis, coordinates.cosine), self.mirrors(at.node + 1, axis, coordinates.cosine));
             before + (after - before) * at.part
         };
         let (along, across) = (of(0), of(1));
@@ -116,15 +120,12 @@ impl Energy {
     #[inline(always)]
     pub fn schlick(&self, w: Vec3) -> f32 {
         let cos = w.z.clamp(0.0, 1.0);
-        let of = |alpha: f32, at_alpha: TableCoordinate| {
-            SCHLICK.bilinear_from(0, COSINES, at_alpha, TableCoordinate::of_cosine(cos, alpha)) + schlick_weight(smoothed(cos, alpha))
-        };
-        let weight = of(self.alpha, self.at_alpha);
+        let weight = isotropic_schlick(cos, self.alpha, self.at_alpha);
         if self.aspect == 1.0 {
             return weight;
         }
         let alpha = self.grazed_alpha(w);
-        weight.max(of(alpha, TableCoordinate::of_alpha(alpha)))
+        weight.max(isotropic_schlick(cos, alpha, TableCoordinate::of_alpha(alpha)))
     }
 
     /// Alpha of round microfacets that grazing light from `w` meets at the angles at which it meets these, or at greater ones.
@@ -166,6 +167,12 @@ impl Energy {
     }
 }
 
+/// [`Energy::schlick`] of isotropic microfacets.
+#[inline(always)]
+fn isotropic_schlick(cos: f32, alpha: f32, at_alpha: TableCoordinate) -> f32 {
+    SCHLICK.bilinear_from(0, COSINES, at_alpha, TableCoordinate::of_cosine(cos, alpha)) + schlick_weight(smoothed(cos, alpha))
+}
+
 /// Colour of light that leaves after more than one reflection, over what perfect mirrors would leave for it, where
 /// `reflectance` is the mean reflectance and `average` what perfect mirrors scatter at once under diffuse light: `sum_k
 /// reflectance^k (1 - average)^(k - 2) average` from `k = 2` on.
@@ -178,9 +185,9 @@ pub fn multiple_color(reflectance: f32, average: f32) -> f32 {
 #[inline(always)]
 pub fn principled_diffuse(roughness: f32, subsurface: f32, cos: f32) -> f32 {
     let (shape, at) = (TableCoordinate::new(roughness, SHAPES), TableCoordinate::of_cosine(cos, 1.0));
-    let of = |kind: usize| DIFFUSE.bilinear_from(kind * SHAPES * COSINES, COSINES, shape, at);
-    let diffuse = of(0);
-    if subsurface == 0.0 { diffuse } else { diffuse + (of(1) - diffuse) * subsurface }
+    const KIND: usize = SHAPES * COSINES;
+    let diffuse = DIFFUSE.bilinear_from(0, COSINES, shape, at);
+    if subsurface == 0.0 { diffuse } else { diffuse + (DIFFUSE.bilinear_from(KIND, COSINES, shape, at) - diffuse) * subsurface }
 }
 
 /// Albedo of the principled model's sheen.

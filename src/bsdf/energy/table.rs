@@ -75,8 +75,8 @@ impl Block {
     /// Between nodes of two axes, the second with `columns` nodes, in the part of the block that begins at `start`.
     #[inline(always)]
     pub fn bilinear_from(&self, start: usize, columns: usize, first: TableCoordinate, second: TableCoordinate) -> f32 {
-        let row = |node: usize| self.linear(start + node * columns + second.node, second.part);
-        let (before, after) = (row(first.node), row(first.node + 1));
+        let at = start + first.node * columns + second.node;
+        let (before, after) = (self.linear(at, second.part), self.linear(at + columns, second.part));
         before + (after - before) * first.part
     }
 

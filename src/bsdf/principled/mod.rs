@@ -141,11 +141,10 @@ impl Principled {
     #[inline(always)]
     fn reflectance(&self, cos: f32) -> Rgb {
         let weight = schlick_weight(cos);
-        let schlick = |f0: Rgb, f90: f32| f0 * (1.0 - weight) + Rgb::splat(f90 * weight);
         if !self.is_mitsuba() {
-            return schlick(self.f0(), self.p.metallic + self.dielectric());
+            return schlick(self.f0(), self.p.metallic + self.dielectric(), weight);
         }
-        schlick(self.p.base_color, 1.0) * self.p.metallic + self.mitsuba_specular(cos) * self.dielectric()
+        schlick(self.p.base_color, 1.0, weight) * self.p.metallic + self.mitsuba_specular(cos) * self.dielectric()
     }
 
     /// `ISOTROPIC` where it is known that the microfacets are.
@@ -166,7 +165,10 @@ impl Principled {
     /// What the dielectric layer reflects, several times scattered light included.
     #[inline(always)]
     fn layer_albedo(&self, at: &LobeAlbedos) -> Rgb {
-        self.specular.map(|f| facets_albedo(f, at))
+        self.specular.map(
+            #[inline(always)]
+            |f| facets_albedo(f, at),
+        )
     }
 
     /// What diffuse base and sheen would scatter without a layer.
@@ -182,7 +184,12 @@ impl Principled {
     fn uncoated_albedo(&self, at: &LobeAlbedos) -> Rgb {
         let layer = self.layer_albedo(at);
         let base = rgb_min(self.base_albedo(at), Rgb::WHITE - layer);
-        self.p.base_color.map(|f| facets_albedo(f, at)) * self.p.metallic + (layer + base) * self.dielectric() + Rgb::splat(self.glass)
+        self.p.base_color.map(
+            #[inline(always)]
+            |f| facets_albedo(f, at),
+        ) * self.p.metallic
+            + (layer + base) * self.dielectric()
+            + Rgb::splat(self.glass)
     }
 
     /// What the layer of a black base reflects, for a direction of the upper side: the closed form for tests.
@@ -363,14 +370,10 @@ impl Principled {
             return Rgb::WHITE;
         }
         let ([layer_o, layer_i], [below_o, below_i]) = (layer, below);
-        let left = |layer_o: f32, layer_i: f32, below_o: f32, below_i: f32| {
-            let (rest, wanted) = ((1.0 - layer_o.max(layer_i)).max(0.0), below_o.max(below_i));
-            if wanted > rest { rest / wanted } else { 1.0 }
-        };
         Rgb::new(
-            left(layer_o.r, layer_i.r, below_o.r, below_i.r),
-            left(layer_o.g, layer_i.g, below_o.g, below_i.g),
-            left(layer_o.b, layer_i.b, below_o.b, below_i.b),
+            remaining(layer_o.r, layer_i.r, below_o.r, below_i.r),
+            remaining(layer_o.g, layer_i.g, below_o.g, below_i.g),
+            remaining(layer_o.b, layer_i.b, below_o.b, below_i.b),
         )
     }
 
@@ -406,6 +409,19 @@ impl Principled {
 fn facets_albedo(f: f32, at: &LobeAlbedos) -> f32 {
     let average = f + (1.0 - f) / 21.0;
     f * (at.facets - at.schlick) + at.schlick + (1.0 - at.facets) * average * average
+}
+
+/// Schlick's reflectance for a weight, between those ahead and at grazing angles.
+#[inline(always)]
+fn schlick(f0: Rgb, f90: f32, weight: f32) -> Rgb {
+    f0 * (1.0 - weight) + Rgb::splat(f90 * weight)
+}
+
+/// [`Principled::base_attenuation`] of one channel.
+#[inline(always)]
+fn remaining(layer_o: f32, layer_i: f32, below_o: f32, below_i: f32) -> f32 {
+    let (rest, wanted) = ((1.0 - layer_o.max(layer_i)).max(0.0), below_o.max(below_i));
+    if wanted > rest { rest / wanted } else { 1.0 }
 }
 
 #[inline(always)]
