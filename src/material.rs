@@ -294,7 +294,8 @@ impl TexturedMaterial {
 }
 
 impl Material {
-    /// The scattering over a footprint; nothing for what consists of other materials, which [`Material::part`] resolves first.
+    /// The scattering over a footprint; nothing for what consists of other materials, which [`Material::part`] resolves
+    /// first.
     #[inline]
     pub fn bsdf<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>) -> Bsdf {
         match self {
@@ -304,8 +305,8 @@ impl Material {
         }
     }
 
-    /// The scattering over a footprint of a dielectric as a boundary with another relative index of refraction, inside over outside; `None`
-    /// for all other materials.
+    /// The scattering over a footprint of a dielectric as a boundary with another relative index of refraction, inside
+    /// over outside; `None` for all other materials.
     pub fn boundary<'f>(&self, textures: &[Texture], footprint: impl FnOnce() -> Footprint<'f>, ior: f32) -> Option<Bsdf> {
         match self {
             Self::Textured(textured, _) => match **textured {

@@ -1,5 +1,5 @@
-//! Beckmann's distribution of microfacet normals, slopes of which are Gaussian, with Smith's shadowing; for agreement with renderers that
-//! have it.
+//! Beckmann's distribution of microfacet normals, slopes of which are Gaussian, with Smith's shadowing; for agreement
+//! with renderers that have it.
 //!
 //! With the slope `a(w) = wz / |(ax wx, ay wy)|` of a direction over that of the microfacets,
 //!
@@ -10,8 +10,9 @@
 //! visible normals = D(m) (o·m) / p(o)
 //! ```
 //!
-//! (Walter et al., "Microfacet Models for Refraction through Rough Surfaces"). `p` is the area of the visible microfacets as seen from `w`.
-//! Both sides are masked independently of each other, as in Mitsuba; what several encounters scatter is lost.
+//! (Walter et al., "Microfacet Models for Refraction through Rough Surfaces"). `p` is the area of the visible
+//! microfacets as seen from `w`. Both sides are masked independently of each other, as in Mitsuba; what several
+//! encounters scatter is lost.
 //!
 //! Directions are unit, local, on the upper side (`z > 0`).
 
@@ -167,7 +168,8 @@ impl Microfacets for Beckmann {
     }
 }
 
-/// `1 - erf x` for `x` not negative, given `exp(-x²)`: within 1.5e-7 (Abramowitz and Stegun, "Handbook of Mathematical Functions", 7.1.26).
+/// `1 - erf x` for `x` not negative, given `exp(-x²)`: within 1.5e-7 (Abramowitz and Stegun, "Handbook of Mathematical
+/// Functions", 7.1.26).
 #[inline]
 fn erfc(x: f32, gaussian: f32) -> f32 {
     const TERMS: [f32; 5] = [0.254_829_6, -0.284_496_74, 1.421_413_7, -1.453_152, 1.061_405_4];

@@ -8,7 +8,8 @@ use super::microfacet::{FacetReflection, Microfacets, reflect};
 use super::{BsdfFlags, Ggx};
 use crate::math::{Vec3, sin_cos_turns, vec3};
 
-/// A coat of clear dielectric with microfacets distributed by `D`, smooth or rough, seen from outside; directions are of the upper side.
+/// A coat of clear dielectric with microfacets distributed by `D`, smooth or rough, seen from outside; directions are
+/// of the upper side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coat<D = Ggx> {
     /// Index of refraction over that of the outside.
@@ -40,8 +41,8 @@ impl Coat<Ggx> {
         coat
     }
 
-    /// The same within a microsecond, for parameters that change from point to point: the albedo comes from a table, and is right to a few
-    /// thousandths, of an anisotropic coat to a few hundredths.
+    /// The same within a microsecond, for parameters that change from point to point: the albedo comes from a table,
+    /// and is right to a few thousandths, of an anisotropic coat to a few hundredths.
     pub fn looked_up(ior: f32, alpha: [f32; 2]) -> Self {
         let ggx = Ggx::new(alpha);
         let alpha = ggx.alpha();

@@ -10,10 +10,10 @@
 //! g = 1 - max(E(wo), E(wi))                    over any other
 //! ```
 //!
-//! with `cos_t` the cosine of the refracted direction in the coat. Both are reciprocal and scatter no more than they receive; the first
-//! loses nothing over a diffuse base, the second nothing over a mirror, and up to `E_avg - E(wo)` over a base that
-//! spreads light widely. The base sees directions as they are outside: what the coat bends on the way in it bends back
-//! on the way out.
+//! with `cos_t` the cosine of the refracted direction in the coat. Both are reciprocal and scatter no more than they
+//! receive; the first loses nothing over a diffuse base, the second nothing over a mirror, and up to `E_avg - E(wo)`
+//! over a base that spreads light widely. The base sees directions as they are outside: what the coat bends on the way
+//! in it bends back on the way out.
 
 use std::cell::RefCell;
 use std::ops::Deref;
@@ -82,7 +82,8 @@ impl Deref for PooledCoated {
 const MIN_BASE: f32 = 0.05;
 
 impl Coated {
-    /// A coat over an opaque base; `tint` within `[0, 1]` is what light keeps that crosses the coat twice along the normal.
+    /// A coat over an opaque base; `tint` within `[0, 1]` is what light keeps that crosses the coat twice along the
+    /// normal.
     pub fn new(coat: Coat, tint: Rgb, base: Bsdf) -> Self {
         let inverse = coat.interreflection(1.0);
         let diffuse = match base {
@@ -104,7 +105,8 @@ impl Coated {
         Some(Self { coat, base: base.unwrap_or_else(|| self.base.clone()), ..*self })
     }
 
-    /// What is left of the light from `i` to `o`, both on the upper side, on its way through the coat to the base and back.
+    /// What is left of the light from `i` to `o`, both on the upper side, on its way through the coat to the base and
+    /// back.
     #[inline]
     fn left(&self, o: Vec3, i: Vec3, coat_o: f32) -> Rgb {
         let coat_i = self.coat.albedo(i);

@@ -1,5 +1,6 @@
-//! Metals: reflection with the exact Fresnel equations of a complex index of refraction, by a plane or by microfacets; light that meets
-//! several GGX microfacets comes back as the lobe of [`energy`](super::energy), coloured by as many reflections.
+//! Metals: reflection with the exact Fresnel equations of a complex index of refraction, by a plane or by microfacets;
+//! light that meets several GGX microfacets comes back as the lobe of [`energy`](super::energy), coloured by as many
+//! reflections.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -27,8 +28,8 @@ pub struct Conductor<D = Ggx> {
 }
 
 impl Conductor<Ggx> {
-    /// A metal with index of refraction `eta + i k` relative to the outside; smooth where [`Ggx::new`] says so. `tint` multiplies the
-    /// reflectance.
+    /// A metal with index of refraction `eta + i k` relative to the outside; smooth where [`Ggx::new`] says so. `tint`
+    /// multiplies the reflectance.
     pub fn new(eta: Rgb, k: Rgb, alpha: [f32; 2], tint: Rgb) -> Self {
         let index = [ComplexIndex::new(eta.r, k.r), ComplexIndex::new(eta.g, k.g), ComplexIndex::new(eta.b, k.b)];
         let average = Rgb::from(index.map(ComplexIndex::average));
@@ -97,7 +98,8 @@ impl<D: Microfacets> Conductor<D> {
         multiple / (directional_albedo + multiple)
     }
 
-    /// `F D G2 / (4 |cos wo|)` and light scattered several times for directions on the same side of a rough metal, zero for a smooth one.
+    /// `F D G2 / (4 |cos wo|)` and light scattered several times for directions on the same side of a rough metal, zero
+    /// for a smooth one.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
         if self.facets.is_smooth() || wo.z * wi.z <= 0.0 {

@@ -1,9 +1,9 @@
-//! Glass, water and the like: reflection and refraction with the exact Fresnel equations, by a plane or by microfacets (Walter et al.,
-//! "Microfacet Models for Refraction through Rough Surfaces").
+//! Glass, water and the like: reflection and refraction with the exact Fresnel equations, by a plane or by microfacets
+//! (Walter et al., "Microfacet Models for Refraction through Rough Surfaces").
 //!
-//! Values are for radiance carried towards `wo`: what is refracted carries `1 / eta²`, with `eta` the index of refraction on the side of
-//! `wi` over that on the side of `wo`. With the unnormalised half vector `h = wo + eta wi`, which points from the optically thinner side to
-//! the denser one or back, `wo·m + eta wi·m = ±|h|`, and
+//! Values are for radiance carried towards `wo`: what is refracted carries `1 / eta²`, with `eta` the index of
+//! refraction on the side of `wi` over that on the side of `wo`. With the unnormalised half vector `h = wo + eta wi`,
+//! which points from the optically thinner side to the denser one or back, `wo·m + eta wi·m = ±|h|`, and
 //!
 //! ```text
 //! value = (1 - F) D G2 |wo·m| |wi·m| / (|cos wo| |h|²)
@@ -69,8 +69,8 @@ fn multiple_scattering(ior: f32, ggx: &Ggx) -> [Multiple; 2] {
     ]
 }
 
-/// Alpha as a boundary with this relative index of refraction uses it, zero for a smooth one. Since refraction turns directions by about
-/// `|ior - 1|` times the slope, that also multiplies alpha before it is compared with the limit.
+/// Alpha as a boundary with this relative index of refraction uses it, zero for a smooth one. Since refraction turns
+/// directions by about `|ior - 1|` times the slope, that also multiplies alpha before it is compared with the limit.
 fn clamp_alpha_for_ior(ior: f32, alpha: [f32; 2]) -> [f32; 2] {
     let turn = (ior - 1.0).abs().min(1.0);
     let is_smooth = clamp_alpha(alpha.map(|a| a * turn))[0] == 0.0;
@@ -134,7 +134,8 @@ impl<D: Microfacets> Dielectric<D> {
         if is_transmission { transmission } else { reflection }
     }
 
-    /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over that on its side.
+    /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over
+    /// that on its side.
     #[inline]
     fn missing_energy(&self, eta: f32, w: Vec3) -> f32 {
         self.facets.energy().map_or(0.0, |energy| 1.0 - energy.dielectric_albedo(eta, w)).clamp(0.0, 1.0)
@@ -207,7 +208,8 @@ impl<D: Microfacets> Dielectric<D> {
         let scale = 1.0 / length_squared.sqrt();
         let (cos_o, cos_i) = (o.dot(half) * scale, -i.dot(half) * scale);
         let is_valid = (length_squared > 0.0) & (cos_o > 0.0) & (cos_i > 0.0);
-        // The cosine of refraction is known: recomputing it by Snell's law would lose its digits near the critical angle.
+        // The cosine of refraction is known: recomputing it by Snell's law would lose its digits near the critical
+        // angle.
         let transmittance = 1.0 - fresnel::dielectric_reflectance(cos_o, cos_i, eta);
         let common = 2.0 * transmittance * self.facets.normal_density(half) * cos_o * cos_i / length_squared;
         let (value, pdf) = self.facets.refraction(o, vec3(i.x, i.y, -i.z), common);
@@ -267,7 +269,8 @@ impl<D: Microfacets> Dielectric<D> {
         let mut wi = if is_transmission { refracted } else { reflected };
         let is_valid = (cos > 0.0) & if is_transmission { wi.z < 0.0 } else { wi.z > 0.0 };
         let shadowing = self.facets.g2_over_g1(o, vec3(wi.x, wi.y, wi.z.abs()));
-        // |h| = |cos - eta cos_t|; the reflection's density holds 1 / (4 cos), which the Jacobian of refraction replaces.
+        // |h| = |cos - eta cos_t|; the reflection's density has 1 / (4 cos) in it, which the Jacobian of refraction
+        // replaces.
         let across = cos - eta * refraction.cos_t;
         let jacobian = eta * eta * refraction.cos_t / (across * across);
         let facet_pdf = self.facets.reflection_pdf(o, m);

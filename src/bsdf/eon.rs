@@ -1,5 +1,6 @@
-//! Rough diffuse reflection: the Oren-Nayar model of Fujii with the light that its facets reflect several times (Portsmouth, Kutz and Hill,
-//! "EON: A Practical Energy-Preserving Rough Diffuse BRDF"), sampled by their clipped linearly transformed cosine.
+//! Rough diffuse reflection: the Oren-Nayar model of Fujii with the light that its facets reflect several times
+//! (Portsmouth, Kutz and Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF"), sampled by their clipped
+//! linearly transformed cosine.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 

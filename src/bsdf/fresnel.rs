@@ -9,7 +9,8 @@ pub struct Refraction {
     pub cos_t: f32,
 }
 
-/// A dielectric seen at `cos_i`, within `[0, 1]`; `eta` is the index of refraction on the far side over that on the near side.
+/// A dielectric seen at `cos_i`, within `[0, 1]`; `eta` is the index of refraction on the far side over that on the
+/// near side.
 #[inline(always)]
 pub fn dielectric(cos_i: f32, eta: f32) -> Refraction {
     // Snell's law; `1 - sin²` is written so that it keeps its digits near the critical angle.
@@ -29,7 +30,8 @@ pub fn dielectric_reflectance(cos_i: f32, cos_t: f32, eta: f32) -> f32 {
     0.5 * (parallel * parallel + across * across)
 }
 
-/// Mean reflectance of a dielectric under diffuse light, `2 ∫ F(cos) cos dcos`, for the far side's index over the near side's.
+/// Mean reflectance of a dielectric under diffuse light, `2 ∫ F(cos) cos dcos`, for the far side's index over the near
+/// side's.
 pub fn dielectric_average(eta: f32) -> f32 {
     let eta = f64::from(eta);
     if eta < 1.0 {

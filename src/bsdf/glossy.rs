@@ -30,7 +30,8 @@ pub struct Glossy {
 const MIN_ALPHA: f32 = 1e-3;
 
 impl Glossy {
-    /// With Schlick's Fresnel term from `f0` to `f90` and a GGX `alpha` within `[0, 1]`, of which at least 0.001 counts.
+    /// With Schlick's Fresnel term from `f0` to `f90` and a GGX `alpha` within `[0, 1]`, of which at least 0.001
+    /// counts.
     pub fn new(diffuse: Rgb, f0: Rgb, f90: Rgb, alpha: f32) -> Self {
         Self { diffuse, f0, f90, ggx: Ggx::new([alpha.max(MIN_ALPHA); 2]) }
     }
@@ -45,8 +46,8 @@ impl Glossy {
         Self { ggx: Ggx::new(alpha), ..*self }
     }
 
-    /// Phong's model with the highlight of the same width: alpha is `sqrt(2 / (exponent + 2))` (Walter et al., "Microfacet Models for
-    /// Refraction through Rough Surfaces").
+    /// Phong's model with the highlight of the same width: alpha is `sqrt(2 / (exponent + 2))` (Walter et al.,
+    /// "Microfacet Models for Refraction through Rough Surfaces").
     pub fn phong(diffuse: Rgb, specular: Rgb, exponent: f32) -> Self {
         Self::new(diffuse, specular, specular, (2.0 / (exponent + 2.0)).sqrt())
     }

@@ -8,8 +8,8 @@
 //! visible normals    = G1(o) D(m) (o·m) / oz = 2 D(m) (o·m) / (oz + s(o))
 //! ```
 //!
-//! (Walter et al., "Microfacet Models for Refraction through Rough Surfaces"; Heitz, "Understanding the Masking-Shadowing Function in
-//! Microfacet-Based BRDFs".) Directions are unit, local, on the upper side (`z > 0`).
+//! (Walter et al., "Microfacet Models for Refraction through Rough Surfaces"; Heitz, "Understanding the
+//! Masking-Shadowing Function in Microfacet-Based BRDFs".) Directions are unit, local, on the upper side (`z > 0`).
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -25,7 +25,8 @@ pub trait Microfacets: Copy {
     /// Alpha along x and y.
     fn alpha(&self) -> [f32; 2];
 
-    /// Density of microfacet normals: microfacet area per surface area and solid angle around `m`, which need not be unit.
+    /// Density of microfacet normals: microfacet area per surface area and solid angle around `m`, which need not be
+    /// unit.
     fn normal_density(&self, m: Vec3) -> f32;
 
     /// A normal among those visible from `o`. Unit; `o·m` is positive but for rounding.
@@ -68,11 +69,12 @@ pub struct Ggx {
     pub(super) alpha: [f32; 2],
 }
 
-/// Alpha below which a surface counts as smooth. The rounding of a direction, 1e-7, turns a microfacet normal by as much: of a lobe of
-/// width 1e-4 that is a thousandth, and a narrower one would have no digits left.
+/// Alpha below which a surface counts as smooth. The rounding of a direction, 1e-7, turns a microfacet normal by as
+/// much: of a lobe of width 1e-4 that is a thousandth, and a narrower one would have no digits left.
 pub const SMOOTH_ALPHA: f32 = 1e-4;
 
-/// A direction whose cosine is not above this lies in the surface: below, products of cosines and alpha would underflow.
+/// A direction whose cosine is not above this lies in the surface: below, products of cosines and alpha would
+/// underflow.
 pub(super) const MIN_COSINE: f32 = 1e-30;
 
 /// Reflection by a microfacet between two directions, all but the Fresnel factor.
@@ -152,7 +154,8 @@ impl Microfacets for Ggx {
         if stretched == 0.0 { 0.0 } else { FRAC_1_PI * a * ratio * ratio }
     }
 
-    /// With density [`Ggx::visible_normal_pdf`] (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps").
+    /// With density [`Ggx::visible_normal_pdf`] (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical
+    /// Caps").
     #[inline(always)]
     fn sample_visible_normal(&self, o: Vec3, u: [f32; 2]) -> Vec3 {
         let [ax, ay] = self.alpha;

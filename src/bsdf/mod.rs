@@ -1,7 +1,8 @@
-//! Scattering at a point, in the local frame: `z` is the shading normal, directions are unit and point away from the surface.
+//! Scattering at a point, in the local frame: `z` is the shading normal, directions are unit and point away from the
+//! surface.
 //!
-//! Every value carries the cosine: `f(wo, wi) |cos wi|`. Densities are per solid angle. Materials are two-sided: `wo.z < 0` sees the
-//! back, which an opaque BSDF treats as its front and a dielectric as its inside.
+//! Every value carries the cosine: `f(wo, wi) |cos wi|`. Densities are per solid angle. Materials are two-sided: `wo.z
+//! < 0` sees the back, which an opaque BSDF treats as its front and a dielectric as its inside.
 
 mod beckmann;
 mod coat;
@@ -57,15 +58,15 @@ pub struct BsdfSample {
     pub wi: Vec3,
     /// `f |cos| / pdf`, all lobes counted; for a delta lobe the factor on radiance.
     pub weight: Rgb,
-    /// Density per solid angle, all non-delta lobes counted; for a delta lobe the probability of having chosen it (only to compare: it is
-    /// no density).
+    /// Density per solid angle, all non-delta lobes counted; for a delta lobe the probability of having chosen it (only
+    /// to compare: it is no density).
     pub pdf: f32,
     /// Whether the direction came from a delta lobe: light sampling cannot find it.
     pub is_delta: bool,
     /// Whether the direction crosses the surface.
     pub is_transmission: bool,
-    /// Index of refraction on the side of `wi` over that on the side of `wo`; 1 for reflection. Roulette undoes the radiance scaling of
-    /// refraction with its square.
+    /// Index of refraction on the side of `wi` over that on the side of `wo`; 1 for reflection. Roulette undoes the
+    /// radiance scaling of refraction with its square.
     pub eta: f32,
 }
 
@@ -157,8 +158,8 @@ impl Bsdf {
         each!(self, bsdf => bsdf.eval(wo, wi))
     }
 
-    /// A direction chosen with density [`BsdfEval::pdf`]; `u_lobe` chooses among lobes, `u` within one. `None` where the sample fails or
-    /// carries nothing.
+    /// A direction chosen with density [`BsdfEval::pdf`]; `u_lobe` chooses among lobes, `u` within one. `None` where
+    /// the sample fails or carries nothing.
     #[inline]
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
         if let Self::Lambert(bsdf) = self { bsdf.sample(wo, u_lobe, u) } else { Some(self.sample_any(wo, u_lobe, u)?) }

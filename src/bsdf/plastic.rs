@@ -39,8 +39,8 @@ pub struct Plastic<D = Ggx> {
 }
 
 impl Plastic {
-    /// A base of colour `diffuse` under a coat with index of refraction `ior` over the outside, at least 1; smooth where
-    /// [`Ggx::new`](super::Ggx::new) says so. A rough coat costs some milliseconds here.
+    /// A base of colour `diffuse` under a coat with index of refraction `ior` over the outside, at least 1; smooth
+    /// where [`Ggx::new`](super::Ggx::new) says so. A rough coat costs some milliseconds here.
     pub fn new(diffuse: Rgb, ior: f32, alpha: [f32; 2]) -> Self {
         Self { diffuse, coat: Coat::new(ior, alpha), tint: Rgb::WHITE, nonlinear: false }
     }

@@ -4,8 +4,9 @@
 use super::{Bsdf, Coated, Microfacets, SingleScatteringBsdf};
 
 impl Bsdf {
-    /// The same scattering with an alpha of at least `alpha`, within `[0, 1]`, along both tangents; what lies below a coat and how much the
-    /// coat lets through stay. `None` if nothing is narrower: diffuse and ideally smooth surfaces, and Phong's own lobe, stay as they are.
+    /// The same scattering with an alpha of at least `alpha`, within `[0, 1]`, along both tangents; what lies below a
+    /// coat and how much the coat lets through stay. `None` if nothing is narrower: diffuse and ideally smooth
+    /// surfaces, and Phong's own lobe, stay as they are.
     pub fn with_min_alpha(&self, alpha: f32) -> Option<Self> {
         Some(match self {
             Self::Conductor(bsdf) => Self::Conductor(bsdf.with_alpha(widened(bsdf.alpha(), alpha)?)),

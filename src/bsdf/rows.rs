@@ -207,8 +207,8 @@ macro_rules! lanes {
 }
 
 impl Bsdf {
-    /// Whether BSDFs of one material that are like this one, and of plastics those that differ in colours alone, can be one
-    /// group of queries.
+    /// Whether BSDFs of one material that are like this one, and of plastics those that differ in colours alone, can be
+    /// one group of queries.
     pub fn can_vary(&self) -> bool {
         match self {
             Self::Plastic(bsdf) => bsdf.coat.is_smooth() || !bsdf.coat.is_anisotropic(),
@@ -218,7 +218,8 @@ impl Bsdf {
         }
     }
 
-    /// [`eval`](Self::eval) for the first `count` queries, at most [`BATCH`]; with the parameters of the queries where `varies`.
+    /// [`eval`](Self::eval) for the first `count` queries, at most [`BATCH`]; with the parameters of the queries where
+    /// `varies`.
     pub fn eval_rows(&self, queries: &BsdfQueryRows, varies: bool, count: usize, out: &mut BsdfEvalRows) {
         let single = |i: usize| self.eval(queries.wo.get(i), queries.wi.get(i));
         if count == 1 {

@@ -100,7 +100,8 @@ impl RangedInput {
     }
 }
 
-/// How the normals of microfacets are distributed and masked, and what becomes of light that they scatter several times.
+/// How the normals of microfacets are distributed and masked, and what becomes of light that they scatter several
+/// times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Facets {
     /// GGX; it is kept.
@@ -206,8 +207,8 @@ pub enum PlasticCoat {
 }
 
 impl PlasticCoat {
-    /// The coat over `footprint` with a base of colour `diffuse`, a factor `tint` on what the coat reflects, and whether the base is
-    /// [nonlinear](Plastic::nonlinear).
+    /// The coat over `footprint` with a base of colour `diffuse`, a factor `tint` on what the coat reflects, and
+    /// whether the base is [nonlinear](Plastic::nonlinear).
     #[inline]
     pub(super) fn over(&self, diffuse: Rgb, tint: Rgb, nonlinear: bool, textures: &[Texture], footprint: &Footprint) -> Bsdf {
         match self {

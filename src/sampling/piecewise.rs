@@ -7,8 +7,8 @@
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::vectorize::vectorize;
 
-/// The whole of a cumulative table. Tables count in units of `1 / WHOLE`: the density is then exactly that of the sampling, and a cell of
-/// positive weight never rounds to nothing.
+/// The whole of a cumulative table. Tables count in units of `1 / WHOLE`: the density is then exactly that of the
+/// sampling, and a cell of positive weight never rounds to nothing.
 const WHOLE: u32 = u32::MAX;
 
 /// A point chosen by a [`Piecewise2d`].
@@ -104,8 +104,8 @@ struct Table {
 struct TableLevel {
     /// Nodes of each tree.
     count: usize,
-    /// Of leaves, the upper limits of entries, within `[0, WHOLE]`; of others, those of the last entries below each child.
-    /// Unused keys are [`WHOLE`].
+    /// Of leaves, the upper limits of entries, within `[0, WHOLE]`; of others, those of the last entries below each
+    /// child. Unused keys are [`WHOLE`].
     nodes: Vec<Keys>,
 }
 
@@ -214,8 +214,8 @@ impl Table {
 }
 
 impl Piecewise2d {
-    /// The density in proportion to `width * height` weights, by rows; `None` if the count is wrong, one is negative or not finite, or all
-    /// are zero.
+    /// The density in proportion to `width * height` weights, by rows; `None` if the count is wrong, one is negative or
+    /// not finite, or all are zero.
     pub fn new(width: usize, height: usize, weights: &[f32]) -> Option<Self> {
         let fits = width.checked_mul(height) == Some(weights.len()) && width.max(height) < u32::MAX as usize / 2;
         if !fits || !weights.iter().all(|w| w.is_finite() && *w >= 0.0) || !weights.iter().any(|w| *w > 0.0) {
@@ -242,14 +242,16 @@ impl Piecewise2d {
         Some(Self { width, height, rows, columns, blocks })
     }
 
-    /// A cell with its probability and a uniform point inside; `u` in `[0, 1)²`. The first number chooses the column, the second the row.
+    /// A cell with its probability and a uniform point inside; `u` in `[0, 1)²`. The first number chooses the column,
+    /// the second the row.
     #[inline]
     pub fn sample_cell(&self, u: [f32; 2]) -> PiecewiseCell {
         let chosen = self.choose_block(u);
         chosen.cell_in(&self.blocks[self.block_at(&chosen)])
     }
 
-    /// Cells for as many numbers as there are places for the results, as [`sample_cell`](Self::sample_cell): all wait for memory at once.
+    /// Cells for as many numbers as there are places for the results, as [`sample_cell`](Self::sample_cell): all wait
+    /// for memory at once.
     #[inline]
     pub fn sample_cells<const N: usize>(&self, us: &[[f32; 2]], cells: &mut [PiecewiseCell; N]) {
         let mut chosen = [ChosenBlock::default(); N];

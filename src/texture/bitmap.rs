@@ -19,7 +19,8 @@ pub enum TextureFilter {
     Nearest,
     /// The colours of the four nearest texels, blended.
     Bilinear,
-    /// As `Bilinear`, in the two levels of the image's [pyramid](super::Pyramid) whose texels are about as large as the footprint, blended.
+    /// As `Bilinear`, in the two levels of the image's [pyramid](super::Pyramid) whose texels are about as large as the
+    /// footprint, blended.
     #[default]
     Trilinear,
 }
@@ -175,8 +176,8 @@ impl Bitmap {
         }
     }
 
-    /// How many cells there are along each axis: parts in which the same texels decide. Without blending a cell is a texel; else it is the
-    /// square between the middles of four, the first of which lie beyond the edge.
+    /// How many cells there are along each axis: parts in which the same texels decide. Without blending a cell is a
+    /// texel; else it is the square between the middles of four, the first of which lie beyond the edge.
     pub(super) fn cells(&self) -> [usize; 2] {
         let between = usize::from(self.filter != TextureFilter::Nearest);
         [self.image.width() + between, self.image.height() + between]

@@ -24,8 +24,9 @@ impl Footprint<'_> {
         Self { uv, area: 0.0, attributes: None }
     }
 
-    /// Where a cone of this `width`, whose unit axis meets the surface's unit normal at the cosine `cos`, meets a surface with this
-    /// [area in uv per area](crate::geometry::Geometry::uv_density); a point where uv do not span the surface.
+    /// Where a cone of this `width`, whose unit axis meets the surface's unit normal at the cosine `cos`, meets a
+    /// surface with this [area in uv per area](crate::geometry::Geometry::uv_density); a point where uv do not span the
+    /// surface.
     #[inline]
     pub fn of_cone(uv: Vec2, width: f32, cos: f32, uv_density: f32) -> Self {
         // In f64: uv may span kilometres or micrometres.

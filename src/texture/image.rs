@@ -133,7 +133,8 @@ impl TextureImage {
         self.data.is_float()
     }
 
-    /// Smallest and largest number of alpha or of all colour channels; 0 and 1 for whole numbers and where there is no alpha.
+    /// Smallest and largest number of alpha or of all colour channels; 0 and 1 for whole numbers and where there is no
+    /// alpha.
     pub fn range(&self, alpha: bool) -> [f32; 2] {
         if alpha && !self.has_alpha() { [0.0, 1.0] } else { self.ranges[usize::from(alpha)] }
     }

@@ -54,7 +54,8 @@ impl Texture {
         }
     }
 
-    /// One number at `uv`, for roughness, heights and the like: the luminance of a colour, or the channel that an image says.
+    /// One number at `uv`, for roughness, heights and the like: the luminance of a colour, or the channel that an image
+    /// says.
     #[inline]
     pub fn scalar(&self, uv: Vec2) -> f32 {
         match self {
@@ -144,7 +145,8 @@ impl Texture {
         }
     }
 
-    /// Changes of the place in an image along u and along v, each per unit of uv; u and v themselves for what is no image.
+    /// Changes of the place in an image along u and along v, each per unit of uv; u and v themselves for what is no
+    /// image.
     pub fn axes(&self) -> [Vec2; 2] {
         match self {
             Self::Bitmap(bitmap) => bitmap.transform.axes(),

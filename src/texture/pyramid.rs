@@ -1,14 +1,15 @@
 //! Image pyramids (Williams, "Pyramidal Parametrics"): an image, its half, its quarter and so on.
 //!
-//! A texel of a level is the mean of the part of the image that it covers, in linear values, for images of odd sizes too: so all levels
-//! have the image's mean.
+//! A texel of a level is the mean of the part of the image that it covers, in linear values, for images of odd sizes
+//! too: so all levels have the image's mean.
 
 use half::f16;
 
 use super::image::{Channel, Decoding, TextureImage};
 use crate::image_data::{ImageData, Samples};
 
-/// The smaller levels of an image, down to a single texel. Whole numbers are kept in 16 bits, floats as the image has them; all are linear.
+/// The smaller levels of an image, down to a single texel. Whole numbers are kept in 16 bits, floats as the image has
+/// them; all are linear.
 #[derive(Clone, Debug)]
 pub struct Pyramid {
     /// From half the image's size on.

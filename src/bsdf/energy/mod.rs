@@ -1,14 +1,16 @@
 //! Directional albedo of single-scattering microfacets, and the energy that multiple scattering carries.
 //!
-//! A microfacet model follows light to one microfacet; what is masked on its way out is missing, up to two thirds at alpha 1. With `E(w)`
-//! the fraction that is scattered at once for the direction `w` and `E_avg` its mean under diffuse light, the lobe
+//! A microfacet model follows light to one microfacet; what is masked on its way out is missing, up to two thirds at
+//! alpha 1. With `E(w)` the fraction that is scattered at once for the direction `w` and `E_avg` its mean under diffuse
+//! light, the lobe
 //!
 //! ```text
 //! (1 - E(wo)) (1 - E(wi)) / (pi (1 - E_avg))
 //! ```
 //!
-//! times the colour that several reflections leave gives back exactly what is missing, and is reciprocal (Kulla and Conty, "Revisiting
-//! Physically Based Shading at Imageworks"). `E` comes from tables that `cargo xtask bake_energy` computes.
+//! times the colour that several reflections leave gives back exactly what is missing, and is reciprocal (Kulla and
+//! Conty, "Revisiting Physically Based Shading at Imageworks"). `E` comes from tables that `cargo xtask bake_energy`
+//! computes.
 //!
 //! Directions are unit, local, on the upper side.
 
@@ -110,7 +112,8 @@ impl Energy {
     pub fn average_missing_energy(&self) -> f32 {
         let missing =
             MIRRORS_AVERAGE.bilinear_square(0, ALPHAS, TableCoordinate::new(self.aspect.sqrt(), ASPECTS), self.at_alpha).max(MIN_LOST);
-        // Between the axes of anisotropic microfacets the table is interpolated: rather a hundredth of the lobe too dark than too bright.
+        // Between the axes of anisotropic microfacets the table is interpolated: rather a hundredth of the lobe too
+        // dark than too bright.
         if self.aspect == 1.0 { missing } else { 1.01 * missing }
     }
 
@@ -128,7 +131,8 @@ impl Energy {
         weight.max(isotropic_schlick(cos, alpha, TableCoordinate::of_alpha(alpha)))
     }
 
-    /// Alpha of round microfacets that grazing light from `w` meets at the angles at which it meets these, or at greater ones.
+    /// Alpha of round microfacets that grazing light from `w` meets at the angles at which it meets these, or at
+    /// greater ones.
     #[inline]
     fn grazed_alpha(&self, w: Vec3) -> f32 {
         let [ax, ay] = self.ggx.alpha();
@@ -150,8 +154,8 @@ impl Energy {
         alpha * (0.78 + 0.22 * self.aspect)
     }
 
-    /// What dielectric microfacets reflect and refract together, for the index of refraction beyond them over that on this side, within
-    /// `[1/10, 10]`. Of isotropic microfacets.
+    /// What dielectric microfacets reflect and refract together, for the index of refraction beyond them over that on
+    /// this side, within `[1/10, 10]`. Of isotropic microfacets.
     #[inline]
     pub fn dielectric_albedo(&self, eta: f32, w: Vec3) -> f32 {
         const SIDE: usize = ALPHAS * IORS * COSINES;
@@ -203,7 +207,8 @@ pub fn principled_clear_coat(gloss: f32, cos: f32) -> f32 {
     CLEAR_COAT.bilinear_from(0, COSINES, TableCoordinate::new(gloss, SHAPES), TableCoordinate::of_cosine(cos, 1.0))
 }
 
-/// Albedo of a clear coat of isotropic microfacets, for an index of refraction over that of the outside within `[1, 10]`.
+/// Albedo of a clear coat of isotropic microfacets, for an index of refraction over that of the outside within `[1,
+/// 10]`.
 #[inline]
 pub fn coat_albedo(ior: f32, alpha: f32, cos: f32) -> f32 {
     let at = [TableCoordinate::of_alpha(alpha), TableCoordinate::of_ior(ior), TableCoordinate::new(cos.sqrt(), COAT_NODES)];

@@ -161,8 +161,8 @@ impl TableCoordinate {
     }
 }
 
-/// Where a cosine lies on its axis: half of the nodes follow its square root; the others are dense where the cosine is of the order of
-/// alpha, since there masking sets in.
+/// Where a cosine lies on its axis: half of the nodes follow its square root; the others are dense where the cosine is
+/// of the order of alpha, since there masking sets in.
 #[inline(always)]
 pub fn cosine_axis(cos: f32, alpha: f32) -> f32 {
     0.5 * (cos * (1.0 + alpha) / (cos + alpha).max(f32::MIN_POSITIVE) + cos.sqrt())
@@ -178,8 +178,8 @@ pub fn across(cos_squared: f32, sin_squared: f32, aspect: f32) -> f32 {
     if cos_squared + shrunk > 0.0 { shrunk / (cos_squared + shrunk) } else { 0.5 }
 }
 
-/// A cosine that stays away from grazing by about alpha, where microfacets are not seen at grazing angles: what is left to tabulate after
-/// Fresnel's reflectance there is smooth.
+/// A cosine that stays away from grazing by about alpha, where microfacets are not seen at grazing angles: what is left
+/// to tabulate after Fresnel's reflectance there is smooth.
 #[inline(always)]
 pub fn smoothed(cos: f32, alpha: f32) -> f32 {
     let apart = 2.25 * alpha * alpha;

@@ -22,7 +22,8 @@ impl Principled {
         Dielectric::rough(self.p.ior, self.ggx, self.p.multiscatter)
     }
 
-    /// Mitsuba's specular reflectance of the dielectric layer at a cosine: exact Fresnel, mixed with Schlick's by the tint.
+    /// Mitsuba's specular reflectance of the dielectric layer at a cosine: exact Fresnel, mixed with Schlick's by the
+    /// tint.
     #[inline(always)]
     pub(super) fn mitsuba_specular(&self, cos: f32) -> Rgb {
         let exact = fresnel::dielectric(cos, self.p.ior).reflectance;
@@ -55,20 +56,22 @@ impl Principled {
             return BsdfEval { value: self.mitsuba_specular(facet.cos) * facet.value, pdf: reflection * facet.pdf };
         }
         let facet = self.transmission_facets().reflection(o, i);
-        // Mitsuba tests the half vector of the mirrored direction against the direction itself, which cuts wide transmission off.
+        // Mitsuba tests the half vector of the mirrored direction against the direction itself, which cuts wide
+        // transmission off.
         let passes = (o + i).dot(Vec3::new(i.x, i.y, -i.z)) < 0.0;
         let fraction = if passes { 1.0 - fresnel::dielectric(facet.cos, self.p.ior).reflectance } else { 0.0 };
         BsdfEval { value: self.p.base_color * (fraction * facet.value), pdf: (1.0 - reflection) * facet.pdf }
     }
 
-    /// The microfacets of transmission through a thin sheet in Mitsuba: the roughness of refraction at both faces together
-    /// (Burley, "Extending the Disney BRDF to a BSDF with Integrated Subsurface Scattering").
+    /// The microfacets of transmission through a thin sheet in Mitsuba: the roughness of refraction at both faces
+    /// together (Burley, "Extending the Disney BRDF to a BSDF with Integrated Subsurface Scattering").
     fn transmission_facets(&self) -> SeparableGgx {
         let scale = (0.65 * self.p.ior - 0.35).max(0.0);
         SeparableGgx::new(self.ggx.alpha().map(|alpha| (alpha * scale * scale).clamp(super::MIN_ALPHA, 1.0)))
     }
 
-    /// The direction of the light mirrored to the viewer's side, which may be below, and whether the light is reflected.
+    /// The direction of the light mirrored to the viewer's side, which may be below, and whether the light is
+    /// reflected.
     #[inline]
     pub(super) fn sample_thin(&self, o: Vec3, u_side: f32, u: [f32; 2]) -> (Vec3, bool) {
         if self.is_mitsuba() {

@@ -1,21 +1,23 @@
-//! The principled model: one material for most surfaces, from a dozen parameters (Burley, "Physically Based Shading at Disney"; Burley,
-//! "Extending the Disney BRDF to a BSDF with Integrated Subsurface Scattering").
+//! The principled model: one material for most surfaces, from a dozen parameters (Burley, "Physically Based Shading at
+//! Disney"; Burley, "Extending the Disney BRDF to a BSDF with Integrated Subsurface Scattering").
 //!
-//! From the top: a clear coat; below it, shared out by `metallic` and `transmission`, a metal, a dielectric layer over a diffuse base with
-//! sheen, and rough glass. As in the papers the lobes are added, but so a white surface might reflect up to twice what it receives. A layer
-//! that reflects `E(w)` of the light from `w` over what would scatter `A(w)` of it alone therefore leaves
+//! From the top: a clear coat; below it, shared out by `metallic` and `transmission`, a metal, a dielectric layer over
+//! a diffuse base with sheen, and rough glass. As in the papers the lobes are added, but so a white surface might
+//! reflect up to twice what it receives. A layer that reflects `E(w)` of the light from `w` over what would scatter
+//! `A(w)` of it alone therefore leaves
 //!
 //! ```text
 //! min(1, (1 - max(E(wo), E(wi))) / max(A(wo), A(wi)))
 //! ```
 //!
-//! of what is below, in each channel: 1 wherever the sum is sound, reciprocal, and the whole never scatters more than it receives, whatever
-//! the parameters. Other differences from the papers:
+//! of what is below, in each channel: 1 wherever the sum is sound, reciprocal, and the whole never scatters more than
+//! it receives, whatever the parameters. Other differences from the papers:
 //!
 //! - GGX masks with the height-correlated G2, and light scattered among microfacets several times is added back;
 //! - alpha is `roughness²` stretched by the aspect, within `[0.001, 1]`, for distribution and masking alike;
 //! - tints are the base colour over its largest channel in place of its luminance, so that no channel exceeds 1;
-//! - subsurface scattering is the flat lobe of 2012 for solids as well; glass has exact Fresnel terms, all else Schlick's;
+//! - subsurface scattering is the flat lobe of 2012 for solids as well; glass has exact Fresnel terms, all else
+//!   Schlick's;
 //! - the specular lobe that passes a thin sheet has the width of the one that it reflects.
 //!
 //! [`PrincipledModel::Mitsuba`] has the lobes of Mitsuba 3's `principled` and, for thin sheets of glass,
@@ -44,13 +46,15 @@ use shapes::ClearCoat;
 /// The least alpha: no lobe is a delta.
 const MIN_ALPHA: f32 = 1e-3;
 
-/// The least index of refraction of glass: with less, directions have no digits left to tell refracted light from light that goes on.
+/// The least index of refraction of glass: with less, directions have no digits left to tell refracted light from light
+/// that goes on.
 const MIN_GLASS_IOR: f32 = 1.05;
 
 /// The principled model at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Principled {
-    /// The parameters; `ior` is the index that glass has, also where `specular` is given, and `multiscatter` is false for Mitsuba's lobes.
+    /// The parameters; `ior` is the index that glass has, also where `specular` is given, and `multiscatter` is false
+    /// for Mitsuba's lobes.
     p: PrincipledParameters,
     /// Reflectance of the dielectric layer ahead.
     specular: Rgb,
@@ -363,7 +367,8 @@ impl Principled {
         above(i).map(|i| if reflects { i } else { vec3(i.x, i.y, -i.z) })
     }
 
-    /// The share of what is below a layer that is left for a pair of directions: the layer's albedos for both, and those of what is below.
+    /// The share of what is below a layer that is left for a pair of directions: the layer's albedos for both, and
+    /// those of what is below.
     #[inline(always)]
     fn base_attenuation(&self, layer: [Rgb; 2], below: [Rgb; 2]) -> Rgb {
         if self.is_mitsuba() {
@@ -444,7 +449,8 @@ fn mix(a: Rgb, b: Rgb, amount: f32) -> Rgb {
     a * (1.0 - amount) + b * amount
 }
 
-/// Colour that several reflections leave where Schlick's reflectance is `f` ahead and one reflection releases `average` of diffuse light.
+/// Colour that several reflections leave where Schlick's reflectance is `f` ahead and one reflection releases `average`
+/// of diffuse light.
 fn schlick_multiple(f: f32, average: f32) -> f32 {
     super::energy::multiple_color(f + (1.0 - f) / 21.0, average)
 }

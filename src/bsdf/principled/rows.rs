@@ -5,8 +5,8 @@ use crate::bsdf::rows::{BsdfQueryRows, LaneBsdf};
 use crate::bsdf::{BsdfEval, BsdfSample, Ggx};
 use crate::math::Vec3;
 
-/// Isotropic metal and a dielectric layer over a diffuse base, without any other lobe, for vector code: the parameters of
-/// the other lobes are constants here, so that their code is left out.
+/// Isotropic metal and a dielectric layer over a diffuse base, without any other lobe, for vector code: the parameters
+/// of the other lobes are constants here, so that their code is left out.
 #[derive(Clone, Copy)]
 pub struct BasicPrincipled<const MITSUBA: bool>(Principled);
 

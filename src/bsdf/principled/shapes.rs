@@ -61,7 +61,8 @@ impl ClearCoat {
     pub fn eval(&self, o: Vec3, i: Vec3) -> (f32, f32) {
         let half = o + i;
         let length_squared = half.length_squared();
-        // Of the half vector: cos² with the normal and cos with the directions. Its sine comes from x and y, which keep their digits.
+        // Of the half vector: cos² with the normal and cos with the directions. Its sine comes from x and y, which keep
+        // their digits.
         let sin_squared = half.truncate().length_squared() / length_squared;
         let cos_half = 0.5 * length_squared.sqrt();
         let density = self.normal_density(1.0 - sin_squared);

@@ -51,8 +51,9 @@ fn nothing_crosses_a_coat() {
 
 #[test]
 fn no_white_base_gives_back_more_than_it_receives_or_much_less() {
-    // Quadrature with 4096 points. Over a diffuse base and a mirror nothing is lost but what the tables' interpolation says; over others
-    // what the coat reflects of diffuse light more than of light from ahead, at most 0.06 for 1.5, and what the base itself loses.
+    // Quadrature with 4096 points. Over a diffuse base and a mirror nothing is lost but what the tables' interpolation
+    // says; over others what the coat reflects of diffuse light more than of light from ahead, at most 0.06 for 1.5,
+    // and what the base itself loses.
     for (name, base) in bases(Rgb::WHITE) {
         for alpha in COATS {
             let bsdf = coated(1.5, alpha, Rgb::WHITE, base.clone());

@@ -7,7 +7,8 @@ fn eon(roughness: f32) -> Bsdf {
     Bsdf::Eon(Eon { albedo: Rgb::new(1.0, 0.5, 0.1), roughness })
 }
 
-/// The formula of reports that leave out pi and the cosines' place is replaced by the normalised one: here with `d + s = 1`.
+/// The formula of reports that leave out pi and the cosines' place is replaced by the normalised one: here with `d + s
+/// = 1`.
 fn cook_torrance(m: f32) -> Bsdf {
     Bsdf::Glossy(Glossy::new(Rgb::new(0.4, 0.2, 0.1), Rgb::new(0.5, 0.3, 0.1) * 0.6, Rgb::splat(0.6), m))
 }

@@ -22,8 +22,8 @@ fn essential(bits: u32) -> u32 {
 
 #[test]
 fn no_corner_scatters_more_than_it_receives() {
-    // Corners that differ in what has no effect scatter alike, bit for bit. For each of the others the albedo comes from two shifted Sobol
-    // sequences over all random numbers of a sample. Nothing is random: the points are fixed.
+    // Corners that differ in what has no effect scatter alike, bit for bit. For each of the others the albedo comes
+    // from two shifted Sobol sequences over all random numbers of a sample. Nothing is random: the points are fixed.
     let mut corners = Vec::new();
     for bits in 0..2048 {
         if essential(bits) == bits {
@@ -45,7 +45,8 @@ fn no_corner_scatters_more_than_it_receives() {
         for cos in [1.0, 0.7, 0.3, 0.1, 0.02].into_iter().chain(inside) {
             let by = |count: u32| [1, 2].map(|seed| scattered_by(count, seed, &bsdf, direction(cos, 0.07)).max_channel());
             let [mut a, mut b] = by(4096);
-            // Where the two leave it open, the narrow lobe of a coat at grazing angles for the most part, many more points tell.
+            // Where the two leave it open, the narrow lobe of a coat at grazing angles for the most part, many more
+            // points tell.
             if 0.5 * (a + b) + (a - b).abs() > 1.005 {
                 [a, b] = by(1 << 17);
                 assert!((a - b).abs() < 0.004, "{bits:b} at {cos}: {a} {b}");
@@ -139,8 +140,8 @@ fn a_white_metal_loses_nothing_and_black_keeps_only_its_layers() {
 
 #[test]
 fn masking_and_distribution_share_their_alpha() {
-    // With G from another alpha than D, normals visible from a direction would not add up to it: the white furnace of single scattering at
-    // the limit of weak roughness keeps all, at any direction.
+    // With G from another alpha than D, normals visible from a direction would not add up to it: the white furnace of
+    // single scattering at the limit of weak roughness keeps all, at any direction.
     let metal = PrincipledParameters { base_color: Rgb::WHITE, metallic: 1.0, roughness: 0.1, multiscatter: false, ..Default::default() };
     let bsdf = Principled::new(&metal);
     for cos in [1.0, 0.5, 0.2] {
@@ -153,7 +154,8 @@ fn masking_and_distribution_share_their_alpha() {
 
 #[test]
 fn the_base_is_coloured_once() {
-    // What cosine-weighted samples carry of a plain diffuse base is its colour below the layer: no factor pi, no colour twice.
+    // What cosine-weighted samples carry of a plain diffuse base is its colour below the layer: no factor pi, no colour
+    // twice.
     let color = Rgb::new(0.8, 0.4, 0.2);
     let plain = PrincipledParameters { base_color: color, ior: 1.0, roughness: 0.5, ..PrincipledParameters::default() };
     let bsdf = Principled::new(&plain);

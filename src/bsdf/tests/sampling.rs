@@ -3,7 +3,8 @@
 use super::*;
 use crate::sampling::statistics::random_points;
 
-/// Largest relative difference between a sample and the evaluation of its direction, over the samples of some directions.
+/// Largest relative difference between a sample and the evaluation of its direction, over the samples of some
+/// directions.
 pub(super) fn worst_disagreement(bsdf: &Bsdf, cosines: &[f32]) -> f32 {
     let mut worst = 0f32;
     for &cos in cosines {
@@ -24,9 +25,8 @@ pub(super) fn worst_disagreement(bsdf: &Bsdf, cosines: &[f32]) -> f32 {
 #[test]
 fn weights_are_value_over_density() {
     for (name, bsdf) in rough_bsdfs() {
-        // Where refraction is involved the half vector is a difference of directions, and near the critical angle 1 - F is the root of one:
-        // both amplify the rounding of wi.
-        // So does the exponential of Beckmann's density.
+        // Where refraction is involved the half vector is a difference of directions, and near the critical angle 1 - F
+        // is the root of one: both amplify the rounding of wi. So does the exponential of Beckmann's density.
         const BOTH_SIDES: &[f32] = &[1.0, 0.7, 0.3, -0.3, -0.7, -1.0];
         let (limit, cosines) = match bsdf {
             Bsdf::Dielectric(_) | Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(_)) => (2e-3, BOTH_SIDES),

@@ -45,7 +45,8 @@ impl Default for GuideRecorder {
     }
 }
 
-/// Whether directions at a vertex may be guided: not at mirrors, nor where light crosses, for roulette must know how it was refracted.
+/// Whether directions at a vertex may be guided: not at mirrors, nor where light crosses, for roulette must know how it
+/// was refracted.
 fn is_guided(vertices: &Vertices, lane: usize) -> bool {
     vertices.rows.flags[lane] & (vertex_flags::DELTA | vertex_flags::TRANSMITS | vertex_flags::MISS) == 0
 }

@@ -107,7 +107,8 @@ pub(super) fn evaluate(context: &Context, wave: &mut Wave, block: usize) {
     evaluate_textured(context, &mut wave.vertices);
 }
 
-/// Finds the footprints of vertices with textures, and starts to load the texels below them: they then wait for memory together.
+/// Finds the footprints of vertices with textures, and starts to load the texels below them: they then wait for memory
+/// together.
 fn find_footprints(context: &Context, wave: &mut Wave, block: usize) {
     let Wave { vertices, rays, hits, cones, .. } = wave;
     for i in 0..vertices.textured.len() {

@@ -1,10 +1,10 @@
 //! Path tracing with next-event estimation and multiple importance sampling, a wave of paths at a time.
 //!
-//! A wave is one sample of every pixel of a tile. Each round of the main loop lengthens all its paths by a segment, stage by stage: trace,
-//! media, vertices, misses, materials, emission, direct light, scatter, shadow rays. Stages work on blocks of `BATCH`
-//! paths, whose state is in structures of arrays. Each path draws its random numbers from its own (pixel, sample,
-//! bounce), so a path is the same in any wave. "Vectorized Production Path Tracing" (Lee et al. 2017) has the idea,
-//! `docs/wavefront.md` the figures.
+//! A wave is one sample of every pixel of a tile. Each round of the main loop lengthens all its paths by a segment,
+//! stage by stage: trace, media, vertices, misses, materials, emission, direct light, scatter, shadow rays. Stages work
+//! on blocks of `BATCH` paths, whose state is in structures of arrays. Each path draws its random numbers from its own
+//! (pixel, sample, bounce), so a path is the same in any wave. "Vectorized Production Path Tracing" (Lee et al. 2017)
+//! has the idea, `docs/wavefront.md` the figures.
 
 mod block;
 mod direct;
@@ -42,7 +42,8 @@ pub struct PathIntegrator {
     pub rr_depth: u32,
     /// How directions towards lights are found.
     pub strategy: Strategy,
-    /// Largest channel that a single contribution of indirect light keeps: less noise for too little light. Infinite for no bias.
+    /// Largest channel that a single contribution of indirect light keeps: less noise for too little light. Infinite
+    /// for no bias.
     pub clamp: f32,
     /// Path space regularization, if it is enabled.
     pub regularization: Option<Regularization>,

@@ -20,7 +20,8 @@ use crate::sampling::{PixelSeed, SampleIdRows};
 
 /// Bits of [`Path::flags`].
 pub(super) mod path_flags {
-    /// Light sampling could not have found the last direction: a camera ray, scattering by a delta lobe, or a passed boundary.
+    /// Light sampling could not have found the last direction: a camera ray, scattering by a delta lobe, or a passed
+    /// boundary.
     pub const SPECULAR: u32 = 1;
     /// Some vertex has scattered the path by a lobe that is no delta.
     pub const ANY_NON_SPECULAR: u32 = 2;
@@ -33,7 +34,8 @@ soa! {
         throughput: Rgb,
         /// Density of the last direction, per solid angle.
         pdf: f32,
-        /// Roulette multiplies the throughput by it: it undoes the radiance scaling of refraction and what a guide added to densities.
+        /// Roulette multiplies the throughput by it: it undoes the radiance scaling of refraction and what a guide
+        /// added to densities.
         rr_scale: f32,
         /// See [`path_flags`].
         flags: u32,
@@ -183,7 +185,8 @@ impl Wave {
         sampler.sample_4d_batch(requests, *count, dimensions::bsdf(context.bounce), u_bsdf);
     }
 
-    /// Queues the shadow rays of a block's vertices and moves the paths that go on to the index `survivors` and those after it.
+    /// Queues the shadow rays of a block's vertices and moves the paths that go on to the index `survivors` and those
+    /// after it.
     pub fn append(&mut self, context: &Context, block: usize, survivors: &mut usize) {
         if context.config.clamp.is_finite() {
             self.vertices.clamp_direct(context);

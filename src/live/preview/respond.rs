@@ -3,7 +3,7 @@
 //! | path | response |
 //! |---|---|
 //! | `/` | the page |
-//! | `/state?page=P&have=V` | numbers and layers as JSON; page P has picture V and requests the next, not with `idle=1` |
+//! | `/state?page=P&have=V` | numbers, layers as JSON; page P has picture V; the next is requested without `idle=1` |
 //! | `/layer?index=I` | a layer: version, width, height, channels (little-endian u32), then rows of 16-bit floats |
 //! | `/pixel?x=X&y=Y` | every layer's exact values at a pixel as JSON |
 
