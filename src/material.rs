@@ -7,7 +7,7 @@ pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, PlasticCoat, RangedI
 pub use principled::PrincipledInputs;
 
 use crate::bsdf::{
-    Beckmann, Bsdf, BsdfFlags, Coated, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic,
+    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic,
     Principled, SeparableGgx, SingleScatteringBsdf, ThinDielectric,
 };
 use crate::color::Rgb;
@@ -220,7 +220,7 @@ impl TexturedMaterial {
             }
             Self::Coated { coat, tint, base } => {
                 let base = base.bsdf(textures, || *footprint);
-                Bsdf::Coated(Coated::new(coat.at(textures, footprint), tint.at(textures, footprint), base).into())
+                Bsdf::coated(coat.at(textures, footprint), tint.at(textures, footprint), base)
             }
             Self::Principled(inputs) => Bsdf::Principled(Principled::new(&inputs.parameters(textures, footprint))),
         }
@@ -231,6 +231,7 @@ impl TexturedMaterial {
     pub fn can_be_grouped(&self) -> bool {
         match self {
             Self::Plastic { coat, .. } => coat.textures().is_empty(),
+            Self::Coated { coat, tint, .. } => coat.textures().is_empty() && tint.texture().is_none(),
             Self::Principled(_) => true,
             _ => false,
         }

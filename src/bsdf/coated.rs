@@ -4,12 +4,11 @@
 //!
 //! ```text
 //! f = coat + tint^((1 / cos_t(wo) + 1 / cos_t(wi)) / 2) g(wo, wi) base
-//! g = (1 - E(wo)) (1 - E(wi)) / (1 - E_avg)     over a diffuse base, as for plastic (Kelemen and Szirmay-Kalos, "A
-//! Microfacet Based Coupled
-//!                                              Specular-Matte BRDF Model with Importance Sampling")
+//! g = (1 - E(wo)) (1 - E(wi)) / (1 - E_avg)     over a diffuse base, as for plastic
 //! g = 1 - max(E(wo), E(wi))                    over any other
 //! ```
 //!
+//! (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model with Importance Sampling"),
 //! with `cos_t` the cosine of the refracted direction in the coat. Both are reciprocal and scatter no more than they
 //! receive; the first loses nothing over a diffuse base, the second nothing over a mirror, and up to `E_avg - E(wo)`
 //! over a base that spreads light widely. The base sees directions as they are outside: what the coat bends on the way
@@ -23,7 +22,7 @@ use super::fresnel;
 use super::microfacet::MIN_COSINE;
 use super::regularize::widened;
 use super::split::share;
-use super::{Bsdf, BsdfEval, BsdfFlags, BsdfSample, Coat, Eon};
+use super::{Bsdf, BsdfEval, BsdfFlags, BsdfSample, Coat, Eon, Lambert, Plastic};
 use crate::color::Rgb;
 use crate::math::float::ONE_MINUS_EPSILON;
 use crate::math::{Vec3, vec3};
@@ -75,6 +74,18 @@ impl Deref for PooledCoated {
     #[inline]
     fn deref(&self) -> &Coated {
         &self.0
+    }
+}
+
+impl Bsdf {
+    /// As [`Coated::new`]: a coat without tint over diffuse reflection is [`Plastic`].
+    pub fn coated(coat: Coat, tint: Rgb, base: Self) -> Self {
+        match base {
+            Self::Lambert(Lambert { albedo: diffuse }) if tint == Rgb::WHITE => {
+                Self::Plastic(Plastic { diffuse, coat, tint, nonlinear: false })
+            }
+            base => Self::Coated(Coated::new(coat, tint, base).into()),
+        }
     }
 }
 

@@ -17,6 +17,16 @@ pub const SMALLEST_NORMAL: f32 = f32::MIN_POSITIVE;
 /// The largest `f32` below one: random numbers and parameters stay within `[0, 1)`.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
+/// `x.floor()` but for the sign of zero, without the call that it is on processors without SSE4.1.
+#[inline(always)]
+pub fn floor(x: f32) -> f32 {
+    /// From here on all are whole numbers.
+    const WHOLE: f32 = 8_388_608.0;
+    let towards_zero = x as i32 as f32;
+    let floor = if towards_zero > x { towards_zero - 1.0 } else { towards_zero };
+    if x.abs() < WHOLE { floor } else { x }
+}
+
 /// The smallest `f32` that is not below `x`.
 #[inline]
 pub fn round_up(x: f64) -> f32 {
@@ -47,6 +57,16 @@ mod tests {
             assert!(f64::from(round_down(x)) <= x && x <= f64::from(round_up(x)), "{x}");
             assert!(round_up(x) <= round_down(x).next_up(), "{x}");
         }
+    }
+
+    #[test]
+    fn floors_are_those_of_the_standard_library() {
+        let odd =
+            [0.0, -0.0, 0.5, -0.5, 1.0 - 6e-8, -1e-45, 8_388_607.5, -8_388_607.5, 8_388_608.0, -8_388_609.0, 3e9, -3e9, f32::MAX, f32::MIN];
+        for x in odd.into_iter().chain((-2000..2000).map(|i| i as f32 * 0.37)) {
+            assert_eq!(floor(x), x.floor(), "{x}");
+        }
+        assert!(floor(f32::NAN).is_nan() && floor(f32::INFINITY) == f32::INFINITY && floor(f32::NEG_INFINITY) == f32::NEG_INFINITY);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::footprint::Footprint;
 use super::image::{Channel, Decoding, TextureImage};
 use super::mapping::{UvTransform, Wrap};
 use crate::color::Rgb;
+use crate::math::float::floor;
 use crate::math::{Vec2, vec2};
 
 /// What stands between the middles of texels.
@@ -260,7 +261,7 @@ impl Between {
     #[inline]
     fn new(place: f32, count: usize, wrap: Wrap) -> Self {
         let x = place * count as f32 - 0.5;
-        let first = x.floor();
+        let first = floor(x);
         let (index, count) = (first as i32, count as i32);
         Self { texels: [wrap.texel(index, count), wrap.texel(index + 1, count)], fraction: x - first }
     }

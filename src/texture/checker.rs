@@ -2,6 +2,7 @@
 
 use crate::color::Rgb;
 use crate::math::Vec2;
+use crate::math::float::floor;
 
 /// Two colours in squares; the square at the origin of uv has `colors[0]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +18,7 @@ impl Checker {
     #[inline]
     pub fn color(&self, uv: Vec2) -> Rgb {
         let cell = uv * self.scale;
-        let second_half = |x: f32| x - x.floor() >= 0.5;
+        let second_half = |x: f32| x - floor(x) >= 0.5;
         self.colors[usize::from(second_half(cell.x) != second_half(cell.y))]
     }
 }

@@ -1,5 +1,6 @@
 //! From the uv of a surface to a place in an image.
 
+use crate::math::float::floor;
 use crate::math::{Vec2, vec2};
 
 /// What lies beyond the edges of an image, along one axis.
@@ -19,10 +20,10 @@ impl Wrap {
     #[inline]
     pub fn fold(self, x: f32) -> f32 {
         let folded = match self {
-            Self::Repeat => x - x.floor(),
+            Self::Repeat => x - floor(x),
             Self::Clamp => x.clamp(0.0, 1.0),
             Self::Mirror => {
-                let x = x - 2.0 * (0.5 * x).floor();
+                let x = x - 2.0 * floor(0.5 * x);
                 if x > 1.0 { 2.0 - x } else { x }
             }
         };
