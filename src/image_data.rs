@@ -2,8 +2,6 @@
 
 use half::f16;
 
-use crate::math::prefetch::prefetch;
-
 /// An image with the numbers of its file, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageData {
@@ -38,17 +36,6 @@ impl Samples {
             Self::U16(s) => s.len(),
             Self::F16(s) => s.len(),
             Self::F32(s) => s.len(),
-        }
-    }
-
-    /// Starts to load one into the caches.
-    #[inline(always)]
-    pub fn prefetch(&self, i: usize) {
-        match self {
-            Self::U8(s) => prefetch(s, i),
-            Self::U16(s) => prefetch(s, i),
-            Self::F16(s) => prefetch(s, i),
-            Self::F32(s) => prefetch(s, i),
         }
     }
 

@@ -7,8 +7,8 @@ pub use inputs::{AlphaInput, CoatInput, ColorInput, Facets, PlasticCoat, RangedI
 pub use principled::PrincipledInputs;
 
 use crate::bsdf::{
-    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic,
-    Principled, SeparableGgx, SingleScatteringBsdf, ThinDielectric,
+    Beckmann, Bsdf, BsdfFlags, Conductor, Dielectric, DiffuseTransmission, Eon, Glossy, Lambert, Mirror, Phong, Plastic, Principled,
+    SeparableGgx, SingleScatteringBsdf, ThinDielectric,
 };
 use crate::color::Rgb;
 use crate::id::{MaterialId, TextureId};
@@ -230,8 +230,8 @@ impl TexturedMaterial {
     #[inline]
     pub fn can_be_grouped(&self) -> bool {
         match self {
-            Self::Plastic { coat, .. } => coat.textures().is_empty(),
-            Self::Coated { coat, tint, .. } => coat.textures().is_empty() && tint.texture().is_none(),
+            Self::Plastic { coat, .. } => coat.is_constant(),
+            Self::Coated { coat, tint, .. } => coat.is_constant() && tint.texture().is_none(),
             Self::Principled(_) => true,
             _ => false,
         }

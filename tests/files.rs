@@ -103,19 +103,25 @@ fn what_never_ends_is_not_read() {
 fn killed_writers_leave_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let arguments =
-        "render scene.json -q --size 256x192 --spp 400 --layers Z,N,P --checkpoint a.state --every 0 --resume -o a.exr --json a.json";
+        "render scene.json -q --size 256x192 --spp 8000 --layers Z,N,P --checkpoint a.state --every 0 --resume -o a.exr --json a.json";
+    let left = || hidden(folder.path()).into_iter().filter(|name| name != ".a.state.lock").collect::<Vec<_>>();
     let mut killed = 0;
     for i in 0..8 {
         let mut child = steradian(folder.path(), arguments).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(150 + 37 * i));
         child.kill().unwrap();
         killed += u32::from(child.wait().unwrap().signal() == Some(9));
-        let left: Vec<_> = hidden(folder.path()).into_iter().filter(|name| name != ".a.state.lock").collect();
-        assert!(left.is_empty(), "{left:?}");
+        // Between the moments when a file gets a name and its place: the next writer removes it.
+        assert!(left().len() <= 1, "{:?}", left());
     }
+    let next = Running::start(&mut steradian(folder.path(), arguments));
+    std::thread::sleep(Duration::from_millis(500));
+    next.signal(Signal::INT);
+    next.output();
+    assert!(left().is_empty(), "{:?}", left());
     assert!(killed > 4, "{killed}");
     let output =
-        run(folder.path(), &arguments.replace("--spp 400", "--spp 2 --seed 9").replace("--resume", "").replace("a.state", "b.state"));
+        run(folder.path(), &arguments.replace("--spp 8000", "--spp 2 --seed 9").replace("--resume", "").replace("a.state", "b.state"));
     assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
 }
 

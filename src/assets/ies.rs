@@ -186,7 +186,7 @@ mod tests {
             ("10 8 0", "10 -8 0", "line 9"),
             ("10 8 0", "10 nan 0", "line 9: a candela value should be a number, not \"nan\""),
             ("10, 6, 0\n", "10, 6\n", "the file ends where a candela value should be"),
-            ("10, 6, 0\n", "10, 6, 0, 1\n", "line 10: \"1\" is more"),
+            ("10, 6, 0\n", "10, 6, 0, 1\n", "line 10: \"1\" is beyond the number of values"),
         ] {
             let message = parse(&SMALL.replacen(from, to, 1)).unwrap_err();
             assert!(message.contains(words), "{to:?}: {message}");

@@ -190,7 +190,7 @@ impl<D: Microfacets> Coat<D> {
     fn look_up<const AXES: usize>(&self, cos: f32, axis: usize) -> f32 {
         let last = NODES / AXES - 1;
         let at = cos.sqrt() * last as f32;
-        let node = (at as usize).min(last - 1);
+        let node = (at as i32).clamp(0, last as i32 - 1) as usize;
         let part = (at - node as f32).min(1.0);
         let (before, after) = (f32::from(self.reflected[node * AXES + axis]), f32::from(self.reflected[(node + 1) * AXES + axis]));
         (before + (after - before) * part) * (1.0 / 65_535.0)

@@ -30,6 +30,7 @@ mod tests {
         let schema = schema();
         let (_, list) = schema.split_once("A metal by name: ").unwrap();
         let (list, _) = list.split_once(".\"").unwrap();
+        let list = list.replace("\\n", " ");
         let mut listed: Vec<_> = list.split(", ").map(|name| name.trim_matches('`')).collect();
         listed.sort_unstable();
         assert_eq!(listed, Metal::names(MetalNames::Steradian).collect::<Vec<_>>());

@@ -180,6 +180,11 @@ impl CoatInput {
         }
     }
 
+    /// Whether no texture changes it.
+    pub(super) fn is_constant(&self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
+
     pub(super) fn textures(&self) -> Vec<TextureId> {
         match self {
             Self::Constant(_) => Vec::new(),
@@ -218,6 +223,11 @@ impl PlasticCoat {
             }
             Self::Beckmann(coat) => Bsdf::Beckmann(SingleScatteringBsdf::Plastic(Plastic { diffuse, coat: *coat, tint, nonlinear })),
         }
+    }
+
+    /// Whether no texture changes it.
+    pub(super) fn is_constant(&self) -> bool {
+        !matches!(self, Self::Ggx(coat) if !coat.is_constant())
     }
 
     pub(super) fn textures(&self) -> Vec<TextureId> {

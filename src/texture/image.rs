@@ -7,6 +7,7 @@ use half::f16;
 use super::pyramid::Pyramid;
 use crate::color::{Rgb, linear_from_srgb};
 use crate::image_data::{ImageData, Samples};
+use crate::math::prefetch::prefetch;
 
 /// Why an image is refused.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -186,7 +187,13 @@ impl TextureImage {
     /// Starts to load a pixel (column, row) into the caches.
     #[inline(always)]
     pub(super) fn prefetch(&self, [x, y]: [usize; 2]) {
-        self.data.samples.prefetch((y * self.data.width + x) * self.data.channels);
+        let i = (y * self.data.width + x) * self.data.channels;
+        match &self.data.samples {
+            Samples::U8(s) => prefetch(s, i),
+            Samples::U16(s) => prefetch(s, i),
+            Samples::F16(s) => prefetch(s, i),
+            Samples::F32(s) => prefetch(s, i),
+        }
     }
 
     /// The sum of `weights` times the colours of four pixels (column, row).
