@@ -12,7 +12,7 @@ pub struct BasicPrincipled<const MITSUBA: bool>(Principled);
 
 impl Principled {
     /// Whether it is a [`BasicPrincipled`].
-    pub fn is_basic(&self) -> bool {
+    pub(in crate::bsdf) fn is_basic(&self) -> bool {
         let Self { p, glass, ggx, .. } = self;
         let others = [p.sheen, p.clearcoat, p.subsurface, p.diffuse_transmission, *glass];
         let [ax, ay] = ggx.alpha;
@@ -21,7 +21,7 @@ impl Principled {
 
     /// The parameters of one with no other lobes.
     #[inline(always)]
-    pub fn basic<const MITSUBA: bool>(&self) -> BasicPrincipled<MITSUBA> {
+    pub(in crate::bsdf) fn basic<const MITSUBA: bool>(&self) -> BasicPrincipled<MITSUBA> {
         let PrincipledParameters { base_color, metallic, roughness, ior, .. } = self.p;
         let p = PrincipledParameters {
             base_color,
@@ -47,7 +47,7 @@ impl Principled {
 
     /// Sets the parameters of a query.
     #[inline(always)]
-    pub fn set_parameters(&self, i: usize, queries: &mut BsdfQueryRows) {
+    pub(in crate::bsdf) fn set_parameters(&self, i: usize, queries: &mut BsdfQueryRows) {
         queries.color.set(i, self.p.base_color);
         queries.specular.set(i, self.specular);
         queries.multiple.set(i, self.multiple);
@@ -57,7 +57,7 @@ impl Principled {
 
     /// The model with the parameters of a query.
     #[inline(always)]
-    pub fn with_parameters(&self, i: usize, queries: &BsdfQueryRows) -> Self {
+    pub(in crate::bsdf) fn with_parameters(&self, i: usize, queries: &BsdfQueryRows) -> Self {
         let p = PrincipledParameters {
             base_color: queries.color.get(i),
             metallic: queries.metallic[i],
