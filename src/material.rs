@@ -20,7 +20,7 @@ use crate::texture::{Footprint, Texture};
 pub enum Material {
     /// The same scattering everywhere, prepared once.
     Constant(Bsdf),
-    /// Scattering that these textures change.
+    /// Scattering that is evaluated at every hit, and the textures of its parameters.
     Textured(Box<TexturedMaterial>, Box<[TextureId]>),
     /// One of two materials at each point, chosen anew at each hit: the second with the probability `amount`.
     Mix {
@@ -295,6 +295,12 @@ impl TexturedMaterial {
 }
 
 impl Material {
+    /// Scattering that is evaluated at every hit, with or without textures.
+    pub fn varying(textured: TexturedMaterial) -> Self {
+        let textures = textured.textures().into();
+        Self::Textured(Box::new(textured), textures)
+    }
+
     /// The scattering over a footprint; nothing for what consists of other materials, which [`Material::part`] resolves
     /// first.
     #[inline]
@@ -372,11 +378,10 @@ impl Material {
 impl From<TexturedMaterial> for Material {
     /// What no texture changes is prepared once.
     fn from(textured: TexturedMaterial) -> Self {
-        let textures = textured.textures();
-        if textures.is_empty() {
+        if textured.textures().is_empty() {
             Self::Constant(textured.bsdf(&[], &Footprint::point(Vec2::ZERO)))
         } else {
-            Self::Textured(Box::new(textured), textures.into())
+            Self::varying(textured)
         }
     }
 }

@@ -118,6 +118,10 @@ fn faults_name_the_shape_and_the_material() {
     ] {
         assert_error(&folder, &scene_of(shape), kind, &parts);
     }
+    // Media are evaluated at every hit, with textures and without.
+    let mut medium = scene_of(json!({ "type": "sphere", "material": "m" }));
+    set(&mut medium, "materials.m", json!({ "type": "dielectric", "priority": 1, "roughness": { "texture": "colors" } }));
+    assert_error(&folder, &medium, ErrorKind::Scene, &["shapes[0]", "\"m\"", "the shape has none"]);
     let mut few = scene_of(inline());
     set(&mut few, "shapes[0].colors", json!([[1, 1, 1], [0, 0, 0]]));
     assert_error(&folder, &few, ErrorKind::Scene, &["shapes[0]", "\"vertex_color\": 2 for 4 vertices"]);

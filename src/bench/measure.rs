@@ -266,8 +266,8 @@ fn build<'g>(kind: AccelKind, geometry: &'g Geometry, primitives: usize, options
     Ok((report, accel))
 }
 
-/// The accelerator that stands in for the oracle on rays that would take the oracle too long: one of ours, which is
-/// checked against it.
+/// The accelerator that stands in for the oracle on rays that would take the oracle too long: one of the own
+/// accelerators, which is checked against it.
 fn choose_oracle(accels: &[Measured]) -> Option<usize> {
     accels.iter().position(|(report, accel)| accel.inspect().is_some() && report.name.starts_with("bvh"))
 }

@@ -100,7 +100,7 @@ impl Ggx {
         Self { alpha: clamp_alpha(alpha) }
     }
 
-    /// The distribution with an alpha that another one has along an axis.
+    /// The isotropic distribution for an alpha that is zero or within `[SMOOTH_ALPHA, 1]`.
     #[inline(always)]
     pub(super) fn isotropic(alpha: f32) -> Self {
         Self { alpha: [alpha; 2] }

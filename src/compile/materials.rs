@@ -209,7 +209,7 @@ impl Compiler<'_> {
         let tints = self.tints(path, &desc.reflection_tint, &desc.transmission_tint)?;
         let boundary = TexturedMaterial::Dielectric { ior, alpha, facets: facets(desc.distribution, desc.multiscatter), tints };
         // The relative index at a medium's surface depends on what is around it.
-        Ok(if desc.is_medium() { Material::Textured(Box::new(boundary), Box::default()) } else { boundary.into() })
+        Ok(if desc.is_medium() { Material::varying(boundary) } else { boundary.into() })
     }
 
     fn plastic(&self, path: &str, desc: &PlasticDesc) -> Result<TexturedMaterial> {

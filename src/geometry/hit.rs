@@ -23,7 +23,7 @@ impl Hit {
     /// The instance of shapes that are placed in the world directly.
     pub const NO_INSTANCE: InstanceId = InstanceId(u32::MAX);
 
-    /// The order in which ties are broken: by distance, then by ids, so that all accelerators of ours return the same
+    /// The order in which ties are broken: by distance, then by ids, so that all own accelerators return the same
     /// hit.
     #[inline]
     pub fn is_before(&self, other: &Self) -> bool {

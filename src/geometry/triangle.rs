@@ -1,4 +1,4 @@
-//! The one triangle test that all accelerators of ours share: watertight, with edge functions in `f64`.
+//! The one triangle test that all own accelerators share: watertight, with edge functions in `f64`.
 //!
 //! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection": shear the ray onto the axis where its direction is
 //! largest; the signs of three edge functions decide. Shared edges are computed from the same numbers in both

@@ -17,10 +17,10 @@ pub const SMALLEST_NORMAL: f32 = f32::MIN_POSITIVE;
 /// The largest `f32` below one: random numbers and parameters stay within `[0, 1)`.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// `x.floor()` but for the sign of zero, without the call that it is on processors without SSE4.1.
+/// `x.floor()` except for the sign of zero; inlined, where that is a library call without SSE4.1.
 #[inline(always)]
 pub fn floor(x: f32) -> f32 {
-    /// From here on all are whole numbers.
+    /// Numbers from this magnitude on are integers.
     const WHOLE: f32 = 8_388_608.0;
     let towards_zero = x as i32 as f32;
     let floor = if towards_zero > x { towards_zero - 1.0 } else { towards_zero };

@@ -54,8 +54,8 @@ impl Texture {
         }
     }
 
-    /// One number at `uv`, for roughness, heights and the like: the luminance of a colour, or the channel that an image
-    /// says.
+    /// One number at `uv`, for roughness, heights and the like: the luminance of a colour, or the chosen channel
+    /// of an image.
     #[inline]
     pub fn scalar(&self, uv: Vec2) -> f32 {
         match self {

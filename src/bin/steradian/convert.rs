@@ -8,7 +8,7 @@ use crate::args::{ConvertArgs, Verbosity};
 use crate::log::{self, Level};
 use crate::{files, scene};
 
-/// Reads a scene of any kind and writes one of ours.
+/// Reads a scene of any format and writes it as JSON.
 pub fn run(arguments: &ConvertArgs, mut uses: FileUses) -> Result<()> {
     let verbosity = Verbosity { quiet: arguments.quiet, verbose: arguments.verbose };
     let imported = scene::load(&arguments.input, &arguments.import, verbosity)?;

@@ -279,7 +279,7 @@ mod tests {
 
     #[test]
     fn the_tables_are_what_the_code_computes() {
-        // Some entries of every block, spread over it by a prime, baked anew: equal to two steps of their 16 bits,
+        // Some entries of every block, spread over it by a prime, baked again: equal to two steps of their 16 bits,
         // which leaves room for another machine's logarithm. A block of averages is computed from the committed block
         // before it; most hold roots of small numbers, which must be as close themselves.
         let mut before = Vec::new();

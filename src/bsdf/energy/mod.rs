@@ -60,7 +60,7 @@ impl Energy {
         Self { ggx: *ggx, alpha, aspect: ax.min(ay) / alpha, at_alpha: TableCoordinate::of_alpha(alpha) }
     }
 
-    /// Of isotropic microfacets.
+    /// For isotropic GGX microfacets.
     #[inline(always)]
     pub fn isotropic(alpha: f32) -> Self {
         Self { ggx: Ggx::isotropic(alpha), alpha, aspect: 1.0, at_alpha: TableCoordinate::of_alpha(alpha) }

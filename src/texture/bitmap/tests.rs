@@ -207,7 +207,7 @@ fn footprints_choose_the_level_of_their_texels() {
         close(at(1e4), mean);
         close(at(f32::INFINITY), mean);
         close(bitmap.color_over(&over(uv, 1e4, 128)).g, mean);
-        // An image that is shown four times has four times as many texels there; one that says 1 - v has their means
+        // An image that is shown four times has four times as many texels there; an inverted one has their means
         // the same way.
         let scaled = Bitmap { transform: UvTransform::new(vec2(4.0, -1.0), 0.4, Vec2::ZERO), invert: true, ..bitmap.clone() };
         let upright = Bitmap { transform: scaled.transform, invert: true, ..levels[0].clone() };

@@ -47,7 +47,7 @@ Examples:
   steradian render scene.json                      Writes what the scene's \"outputs\" name
   steradian render scene.json -o a.exr -o a.png    Writes these instead
   steradian render scene.xml                       A Mitsuba 3 scene; .pbrt, .gltf and .glb files are read as well
-  steradian convert scene.xml scene.json           The same as a scene of ours, to be changed
+  steradian convert scene.xml scene.json           The same as a JSON scene, to be edited
   steradian info scene.json                        What is in the scene
   steradian compare reference.exr test.exr         How far two pictures differ
 
@@ -100,7 +100,7 @@ pub enum Command {
     /// Loads the scene with everything it names and prints counts, bounds, memory and features. A scene that has info
     /// without an error renders without an error.
     Info(InfoArgs),
-    /// Turn a scene of another renderer into one of ours, with its meshes and images beside it
+    /// Turn a scene of another renderer into the JSON format, with its meshes and images beside it
     #[command(after_help = import::CONVERT_EXAMPLES)]
     Convert(ConvertArgs),
     /// Print the JSON Schema of scene files
