@@ -163,7 +163,7 @@ impl Microfacets for Beckmann {
         (pdf * self.g1(i), pdf)
     }
 
-    fn energy(&self) -> Option<Energy> {
+    fn energy<const ISOTROPIC: bool>(&self) -> Option<Energy> {
         None
     }
 }

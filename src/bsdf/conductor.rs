@@ -85,14 +85,8 @@ impl<D: Microfacets> Conductor<D> {
         self.tint * Rgb::new(r.reflectance(cos), g.reflectance(cos), b.reflectance(cos))
     }
 
-    /// Directional albedo of perfectly reflecting microfacets; 1 where multiple scattering is left out.
-    #[inline]
-    fn directional_albedo(&self, w: Vec3) -> f32 {
-        self.facets.energy().map_or(1.0, |energy| energy.directional_albedo(w))
-    }
-
     /// Probability of sampling light scattered several times, for what microfacets scatter at once.
-    #[inline]
+    #[inline(always)]
     fn multiple_probability(&self, directional_albedo: f32) -> f32 {
         let multiple = self.share * (1.0 - directional_albedo);
         multiple / (directional_albedo + multiple)
@@ -102,81 +96,37 @@ impl<D: Microfacets> Conductor<D> {
     /// for a smooth one.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        if self.facets.is_smooth() || wo.z * wi.z <= 0.0 {
-            return BsdfEval::default();
-        }
-        let (o, i) = (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
-        if self.share == 0.0 {
-            return self.eval_once(o, i);
-        }
-        self.eval_upper(o, i, self.directional_albedo(o))
-    }
-
-    /// One encounter with a microfacet, for directions on the upper side.
-    #[inline(always)]
-    fn eval_once(&self, o: Vec3, i: Vec3) -> BsdfEval {
-        let facet = self.facets.reflection(o, i);
-        BsdfEval { value: self.reflectance(facet.cos) * facet.value, pdf: facet.pdf }
-    }
-
-    /// With multiple scattering, for what microfacets scatter at once of the light from `o`.
-    #[inline]
-    fn eval_upper(&self, o: Vec3, i: Vec3, directional_albedo: f32) -> BsdfEval {
-        let facet = self.facets.reflection(o, i);
-        let probability = self.multiple_probability(directional_albedo);
-        let missing_energy = (1.0 - directional_albedo) * (1.0 - self.directional_albedo(i));
-        BsdfEval {
-            value: self.reflectance(facet.cos) * facet.value + self.multiple * (missing_energy * i.z),
-            pdf: (1.0 - probability) * facet.pdf + probability * FRAC_1_PI * i.z,
+        match self.scattering() {
+            Scattering::Smooth => BsdfEval::default(),
+            Scattering::Single => SingleScattering(self).eval(wo, wi),
+            Scattering::Multiple { isotropic: true } => MultipleScattering::<D, true>(self).eval(wo, wi),
+            Scattering::Multiple { isotropic: false } => MultipleScattering::<D, false>(self).eval(wo, wi),
         }
     }
 
     /// A reflection at a visible normal, or by the cosine for light scattered several times.
     #[inline]
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        if wo.z.abs() <= MIN_COSINE {
-            return None;
+        match self.scattering() {
+            Scattering::Smooth if wo.z.abs() <= MIN_COSINE => None,
+            Scattering::Smooth => Some(BsdfSample::mirrored(wo, self.reflectance(wo.z.abs().min(1.0)), 1.0)),
+            Scattering::Single => SingleScattering(self).sample(wo, u_lobe, u),
+            Scattering::Multiple { isotropic: true } => MultipleScattering::<D, true>(self).sample(wo, u_lobe, u),
+            Scattering::Multiple { isotropic: false } => MultipleScattering::<D, false>(self).sample(wo, u_lobe, u),
         }
-        if self.facets.is_smooth() {
-            return Some(BsdfSample::mirrored(wo, self.reflectance(wo.z.abs().min(1.0)), 1.0));
-        }
-        let o = vec3(wo.x, wo.y, wo.z.abs());
-        if self.share == 0.0 {
-            return self.sample_once(wo, u);
-        }
-        let directional_albedo = self.directional_albedo(o);
-        if u_lobe < self.multiple_probability(directional_albedo) {
-            return self.weighted_sample(wo, o, warp::cosine_hemisphere(u), directional_albedo);
-        }
-        let m = self.facets.sample_visible_normal(o, u);
-        let cos = o.dot(m);
-        let wi = reflect(o, m, cos);
-        if cos > 0.0 && wi.z > 0.0 { self.weighted_sample(wo, o, wi, directional_albedo) } else { None }
     }
 
-    /// One encounter with a microfacet.
+    /// What happens to light at the metal.
     #[inline(always)]
-    fn sample_once(&self, wo: Vec3, u: [f32; 2]) -> Option<BsdfSample> {
-        let o = vec3(wo.x, wo.y, wo.z.abs());
-        let m = self.facets.sample_visible_normal(o, u);
-        let cos = o.dot(m);
-        let mut wi = reflect(o, m, cos);
-        let is_valid = (o.z > MIN_COSINE) & (cos > 0.0) & (wi.z > 0.0);
-        let weight = self.reflectance(cos.min(1.0)) * self.facets.g2_over_g1(o, wi);
-        let pdf = self.facets.reflection_pdf(o, m);
-        wi.z = wi.z.copysign(wo.z);
-        is_valid.then_some(BsdfSample { wi, weight, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
-    }
-
-    /// Whether the metal is rough, and light that its microfacets scatter several times is left out.
-    pub(super) fn is_rough_single(&self) -> bool {
-        !self.facets.is_smooth() && self.share == 0.0
-    }
-
-    /// The sample for a direction of the upper side, all lobes counted.
-    #[inline]
-    fn weighted_sample(&self, wo: Vec3, o: Vec3, i: Vec3, directional_albedo: f32) -> Option<BsdfSample> {
-        self.eval_upper(o, i, directional_albedo).sampled(vec3(i.x, i.y, i.z.copysign(wo.z))).filter(|_| i.z > 0.0)
+    pub(super) fn scattering(&self) -> Scattering {
+        let [ax, ay] = self.facets.alpha();
+        if self.facets.is_smooth() {
+            Scattering::Smooth
+        } else if self.share == 0.0 {
+            Scattering::Single
+        } else {
+            Scattering::Multiple { isotropic: ax == ay }
+        }
     }
 
     /// Alpha along both tangents.
@@ -196,6 +146,17 @@ impl<D: Microfacets> Conductor<D> {
     }
 }
 
+/// How a metal scatters light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scattering {
+    /// A plane mirror.
+    Smooth,
+    /// A reflection at one microfacet.
+    Single,
+    /// Reflections at one and at several microfacets.
+    Multiple { isotropic: bool },
+}
+
 /// A rough metal without multiple scattering, for vector code.
 #[derive(Clone, Copy)]
 pub(super) struct SingleScattering<'a, D>(pub &'a Conductor<D>);
@@ -203,12 +164,82 @@ pub(super) struct SingleScattering<'a, D>(pub &'a Conductor<D>);
 impl<D: Microfacets> LaneBsdf for SingleScattering<'_, D> {
     #[inline(always)]
     fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        let eval = self.0.eval_once(vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z.abs()));
+        let metal = self.0;
+        let facet = metal.facets.reflection(upper(wo), upper(wi));
+        let eval = BsdfEval { value: metal.reflectance(facet.cos) * facet.value, pdf: facet.pdf };
         if wo.z * wi.z > 0.0 { eval } else { BsdfEval::default() }
     }
 
     #[inline(always)]
     fn sample(&self, wo: Vec3, _u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        self.0.sample_once(wo, u)
+        let metal = self.0;
+        let o = upper(wo);
+        let m = metal.facets.sample_visible_normal(o, u);
+        let cos = o.dot(m);
+        let mut wi = reflect(o, m, cos);
+        let is_valid = (o.z > MIN_COSINE) & (cos > 0.0) & (wi.z > 0.0);
+        let weight = metal.reflectance(cos.min(1.0)) * metal.facets.g2_over_g1(o, wi);
+        let pdf = metal.facets.reflection_pdf(o, m);
+        wi.z = wi.z.copysign(wo.z);
+        is_valid.then_some(BsdfSample { wi, weight, pdf, is_delta: false, is_transmission: false, eta: 1.0 })
     }
+}
+
+/// A rough metal with multiple scattering, for vector code if it is isotropic.
+#[derive(Clone, Copy)]
+pub(super) struct MultipleScattering<'a, D, const ISOTROPIC: bool>(pub &'a Conductor<D>);
+
+impl<D: Microfacets, const ISOTROPIC: bool> MultipleScattering<'_, D, ISOTROPIC> {
+    /// Directional albedo of perfectly reflecting microfacets.
+    #[inline(always)]
+    fn directional_albedo(&self, w: Vec3) -> f32 {
+        // A closure might not be inlined into vector code.
+        match self.0.facets.energy::<ISOTROPIC>() {
+            Some(energy) => energy.directional_albedo(w),
+            None => 1.0,
+        }
+    }
+
+    /// For directions on the upper side and the albedo for `o`.
+    #[inline(always)]
+    fn eval_upper(&self, o: Vec3, i: Vec3, directional_albedo: f32) -> BsdfEval {
+        let metal = self.0;
+        let facet = metal.facets.reflection(o, i);
+        let probability = metal.multiple_probability(directional_albedo);
+        let missing_energy = (1.0 - directional_albedo) * (1.0 - self.directional_albedo(i));
+        BsdfEval {
+            value: metal.reflectance(facet.cos) * facet.value + metal.multiple * (missing_energy * i.z),
+            pdf: (1.0 - probability) * facet.pdf + probability * FRAC_1_PI * i.z,
+        }
+    }
+}
+
+impl<D: Microfacets, const ISOTROPIC: bool> LaneBsdf for MultipleScattering<'_, D, ISOTROPIC> {
+    #[inline(always)]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        let o = upper(wo);
+        let eval = self.eval_upper(o, upper(wi), self.directional_albedo(o));
+        if wo.z * wi.z > 0.0 { eval } else { BsdfEval::default() }
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let metal = self.0;
+        let o = upper(wo);
+        let directional_albedo = self.directional_albedo(o);
+        let is_multiple = u_lobe < metal.multiple_probability(directional_albedo);
+        let m = metal.facets.sample_visible_normal(o, u);
+        let cos = o.dot(m);
+        let reflected = reflect(o, m, cos);
+        let i = if is_multiple { warp::cosine_hemisphere(u) } else { reflected };
+        let is_valid = (o.z > MIN_COSINE) & (is_multiple | (cos > 0.0)) & (i.z > 0.0);
+        let sample = self.eval_upper(o, i, directional_albedo).sampled(vec3(i.x, i.y, i.z.copysign(wo.z)));
+        sample.filter(|_| is_valid)
+    }
+}
+
+/// The same direction on the upper side.
+#[inline(always)]
+fn upper(w: Vec3) -> Vec3 {
+    vec3(w.x, w.y, w.z.abs())
 }

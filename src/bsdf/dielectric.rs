@@ -47,7 +47,7 @@ const CLEAR: [Rgb; 2] = [Rgb::WHITE; 2];
 
 /// Light from one side that is scattered several times.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Multiple {
+pub(super) struct Multiple {
     /// What is lost of diffuse light from this side.
     missing_energy: f32,
     /// How much of it crosses.
@@ -134,13 +134,6 @@ impl<D: Microfacets> Dielectric<D> {
         if is_transmission { transmission } else { reflection }
     }
 
-    /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over
-    /// that on its side.
-    #[inline]
-    fn missing_energy(&self, eta: f32, w: Vec3) -> f32 {
-        self.facets.energy().map_or(0.0, |energy| 1.0 - energy.dielectric_albedo(eta, w)).clamp(0.0, 1.0)
-    }
-
     /// Index of refraction beyond the surface over that on the side of `wo`.
     #[inline(always)]
     fn eta(&self, wo: Vec3) -> f32 {
@@ -150,44 +143,28 @@ impl<D: Microfacets> Dielectric<D> {
     /// Reflection or refraction by microfacets, zero for a smooth boundary.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
-        if self.facets.is_smooth() || wo.z.abs().min(wi.z.abs()) <= MIN_COSINE {
-            return BsdfEval::default();
+        match (self.facets.is_smooth(), &self.multiple) {
+            (true, _) => BsdfEval::default(),
+            (false, None) => SingleScattering(self).eval(wo, wi),
+            (false, Some(multiple)) => MultipleScattering { bsdf: self, multiple }.eval(wo, wi),
         }
-        // Seen from the side of `wo`, which becomes the upper one.
-        let eta = self.eta(wo);
-        let o = vec3(wo.x, wo.y, wo.z.abs());
-        let i = vec3(wi.x, wi.y, wi.z * 1f32.copysign(wo.z));
-        let BsdfEval { value, pdf } = match &self.multiple {
-            None => self.eval_once(o, i, eta),
-            Some(multiple) => self.eval_all(multiple, wo, o, i, eta),
-        };
-        BsdfEval { value: value * self.tint(i.z < 0.0), pdf }
     }
 
-    /// With multiple scattering, without the tints; `o` on the upper side.
+    /// Reflection if `u_lobe` is below the reflectance, else refraction.
     #[inline]
-    fn eval_all(&self, multiple: &[Multiple; 2], wo: Vec3, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
-        let [near, far] = if wo.z > 0.0 { [multiple[0], multiple[1]] } else { [multiple[1], multiple[0]] };
-        let once = self.eval_once(o, i, eta);
-        let missing_energy = self.missing_energy(eta, o);
-        let cosine_pdf = FRAC_1_PI * i.z.abs();
-        let (value, fraction) = if i.z > 0.0 {
-            let fraction = 1.0 - near.crossing;
-            (fraction * missing_energy * self.missing_energy(eta, i) / near.missing_energy, fraction)
-        } else {
-            let beyond = self.missing_energy(1.0 / eta, vec3(i.x, i.y, -i.z));
-            (near.crossing * missing_energy * beyond / (far.missing_energy * eta * eta), near.crossing)
-        };
-        BsdfEval {
-            value: once.value + Rgb::splat(value * cosine_pdf),
-            pdf: (1.0 - missing_energy) * once.pdf + missing_energy * fraction * cosine_pdf,
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        match (self.facets.is_smooth(), &self.multiple) {
+            (true, _) => Smooth(self).sample(wo, u_lobe, u),
+            (false, None) => SingleScattering(self).sample(wo, u_lobe, u),
+            (false, Some(multiple)) => MultipleScattering { bsdf: self, multiple }.sample(wo, u_lobe, u),
         }
     }
 
     /// One encounter with a microfacet, without the tints; `o` on the upper side.
-    #[inline]
+    #[inline(always)]
     fn eval_once(&self, o: Vec3, i: Vec3, eta: f32) -> BsdfEval {
-        if i.z > 0.0 { self.eval_reflection(o, i, eta) } else { self.eval_refraction(o, i, eta) }
+        let (reflection, refraction) = (self.eval_reflection(o, i, eta), self.eval_refraction(o, i, eta));
+        if i.z > 0.0 { reflection } else { refraction }
     }
 
     /// Reflection of `i` towards `o`, both on the upper side.
@@ -214,46 +191,6 @@ impl<D: Microfacets> Dielectric<D> {
         let common = 2.0 * transmittance * self.facets.normal_density(half) * cos_o * cos_i / length_squared;
         let (value, pdf) = self.facets.refraction(o, vec3(i.x, i.y, -i.z), common);
         if is_valid { BsdfEval { value: Rgb::splat(value), pdf: pdf * eta * eta } } else { BsdfEval::default() }
-    }
-
-    /// Reflection if `u_lobe` is below the reflectance, else refraction.
-    #[inline]
-    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        if wo.z.abs() <= MIN_COSINE {
-            return None;
-        }
-        let sample = if self.facets.is_smooth() {
-            self.sample_smooth(wo, u_lobe)
-        } else {
-            match &self.multiple {
-                None => self.sample_once(wo, u_lobe, u),
-                Some(multiple) => self.sample_all(multiple, wo, u_lobe, u),
-            }?
-        };
-        Some(self.tinted_sample(sample))
-    }
-
-    /// With multiple scattering.
-    #[inline]
-    fn sample_all(&self, multiple: &[Multiple; 2], wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
-        let (o, eta) = (vec3(wo.x, wo.y, wo.z.abs()), self.eta(wo));
-        let missing_energy = self.missing_energy(eta, o);
-        let side = 1f32.copysign(wo.z);
-        let wi = if u_lobe < missing_energy {
-            let near = multiple[usize::from(wo.z < 0.0)];
-            let i = warp::cosine_hemisphere(u);
-            let z = if u_lobe < missing_energy * near.crossing { -i.z } else { i.z };
-            vec3(i.x, i.y, z * side)
-        } else {
-            self.sample_once(wo, ((u_lobe - missing_energy) / (1.0 - missing_energy)).min(ONE_MINUS_EPSILON), u)?.wi
-        };
-        if wi.z.abs() <= MIN_COSINE {
-            return None;
-        }
-        let BsdfEval { value, pdf } = self.eval_all(multiple, wo, o, vec3(wi.x, wi.y, wi.z * side), eta);
-        let is_transmission = wi.z * wo.z < 0.0;
-        let eta = if is_transmission { eta } else { 1.0 };
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission, eta })
     }
 
     /// One encounter with a microfacet.
@@ -309,9 +246,9 @@ impl<D: Microfacets> Dielectric<D> {
         BsdfSample { weight: sample.weight * self.tint(sample.is_transmission), ..sample }
     }
 
-    /// Whether the boundary is rough, and light that its microfacets scatter several times is left out.
-    pub(super) fn is_rough_single(&self) -> bool {
-        !self.facets.is_smooth() && self.multiple.is_none()
+    /// The light that microfacets scatter several times, where it is known.
+    pub(super) fn multiple(&self) -> Option<&[Multiple; 2]> {
+        self.multiple.as_ref()
     }
 
     /// The lobes.
@@ -359,10 +296,8 @@ impl<D: Microfacets> LaneBsdf for SingleScattering<'_, D> {
     #[inline(always)]
     fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
         let eta = self.0.eta(wo);
-        let o = vec3(wo.x, wo.y, wo.z.abs());
-        let i = vec3(wi.x, wi.y, wi.z * 1f32.copysign(wo.z));
-        let (reflection, refraction) = (self.0.eval_reflection(o, i, eta), self.0.eval_refraction(o, i, eta));
-        let BsdfEval { value, pdf } = if i.z > 0.0 { reflection } else { refraction };
+        let (o, i) = seen_from(wo, wi);
+        let BsdfEval { value, pdf } = self.0.eval_once(o, i, eta);
         let eval = BsdfEval { value: value * self.0.tint(i.z < 0.0), pdf };
         if wo.z.abs().min(wi.z.abs()) > MIN_COSINE { eval } else { BsdfEval::default() }
     }
@@ -372,4 +307,82 @@ impl<D: Microfacets> LaneBsdf for SingleScattering<'_, D> {
         let sample = self.0.sample_once(wo, u_lobe, u).map(|sample| self.0.tinted_sample(sample));
         sample.filter(|_| wo.z.abs() > MIN_COSINE)
     }
+}
+
+/// A rough boundary with multiple scattering, for vector code.
+#[derive(Clone, Copy)]
+pub(super) struct MultipleScattering<'a, D> {
+    pub bsdf: &'a Dielectric<D>,
+    pub multiple: &'a [Multiple; 2],
+}
+
+impl<D: Microfacets> MultipleScattering<'_, D> {
+    /// Fraction of the light from the upper `w` that microfacets lose, for the index of refraction beyond them over
+    /// that on its side.
+    #[inline(always)]
+    fn missing_energy(&self, eta: f32, w: Vec3) -> f32 {
+        // A closure might not be inlined into vector code.
+        match self.bsdf.facets.energy::<true>() {
+            Some(energy) => (1.0 - energy.dielectric_albedo(eta, w)).clamp(0.0, 1.0),
+            None => 0.0,
+        }
+    }
+
+    /// Without the tints, for the energy that is missing of the light from `o`, on the upper side.
+    #[inline(always)]
+    fn eval_all(&self, wo: Vec3, o: Vec3, i: Vec3, eta: f32, missing_energy: f32) -> BsdfEval {
+        let [outside, inside] = *self.multiple;
+        let (near, far) = if wo.z > 0.0 { (outside, inside) } else { (inside, outside) };
+        let once = self.bsdf.eval_once(o, i, eta);
+        let cosine_pdf = FRAC_1_PI * i.z.abs();
+        let is_reflection = i.z > 0.0;
+        let fraction = if is_reflection { 1.0 - near.crossing } else { near.crossing };
+        let missing = if is_reflection { near.missing_energy } else { far.missing_energy * eta * eta };
+        let beyond = self.missing_energy(if is_reflection { eta } else { 1.0 / eta }, vec3(i.x, i.y, i.z.abs()));
+        BsdfEval {
+            value: once.value + Rgb::splat(fraction * missing_energy * beyond / missing * cosine_pdf),
+            pdf: (1.0 - missing_energy) * once.pdf + missing_energy * fraction * cosine_pdf,
+        }
+    }
+}
+
+impl<D: Microfacets> LaneBsdf for MultipleScattering<'_, D> {
+    #[inline(always)]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> BsdfEval {
+        let eta = self.bsdf.eta(wo);
+        let (o, i) = seen_from(wo, wi);
+        let BsdfEval { value, pdf } = self.eval_all(wo, o, i, eta, self.missing_energy(eta, o));
+        let eval = BsdfEval { value: value * self.bsdf.tint(i.z < 0.0), pdf };
+        if wo.z.abs().min(wi.z.abs()) > MIN_COSINE { eval } else { BsdfEval::default() }
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample> {
+        let (o, eta) = (vec3(wo.x, wo.y, wo.z.abs()), self.bsdf.eta(wo));
+        let [outside, inside] = *self.multiple;
+        let crossing = if wo.z > 0.0 { outside.crossing } else { inside.crossing };
+        let missing_energy = self.missing_energy(eta, o);
+        let side = 1f32.copysign(wo.z);
+        let is_multiple = u_lobe < missing_energy;
+        let i = warp::cosine_hemisphere(u);
+        let diffuse = vec3(i.x, i.y, if u_lobe < missing_energy * crossing { -i.z } else { i.z } * side);
+        let u_lobe = ((u_lobe - missing_energy) / (1.0 - missing_energy)).min(ONE_MINUS_EPSILON);
+        let once = self.bsdf.sample_once(wo, u_lobe, u);
+        let is_valid = (is_multiple | once.is_some()) & (wo.z.abs() > MIN_COSINE);
+        let wi = match once {
+            Some(sample) if !is_multiple => sample.wi,
+            _ => diffuse,
+        };
+        let BsdfEval { value, pdf } = self.eval_all(wo, o, vec3(wi.x, wi.y, wi.z * side), eta, missing_energy);
+        let is_transmission = wi.z * wo.z < 0.0;
+        let eta = if is_transmission { eta } else { 1.0 };
+        let sample = BsdfSample { wi, weight: value / pdf, pdf, is_delta: false, is_transmission, eta };
+        (is_valid & (wi.z.abs() > MIN_COSINE) & (pdf > 0.0)).then_some(self.bsdf.tinted_sample(sample))
+    }
+}
+
+/// Both directions, turned so that the first is on the upper side.
+#[inline(always)]
+fn seen_from(wo: Vec3, wi: Vec3) -> (Vec3, Vec3) {
+    (vec3(wo.x, wo.y, wo.z.abs()), vec3(wi.x, wi.y, wi.z * 1f32.copysign(wo.z)))
 }

@@ -44,8 +44,9 @@ pub trait Microfacets: Copy {
     /// `x G2(o, i) / (2 oz)` and `x G1(o) / (2 oz)`: value and density of refraction, but for their common factors.
     fn refraction(&self, o: Vec3, i: Vec3, x: f32) -> (f32, f32);
 
-    /// How much of the light the microfacets scatter at once, where that is known.
-    fn energy(&self) -> Option<Energy>;
+    /// How much of the light the microfacets scatter at once, where that is known; the caller knows whether they are
+    /// isotropic.
+    fn energy<const ISOTROPIC: bool>(&self) -> Option<Energy>;
 
     /// Specular or glossy, and whether anisotropic.
     #[inline(always)]
@@ -200,8 +201,8 @@ impl Microfacets for Ggx {
     }
 
     #[inline(always)]
-    fn energy(&self) -> Option<Energy> {
-        Some(Energy::new(self))
+    fn energy<const ISOTROPIC: bool>(&self) -> Option<Energy> {
+        Some(if ISOTROPIC { Energy::isotropic(self.alpha[0]) } else { Energy::new(self) })
     }
 }
 
@@ -266,7 +267,7 @@ impl Microfacets for SeparableGgx {
     }
 
     #[inline(always)]
-    fn energy(&self) -> Option<Energy> {
+    fn energy<const ISOTROPIC: bool>(&self) -> Option<Energy> {
         None
     }
 }

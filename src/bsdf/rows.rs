@@ -1,13 +1,13 @@
 //! Scattering for many pairs of directions at once, the same as for each of them alone.
 
-use super::conductor::SingleScattering as Metal;
-use super::dielectric::{SingleScattering as Glass, Smooth as SmoothGlass};
+use super::conductor::{MultipleScattering as MetalMultiple, Scattering, SingleScattering as Metal};
+use super::dielectric::{MultipleScattering as GlassMultiple, SingleScattering as Glass, Smooth as SmoothGlass};
 use super::plastic::{IsotropicPlastic, PlasticLayers, SmoothPlastic};
 use super::{Bsdf, BsdfEval, BsdfSample, Plastic, Principled, SingleScatteringBsdf};
 use crate::color::Rgb;
 use crate::math::Vec3;
 use crate::math::rows::{BATCH, soa};
-use crate::math::vectorize::vectorize;
+use crate::math::vectorize::{self, vectorize};
 
 soa! {
     /// Arguments of [`Bsdf::eval`] and of [`Bsdf::sample`], and what differs between their BSDFs.
@@ -190,17 +190,26 @@ macro_rules! lanes {
         match $bsdf {
             Bsdf::Principled(bsdf) if bsdf.is_basic() && bsdf.is_mitsuba() => with_principled!(bsdf, Principled::basic::<true>),
             Bsdf::Principled(bsdf) if bsdf.is_basic() => with_principled!(bsdf, Principled::basic::<false>),
-            Bsdf::Conductor(bsdf) if bsdf.is_rough_single() => with!(Uniform(Metal(bsdf))),
+            Bsdf::Conductor(bsdf) => match bsdf.scattering() {
+                Scattering::Single => with!(Uniform(Metal(bsdf))),
+                Scattering::Multiple { isotropic: true } => with!(Uniform(MetalMultiple::<_, true>(bsdf))),
+                Scattering::Smooth | Scattering::Multiple { isotropic: false } => $otherwise,
+            },
             Bsdf::Dielectric(bsdf) if bsdf.flags().is_delta() => with!(Uniform(SmoothGlass(bsdf))),
-            Bsdf::Dielectric(bsdf) if bsdf.is_rough_single() => with!(Uniform(Glass(bsdf))),
+            Bsdf::Dielectric(bsdf) => match bsdf.multiple() {
+                None => with!(Uniform(Glass(bsdf))),
+                Some(multiple) => with!(Uniform(GlassMultiple { bsdf, multiple })),
+            },
             Bsdf::Plastic(bsdf) if bsdf.coat.is_smooth() => with_plastic!(bsdf, SmoothPlastic),
             Bsdf::Plastic(bsdf) if !bsdf.flags().is_anisotropic() => with_plastic!(bsdf, IsotropicPlastic),
             Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if bsdf.coat.is_smooth() => with_plastic!(bsdf, SmoothPlastic),
             Bsdf::SeparableGgx(SingleScatteringBsdf::Plastic(bsdf)) if !bsdf.flags().is_anisotropic() => {
                 with_plastic!(bsdf, IsotropicPlastic)
             }
-            Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(bsdf)) if bsdf.is_rough_single() => with!(Uniform(Metal(bsdf))),
-            Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(bsdf)) if bsdf.is_rough_single() => with!(Uniform(Glass(bsdf))),
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Conductor(bsdf)) if bsdf.scattering() == Scattering::Single => {
+                with!(Uniform(Metal(bsdf)))
+            }
+            Bsdf::SeparableGgx(SingleScatteringBsdf::Dielectric(bsdf)) if !bsdf.flags().is_delta() => with!(Uniform(Glass(bsdf))),
             _ => $otherwise,
         }
     }};
@@ -225,7 +234,10 @@ impl Bsdf {
         if count == 1 {
             return out.set(0, &single(0));
         }
-        lanes!(self, varies.then_some(queries), bsdfs => vectorize!(eval(&bsdfs, queries, out, count)), {
+        lanes!(self, varies.then_some(queries), bsdfs => {
+            let count = whole_vectors(count);
+            vectorize!(eval(&bsdfs, queries, out, count))
+        }, {
             (0..count.min(BATCH)).for_each(|i| out.set(i, &single(i)));
         });
     }
@@ -236,26 +248,30 @@ impl Bsdf {
         if count == 1 {
             return out.set(0, single(0));
         }
-        lanes!(self, varies.then_some(queries), bsdfs => vectorize!(sample(&bsdfs, queries, out, count)), {
+        lanes!(self, varies.then_some(queries), bsdfs => {
+            let count = whole_vectors(count);
+            vectorize!(sample(&bsdfs, queries, out, count))
+        }, {
             (0..count.min(BATCH)).for_each(|i| out.set(i, single(i)));
         });
     }
 }
 
-// Whole vectors: what is computed for lanes beyond the count is not used.
+/// The count rounded up to whole vectors: what is computed for lanes beyond it is not used.
+fn whole_vectors(count: usize) -> usize {
+    count.next_multiple_of(vectorize::lanes()).min(BATCH)
+}
+
 #[inline(always)]
 fn eval(bsdfs: &impl LaneBsdfs, queries: &BsdfQueryRows, out: &mut BsdfEvalRows, count: usize) {
-    for i in 0..count.next_multiple_of(LANES).min(BATCH) {
+    for i in 0..count.min(BATCH) {
         out.set(i, &bsdfs.lane(i).eval(queries.wo.get(i), queries.wi.get(i)));
     }
 }
 
 #[inline(always)]
 fn sample(bsdfs: &impl LaneBsdfs, queries: &BsdfQueryRows, out: &mut BsdfSampleRows, count: usize) {
-    for i in 0..count.next_multiple_of(LANES).min(BATCH) {
+    for i in 0..count.min(BATCH) {
         out.set(i, bsdfs.lane(i).sample(queries.wo.get(i), queries.u_lobe[i], [queries.u[i], queries.v[i]]));
     }
 }
-
-/// Lanes of the widest vectors.
-const LANES: usize = 16;

@@ -148,7 +148,7 @@ impl LightQueue {
         (samples.light[lane], self.pmfs[lane]) = (choice.id.0, choice.pmf);
         match context.lights.get(choice.id) {
             Light::Area(light) if self.area.push(light, choice.id, lane) || self.emitters.push(light, choice.id, lane) => {}
-            _ if context.lights.single_environment_map().is_some_and(|(id, _)| id == choice.id) => self.sky.lanes.push(lane),
+            _ if context.lights.environment_map().is_some_and(|(id, _)| id == choice.id) => self.sky.lanes.push(lane),
             _ => self.alone.push((lane, choice.id)),
         }
     }
@@ -159,7 +159,7 @@ impl LightQueue {
         area.sample(queries, pmfs, samples, target_p);
         let mut set = |lane: usize, sample: &LightSample| samples.set(lane, sample, pmfs[lane], target_p);
         emitters.sample(context, queries, &mut set);
-        if let Some((_, image)) = context.lights.single_environment_map() {
+        if let Some((_, image)) = context.lights.environment_map() {
             sky.sample(image, context.compensation, queries, &mut set);
         }
         for &(lane, id) in &*alone {

@@ -45,6 +45,7 @@ pub struct LightSet {
     /// With it, if that makes a difference.
     mis_compensated: Option<LightDistribution>,
     at_infinity: Vec<LightId>,
+    environment_map: Option<LightId>,
 }
 
 /// How lights are chosen.
@@ -88,6 +89,8 @@ impl LightSet {
         let has_environment = lights.iter().any(|light| matches!(light, Light::Environment(_)));
         let mis_compensated = has_environment.then(|| probabilities(&powers(MisCompensation::On), &far));
         let at_infinity = (0..lights.len()).filter(|&i| lights[i].is_visible_at_infinity()).map(LightId::new).collect();
+        let is_map = |light: &Light| matches!(light, Light::Environment(Environment::Map(_)));
+        let environment_map = lights.iter().position(is_map).map(LightId::new);
         let tree = match selection {
             LightSelection::Power => None,
             LightSelection::Tree => {
@@ -104,7 +107,7 @@ impl LightSet {
             LightDistribution { table: AliasTable::new(&probabilities), tree_share }
         };
         let (plain, mis_compensated) = (distribution(plain), mis_compensated.map(distribution));
-        Self { lights, tree: tree.map(Box::new), plain, mis_compensated, at_infinity }
+        Self { lights, tree: tree.map(Box::new), plain, mis_compensated, at_infinity, environment_map }
     }
 
     /// All lights, by [`LightId`].
@@ -166,14 +169,12 @@ impl LightSet {
         }
     }
 
-    /// The image around the scene, if it is all that rays leaving the scene can see.
+    /// The first image around the scene.
     #[inline]
-    pub fn single_environment_map(&self) -> Option<(LightId, &EnvironmentMap)> {
-        match self.at_infinity[..] {
-            [id] => match self.get(id) {
-                Light::Environment(Environment::Map(map)) => Some((id, map)),
-                _ => None,
-            },
+    pub fn environment_map(&self) -> Option<(LightId, &EnvironmentMap)> {
+        let id = self.environment_map?;
+        match self.get(id) {
+            Light::Environment(Environment::Map(map)) => Some((id, map)),
             _ => None,
         }
     }

@@ -264,6 +264,18 @@ pub fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
+/// Replaces `lanes` by the chosen ones of the first `count`, without branches.
+#[inline(always)]
+pub fn collect_lanes(lanes: &mut Vec<u8>, count: usize, mut is_chosen: impl FnMut(usize) -> bool) {
+    lanes.resize(BATCH, 0);
+    let mut chosen = 0;
+    for lane in 0..count.min(BATCH) {
+        lanes[chosen % BATCH] = lane as u8;
+        chosen += usize::from(is_chosen(lane));
+    }
+    lanes.truncate(chosen);
+}
+
 /// A lane of a block or of the next.
 #[inline(always)]
 fn place<'a, T>(to: &'a mut Row<T>, next: Option<&'a mut Row<T>>, at: usize) -> Option<&'a mut T> {

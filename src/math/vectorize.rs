@@ -31,6 +31,12 @@ pub fn run<R>(kernel: impl FnOnce() -> R) -> R {
     }
 }
 
+/// Numbers of 32 bits in the vectors that [`run`] uses.
+#[inline]
+pub fn lanes() -> usize {
+    if V4::try_new().is_some() { 16 } else { 8 }
+}
+
 /// Evaluates a call of a kernel with each instruction set that the machine has; the first result is that of plain code.
 #[cfg(test)]
 macro_rules! with_each {

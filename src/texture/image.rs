@@ -118,6 +118,11 @@ impl TextureImage {
         self.data.height
     }
 
+    /// Numbers of a pixel: one of grey, three of colour, and one more with alpha.
+    pub fn channels(&self) -> usize {
+        self.data.channels
+    }
+
     /// Whether pixels have red, green and blue rather than grey.
     #[inline]
     pub fn has_color(&self) -> bool {
@@ -246,7 +251,22 @@ impl TextureImage {
             _ if channels < 3 => (0, decoding),
             _ => (channel as usize, decoding),
         };
-        let i = (y * self.data.width + x) * channels + offset;
+        self.sample((y * self.data.width + x) * channels + offset, decoding)
+    }
+
+    /// Appends the numbers of a row, pixel by pixel.
+    pub fn push_row(&self, y: usize, decoding: Decoding, row: &mut Vec<f32>) {
+        let channels = self.data.channels;
+        let colors = if self.has_alpha() { channels - 1 } else { channels };
+        let start = y * self.data.width * channels;
+        for pixel in (start..).step_by(channels).take(self.data.width) {
+            row.extend((pixel..pixel + colors).map(|i| self.sample(i, decoding)));
+            row.extend((pixel + colors..pixel + channels).map(|i| self.sample(i, Decoding::Linear)));
+        }
+    }
+
+    #[inline(always)]
+    fn sample(&self, i: usize, decoding: Decoding) -> f32 {
         match &self.data.samples {
             Samples::U8(s) => self.tables[decoding as usize][usize::from(s[i])],
             Samples::U16(s) if decoding == Decoding::Srgb => SRGB_U16[usize::from(s[i])],

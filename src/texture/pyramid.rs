@@ -3,9 +3,10 @@
 //! A texel of a level is the mean of the part of the image that it covers, in linear values, for images of odd sizes
 //! too: so all levels have the image's mean.
 
+use arrayvec::ArrayVec;
 use half::f16;
 
-use super::image::{Channel, Decoding, TextureImage};
+use super::image::{Decoding, TextureImage};
 use crate::image_data::{ImageData, Samples};
 
 /// The smaller levels of an image, down to a single texel. Whole numbers are kept in 16 bits, floats as the image has
@@ -46,66 +47,69 @@ impl Pyramid {
     }
 }
 
-/// The share of each of three texels of a row, from `2 j` on, in texel `j` of a row of half as many.
+/// The share of each of up to three texels of a row, from `2 j` on, in texel `j` of a row of half as many.
 struct Shares {
-    /// The texels, within the row.
-    texels: [usize; 3],
-    weights: [f64; 3],
+    first: usize,
+    weights: ArrayVec<f64, 3>,
 }
 
 impl Shares {
     fn new(j: usize, count: usize) -> Self {
         let half = (count / 2).max(1);
-        let weights = if count == 1 {
-            [1.0, 0.0, 0.0]
+        let mut weights = ArrayVec::new();
+        if count == 1 {
+            weights.push(1.0);
         } else if count.is_multiple_of(2) {
-            [0.5, 0.5, 0.0]
+            weights.extend([0.5; 2]);
         } else {
             // A texel covers 2 + 1/half of the row's.
             let (j, half, count) = (j as f64, half as f64, count as f64);
-            [(half - j) / count, half / count, (j + 1.0) / count]
-        };
-        Self { texels: [0, 1, 2].map(|i| (2 * j + i).min(count - 1)), weights }
+            weights.extend([(half - j) / count, half / count, (j + 1.0) / count]);
+        }
+        Self { first: 2 * j, weights }
     }
 }
 
 fn halved(image: &TextureImage, decoding: Decoding) -> ImageData {
     let half = |count: usize| (count / 2).max(1);
-    let (width, height) = (half(image.width()), half(image.height()));
-    let channels: &[Channel] = match (image.has_color(), image.has_alpha()) {
-        (false, false) => &[Channel::R],
-        (false, true) => &[Channel::R, Channel::A],
-        (true, false) => &[Channel::R, Channel::G, Channel::B],
-        (true, true) => &[Channel::R, Channel::G, Channel::B, Channel::A],
-    };
+    let (width, height, channels) = (half(image.width()), half(image.height()), image.channels());
     let columns: Vec<Shares> = (0..width).map(|x| Shares::new(x, image.width())).collect();
-    let mut values = Vec::with_capacity(width * height * channels.len());
+    let mut values = Vec::with_capacity(width * height * channels);
+    let mut texels: [Vec<f32>; 3] = Default::default();
     for y in 0..height {
         let rows = Shares::new(y, image.height());
+        for (i, texels) in texels.iter_mut().enumerate().take(rows.weights.len()) {
+            texels.clear();
+            image.push_row(rows.first + i, decoding, texels);
+        }
         for columns in &columns {
-            for &channel in channels {
+            for channel in 0..channels {
                 let mut sum = 0.0;
-                for (&row, &by_row) in rows.texels.iter().zip(&rows.weights).filter(|(_, weight)| **weight > 0.0) {
-                    for (&column, &by_column) in columns.texels.iter().zip(&columns.weights).filter(|(_, weight)| **weight > 0.0) {
-                        sum += by_row * by_column * f64::from(image.value(column, row, channel, decoding));
+                for (texels, by_row) in texels.iter().zip(&rows.weights) {
+                    let texels = texels[columns.first * channels + channel..].iter().step_by(channels);
+                    for (&texel, by_column) in texels.zip(&columns.weights) {
+                        sum += by_row * by_column * f64::from(texel);
                     }
                 }
                 values.push(sum as f32);
             }
         }
     }
+    // Truncation of what is half a step higher: rounding itself is a library call on many processors.
+    let rounded = |v: f32| (f64::from(v * 65_535.0) + 0.5) as u16;
     let samples = match image.samples() {
-        Samples::U8(_) | Samples::U16(_) => Samples::U16(values.iter().map(|v| (v * 65_535.0).round() as u16).collect()),
-        Samples::F16(_) => Samples::F16(values.iter().map(|&v| f16::from_f32(v)).collect()),
+        Samples::U8(_) | Samples::U16(_) => Samples::U16(values.into_iter().map(rounded).collect()),
+        Samples::F16(_) => Samples::F16(values.into_iter().map(f16::from_f32).collect()),
         Samples::F32(_) => Samples::F32(values),
     };
-    ImageData { width, height, channels: channels.len(), samples }
+    ImageData { width, height, channels, samples }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::Rng;
+    use crate::texture::image::Channel;
 
     fn mean(image: &TextureImage, channel: Channel, decoding: Decoding) -> f64 {
         let (width, height) = (image.width(), image.height());

@@ -156,10 +156,11 @@ impl Energy {
 
     /// What dielectric microfacets reflect and refract together, for the index of refraction beyond them over that on
     /// this side, within `[1/10, 10]`. Of isotropic microfacets.
-    #[inline]
+    #[inline(always)]
     pub fn dielectric_albedo(&self, eta: f32, w: Vec3) -> f32 {
         const SIDE: usize = ALPHAS * IORS * COSINES;
-        let (start, ior) = if eta >= 1.0 { (0, eta) } else { (SIDE, 1.0 / eta) };
+        let start = if eta >= 1.0 { 0 } else { SIDE };
+        let ior = if eta >= 1.0 { eta } else { 1.0 / eta };
         let coordinates = self.coordinates(w);
         GLASS.trilinear(start, [IORS, COSINES], [self.at_alpha, TableCoordinate::of_ior(ior), coordinates.cosine])
     }

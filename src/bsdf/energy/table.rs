@@ -93,10 +93,12 @@ impl Block {
     }
 
     /// Between nodes of three axes.
-    #[inline]
+    #[inline(always)]
     pub fn trilinear(&self, start: usize, counts: [usize; 2], places: [TableCoordinate; 3]) -> f32 {
-        let plane = |node: usize| self.bilinear_from(start + node * counts[0] * counts[1], counts[1], places[1], places[2]);
-        let (before, after) = (plane(places[0].node), plane(places[0].node + 1));
+        let plane = counts[0] * counts[1];
+        let at = start + places[0].node * plane;
+        let before = self.bilinear_from(at, counts[1], places[1], places[2]);
+        let after = self.bilinear_from(at + plane, counts[1], places[1], places[2]);
         before + (after - before) * places[0].part
     }
 }
@@ -148,7 +150,7 @@ impl TableCoordinate {
     }
 
     /// On the axis of the index of refraction, at least 1.
-    #[inline]
+    #[inline(always)]
     pub fn of_ior(ior: f32) -> Self {
         const LAST: f32 = (MAX_IOR + 1.0) / (MAX_IOR - 1.0);
         Self::new(((ior - 1.0) / (ior + 1.0) * LAST).max(0.0).sqrt(), IORS)

@@ -27,7 +27,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
         return;
     }
     let MissScratch { directions, evals, environment } = miss;
-    let image = context.scene.lights.single_environment_map();
+    let image = context.scene.lights.environment_map();
     for (k, &path) in misses.iter().enumerate() {
         directions.set(k, rays.direction.get(usize::from(path)));
     }
@@ -40,7 +40,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
     for (k, &path) in misses.iter().enumerate() {
         let i = usize::from(path);
         let direction = directions.get(k);
-        let known = image.map(|_| InfiniteLightEval { radiance: evals.radiance.get(k), pdf: evals.pdf[k] });
+        let known = image.map(|(id, _)| (id, InfiniteLightEval { radiance: evals.radiance.get(k), pdf: evals.pdf[k] }));
         let miss = Miss { paths, i, direction, known };
         let slot = paths.slot[i];
         if is_visible {
@@ -68,8 +68,8 @@ struct Miss<'a> {
     paths: &'a PathRows,
     i: usize,
     direction: Vec3,
-    /// What the environment emits there, if that has been looked up already.
-    known: Option<InfiniteLightEval>,
+    /// An environment and what it emits there, if that has been looked up already.
+    known: Option<(LightId, InfiniteLightEval)>,
 }
 
 impl Miss<'_> {
@@ -83,7 +83,10 @@ impl Miss<'_> {
     fn radiance_of(&self, context: &Context, id: LightId) -> Rgb {
         let Self { paths, i, direction, known } = *self;
         let lights = &context.scene.lights;
-        let InfiniteLightEval { radiance, pdf } = known.unwrap_or_else(|| lights.get(id).eval_infinite(direction, context.compensation));
+        let InfiniteLightEval { radiance, pdf } = match known {
+            Some((known, eval)) if known == id => eval,
+            _ => lights.get(id).eval_infinite(direction, context.compensation),
+        };
         if radiance.is_black() {
             return Rgb::BLACK;
         }

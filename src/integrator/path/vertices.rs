@@ -8,7 +8,7 @@ use crate::color::Rgb;
 use crate::geometry::{Hit, Shape, TrianglePoints, interpolated_normal, interpolated_uv, uv_area, uv_density};
 use crate::id::ShapeId;
 use crate::integrator::shading::{adapted_normal, is_consistent};
-use crate::math::compact::Compaction;
+use crate::math::compact::{Compaction, collect_lanes};
 use crate::math::rows::{BATCH, Element, Row, Vectors};
 use crate::math::vectorize::vectorize;
 use crate::math::{Frame, RayRows, Vec2};
@@ -20,8 +20,7 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     let (paths, rays, hits) = (&paths[block], &rays[block], &hits[block]);
     let features = &context.scene.features;
     let lanes = Compaction::different(&hits.shape, HitRows::MISS, count);
-    vertices.misses.clear();
-    vertices.misses.extend((0..count.min(BATCH)).filter(|&path| !lanes.contains(path)).map(|path| path as u8));
+    collect_lanes(&mut vertices.misses, count, |path| !lanes.contains(path));
     start_vertices(vertices, &lanes, paths, rays, hits);
     let mut triangles = 0;
     for lane in 0..vertices.count.min(BATCH) {
@@ -102,12 +101,10 @@ fn start_vertices(vertices: &mut Vertices, lanes: &Compaction, paths: &PathRows,
 fn resolve_analytic(context: &Context, vertices: &mut Vertices, rays: &RayRows, hits: &HitRows) {
     let Vertices { count, rows, points, analytic, .. } = vertices;
     let AnalyticScratch { lanes, rays: gathered, t, points: found, normals } = analytic;
-    lanes.clear();
-    let is_wanted = |lane: usize| {
+    collect_lanes(lanes, *count, |lane| {
         let is_in_world = rows.is_unresolved[lane] != 0 && rows.instance[lane] == Hit::NO_INSTANCE.0;
         is_in_world && context.world.resolves_in_rows(ShapeId(rows.shape[lane]))
-    };
-    lanes.extend((0..BATCH.min(*count)).filter(|&lane| is_wanted(lane)).map(|lane| lane as u8));
+    });
     lanes.sort_unstable_by_key(|&lane| u64::from(rows.shape[usize::from(lane)]) << 8 | u64::from(lane));
     for lanes in lanes.chunk_by(|&a, &b| rows.shape[usize::from(a)] == rows.shape[usize::from(b)]) {
         let Shape::Analytic(placed) = context.scene.geometry.shape(ShapeId(rows.shape[usize::from(lanes[0])])) else { continue };
