@@ -21,7 +21,11 @@ pub(super) fn find(context: &Context, wave: &mut Wave, block: usize) {
     let features = &context.scene.features;
     let lanes = Compaction::different(&hits.shape, HitRows::MISS, count);
     vertices.misses.clear();
-    vertices.misses.extend((0..count.min(BATCH)).filter(|&path| !lanes.contains(path)).map(|path| path as u8));
+    for path in 0..count.min(BATCH) {
+        if !lanes.contains(path) {
+            vertices.misses.push(path as u8);
+        }
+    }
     start_vertices(vertices, &lanes, paths, rays, hits);
     let mut triangles = 0;
     for lane in 0..vertices.count.min(BATCH) {
