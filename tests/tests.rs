@@ -59,7 +59,7 @@ mod gallery;
 /// Bottles and glasses of revolution, filled.
 mod glassware;
 /// glTF files as they look: which way up images, normals and glass are.
-mod gltf_looks;
+mod gltf_rendering;
 mod guiding;
 /// Progress, logs, colours, configuration and manual pages.
 mod hygiene;

@@ -30,6 +30,13 @@ impl SampleMoments {
         self.squares.add(pixel, mean.map(|value| value * value));
     }
 
+    /// Adds groups, at most one of each pixel, by pixel and mean.
+    pub fn add_all(&mut self, buffer: &mut Vec<f64>, means: impl ExactSizeIterator<Item = (usize, [f64; 3])> + Clone) {
+        means.clone().for_each(|(pixel, _)| self.groups[pixel] += 1);
+        self.sums.add_all(buffer, means.clone());
+        self.squares.add_all(buffer, means.map(|(pixel, mean)| (pixel, mean.map(|value| value * value))));
+    }
+
     pub fn merge(&mut self, other: &Self) {
         self.groups.iter_mut().zip(&other.groups).for_each(|(sum, groups)| *sum = sum.saturating_add(*groups));
         self.sums.merge(&other.sums, 1.0);
@@ -92,10 +99,10 @@ impl Accumulator {
 
     /// Adds one average of samples; a sample's entry is its pixel.
     #[inline(always)]
-    pub fn add_average<'a>(&mut self, index: usize, values: impl Iterator<Item = (&'a WorldSample, Rgb)>) {
-        for (at, value) in values.filter(|(_, value)| !value.is_black()) {
-            let weight = f64::from(at.weight);
-            self.average_mut(index).add(at.pixel as usize, value.to_array().map(|value| weight * f64::from(value)));
+    pub fn add_average(&mut self, index: usize, samples: &[WorldSample], buffer: &mut Vec<f64>, value: impl Fn(&WorldSample) -> Rgb) {
+        if samples.iter().any(|at| !value(at).is_black()) {
+            let terms = samples.iter().map(|at| at.weighted(value(at).to_array()));
+            self.average_mut(index).add_all(buffer, terms);
         }
     }
 

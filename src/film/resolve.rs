@@ -157,9 +157,8 @@ impl Film {
             }
             for (layer, &first) in layers.iter_mut().zip(&firsts) {
                 let info = LayerInfo::of(layer.kind);
-                let start = layer.data.len();
-                layer.data.resize(start + info.channels.len(), 0.0);
-                let out = &mut layer.data[start..];
+                let mut values = [0.0; 4];
+                let out = &mut values[..info.channels.len()];
                 match info.source {
                     LayerSource::Color => estimator.color(out),
                     LayerSource::LightAov(_) | LayerSource::LightGroups | LayerSource::Surface(_, Filtering::Mean) => {
@@ -170,6 +169,7 @@ impl Film {
                     LayerSource::Film => out.copy_from_slice(&self.variance(&kernel, x, y).map(to_f32)),
                     LayerSource::Coverage | LayerSource::Denoiser => {}
                 }
+                layer.data.extend_from_slice(out);
             }
             if let Some(coverage) = &mut coverage {
                 coverage.push(estimator.coverage());

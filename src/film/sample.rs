@@ -2,6 +2,24 @@
 
 use crate::color::Rgb;
 use crate::math::Vec3;
+use crate::math::vectorize::vectorize;
+
+/// Far from what `f32` can hold: weighted sums of fewer values are finite.
+const BOUND: f32 = 1e30;
+
+#[inline(always)]
+fn are_bounded<T>(values: &[T], magnitude: impl Fn(&T) -> f32) -> bool {
+    let mut all = true;
+    for value in values {
+        all &= magnitude(value) < BOUND;
+    }
+    all
+}
+
+#[inline(always)]
+fn magnitude(color: Rgb) -> f32 {
+    color.r.abs() + color.g.abs() + color.b.abs()
+}
 
 /// Radiance and alpha of one sample of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -10,6 +28,21 @@ pub struct PixelSample {
     pub radiance: Rgb,
     /// 1 where the camera sees a surface or a background, 0 where not.
     pub alpha: f32,
+}
+
+impl PixelSample {
+    /// Radiance, then alpha.
+    #[inline(always)]
+    pub fn to_array(self) -> [f32; 4] {
+        let [r, g, b] = self.radiance.to_array();
+        [r, g, b, self.alpha]
+    }
+
+    /// The sum of all numbers' absolute values: not finite unless all of them are.
+    #[inline(always)]
+    pub fn magnitude(&self) -> f32 {
+        magnitude(self.radiance) + self.alpha.abs()
+    }
 }
 
 /// The shape that a sample shows, and through which instance.
@@ -61,14 +94,13 @@ pub struct SurfaceSample {
 }
 
 impl SurfaceSample {
-    /// Whether every number is finite.
-    #[inline]
-    pub fn is_finite(&self) -> bool {
-        let vectors = [self.normal, self.geometric_normal, self.position, self.feature_normal].map(|v| v.x.abs() + v.y.abs() + v.z.abs());
-        let colors = [self.albedo, self.feature_albedo].map(|c| c.r.abs() + c.g.abs() + c.b.abs());
-        let rest = [self.depth, self.uv[0], self.uv[1], self.motion[0], self.motion[1]].map(f32::abs);
-        let all = vectors.into_iter().chain(colors).chain(rest);
-        all.fold(0.0, |sum, value| sum + value * 0.0) == 0.0
+    /// The sum of all numbers' absolute values: not finite unless all of them are.
+    #[inline(always)]
+    pub fn magnitude(&self) -> f32 {
+        let vectors = self.normal.abs() + self.geometric_normal.abs() + self.position.abs() + self.feature_normal.abs();
+        let ([u, v], [x, y]) = (self.uv, self.motion);
+        let scalars = Vec3::new(self.depth, u, v).abs() + Vec3::new(x, y, 0.0).abs();
+        magnitude(self.albedo) + magnitude(self.feature_albedo) + (vectors + scalars).element_sum()
     }
 }
 
@@ -146,7 +178,7 @@ impl LightAovRows {
     }
 
     /// Adds to the AOV with this index of a sample.
-    #[inline]
+    #[inline(always)]
     pub fn add(&mut self, sample: usize, aov: usize, light: Rgb) {
         if light.is_black() {
             return;
@@ -161,12 +193,6 @@ impl LightAovRows {
     /// Those that are not black in all samples, with their indices.
     pub fn rows(&self) -> impl Iterator<Item = (usize, &[Rgb])> {
         self.rows.iter().map(Vec::as_slice).enumerate().filter(|(_, row)| !row.is_empty())
-    }
-
-    /// Whether all are finite, and far from what `f32` can hold.
-    pub fn are_bounded(&self) -> bool {
-        let is_bounded = |value: &Rgb| [value.r, value.g, value.b].iter().fold(true, |all, value| all & (value.abs() < 1e30));
-        self.rows().all(|(_, row)| row.iter().fold(true, |all, value| all & is_bounded(value)))
     }
 
     /// Those of a sample.
@@ -216,10 +242,18 @@ impl SampleBatch {
         self.light_aovs.reset(count, light_aovs);
     }
 
+    /// Whether all values are finite, and far from what `f32` can hold.
+    pub fn is_bounded(&self) -> bool {
+        vectorize!(are_bounded(&self.pixels, PixelSample::magnitude))
+            && vectorize!(are_bounded(&self.surfaces, SurfaceSample::magnitude))
+            && self.light_aovs.rows().all(|(_, row)| vectorize!(are_bounded(row, |light| magnitude(*light))))
+    }
+
     /// The radiance of the sample with this index.
     #[inline]
     pub fn radiance(&self, index: usize) -> [f64; 3] {
-        self.pixels[index].radiance.to_array().map(f64::from)
+        let Rgb { r, g, b } = self.pixels[index].radiance;
+        [f64::from(r), f64::from(g), f64::from(b)]
     }
 
     /// The values of the sample with this index.

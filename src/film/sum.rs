@@ -6,6 +6,7 @@
 //! So films of any parts of the samples merge to the same bits.
 
 use crate::bytes::{ByteReader, ByteWriter};
+use crate::math::vectorize::vectorize;
 
 /// `N` sums for each of a number of entries; those of an entry side by side.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,6 +39,24 @@ impl<const N: usize> SumPlane<N> {
             high[k] = sum;
             low[k] += error as f32;
         }
+    }
+
+    /// Adds terms to entries, at most one to each. `buffer` holds them in the order of the entries.
+    #[inline(always)]
+    pub fn add_all(&mut self, buffer: &mut Vec<f64>, terms: impl ExactSizeIterator<Item = (usize, [f64; N])>) {
+        let count = self.high.len() * N;
+        if buffer.len() < count {
+            buffer.resize(count, 0.0);
+        }
+        let buffer = &mut buffer[..count];
+        if terms.len() < self.high.len() {
+            buffer.fill(0.0);
+        }
+        let by_entry = buffer.as_chunks_mut::<N>().0;
+        for (entry, term) in terms {
+            by_entry[entry] = term;
+        }
+        vectorize!(add_terms(self.high.as_flattened_mut(), self.low.as_flattened_mut(), buffer));
     }
 
     /// Adds the sums of other terms, each times `factor`.
@@ -83,6 +102,15 @@ impl<const N: usize> SumPlane<N> {
     /// Whether this is the number of entries.
     pub fn has_entries(&self, entries: usize) -> bool {
         self.high.len() == entries
+    }
+}
+
+#[inline(always)]
+fn add_terms(high: &mut [f64], low: &mut [f32], terms: &[f64]) {
+    for ((high, low), &term) in high.iter_mut().zip(low).zip(terms) {
+        let (sum, error) = two_sum(*high, term);
+        *high = sum;
+        *low += error as f32;
     }
 }
 

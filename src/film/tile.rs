@@ -6,7 +6,7 @@ use super::layer::MAX_MEANS;
 use super::nearest::Nearest;
 use super::splats::Splats;
 use super::sum::SumPlane;
-use super::{CoverageCounts, Crop, LayerKind, Layout, LightAovSample, PixelSample, Sample, SampleBatch, SurfaceSample, Taps};
+use super::{CoverageCounts, Crop, LayerKind, Layout, LightAovSample, PixelSample, Sample, SampleBatch, Taps};
 use crate::color::Rgb;
 
 /// How many dropped samples a tile remembers; it counts all of them.
@@ -34,6 +34,18 @@ pub struct WorldSample {
     pub sample: u32,
     /// Weight of the filter.
     pub weight: f32,
+}
+
+impl WorldSample {
+    /// The pixel, and values times the weight.
+    #[inline(always)]
+    pub(super) fn weighted<const N: usize>(&self, values: [f32; N]) -> (usize, [f64; N]) {
+        let mut terms = [0.0; N];
+        for (term, value) in terms.iter_mut().zip(values) {
+            *term = f64::from(self.weight) * f64::from(value);
+        }
+        (self.pixel as usize, terms)
+    }
 }
 
 /// A pixel of samples that do not all count the same.
@@ -133,45 +145,55 @@ impl FilmTile {
         if !self.layout.beside_color() && self.weights.is_empty() {
             return self.add_color(pixel, sample, value.pixel, weight);
         }
-        let Some(values) = self.take::<true>(pixel, sample, value, weight) else { return false };
+        let Some(values) = self.take(pixel, sample, value, weight) else { return false };
         self.add_values(pixel, &value, &values, weight);
         true
     }
 
-    /// As [`add`](Self::add) for samples of a batch, each of which is a [group](Self::add_moments) of its own.
-    /// `samples` keeps those that were not dropped.
-    pub fn add_batch(&mut self, batch: &SampleBatch, samples: &mut Vec<WorldSample>) {
-        if !self.layout.beside_color() || self.layout.signed || !batch.light_aovs.are_bounded() {
-            samples.retain(|at| self.add(at.pixel as usize, at.sample, batch.sample(at.slot as usize), at.weight));
-        } else {
-            samples.retain(|at| {
-                let (pixel, value) = (at.pixel as usize, batch.sample(at.slot as usize));
-                let values = self.take::<false>(pixel, at.sample, value, at.weight);
-                values.is_some_and(|values| {
-                    self.add_values(pixel, &value, &values, at.weight);
-                    true
-                })
-            });
-            self.add_averages(batch, samples);
+    /// As [`add`](Self::add) for samples of a batch, at most one of each pixel, each of which is a
+    /// [group](Self::add_moments) of its own. `buffer` is for what is added to one plane.
+    pub fn add_batch(&mut self, batch: &SampleBatch, samples: &[WorldSample], buffer: &mut Vec<f64>) {
+        if self.layout.signed || !batch.is_bounded() {
+            for at in samples {
+                let (pixel, slot) = (at.pixel as usize, at.slot as usize);
+                if self.add(pixel, at.sample, batch.sample(slot), at.weight) {
+                    self.add_moments(pixel, batch.radiance(slot));
+                }
+            }
+            return;
         }
-        if let Some(moments) = &mut self.moments {
-            samples.iter().for_each(|at| moments.add(at.pixel as usize, batch.radiance(at.slot as usize)));
+        for at in samples {
+            let pixel = at.pixel as usize;
+            self.samples[pixel] += 1;
+            if let Some(surface) = batch.surfaces.get(at.slot as usize) {
+                self.nearest.add(pixel, at.sample, surface, &self.layout.nearest);
+                if let Some(coverage) = &mut self.coverage {
+                    coverage.add(pixel, surface.visible_shape, 1);
+                }
+            }
         }
+        self.add_planes(batch, samples, buffer);
     }
 
-    /// Adds the averages of samples one after the other, so that the sums of each stay in the cache.
-    fn add_averages(&mut self, batch: &SampleBatch, samples: &[WorldSample]) {
+    /// Adds samples to the sums, one plane after the other.
+    fn add_planes(&mut self, batch: &SampleBatch, samples: &[WorldSample], buffer: &mut Vec<f64>) {
+        self.filtered.color.add_all(buffer, samples.iter().map(|at| at.weighted(batch.pixels[at.slot as usize].to_array())));
+        if !self.weights.is_empty() {
+            self.weights.add_all(buffer, samples.iter().map(|at| at.weighted([1.0])));
+        }
         for (k, row) in batch.light_aovs.rows() {
-            self.filtered.add_average(k, samples.iter().map(|at| (at, row[at.slot as usize])));
+            self.filtered.add_average(k, samples, buffer, |at| row[at.slot as usize]);
         }
         let (first, means) = (self.layout.light_aovs.count(), self.layout.means);
         for (k, read) in means.readers().enumerate() {
-            let value = |at: &WorldSample| {
+            self.filtered.add_average(first + k, samples, buffer, |at| {
                 let mut value = [0.0; 3];
                 read(&batch.surfaces[at.slot as usize], &mut value);
                 Rgb::from(value)
-            };
-            self.filtered.add_average(first + k, samples.iter().map(|at| (at, value(at))));
+            });
+        }
+        if let Some(moments) = &mut self.moments {
+            moments.add_all(buffer, samples.iter().map(|at| (at.pixel as usize, batch.radiance(at.slot as usize))));
         }
     }
 
@@ -209,7 +231,7 @@ impl FilmTile {
     pub fn splat<'a>(&mut self, pixel: usize, sample: u32, value: impl Into<Sample<'a>>, taps: &[Taps; 2], splats: &mut Splats) -> bool {
         let value = value.into();
         // A sum of as many terms as a pixel has neighbours is to be finite, too.
-        let Some(values) = self.take::<true>(pixel, sample, value, Splats::MOST_TERMS) else { return false };
+        let Some(values) = self.take(pixel, sample, value, Splats::MOST_TERMS) else { return false };
         let first = self.cells.entry_of(pixel);
         splats.add(&self.cells, first, taps, &values);
         if let (Some(coverage), Some(surface)) = (&mut self.coverage, value.surface) {
@@ -225,10 +247,9 @@ impl FilmTile {
         splats.flush(&self.cells, self.cells.cell_of(pixel), &mut self.filtered, &mut self.weights);
     }
 
-    /// Adds a sample to what is kept of its own pixel and returns what is filtered, with or without averages beside the
-    /// colour; `None` if it is not finite.
+    /// Adds a sample to what is kept of its own pixel and returns what is filtered; `None` if it is not finite.
     #[inline(always)]
-    fn take<'a, const AVERAGES: bool>(&mut self, pixel: usize, sample: u32, value: Sample<'a>, weight: f32) -> Option<Values<'a>> {
+    fn take<'a>(&mut self, pixel: usize, sample: u32, value: Sample<'a>, weight: f32) -> Option<Values<'a>> {
         let Sample { pixel: PixelSample { radiance, alpha }, surface, light_aovs } = value;
         let color = [radiance.r, radiance.g, radiance.b, *alpha];
         let mut values = Values {
@@ -237,8 +258,8 @@ impl FilmTile {
             means: [Rgb::BLACK; MAX_MEANS],
             first_mean: self.layout.light_aovs.count(),
         };
-        let mut finite = is_finite(weight, *radiance, *alpha) && surface.is_none_or(SurfaceSample::is_finite);
-        if AVERAGES && self.layout.beside_color() {
+        let mut finite = is_finite(weight, *radiance, *alpha) && surface.is_none_or(|surface| surface.magnitude().is_finite());
+        if self.layout.beside_color() {
             values.light_aovs = light_aovs;
             if let Some(surface) = surface {
                 values.means = self.layout.means.means(surface);

@@ -69,7 +69,7 @@ impl Node {
 #[derive(Clone, Debug)]
 struct Region {
     directions: Option<Arc<DTree>>,
-    surface_share: f32,
+    bsdf_sampling_fraction: f32,
 }
 
 /// What is being learned of a part of space.
@@ -95,8 +95,8 @@ impl Leaf {
 pub struct GuideRegion<'a> {
     /// Where it comes from.
     pub directions: &'a DTree,
-    /// How many directions the surface had better choose.
-    pub surface_share: f32,
+    /// Fraction of directions to be sampled from the BSDF.
+    pub bsdf_sampling_fraction: f32,
 }
 
 /// Light that a path found.
@@ -137,7 +137,7 @@ impl Guide {
             corner: Vec3::ZERO,
             inverse_size: 0.0,
             nodes: (0..6).map(|leaf| Node(leaf | IS_LEAF)).collect(),
-            learned: vec![Region { directions: None, surface_share: BSDF_SAMPLING_FRACTION }; 6],
+            learned: vec![Region { directions: None, bsdf_sampling_fraction: BSDF_SAMPLING_FRACTION }; 6],
             leaves: (0..6).map(|_| Leaf::default()).collect(),
             scale: scale_of(typical),
             learns: true,
@@ -178,7 +178,7 @@ impl Guide {
     pub fn at(&self, p: Vec3, n: Vec3) -> Option<GuideRegion<'_>> {
         let learned = &self.learned[self.find(root(n), self.normalized(p)).0];
         let directions = learned.directions.as_deref()?;
-        Some(GuideRegion { directions, surface_share: learned.surface_share })
+        Some(GuideRegion { directions, bsdf_sampling_fraction: learned.bsdf_sampling_fraction })
     }
 
     /// Learns from light. What is not a finite number above zero counts as no light. Equal records are treated alike.
@@ -230,10 +230,10 @@ impl Guide {
         for (leaf, parts) in plans {
             let directions = leaf.records.directions().map(Arc::new);
             let records = leaf.records.refined(most_nodes, parts.len());
-            let (count, surface_share) = (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
+            let (count, bsdf_sampling_fraction) = (leaf.count.load(Ordering::Relaxed) / parts.len() as u64, leaf.best_share());
             for &part in &parts {
                 next.nodes[part] = Node(next.leaves.len() as u32 | IS_LEAF);
-                next.learned.push(Region { directions: directions.clone(), surface_share });
+                next.learned.push(Region { directions: directions.clone(), bsdf_sampling_fraction });
                 next.leaves.push(Leaf {
                     records: records.copied(),
                     count: AtomicU64::new(count),

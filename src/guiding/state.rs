@@ -39,7 +39,7 @@ impl Guide {
             let own = learned.directions.as_ref();
             let is_shared = own.zip(last).is_some_and(|(own, last)| Arc::ptr_eq(own, last));
             let place = if is_shared { directions::SHARED } else { own.map_or(directions::NONE, |_| directions::OWN) };
-            out.integers(&[place, learned.surface_share.to_bits()]);
+            out.integers(&[place, learned.bsdf_sampling_fraction.to_bits()]);
             if let Some(own) = own.filter(|_| !is_shared) {
                 own.write(out);
             }
@@ -78,8 +78,8 @@ fn read_learned(data: &mut ByteReader, last: Option<&Region>) -> Option<Region> 
         directions::OWN => Some(Arc::new(DTree::read(data, MAX_NODES_OF_LEAF)?)),
         _ => return None,
     };
-    let surface_share = Some(f32::from_bits(share)).filter(|share| *share > 0.0 && *share < 1.0)?;
-    Some(Region { directions, surface_share })
+    let bsdf_sampling_fraction = Some(f32::from_bits(share)).filter(|share| *share > 0.0 && *share < 1.0)?;
+    Some(Region { directions, bsdf_sampling_fraction })
 }
 
 /// The leaves of the trees over space; `None` if these are not six binary trees with each leaf once.

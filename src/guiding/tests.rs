@@ -128,10 +128,10 @@ fn no_record_can_poison_the_guide() {
     }
     for _ in 0..10_000 {
         let p = if rng.unit() < 0.5 { Vec3::splat(0.5) } else { random_place(&mut rng) };
-        let GuideRegion { directions, surface_share } = guide.at(p, Vec3::Z).unwrap();
+        let GuideRegion { directions, bsdf_sampling_fraction } = guide.at(p, Vec3::Z).unwrap();
         let sample = directions.sample(rng.pair());
         assert!(sample.direction.is_finite() && sample.pdf > 0.0 && sample.pdf.is_finite(), "{sample:?}");
-        assert!((0.0..=1.0).contains(&surface_share));
+        assert!((0.0..=1.0).contains(&bsdf_sampling_fraction));
     }
     for x in bad {
         assert!(guide.at(Vec3::splat(x), Vec3::new(x, 0.0, 0.0)).is_none_or(|known| known.directions.pdf(Vec3::Z).is_finite()));
@@ -177,7 +177,7 @@ fn shares_follow_what_explains_the_light() {
         for _ in 0..100 {
             guide.record(&Record { densities: Some(densities), ..record(Vec3::splat(0.5), Vec3::X, 1.0) });
         }
-        assert_eq!(guide.refined(1).at(Vec3::splat(0.5), Vec3::Z).unwrap().surface_share, expected);
+        assert_eq!(guide.refined(1).at(Vec3::splat(0.5), Vec3::Z).unwrap().bsdf_sampling_fraction, expected);
     }
 }
 

@@ -47,7 +47,7 @@ impl<'a> RenderContext<'a> {
 
     /// Whether the batch under way is to be cancelled.
     #[inline]
-    pub(super) fn gives_up(&self) -> bool {
+    pub(super) fn is_cancel_due(&self) -> bool {
         self.cancel.is_some_and(Cancel::is_due)
     }
 

@@ -185,7 +185,7 @@ impl Whitted {
             let source = world.scene.surface(at.shape).light(at.prim);
             tally.add(world, view.throughput * radiance, view.course(0, LightEvent::Emission), source);
         }
-        if view.depth >= self.max_depth || pass.render.gives_up() {
+        if view.depth >= self.max_depth || pass.render.is_cancel_due() {
             return radiance;
         }
         let boundary = world.boundary_bsdf(at, ray.direction, media);

@@ -38,6 +38,8 @@ pub(super) struct TileWorkspace {
     places: Vec<FilterSample>,
     /// Samples to be added to the film.
     placed: Vec<WorldSample>,
+    /// What they add to one plane of the film.
+    terms: Vec<f64>,
     pub splats: Splats,
     pixels: [[u32; 2]; BATCH],
     /// Points of the film.
@@ -54,6 +56,7 @@ impl Default for TileWorkspace {
             samples: CameraBatch::default(),
             places: vec![FilterSample { offset: Vec2::ZERO, weight: 1.0 }; count],
             placed: Vec::with_capacity(count),
+            terms: Vec::with_capacity(4 * count),
             splats: Splats::default(),
             pixels: [[0; 2]; BATCH],
             film: [[0.0; BATCH]; 2],
@@ -184,18 +187,20 @@ impl<'a> TileRenderer<'a> {
         let active = tile.active();
         let origin = tile.origin().map(|x| x / TILE_SIZE * TILE_SIZE);
         let count = samples.len() as u64 * active.area();
+        workspace.placed.clear();
+        for (slot, [dx, dy]) in slots(self.grid.area, origin).map(pixel_of_slot).enumerate() {
+            let (x, y) = (origin[0] + dx, origin[1] + dy);
+            if active.contains(x, y) {
+                workspace.placed.push(WorldSample { slot: slot as u32, pixel: tile.index(x, y) as u32, sample: 0, weight: 1.0 });
+            }
+        }
         for sample in samples {
             self.render_batch(origin, sample, guide, workspace);
             if self.context.is_cancelled() {
                 break;
             }
-            workspace.placed.clear();
-            for (slot, [dx, dy]) in slots(self.grid.area, origin).map(pixel_of_slot).enumerate() {
-                let (x, y) = (origin[0] + dx, origin[1] + dy);
-                if active.contains(x, y) {
-                    let (pixel, weight) = (tile.index(x, y) as u32, workspace.places[slot].weight);
-                    workspace.placed.push(WorldSample { slot: slot as u32, pixel, sample, weight });
-                }
+            for placed in &mut workspace.placed {
+                (placed.sample, placed.weight) = (sample, workspace.places[placed.slot as usize].weight);
             }
             self.add_batch(tile, workspace);
         }
@@ -205,7 +210,7 @@ impl<'a> TileRenderer<'a> {
     /// Adds the placed samples of the batch to the film, each as a group of its own.
     fn add_batch(&self, tile: &mut FilmTile, workspace: &mut TileWorkspace) {
         if !self.filter.is_shared() {
-            tile.add_batch(&workspace.integrator.out, &mut workspace.placed);
+            tile.add_batch(&workspace.integrator.out, &workspace.placed, &mut workspace.terms);
             return;
         }
         for i in 0..workspace.placed.len() {

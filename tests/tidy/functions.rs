@@ -21,7 +21,6 @@ const ROWS: &str = "rows are separate parameters, so that the compiler can assum
 const EXCEPTIONS: &[(Rule, &str, &str, &str)] = &[
     (Rule::Parameters, "src/geometry/placed/points.rs", "resolve", ROWS),
     (Rule::Parameters, "src/geometry/placed/points.rs", "resolve_on", ROWS),
-    (Rule::Parameters, "src/geometry/placed/points.rs", "resolve_rows", ROWS),
     (Rule::Parameters, "src/integrator/path/direct.rs", "illuminate", ROWS),
     (Rule::Parameters, "src/integrator/path/scatter.rs", "spawn_rays", ROWS),
     (Rule::Parameters, "src/light/area/queue.rs", "sample_by_area", ROWS),

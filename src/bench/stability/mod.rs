@@ -240,7 +240,7 @@ pub(crate) mod testing {
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(
             report::write_evidence(folder.path(), &report).unwrap(),
-            ["Z1-grid-ours.exr", "Z1-grid-reference.exr", "Z1-grid-error.exr"]
+            ["Z1-grid-result.exr", "Z1-grid-reference.exr", "Z1-grid-error.exr"]
         );
         assert_eq!(crate::output::read_exr(&folder.path().join("Z1-grid-error.exr")).unwrap().rgb(0, 0), Some([-2.0; 3]));
     }

@@ -139,9 +139,9 @@ impl Outcome {
 
     /// Adds what was measured and what it should be, as pictures of `width` columns, and their difference.
     #[must_use]
-    pub fn pictures(mut self, name: &str, width: usize, ours: &[f64], reference: &[f64]) -> Self {
-        let difference: Vec<f64> = ours.iter().zip(reference).map(|(a, b)| a - b).collect();
-        for (kind, values) in [("ours", ours), ("reference", reference), ("error", &difference)] {
+    pub fn pictures(mut self, name: &str, width: usize, result: &[f64], reference: &[f64]) -> Self {
+        let difference: Vec<f64> = result.iter().zip(reference).map(|(a, b)| a - b).collect();
+        for (kind, values) in [("result", result), ("reference", reference), ("error", &difference)] {
             self.evidence.push((format!("{name}-{kind}"), gray(width, values)));
         }
         self

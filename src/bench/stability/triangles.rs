@@ -24,13 +24,13 @@ checks! {
     "A6" a6_bumpy_mesh "closed mesh with bumps":
         "16 x 16 sphere mesh with radii of 1 to 6, random rays from near the centre, closest and any hit (pbrt, Triangle.Watertight)";
     "A7" a7_small_far_triangles "small triangles far away":
-        "tilted plane of 100 x 100 cells of size 1, origins in a cube of half size 1e6, rays at the centroids of triangles, at least 0.1 rad from grazing (Embree, verify SmallTriangleHitTest). A direction in f32 misses the centroid by up to 0.06 / sin: ours must find the triangle that the rounded ray meets";
+        "tilted plane of 100 x 100 cells of size 1, origins in a cube of half size 1e6, rays at the centroids of triangles, at least 0.1 rad from grazing (Embree, verify SmallTriangleHitTest). A direction in f32 misses the centroid by up to 0.06 / sin: the other accelerators must find the triangle that the rounded ray meets";
     "A8" a8_solid_angle "solid angle of a triangle":
         "triangles with corners within 10 of a point: 65536 points by area, and random directions, against van Oosterom and Strackee's formula (pbrt, Triangle.SolidAngle)";
-    "A9" a9_bad_cases "slivers that have fooled other programs":
+    "A9" a9_bad_cases "slivers that are wrong in other programs":
         "a triangle without area (pbrt, Triangle.BadCases) and one that is a line in f32, with a ray along it: no hit, or one with numbers";
     "A10" a10_both_sides "both sides of a triangle":
-        "rays at a triangle from both sides, in the world and in a mirrored instance: all hit, the normal tells the sides apart (Embree, verify BackfaceCullingTest)";
+        "rays at a triangle from both sides, in the world and in a mirrored instance: all hit, the normal distinguishes the sides (Embree, verify BackfaceCullingTest)";
     "A11" a11_axes "rays along axes":
         "inside of a cube, in the planes of faces' diagonals and next to faces, with zeros and negative zeros in the direction, closest and any hit";
 }
@@ -288,15 +288,15 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
     }
     Outcome::new()
         .at_least("rays", f64::from(rays), 1_000.0)
-        .none("missed by ours", missed)
+        .none("missed by other accelerators", missed)
         // At 1e6 corners less the origin lie on a grid of 1/16, so that some rays meet corners exactly, of which Embree
         // loses a few (A5).
         .at_most("fraction missed by Embree", missed_by_embree as f64 / f64::from(rays), 2e-5)
-        .none("other triangles than the ray meets, ours", wrong)
+        .none("other triangles than the ray meets, other accelerators", wrong)
         // Corners less the origin have one unit of roundoff, the edge functions made of them up to seven more.
         .at_most("embree: distance of the ray from the triangle found, units of roundoff of the origin", off, 8.0)
         .record("embree: fraction with another triangle than aimed at", other as f64 / f64::from(rays))
-        .short("Embree forms edge functions in f32 from corners less the origin, which are 0.03 units off at 1e6; the catalogue asks for 99.998 % right, which f32 rays cannot name")
+        .short("Embree forms edge functions in f32 from corners less the origin, which are 0.03 units off at 1e6; the catalogue requires 99.998 % right, which f32 rays cannot name")
 }
 
 /// The solid angle of a triangle seen from the origin (van Oosterom and Strackee, "The Solid Angle of a Plane

@@ -14,7 +14,7 @@ use crate::sampling::warp;
 
 /// Where the entries of a block come from.
 #[derive(Clone, Copy)]
-enum Source {
+enum TableValue {
     /// Each from its number.
     Number(fn(usize) -> f32),
     /// Each from its number and the entries of the block before.
@@ -22,17 +22,17 @@ enum Source {
 }
 
 /// The blocks in the order of the file.
-const SOURCES: [(Block, Source); 10] = [
-    (MIRRORS, Source::Number(mirrors)),
-    (MIRRORS_AVERAGE, Source::BlockBefore(mirrors_average)),
-    (SCHLICK, Source::Number(schlick)),
-    (GLASS, Source::Number(glass)),
-    (GLASS_AVERAGE, Source::BlockBefore(glass_average)),
-    (DIFFUSE, Source::Number(diffuse)),
-    (SHEEN, Source::Number(sheen)),
-    (CLEAR_COAT, Source::Number(clear_coat)),
-    (COAT, Source::Number(coat)),
-    (COAT_AVERAGE, Source::BlockBefore(coat_average)),
+const SOURCES: [(Block, TableValue); 10] = [
+    (MIRRORS, TableValue::Number(mirrors)),
+    (MIRRORS_AVERAGE, TableValue::BlockBefore(mirrors_average)),
+    (SCHLICK, TableValue::Number(schlick)),
+    (GLASS, TableValue::Number(glass)),
+    (GLASS_AVERAGE, TableValue::BlockBefore(glass_average)),
+    (DIFFUSE, TableValue::Number(diffuse)),
+    (SHEEN, TableValue::Number(sheen)),
+    (CLEAR_COAT, TableValue::Number(clear_coat)),
+    (COAT, TableValue::Number(coat)),
+    (COAT_AVERAGE, TableValue::BlockBefore(coat_average)),
 ];
 
 /// Computes the content of `tables.bin`: quadrature over visible normals at every node.
@@ -46,10 +46,10 @@ pub fn bake() -> Vec<u8> {
     file
 }
 
-fn value(source: Source, entry: usize, before: &[f32]) -> f32 {
+fn value(source: TableValue, entry: usize, before: &[f32]) -> f32 {
     match source {
-        Source::Number(f) => f(entry),
-        Source::BlockBefore(f) => f(entry, before),
+        TableValue::Number(f) => f(entry),
+        TableValue::BlockBefore(f) => f(entry, before),
     }
 }
 
@@ -288,7 +288,7 @@ mod tests {
             for i in 0..24 {
                 let entry = (i * 7919 + 311 * number) % block.len();
                 let (fresh, old) = (value(source, entry, &before), committed[entry]);
-                let scale = if matches!(source, Source::BlockBefore(_)) { (fresh + old).min(1.0) } else { 1.0 };
+                let scale = if matches!(source, TableValue::BlockBefore(_)) { (fresh + old).min(1.0) } else { 1.0 };
                 assert!((fresh - old).abs() * scale <= 2.0 * block.step(), "block {number}, entry {entry}: {fresh} {old}");
             }
             before = committed;

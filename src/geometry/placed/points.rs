@@ -45,18 +45,13 @@ soa! {
 
 /// Samples the first `count` points, at most [`BATCH`]. Surfaces of revolution are sampled alone.
 pub(super) fn sample(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut WorldSampleRows) {
-    vectorize!(sample_rows(placed, u, count, out));
-}
-
-#[inline(always)]
-fn sample_rows(placed: &TransformedShape, u: &[Row; 2], count: usize, out: &mut WorldSampleRows) {
-    match &placed.shape {
+    vectorize!(match &placed.shape {
         Analytic::Sphere(sphere) => sample_on(placed, sphere, u, count, out),
         Analytic::Quad(quad) => sample_on(placed, quad, u, count, out),
         Analytic::Disk(disk) => sample_on(placed, disk, u, count, out),
         Analytic::Frustum(frustum) => sample_on(placed, frustum, u, count, out),
         Analytic::Revolution(_) => out.pdf_area = [0.0; BATCH],
-    }
+    });
 }
 
 #[inline(always)]
@@ -80,7 +75,13 @@ pub(super) fn resolve(
     points: &mut WorldPointRows,
     normals: &mut WorldNormalRows,
 ) {
-    vectorize!(resolve_rows(placed, rays, t, count, points, normals));
+    vectorize!(match &placed.shape {
+        Analytic::Sphere(sphere) => resolve_on(placed, sphere, rays, t, count, points, normals),
+        Analytic::Quad(quad) => resolve_on(placed, quad, rays, t, count, points, normals),
+        Analytic::Disk(disk) => resolve_on(placed, disk, rays, t, count, points, normals),
+        Analytic::Frustum(frustum) => resolve_on(placed, frustum, rays, t, count, points, normals),
+        Analytic::Revolution(_) => normals.is_resolved = [0; BATCH],
+    });
 }
 
 /// A shape whose functions are inlined into loops that become vector code.
@@ -112,24 +113,6 @@ macro_rules! lane_shapes {
 }
 
 lane_shapes!(Sphere: Detail::Place, Quad: Detail::Full, Disk: Detail::Place, Frustum: Detail::Place);
-
-#[inline(always)]
-fn resolve_rows(
-    placed: &TransformedShape,
-    rays: &RayRows,
-    t: &[f32; BATCH],
-    count: usize,
-    points: &mut WorldPointRows,
-    normals: &mut WorldNormalRows,
-) {
-    match &placed.shape {
-        Analytic::Sphere(sphere) => resolve_on(placed, sphere, rays, t, count, points, normals),
-        Analytic::Quad(quad) => resolve_on(placed, quad, rays, t, count, points, normals),
-        Analytic::Disk(disk) => resolve_on(placed, disk, rays, t, count, points, normals),
-        Analytic::Frustum(frustum) => resolve_on(placed, frustum, rays, t, count, points, normals),
-        Analytic::Revolution(_) => normals.is_resolved = [0; BATCH],
-    }
-}
 
 #[inline(always)]
 fn resolve_on<S: LaneShape>(

@@ -15,4 +15,4 @@ fn interaction(placed: &TransformedShape, ray: &Ray) -> Option<SurfaceInteractio
     placed.interaction(ray, &Hit { t: local.t as f32, ..NO_HIT })
 }
 
-mod promises;
+mod properties;

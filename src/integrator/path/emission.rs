@@ -40,7 +40,7 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
             continue;
         }
         out.add(paths.slot[i], light);
-        if context.config.wants_light_aovs() {
+        if context.config.needs_light_aovs() {
             let event = light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Emission);
             out.add_to_light_aovs(context, paths.slot[i], light, event, id);
         }

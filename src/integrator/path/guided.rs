@@ -66,7 +66,7 @@ pub(super) fn find_regions<'a>(guide: &'a Guide, vertices: &Vertices) -> Regions
 /// The density of a direction that the BSDF and the guide choose with these.
 #[inline]
 fn mixed(region: &GuideRegion, [bsdf, guide]: [f32; 2]) -> f32 {
-    region.surface_share * bsdf + (1.0 - region.surface_share) * guide
+    region.bsdf_sampling_fraction * bsdf + (1.0 - region.bsdf_sampling_fraction) * guide
 }
 
 /// Replaces the densities with which scattering finds the lights' directions.
@@ -91,7 +91,7 @@ impl GuideRecorder {
         for (lane, region) in regions.iter().enumerate().take(vertices.count) {
             self.sampled[lane] = None;
             let Some(region) = region else { continue };
-            let (u, share) = (vertices.u_bsdf.of(lane), region.surface_share);
+            let (u, share) = (vertices.u_bsdf.of(lane), region.bsdf_sampling_fraction);
             if u[0] < share {
                 vertices.u_bsdf.set_first(lane, (u[0] / share).min(ONE_MINUS_EPSILON));
             } else {
@@ -124,8 +124,8 @@ impl GuideRecorder {
                 let scatter = &mut vertices.scatter;
                 let weight = scatter.weight.get(lane);
                 if scatter.is_delta[lane] != 0 {
-                    scatter.weight.set(lane, weight * (1.0 / region.surface_share));
-                    scatter.rr_factor[lane] *= region.surface_share;
+                    scatter.weight.set(lane, weight * (1.0 / region.bsdf_sampling_fraction));
+                    scatter.rr_factor[lane] *= region.bsdf_sampling_fraction;
                 } else {
                     let densities = [scatter.pdf[lane], region.directions.pdf(direction)];
                     let pdf = mixed(region, densities);

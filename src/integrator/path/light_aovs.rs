@@ -1,4 +1,4 @@
-//! What light AOVs and AOVs of surfaces beyond the first need to know of paths; empty where none is wanted.
+//! What light AOVs and AOVs of surfaces beyond the first need to know of paths; empty where none is requested.
 
 use super::{Context, PathIntegrator};
 use crate::color::Rgb;

@@ -49,12 +49,12 @@ pub(super) fn add(context: &Context, wave: &mut Wave, block: usize, out: &mut Ou
             }
             let light = context.config.clamped(paths.throughput.get(i) * miss.radiance(context), context.bounce);
             out.add(slot, light);
-            if context.config.wants_light_aovs() {
+            if context.config.needs_light_aovs() {
                 let event = light_aovs.event(context.bounce, block * BATCH + i, LightEvent::Environment);
                 miss.add_to_light_aovs(context, light, event, out);
             }
         }
-        if context.wants_surfaces() {
+        if context.needs_surface_aovs() {
             let shown = context.bounce > 0 || !context.config.hide_emitters;
             let radiance = || if shown { miss.radiance(context) } else { Rgb::BLACK };
             let features = light_aovs.feature_throughput(block * BATCH + i);

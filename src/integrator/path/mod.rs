@@ -72,13 +72,13 @@ struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// Whether any AOV of surfaces is wanted.
-    fn wants_surfaces(&self) -> bool {
+    /// Whether any AOV of surfaces is requested.
+    fn needs_surface_aovs(&self) -> bool {
         self.config.needs != SurfaceAovs::default()
     }
 
-    /// Whether any AOV is wanted that needs state beside paths.
-    fn wants_aovs(&self) -> bool {
+    /// Whether any AOV is requested that needs state beside paths.
+    fn needs_aov_state(&self) -> bool {
         self.config.light_aovs.by_scattering || self.config.needs.features
     }
 }
@@ -105,9 +105,9 @@ impl PathIntegrator {
         if largest > self.clamp { light * (self.clamp / largest) } else { light }
     }
 
-    /// Whether any light AOV is wanted.
+    /// Whether any light AOV is requested.
     #[inline]
-    fn wants_light_aovs(&self) -> bool {
+    fn needs_light_aovs(&self) -> bool {
         self.light_aovs.count() > 0
     }
 
@@ -119,7 +119,7 @@ impl PathIntegrator {
         let mut context = Context { config: self, pass, world, scene: world.scene, bounce: 0, is_last: false, compensation };
         wave.start(&context, samples);
         for bounce in 0..self.max_depth {
-            if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && render.gives_up()) {
+            if wave.count == 0 || (bounce % cancel::BOUNCES == 0 && render.is_cancel_due()) {
                 break;
             }
             (context.bounce, context.is_last) = (bounce, bounce + 1 >= self.max_depth);

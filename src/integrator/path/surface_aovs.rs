@@ -19,7 +19,7 @@ pub(super) fn write(context: &Context, wave: &mut Wave, block: usize, out: &mut 
             out.batch.pixels[slot as usize].alpha = 1.0;
         }
     }
-    if context.wants_surfaces() {
+    if context.needs_surface_aovs() {
         write_surfaces(context, wave, block, out);
     }
 }

@@ -197,7 +197,7 @@ impl Wave {
         if lanes.is_empty() {
             return;
         }
-        if !(self.media.is_empty() && self.cones.is_empty() && !context.wants_aovs()) {
+        if !(self.media.is_empty() && self.cones.is_empty() && !context.needs_aov_state()) {
             self.append_optional(context, block, *survivors);
         }
         let Vertices { rows, points, scatter, .. } = &self.vertices;
@@ -232,7 +232,7 @@ impl Wave {
     fn queue_shadow_rays(&mut self, context: &Context, block: usize) {
         let Vertices { count, rows, direct, .. } = &self.vertices;
         let lanes = Compaction::equal(&direct.status, spawn::SPAWNED, *count);
-        if context.config.wants_light_aovs() {
+        if context.config.needs_light_aovs() {
             for lane in (0..BATCH).filter(|&lane| lanes.contains(lane)) {
                 let lobes = || self.vertices.lobes(context.scene, lane, direct.wi.get(lane));
                 let event = self.light_aovs.shadow_event(context, block * BATCH + self.vertices.path(lane), lobes);
@@ -270,7 +270,7 @@ impl Wave {
                 let pdf = if is_specular { f32::INFINITY } else { scatter.pdf[lane] };
                 cones[to] = context.pass.render.scattered_cone(cone, vertices.rows.t[lane], pdf);
             }
-            if context.wants_aovs() {
+            if context.needs_aov_state() {
                 let lobes = || vertices.sampled_lobes(context.scene, lane);
                 light_aovs.append(context, [path, to], lobes, || vertices.feature_factor(lane));
             }

@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates};
@@ -13,16 +14,18 @@ use exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_i
 use exr::compression::Compression;
 use exr::error::{Result as ExrResult, UnitResult};
 use exr::image::write::layers::{LayersWriter, WritableLayers};
+use exr::image::write::samples::WritableSamples;
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
-use exr::prelude::FlatImage;
+use exr::prelude::{AnyChannels, FlatImage, FlatSamples, Layer, f16};
 use libdeflater::{CompressionLvl, Compressor};
 use rayon::prelude::*;
 
 use super::header_order::finish_headers;
+use crate::math::vectorize::vectorize;
 
 /// Of libdeflate's levels from 1 to 12. Higher ones take longer, and files are hardly smaller.
-const LEVEL: i32 = 2;
+const LEVEL: i32 = 1;
 
 /// Writes a file. Its bytes do not depend on the number of threads.
 ///
@@ -31,20 +34,23 @@ const LEVEL: i32 = 2;
 pub fn write_image(image: &FlatImage, out: &mut BufWriter<&mut File>) -> Result<(), String> {
     let headers = image.layer_data.infer_headers(&image.attributes);
     let layers = image.layer_data.create_writer(&headers);
-    exr::block::write(&mut *out, headers, true, |meta, chunks| write_blocks(&meta, &layers, chunks)).map_err(|e| e.to_string())?;
+    exr::block::write(&mut *out, headers, true, |meta, chunks| write_blocks(&meta, image, &layers, chunks)).map_err(|e| e.to_string())?;
     out.flush().and_then(|()| finish_headers(out.get_mut())).map_err(|e| e.to_string())
 }
 
-fn write_blocks(meta: &MetaData, layers: &impl LayersWriter, chunks: &mut (impl ChunksWriter + Send)) -> UnitResult {
+fn write_blocks(meta: &MetaData, image: &FlatImage, layers: &impl LayersWriter, chunks: &mut (impl ChunksWriter + Send)) -> UnitResult {
     let ordered = Mutex::new(Ordered { chunks, next: 0, waiting: BTreeMap::new() });
     let blocks = enumerate_ordered_header_block_indices(&meta.headers).enumerate();
     // Threads take blocks in order, so that few wait for those before them.
     blocks.par_bridge().try_for_each_init(Zip::new, |zip, (place, (row, index))| {
-        let data = layers.extract_uncompressed_block(&meta.headers, index);
+        let data = || layers.extract_uncompressed_block(&meta.headers, index);
         let header = &meta.headers[index.layer];
         let chunk = match header.compression {
-            Compression::ZIP1 | Compression::ZIP16 => chunk(header, index, zip.compress(data))?,
-            _ => UncompressedBlock { index, data }.compress_to_chunk(&meta.headers)?,
+            Compression::ZIP1 | Compression::ZIP16 => {
+                zip.predict(&image.layer_data[index.layer], index);
+                chunk(header, index, zip.compress().unwrap_or_else(data))?
+            }
+            _ => UncompressedBlock { index, data: data() }.compress_to_chunk(&meta.headers)?,
         };
         ordered.lock().unwrap_or_else(PoisonError::into_inner).write(place, RowChunk { row, chunk })
     })
@@ -92,6 +98,9 @@ fn chunk(header: &Header, index: BlockIndex, compressed_pixels_le: Vec<u8>) -> E
 /// OpenEXR's ZIP compression.
 struct Zip {
     compressor: Compressor,
+    /// The pair before a line, then the line.
+    line: Vec<u8>,
+    /// The first bytes of all pairs of a block and then the second ones, each less the one before it, plus 128.
     predicted: Vec<u8>,
     compressed: Vec<u8>,
 }
@@ -99,43 +108,79 @@ struct Zip {
 impl Zip {
     fn new() -> Self {
         let level = CompressionLvl::new(LEVEL).unwrap_or_default();
-        Self { compressor: Compressor::new(level), predicted: Vec::new(), compressed: Vec::new() }
+        Self { compressor: Compressor::new(level), line: Vec::new(), predicted: Vec::new(), compressed: Vec::new() }
     }
 
-    /// A block's bytes, compressed if that makes them fewer.
-    fn compress(&mut self, block: Vec<u8>) -> Vec<u8> {
-        predict(&block, &mut self.predicted);
-        self.compressed.resize(block.len().saturating_sub(1), 0);
-        match self.compressor.zlib_compress(&self.predicted, &mut self.compressed) {
-            Ok(length) => self.compressed[..length].to_vec(),
-            // No room.
-            Err(_) => block,
+    /// Predicts the bytes of a block, a line of a channel at a time, so that these stay in the cache.
+    fn predict(&mut self, part: &Layer<AnyChannels<FlatSamples>>, index: BlockIndex) {
+        let (corner, size) = (index.pixel_position, index.pixel_size);
+        let channels = &part.channel_data.list;
+        let pairs: usize =
+            channels.iter().map(|channel| channel.sample_data.sample_type().bytes_per_sample() / 2).sum::<usize>() * size.area();
+        self.predicted.resize(2 * pairs, 0);
+        let (firsts, seconds) = self.predicted.split_at_mut(pairs);
+        // Nothing is before the first byte of all.
+        self.line.clear();
+        self.line.extend([128, 0]);
+        let mut start = 0;
+        for y in corner.y()..corner.y() + size.y() {
+            let line = y * part.size.x() + corner.x();
+            for channel in channels {
+                append(&channel.sample_data, line..line + size.x(), &mut self.line);
+                let end = start + self.line.len() / 2 - 1;
+                vectorize!(subtract_pairs(&self.line, &mut firsts[start..end], &mut seconds[start..end]));
+                let last = self.line.len() - 2;
+                self.line.copy_within(last.., 0);
+                self.line.truncate(2);
+                start = end;
+            }
         }
+        // The first of the second bytes comes after the last of the first ones.
+        if let Some(second) = seconds.first_mut() {
+            *second = second.wrapping_sub(self.line[0]);
+        }
+    }
+
+    /// The block, compressed; `None` if that does not make it shorter.
+    fn compress(&mut self) -> Option<Vec<u8>> {
+        self.compressed.resize(self.predicted.len().saturating_sub(1), 0);
+        let length = self.compressor.zlib_compress(&self.predicted, &mut self.compressed).ok()?;
+        Some(self.compressed[..length].to_vec())
     }
 }
 
-/// The first bytes of all pairs and then the second ones, each less the one before it, plus 128. Blocks have an even
-/// number of bytes.
-fn predict(block: &[u8], out: &mut Vec<u8>) {
-    out.resize(block.len(), 0);
-    let pairs = block.as_chunks::<2>().0;
-    let (Some(first), Some(last)) = (pairs.first(), pairs.last()) else { return };
-    let difference = |byte: u8, before: u8| byte.wrapping_sub(before).wrapping_add(128);
-    let (firsts, seconds) = out.split_at_mut(pairs.len());
-    // Nothing is before the first one.
-    (firsts[0], seconds[0]) = (first[0], difference(first[1], last[0]));
-    let neighbours = pairs.iter().zip(&pairs[1..]);
-    for ((before, pair), (first, second)) in neighbours.zip(firsts[1..].iter_mut().zip(&mut seconds[1..])) {
-        *first = difference(pair[0], before[0]);
-        *second = difference(pair[1], before[1]);
+/// Appends the bytes of samples.
+fn append(samples: &FlatSamples, range: Range<usize>, out: &mut Vec<u8>) {
+    fn convert<T: Copy, const N: usize>(samples: &[T], out: &mut Vec<u8>, to_bytes: impl Fn(T) -> [u8; N]) {
+        let start = out.len();
+        out.resize(start + N * samples.len(), 0);
+        for (bytes, sample) in out[start..].as_chunks_mut().0.iter_mut().zip(samples) {
+            *bytes = to_bytes(*sample);
+        }
+    }
+    match samples {
+        FlatSamples::F16(samples) => convert(&samples[range], out, f16::to_le_bytes),
+        FlatSamples::F32(samples) => convert(&samples[range], out, f32::to_le_bytes),
+        FlatSamples::U32(samples) => convert(&samples[range], out, u32::to_le_bytes),
+    }
+}
+
+/// The first and the second bytes of all pairs but the first, each less the one before it, plus 128.
+#[inline(always)]
+fn subtract_pairs(bytes: &[u8], firsts: &mut [u8], seconds: &mut [u8]) {
+    let pairs = bytes.as_chunks::<2>().0;
+    for (i, (first, second)) in firsts.iter_mut().zip(seconds).enumerate() {
+        let ([a, b], [c, d]) = (pairs[i], pairs[i + 1]);
+        *first = c.wrapping_sub(a).wrapping_add(128);
+        *second = d.wrapping_sub(b).wrapping_add(128);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use exr::prelude::{
-        AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder,
-        ReadChannels, ReadLayers, SmallVec, Vec2, f16, read,
+        AnyChannel, Blocks, Encoding, Image, ImageAttributes, IntegerBounds, LayerAttributes, LineOrder, ReadChannels, ReadLayers,
+        SmallVec, Vec2, read,
     };
 
     use super::*;
@@ -207,15 +252,25 @@ mod tests {
     }
 
     #[test]
-    fn zip_is_no_longer_than_what_it_holds() {
-        let noise: Vec<u8> = (0..1000_u32).map(|i| (i.wrapping_mul(0x9e37_79b9) >> 13) as u8).collect();
-        let mut zip = Zip::new();
-        for block in [noise, vec![7; 4096], vec![1, 2], Vec::new()] {
-            let compressed = zip.compress(block.clone());
-            assert!(compressed.len() < block.len() || compressed == block);
+    fn zip_is_shorter_than_what_it_holds() {
+        let noise = (0..1000_u32).map(|i| (i.wrapping_mul(0x9e37_79b9) >> 13) as u8).collect();
+        for predicted in [noise, vec![7; 4096], vec![1, 2], Vec::new()] {
+            let mut zip = Zip { predicted, ..Zip::new() };
+            let compressed = zip.compress();
+            assert!(compressed.is_none_or(|block| block.len() < zip.predicted.len()));
         }
-        let mut predicted = Vec::new();
-        predict(&[1, 2, 3, 5, 8, 13], &mut predicted);
-        assert_eq!(predicted, [1, 130, 133, 122, 131, 136]);
+    }
+
+    #[test]
+    fn bytes_are_predicted_from_those_before_across_lines_and_channels() {
+        let image = picture(Vec2(2, 3), Compression::ZIP16, Blocks::ScanLines);
+        let index = BlockIndex { layer: 0, pixel_position: Vec2(0, 1), pixel_size: Vec2(2, 2), level: Vec2(0, 0) };
+        let headers = image.layer_data.infer_headers(&image.attributes);
+        let block = image.layer_data.create_writer(&headers).extract_uncompressed_block(&headers, index);
+        let split: Vec<u8> = block.iter().step_by(2).chain(block[1..].iter().step_by(2)).copied().collect();
+        let predicted = split.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
+        let mut zip = Zip::new();
+        zip.predict(&image.layer_data[0], index);
+        assert_eq!(zip.predicted, std::iter::once(split[0]).chain(predicted).collect::<Vec<_>>());
     }
 }

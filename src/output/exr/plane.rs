@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use exr::prelude::{AnyChannel, FlatSamples, f16};
+use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
 
 use crate::film::Crop;
@@ -72,13 +73,21 @@ pub fn planes(sources: &[SampleSource], region: Region) -> Vec<Plane> {
 }
 
 fn collect(values: impl Iterator<Item = f32>, half: bool) -> FlatSamples {
-    if half { FlatSamples::F16(values.map(to_half).collect()) } else { FlatSamples::F32(values.collect()) }
+    if half { FlatSamples::F16(to_half(values.collect())) } else { FlatSamples::F32(values.collect()) }
 }
 
-/// The nearest number of 16 bits; what is beyond becomes the largest.
-pub fn to_half(x: f32) -> f16 {
-    f16::from_f32(x.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))
+/// The nearest numbers of 16 bits; what is beyond becomes the largest.
+pub fn to_half(mut values: Vec<f32>) -> Vec<f16> {
+    for value in &mut values {
+        *value = value.clamp(-MAX_HALF, MAX_HALF);
+    }
+    let mut halves = vec![f16::ZERO; values.len()];
+    halves.convert_from_f32_slice(&values);
+    halves
 }
+
+/// The largest number of 16 bits.
+const MAX_HALF: f32 = 65504.0;
 
 impl From<Plane> for AnyChannel<FlatSamples> {
     fn from(plane: Plane) -> Self {

@@ -14,7 +14,7 @@ fn corner(mesh: &Mesh, i: usize) -> DVec3 {
     DVec3::from_array(mesh.positions()[i].map(f64::from))
 }
 
-/// The answers of our accelerators that differ from the oracle's.
+/// The answers of accelerators other than Embree that differ from the oracle's.
 fn judged(outcome: Outcome, geometry: &Geometry, rays: Vec<Ray>) -> Outcome {
     let rays = oracle_hits(&LinearAccel::new(geometry), rays);
     let hits = rays.iter().filter(|(_, hit)| hit.is_some()).count();
@@ -112,7 +112,7 @@ pub(super) fn f6_far_cameras(effort: Effort) -> Outcome {
     }
     Outcome::new()
         .at_least("rays that surely meet the sphere", sure as f64, effort.pick(5e3, 5e5))
-        .none("of those, rays that the oracle says to miss", missed)
+        .none("of those, rays that miss by the oracle", missed)
         .none("answers of six accelerators that differ from the oracle's", differ)
         .plot(Plot {
             caption: "Share of rays from afar at a unit sphere that an accelerator answers otherwise than the oracle".into(),

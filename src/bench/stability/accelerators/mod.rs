@@ -46,7 +46,7 @@ fn count<T: Sync>(items: &[T], property: impl Fn(&T) -> bool + Sync) -> usize {
     items.par_iter().filter(|item| property(item)).count()
 }
 
-/// How often an accelerator of ours answers otherwise than expected, in any bit.
+/// How often an accelerator other than Embree answers otherwise than expected, in any bit.
 fn differing(accel: &dyn Accelerator, rays: &[(Ray, Option<Hit>)]) -> usize {
     count(rays, |(ray, expected)| accel.intersect(ray) != *expected || accel.occluded(ray) != expected.is_some())
 }
@@ -103,7 +103,7 @@ impl Agreement {
 fn f1_closest_hits(effort: Effort) -> Outcome {
     let cases = cases(effort.pick(250, 10_000));
     let (mut rays, mut hits, mut poor) = (0, 0, 0);
-    let mut ours: Vec<(&str, usize)> = Vec::new();
+    let mut counts: Vec<(&str, usize)> = Vec::new();
     let mut rounding = [Agreement::default(), Agreement::default()];
     for Case { geometry, expected } in &cases {
         let found = expected.iter().filter(|(_, hit)| hit.is_some()).count();
@@ -112,9 +112,9 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
         poor += usize::from(100 * found < expected.len() && !geometry.shapes.is_empty());
         for (name, accel) in own(geometry) {
             let lost = differing(&*accel, expected);
-            match ours.iter_mut().find(|(n, _)| *n == name) {
+            match counts.iter_mut().find(|(n, _)| *n == name) {
                 Some((_, count)) => *count += lost,
-                None => ours.push((name, lost)),
+                None => counts.push((name, lost)),
             }
         }
         for (sum, accel) in rounding.iter_mut().zip([build(AccelKind::EMBREE, geometry), packets(geometry)]) {
@@ -124,7 +124,7 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
     }
     let outcome = Outcome::new().record("rays", rays as f64).record("hits", hits as f64).none("scenes hardly hit", poor);
     let outcome =
-        ours.into_iter().fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
+        counts.into_iter().fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
     ["Embree", "packets"].iter().zip(rounding).fold(outcome, |outcome, (name, Agreement { flags, distances, ties })| {
         outcome
             .none(format!("distances of {name} beyond their rounding"), distances)
@@ -160,7 +160,7 @@ fn f2_ties(_: Effort) -> Outcome {
     let hits: Vec<Hit> = expected.iter().filter_map(|(ray, _)| embree.intersect(ray)).collect();
     let farthest = hits.iter().map(|hit| (f64::from(hit.t) - 1.0).abs()).fold(0.0, f64::max);
     Outcome::new()
-        .none("ties of ours not won by the lowest ids", wrong)
+        .none("ties of accelerators other than Embree not won by the lowest ids", wrong)
         .at_most("error of Embree's distance in ulp", farthest / f64::from(f32::EPSILON), 2.0)
         .record("rays at ties that Embree hits", hits.len() as f64 / points.len() as f64)
 }

@@ -114,7 +114,7 @@ pub(super) fn e4_identical_triangles(effort: Effort) -> Outcome {
     let unstable = embree.iter().filter(|found| found.is_none() || **found != embree[0]).count();
     Outcome::new()
         .record("triangles", count as f64)
-        .none("accelerators of ours, with the oracle, that do not hit the first", others)
+        .none("accelerators other than Embree, with the oracle, that do not hit the first", others)
         .none("builds of Embree with a miss, or another triangle than the first build", unstable)
         .at_most("levels of the deepest tree", f64::from(depth), 65.0)
         .at_most("bytes for a triangle", memory as f64 / count as f64, 400.0)

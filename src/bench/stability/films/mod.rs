@@ -278,6 +278,6 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
         .none("pixels that are not the mean of their good samples", wrong)
         .none("first dropped samples without a place to replay", usize::from(!replayable))
         .record("mean of samples -1 and 3, kept as they are", mean_by_film([-1.0, 3.0].into_iter()))
-        .short("negative samples are kept, where the catalogue asks to drop them: images of an environment may hold negative numbers, as those \
+        .short("negative samples are kept, where the catalogue requires them to be dropped: images of an environment may hold negative numbers, as those \
                 from wide gamuts do, and a mean without them would be biased")
 }

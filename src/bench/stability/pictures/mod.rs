@@ -22,7 +22,7 @@ use needs::r7_pay_for_use;
 checks! {
     "R1" r1_agreement "independent renders of one scene agree":
         "a room of 32 x 32 pixels, mean and variance by renders with other seeds: each pixel by Welch's test, 99.75 % of them within Šidák's level of \
-         1 %, p-values uniform, the whole picture (Mitsuba 3, test_renders; against our own renders: Mitsuba's are compared by \
+         1 %, p-values uniform, the whole picture (Mitsuba 3, test_renders; against other renders of Steradian: Mitsuba's are compared by \
          xtask/src/compare_refs)";
     "R3" r3_power "power of that test":
         "the same room with a lamp 1 % brighter, one material 1 % whiter, paths one segment longer: each must be rejected";

@@ -152,7 +152,7 @@ fn d2_roots_are_accurate(effort: Effort) -> Outcome {
         Outcome::new().at_most("residual of the equation / size²", residual, 1e-13).at_most("error of the distance / size", worst, implied);
     if worst > 1e-11 {
         outcome = outcome
-            .short("a distance near a tangent is known as well as the residual over the slope; the catalogue asks for 1e-11 of fewer rays");
+            .short("a distance near a tangent is known as well as the residual over the slope; the catalogue requires 1e-11 of fewer rays");
     }
     KINDS.iter().zip(distance).fold(outcome, |outcome, (kind, error)| outcome.record(format!("error, {kind}"), error))
 }

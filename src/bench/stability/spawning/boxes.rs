@@ -168,7 +168,7 @@ pub(super) fn b3_two_sides(effort: Effort) -> Outcome {
         }
     }
     let mut outcome = Outcome::new();
-    for (name, [[neither, back], [front, both]]) in ["embree", "ours"].iter().zip(counts) {
+    for (name, [[neither, back], [front, both]]) in ["embree", "bvh"].iter().zip(counts) {
         let all = (neither + back + front + both) as f64;
         outcome = outcome
             .at_least(format!("{name}: points"), all, 1_000.0)

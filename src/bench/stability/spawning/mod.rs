@@ -59,7 +59,7 @@ checks! {
 }
 
 /// What [`accelerators`] are called in reports.
-const NAMES: [&str; 3] = ["embree", "ours", "packets"];
+const NAMES: [&str; 3] = ["embree", "bvh", "packets"];
 
 type Named<'g> = (&'static str, Box<dyn Accelerator + 'g>);
 

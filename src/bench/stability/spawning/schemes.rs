@@ -12,7 +12,7 @@ use crate::math::{DMat3, DVec3, Ray, Vec3};
 #[derive(Clone, Copy, PartialEq)]
 enum Scheme {
     /// Moved by the bound of the error, and false hits rejected in `f64`.
-    Ours,
+    ErrorBound,
     /// Not moved at all.
     None,
     /// A smallest distance in scene units.
@@ -25,7 +25,7 @@ enum Scheme {
 }
 
 const SCHEMES: [(Scheme, &str); 5] = [
-    (Scheme::Ours, "ours"),
+    (Scheme::ErrorBound, "error bound"),
     (Scheme::None, "none"),
     (Scheme::FixedStart, "from 1e-4 along the ray"),
     (Scheme::Floats, "Waechter-Binder"),
@@ -51,12 +51,12 @@ fn moved_by_floats(p: Vec3, n: Vec3) -> Vec3 {
 impl Scheme {
     /// The next hit in `direction`, inside of the box.
     fn next(self, accel: &dyn Accelerator, geometry: &Geometry, at: &SurfaceInteraction, direction: Vec3) -> Option<u32> {
-        if self == Self::Ours {
+        if self == Self::ErrorBound {
             return closest(accel, geometry, &at.spawn(direction)).found.map(|found| found.prim.0);
         }
         let (p, n) = (at.p.as_vec3(), if at.n_g.dot(direction) < 0.0 { -at.n_g } else { at.n_g });
         let ray = match self {
-            Self::Ours | Self::None => Ray::new(p, direction),
+            Self::ErrorBound | Self::None => Ray::new(p, direction),
             Self::FixedStart => Ray { t_min: FIXED_DISTANCE, ..Ray::new(p, direction) },
             Self::Floats => Ray::new(moved_by_floats(p, n), direction),
             Self::AlongNormal => Ray::new(p + n * (NORMAL_DISTANCE * (1.0 + p.abs().max_element())), direction),
@@ -118,12 +118,12 @@ pub(super) fn b13_schemes(effort: Effort) -> Outcome {
     let mut outcome = Outcome::new();
     for (i, (scheme, name)) in SCHEMES.iter().enumerate() {
         let (again, leaks) = (worst(&by_scale, i, 0).max(worst(&by_distance, i, 0)), [&by_scale, &by_distance].map(|p| worst(p, i, 1)));
-        outcome = if *scheme == Scheme::Ours {
+        outcome = if *scheme == Scheme::ErrorBound {
             outcome
-                .at_most("ours: false hits, largest fraction", again, 0.0)
-                .at_most("ours: leaks over size, largest fraction", leaks[0], 0.0)
+                .at_most("error bound: false hits, largest fraction", again, 0.0)
+                .at_most("error bound: leaks over size, largest fraction", leaks[0], 0.0)
                 // Corners are rounded to 1e-3 of the size there.
-                .at_most("ours: leaks over distance, largest fraction", leaks[1], 5e-4)
+                .at_most("error bound: leaks over distance, largest fraction", leaks[1], 5e-4)
         } else {
             outcome
                 .record(format!("{name}: false hits, largest fraction"), again)

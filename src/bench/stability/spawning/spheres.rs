@@ -80,5 +80,5 @@ pub(super) fn b10_spheres(effort: Effort) -> Outcome {
         // Half an ulp of each coordinate at 2e5 radii is up to 0.02 radii together, a quarter of a pixel: of the lit
         // rim, 36 of 576 pixels, a quarter comes or goes.
         .at_most("under a sun: relative RMSE between radii, 2e5 radii away", farthest[0], 0.1)
-        .short("at 2e5 radii the roundings of positions and directions to f32 move the sphere by up to a quarter of a pixel; the catalogue asks for 1 %")
+        .short("at 2e5 radii the roundings of positions and directions to f32 move the sphere by up to a quarter of a pixel; the catalogue requires 1 %")
 }

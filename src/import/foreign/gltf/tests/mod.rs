@@ -1,7 +1,7 @@
 //! Whole files, made here.
 
 mod broken;
-mod looks;
+mod materials;
 mod motion;
 mod places;
 mod surfaces;

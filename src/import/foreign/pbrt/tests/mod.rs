@@ -1,7 +1,7 @@
 //! The reader as a whole.
 
 mod errors;
-mod looks;
+mod materials;
 mod places;
 
 use crate::desc::{ShapeDesc, TransformDesc, TransformStepDesc};

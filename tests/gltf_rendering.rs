@@ -1,4 +1,4 @@
-//! glTF files as they look: images upright, normal maps the right way round, holes, sides that give light.
+//! Renders of glTF files: images upright, normal maps the right way round, holes, sides that give light.
 
 use serde_json::{Value, json};
 use steradian::accel::AccelKind;
