@@ -1,8 +1,10 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::*;
-use crate::light::InfiniteLightEvalRows;
+use crate::geometry::Geometry;
+use crate::id::LightId;
 use crate::light::test_support::assert_chi_squared;
+use crate::light::{DirectionalLight, InfiniteLightEvalRows, Light, LightSet};
 use crate::math::rows::{BATCH, Vectors};
 use crate::math::{DVec3, Rng};
 
@@ -205,4 +207,13 @@ fn many_directions_at_once_are_each_of_them() {
             }
         }
     }
+}
+
+#[test]
+fn an_image_beside_other_lights_at_infinity_is_found() {
+    let sun = || Light::Directional(Box::new(DirectionalLight::new(-DVec3::Y, Rgb::WHITE, 0.01)));
+    let sky = |environment| LightSet::new(vec![sun(), Light::Environment(environment)], &Geometry::default());
+    let image = sky(environment(map(2, 1, |_, _| 1.0)));
+    assert_eq!(image.environment_map().map(|(id, _)| id), Some(LightId(1)));
+    assert!(sky(Environment::Constant(Rgb::WHITE)).environment_map().is_none());
 }
