@@ -35,7 +35,7 @@ pub enum Originals {
 /// that the world uses is not there, [`Error::Output`] if one cannot be written.
 pub fn write_scene(imported: &Imported, source: &Path, target: &Path, originals: Originals, mut uses: FileUses) -> Result<usize> {
     if !target.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-        return Err(Error::Usage(format!("{}: scenes of ours end with .json", target.display())));
+        return Err(Error::Usage(format!("{}: Steradian's scene files end with .json", target.display())));
     }
     check_creatable(target)?;
     uses.read(source, "the scene")?;

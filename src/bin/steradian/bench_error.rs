@@ -116,7 +116,7 @@ fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>
                         ];
                         let parts: Vec<String> = parts.into_iter().flatten().collect();
                         let name = if parts.is_empty() { "steradian".to_owned() } else { parts.join(", ") };
-                        variants.push(Variant { name, subject: Subject::Ours(Box::new(Settings::new(desc, &overrides)?)) });
+                        variants.push(Variant { name, subject: Subject::Steradian(Box::new(Settings::new(desc, &overrides)?)) });
                     }
                 }
             }
@@ -146,7 +146,7 @@ fn name(value: impl Serialize) -> Option<String> {
 
 /// A reference of another size is found before the first render.
 fn check_size(arguments: &BenchErrorArgs, variants: &[Variant], reference: &Standard) -> Result<()> {
-    let (Standard::File(file, image), Some(Variant { subject: Subject::Ours(settings), .. })) = (reference, variants.first()) else {
+    let (Standard::File(file, image), Some(Variant { subject: Subject::Steradian(settings), .. })) = (reference, variants.first()) else {
         return Ok(());
     };
     let [r, s] = [image.crop, settings.crop];

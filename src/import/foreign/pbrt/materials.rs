@@ -124,7 +124,7 @@ impl Materials<'_> {
         })))
     }
 
-    /// What pbrt's walk through layers has and ours has not.
+    /// What pbrt's walk through layers has and Steradian's lacks.
     fn note_layers(&mut self, params: &Params) {
         self.draft.approximated(&params.place, &params.element, "", "a closed form in place of a random walk between layers");
         for parameter in ["thickness", "albedo", "g", "maxdepth", "nsamples"] {
