@@ -1,5 +1,5 @@
-//! Three comparisons that course reports quote, repeated: accelerators as such reports wrote them, beside Steradian's and
-//! Embree, on pictures of normals and on path-traced ones.
+//! Three comparisons that course reports quote, repeated: accelerators as such reports wrote them, beside Steradian's
+//! and Embree, on pictures of normals and on path-traced ones.
 
 mod frames;
 

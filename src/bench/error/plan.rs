@@ -150,7 +150,7 @@ impl<'a> Program<'a> {
         self.accels.iter().find(|(kind, _)| *kind == settings.accel).map(|(_, accel)| &**accel)
     }
 
-    /// Renders one sample with a variant that Steradian renders, so that pages and caches are as they are in the middle of a run.
+    /// Renders one sample with a variant of Steradian, so that pages and caches are as they are in the middle of a run.
     pub(super) fn warm_up(&mut self, variant: usize) -> Result<()> {
         if let Subject::Steradian(_) = self.options.variants[variant].subject
             && let Some(measured) = self.render(variant, Budget::Spp(1), self.options.seed)?

@@ -110,8 +110,9 @@ impl Graphics {
 
 /// The map from pbrt's world to Steradian's.
 ///
-/// pbrt's camera space is left-handed (x right, y up, z forward), Steradian's right-handed (z backward). Where the camera's
-/// transform has no mirror in it, the world is left-handed too and all of it is mirrored: pictures stay the same.
+/// pbrt's camera space is left-handed (x right, y up, z forward), Steradian's right-handed (z backward). Where the
+/// camera's transform has no mirror in it, the world is left-handed too and all of it is mirrored: pictures stay the
+/// same.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct World {
     /// Whether x is negated.
