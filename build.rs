@@ -24,7 +24,8 @@ fn build() -> Result<(), String> {
     // EMBREE_DIR names the prefix of an Embree outside the system's directories.
     let own = env::var_os("EMBREE_DIR").map(PathBuf::from);
     let prefixes: Vec<PathBuf> = own.iter().cloned().chain(["/usr".into(), "/usr/local".into()]).collect();
-    let (prefix, version) = find_embree(&prefixes).ok_or("Embree's headers are missing; on Debian: apt install libembree-dev")?;
+    let (prefix, version) =
+        find_embree(&prefixes).ok_or("Embree's headers are missing; on Debian: apt install libembree-dev")?;
     let include = format!("-I{}", prefix.join("include").display());
     let define = format!("-DSTERADIAN_EMBREE={version}");
 
@@ -37,7 +38,9 @@ fn build() -> Result<(), String> {
         .opt_level(2)
         .flag_if_supported("-fno-plt")
         .try_compile("steradian_embree_shim")
-        .map_err(|error| format!("the C shim does not compile; on Debian: apt install build-essential ({})", one_line(&error)))?;
+        .map_err(|error| {
+            format!("the C shim does not compile; on Debian: apt install build-essential ({})", one_line(&error))
+        })?;
 
     cc::Build::new()
         .cpp(true)
@@ -45,7 +48,9 @@ fn build() -> Result<(), String> {
         .std("c++17")
         .opt_level(2)
         .try_compile("steradian_uncaught")
-        .map_err(|error| format!("the C++ part does not compile; on Debian: apt install build-essential ({})", one_line(&error)))?;
+        .map_err(|error| {
+            format!("the C++ part does not compile; on Debian: apt install build-essential ({})", one_line(&error))
+        })?;
 
     if own.is_some_and(|own| own == prefix) {
         println!("cargo::rustc-link-search=native={}", prefix.join("lib").display());
@@ -84,7 +89,9 @@ fn look_for_instructions() {
 /// The first prefix with Embree's headers, and the major version found there.
 fn find_embree(prefixes: &[PathBuf]) -> Option<(&Path, u32)> {
     let has = |prefix: &Path, version: u32| prefix.join(format!("include/embree{version}/rtcore.h")).is_file();
-    prefixes.iter().find_map(|prefix| EMBREE_VERSIONS.into_iter().find(|&v| has(prefix, v)).map(|v| (prefix.as_path(), v)))
+    prefixes
+        .iter()
+        .find_map(|prefix| EMBREE_VERSIONS.into_iter().find(|&v| has(prefix, v)).map(|v| (prefix.as_path(), v)))
 }
 
 /// Writes `embree.rs` into the output directory.

@@ -55,6 +55,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let counting = Counting { inner, closest: AtomicU64::new(0), any: AtomicU64::new(0) };
     render::render(&scene, &counting, &settings, &Silent, &AtomicBool::new(false))?;
     let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
-    println!("{}: {} closest-hit rays, {} shadow rays", counting.description(), count(&counting.closest), count(&counting.any));
+    println!(
+        "{}: {} closest-hit rays, {} shadow rays",
+        counting.description(),
+        count(&counting.closest),
+        count(&counting.any)
+    );
     Ok(())
 }

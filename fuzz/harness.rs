@@ -55,7 +55,9 @@ pub fn read(kind: &str, data: &[u8], folder: &Path) {
         }
         "recipe" => {
             let file = Path::new("a.exr");
-            if let Some(recipe) = serde_json::from_slice(data).ok().and_then(|value| RenderProvenance::from_value(value, file).ok()) {
+            if let Some(recipe) =
+                serde_json::from_slice(data).ok().and_then(|value| RenderProvenance::from_value(value, file).ok())
+            {
                 let value = recipe.to_value();
                 let again = RenderProvenance::from_value(value.clone(), file).expect("what was taken is taken again");
                 assert_eq!(again.to_value(), value);

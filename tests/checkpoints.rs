@@ -10,7 +10,9 @@ use steradian::accel::{self, AccelKind};
 use steradian::film::{Film, LayerSet};
 use steradian::import::SceneFingerprint;
 use steradian::math::Rng;
-use steradian::render::{self, Checkpoints, Header, Overrides, Progress, RenderSession, RenderState, Shard, Silent, StateFile};
+use steradian::render::{
+    self, Checkpoints, Header, Overrides, Progress, RenderSession, RenderState, Shard, Silent, StateFile,
+};
 
 use crate::util::program::{Running, Signal};
 use crate::util::render::{Prepared, prepare};
@@ -143,7 +145,13 @@ impl Progress for StopAfter<'_> {
 fn a_resumed_render_with_a_target_error_has_the_bits_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let file = StateFile::take(&folder.path().join("a.state")).unwrap();
-    let overrides = Overrides { target_error: Some(5e-3), spp: Some(96), size: Some([16, 12]), threads: Some(2), ..Overrides::default() };
+    let overrides = Overrides {
+        target_error: Some(5e-3),
+        spp: Some(96),
+        size: Some([16, 12]),
+        threads: Some(2),
+        ..Overrides::default()
+    };
     let kit = Kit::new(&scene("mitchell"), &overrides);
     let reference = kit.render(Shard::WHOLE);
     let mut rng = Rng::new(5);
@@ -175,7 +183,8 @@ fn a_state_of_another_render_is_refused_and_named() {
         let other = Kit::new(scene, overrides);
         let mut header = other.header(Shard::WHOLE);
         change(&mut header);
-        let error = RenderState::read(file.path(), &header, &other.prepared.scene, &other.prepared.settings).unwrap_err();
+        let error =
+            RenderState::read(file.path(), &header, &other.prepared.scene, &other.prepared.settings).unwrap_err();
         assert_eq!(error.kind(), steradian::ErrorKind::Checkpoint);
         error.to_string()
     };
@@ -226,7 +235,8 @@ fn changed_settings(settings: &Value) -> Vec<(String, Value)> {
             Value::Object(object) => {
                 let other_kind = ["tent", "depth"].map(|kind| ("type".to_owned(), json!({ "type": kind })));
                 let other_fields = object.iter().filter(|(key, _)| *key != "type").flat_map(|(key, field)| {
-                    let with = |other| Value::Object(object.clone().into_iter().chain([(key.clone(), other)]).collect());
+                    let with =
+                        |other| Value::Object(object.clone().into_iter().chain([(key.clone(), other)]).collect());
                     others(field).into_iter().map(move |other| (key.clone(), with(other)))
                 });
                 let fields = other_kind.into_iter().chain(other_fields);
@@ -258,9 +268,15 @@ fn every_setting_that_differs_is_named() {
     let mut found = std::collections::BTreeSet::new();
     for (name, value) in changed_settings(&serialized) {
         let Ok(settings) = serde_json::from_value::<render::Settings>(value) else { continue };
-        let prepared = Prepared { settings: render::Settings { threads: 1, ..settings }, ..prepare(&scene("box"), &spp(4)) };
+        let prepared =
+            Prepared { settings: render::Settings { threads: 1, ..settings }, ..prepare(&scene("box"), &spp(4)) };
         let other = Kit { prepared };
-        let refused = RenderState::read(state.path(), &other.header(Shard::WHOLE), &other.prepared.scene, &other.prepared.settings);
+        let refused = RenderState::read(
+            state.path(),
+            &other.header(Shard::WHOLE),
+            &other.prepared.scene,
+            &other.prepared.settings,
+        );
         let resumed = refused.unwrap_err().to_string();
         files[1].replace(|out| shard.write(&other.header(shards[1]), out)).unwrap();
         let merged = render::merge(&files.each_ref().map(|file| file.path().to_owned()), true).unwrap_err().to_string();
@@ -288,7 +304,8 @@ fn more_samples_are_refused_where_textures_depend_on_their_number() {
     let few = filtered(2);
     file.replace(|out| few.render(Shard::WHOLE).write(&few.header(Shard::WHOLE), out)).unwrap();
     let more = filtered(4);
-    let read = RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings);
+    let read =
+        RenderState::read(file.path(), &more.header(Shard::WHOLE), &more.prepared.scene, &more.prepared.settings);
     let refused = read.unwrap_err().to_string();
     assert!(refused.contains("that textures are filtered for: 2 in the checkpoint, 4 requested"), "{refused}");
 }
@@ -323,8 +340,12 @@ fn goes_on_in_the_middle(kit: &Kit) {
     let folder = tempfile::tempdir().unwrap();
     let (path, copy) = (folder.path().join("a.state"), folder.path().join("copy.state"));
     let header = kit.header(Shard::WHOLE);
-    let mut checkpoints =
-        Checkpoints::new(StateFile::take(&path).unwrap(), header.clone(), Duration::from_secs(1000), AtomicBool::new(true).into());
+    let mut checkpoints = Checkpoints::new(
+        StateFile::take(&path).unwrap(),
+        header.clone(),
+        Duration::from_secs(1000),
+        AtomicBool::new(true).into(),
+    );
     let progress = Keep { from: &path, to: &copy };
     let whole = kit.go_on_with(kit.start(Shard::WHOLE), Some(&mut checkpoints), &progress, &AtomicBool::new(false));
     let state = RenderState::read(&copy, &header, &kit.prepared.scene, &kit.prepared.settings).unwrap();
@@ -350,7 +371,8 @@ fn a_checkpoint_that_cannot_be_written_is_reported_and_ends_nothing() {
     std::fs::create_dir(&inner).unwrap();
     let kit = Kit::new(&scene("box"), &spp(6));
     let file = StateFile::take(&inner.join("a.state")).unwrap();
-    let mut checkpoints = Checkpoints::new(file, kit.header(Shard::WHOLE), Duration::ZERO, AtomicBool::new(false).into());
+    let mut checkpoints =
+        Checkpoints::new(file, kit.header(Shard::WHOLE), Duration::ZERO, AtomicBool::new(false).into());
     std::fs::remove_dir_all(&inner).unwrap();
     let warnings = Warnings::default();
     let state = kit.go_on_with(kit.start(Shard::WHOLE), Some(&mut checkpoints), &warnings, &AtomicBool::new(false));
@@ -362,8 +384,7 @@ fn a_checkpoint_that_cannot_be_written_is_reported_and_ends_nothing() {
 
 // What follows runs the program.
 
-const SLOW: &str =
-    "render scene.json --checkpoint a.state --threads 2 --spp 64 --size 96x72 --layers Z,N,albedo,variance,samples --float -q -o a.exr";
+const SLOW: &str = "render scene.json --checkpoint a.state --threads 2 --spp 64 --size 96x72 --layers Z,N,albedo,variance,samples --float -q -o a.exr";
 
 fn command(folder: &Path, line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));
@@ -393,7 +414,8 @@ fn wait_for(path: &Path, than: Option<std::time::SystemTime>) {
 fn folder_with_scene() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = scene("mitchell");
-    scene["outputs"] = json!([{ "file": "x.exr", "layers": ["Z", "N", "albedo", "variance", "samples"], "pixel_type": "float" }]);
+    scene["outputs"] =
+        json!([{ "file": "x.exr", "layers": ["Z", "N", "albedo", "variance", "samples"], "pixel_type": "float" }]);
     std::fs::write(folder.path().join("scene.json"), scene.to_string()).unwrap();
     folder
 }
@@ -402,7 +424,9 @@ fn folder_with_scene() -> tempfile::TempDir {
 pub fn channels(path: &Path) -> Vec<(String, Vec<u32>)> {
     let file = exr::prelude::read_all_flat_layers_from_file(path).unwrap();
     let channels = file.layer_data.iter().flat_map(|layer| &layer.channel_data.list);
-    channels.map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().map(f32::to_bits).collect())).collect()
+    channels
+        .map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().map(f32::to_bits).collect()))
+        .collect()
 }
 
 fn same_pictures(folder: &Path, a: &str, b: &str) -> bool {
@@ -428,12 +452,17 @@ fn killed_renders_go_on_and_leave_no_trace() {
     }
     assert_code(&run(folder, &format!("{SLOW} --resume")), 0, "");
     assert!(same_pictures(folder, "a.exr", "b.exr"));
-    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
     assert_eq!(names, ["a.exr", "a.state", "b.exr", "b.state", "scene.json"]);
     // More samples continue from what is there.
     assert_code(&run(folder, &format!("{} --resume", SLOW.replace("64 ", "80 "))), 0, "");
-    assert_code(&run(folder, &SLOW.replace("64 ", "80 ").replace("a.state", "c.state").replace("a.exr", "c.exr")), 0, "");
+    assert_code(
+        &run(folder, &SLOW.replace("64 ", "80 ").replace("a.state", "c.state").replace("a.exr", "c.exr")),
+        0,
+        "",
+    );
     assert!(same_pictures(folder, "a.exr", "c.exr") && !same_pictures(folder, "b.exr", "c.exr"));
 }
 

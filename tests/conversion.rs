@@ -16,7 +16,9 @@ fn picture(path: &Path) -> Vec<[u32; 3]> {
     let imported = read_scene(path, &ImportOptions::default()).unwrap();
     let settings = Settings::new(&imported.desc, &overrides).unwrap();
     let scene = compile::compile_from(&imported.desc, imported.source(path)).unwrap();
-    pixels(&render_with(&Prepared { scene, settings }, AccelKind::EMBREE).image).map(|pixel| pixel.map(f32::to_bits)).collect()
+    pixels(&render_with(&Prepared { scene, settings }, AccelKind::EMBREE).image)
+        .map(|pixel| pixel.map(f32::to_bits))
+        .collect()
 }
 
 fn convert(path: &Path, target: &Path, originals: Originals) -> steradian::Result<usize> {
@@ -52,7 +54,8 @@ fn colours_of_vertices_and_uv_that_a_file_lacks_are_converted() {
                property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
                -1 -1 -5 255 0 7\n1 -1 -5 0 130 99\n0 1 -5 3 200 255\n3 0 1 2\n";
     std::fs::write(folder.path().join("m.ply"), ply).unwrap();
-    let texture = |kind: &str, name: &str, more: &str| format!("<texture type=\"{kind}\" name=\"{name}\">{more}</texture>");
+    let texture =
+        |kind: &str, name: &str, more: &str| format!("<texture type=\"{kind}\" name=\"{name}\">{more}</texture>");
     let colors = texture("mesh_attribute", "diffuse_reflectance", "<string name=\"name\" value=\"vertex_color\"/>");
     let path = folder.path().join("s.xml");
     let scene = format!(
@@ -103,7 +106,9 @@ fn errors_name_the_place_in_the_imported_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.xml");
     let message = |shape: &str| {
-        let scene = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/>\n{shape}\n<emitter type=\"constant\"/></scene>");
+        let scene = format!(
+            "<scene version=\"3.0.0\"><sensor type=\"perspective\"/>\n{shape}\n<emitter type=\"constant\"/></scene>"
+        );
         std::fs::write(&path, scene).unwrap();
         let imported = read_scene(&path, &ImportOptions::default()).unwrap();
         compile::compile_from(&imported.desc, imported.source(&path)).err().unwrap().to_string()

@@ -26,7 +26,13 @@ fn scene() -> Value {
 
 fn assert_same_with_any_number_of_threads(scene: &Value) {
     let images: Vec<_> = [1, 2, 3, 8]
-        .map(|threads| render_with(&prepare(scene, &Overrides { threads: Some(threads), ..Overrides::default() }), AccelKind::EMBREE).image)
+        .map(|threads| {
+            render_with(
+                &prepare(scene, &Overrides { threads: Some(threads), ..Overrides::default() }),
+                AccelKind::EMBREE,
+            )
+            .image
+        })
         .into();
     assert!(images.windows(2).all(|w| w[0] == w[1]));
 }
@@ -75,7 +81,11 @@ fn a_replayed_sample_is_the_one_in_the_picture() {
     let prepared = one(7);
     let image = render_with(&prepared, AccelKind::EMBREE).image;
     let mean = (0..7)
-        .map(|s| f64::from(render::replay(&prepared.scene, &*accel, &prepared.settings, [20, 17], s).unwrap().pixel.radiance.g))
+        .map(|s| {
+            f64::from(
+                render::replay(&prepared.scene, &*accel, &prepared.settings, [20, 17], s).unwrap().pixel.radiance.g,
+            )
+        })
         .sum::<f64>()
         / 7.0;
     assert_eq!(image.rgb(20, 17).unwrap()[1], mean as f32);
@@ -98,6 +108,9 @@ fn embree_and_the_oracle_give_the_same_picture() {
 
 #[test]
 fn seeds_give_different_noise() {
-    let image = |seed| render_with(&prepare(&scene(), &Overrides { seed: Some(seed), ..Overrides::default() }), AccelKind::EMBREE).image;
+    let image = |seed| {
+        render_with(&prepare(&scene(), &Overrides { seed: Some(seed), ..Overrides::default() }), AccelKind::EMBREE)
+            .image
+    };
     assert_ne!(image(1), image(2));
 }

@@ -37,7 +37,12 @@ fn centroid(image: &Image) -> [f64; 2] {
 #[test]
 fn the_tent_filter_does_not_shift_the_picture_by_a_quarter_pixel() {
     // An offset that lacks half a pixel moves the picture by 1/4; the centroid of the symmetric scene shows it.
-    for filter in [json!({ "type": "tent" }), json!({ "type": "box" }), json!({ "type": "gaussian" }), json!({ "type": "mitchell" })] {
+    for filter in [
+        json!({ "type": "tent" }),
+        json!({ "type": "box" }),
+        json!({ "type": "gaussian" }),
+        json!({ "type": "mitchell" }),
+    ] {
         let [x, y] = centroid(&render(&symmetric([16, 16], filter.clone())));
         assert!((x - 8.0).abs() < 5e-3 && (y - 8.0).abs() < 5e-3, "{filter}: {x} {y}");
     }
@@ -53,7 +58,11 @@ fn bright_samples_are_not_clamped_before_the_mean() {
     scene["shapes"][0]["emission"]["radiance"] = json!([100, 100, 100]);
     scene["film"]["width"] = json!(9);
     let image = render(&scene);
-    assert!((brightness(&image, 4, 3) - 50.0).abs() < 0.5 && brightness(&image, 5, 3) == 100.0 && brightness(&image, 3, 3) == 0.0);
+    assert!(
+        (brightness(&image, 4, 3) - 50.0).abs() < 0.5
+            && brightness(&image, 5, 3) == 100.0
+            && brightness(&image, 3, 3) == 0.0
+    );
 }
 
 #[test]

@@ -75,7 +75,12 @@ fn no_light_is_found_by_a_tolerance_that_depends_on_the_scale() {
             "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 0.4 * scale, 0] }] });
         let mut scene = floor_probe([0.0; 3], json!([lamp]));
         for key in ["position", "look_at"] {
-            let scaled = scene["camera"][key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap() * scale).collect::<Vec<_>>();
+            let scaled = scene["camera"][key]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|x| x.as_f64().unwrap() * scale)
+                .collect::<Vec<_>>();
             scene["camera"][key] = json!(scaled);
         }
         assert_irradiance(&scene, PI / 16.0, &format!("scale {scale}"));
@@ -98,7 +103,10 @@ fn lights_shine_in_mirrors_and_through_glass() {
             json!({ "sampler": { "spp": 16 }, "integrator": { "type": "path", "max_depth": 3 }, "materials": { "m": material, "black": { "type": "diffuse", "albedo": 0 } },
                     "shapes": [{ "type": "quad", "material": "m" }, lamp] }),
         );
-        assert!(pixels(&render(&scene)).all(|p| (p[0] - 3.0 * factor).abs() < 1e-5 && (p[2] - factor).abs() < 1e-5), "{factor}");
+        assert!(
+            pixels(&render(&scene)).all(|p| (p[0] - 3.0 * factor).abs() < 1e-5 && (p[2] - factor).abs() < 1e-5),
+            "{factor}"
+        );
     }
 }
 
@@ -124,8 +132,7 @@ fn a_light_across_the_horizon_is_cut_there_and_never_negative() {
     let wall = json!({ "type": "quad", "material": "black", "emission": { "radiance": [1, 1, 1] }, "origin": [2, -1, -1.5], "edge_u": [0, 0, 3], "edge_v": [0, 2, 0] });
     let mut scene = floor_probe([0.0; 3], json!([wall]));
     // Without the floor in front of the wall nothing else would cut it.
-    scene["shapes"][0] =
-        json!({ "type": "disk", "radius": 0.05, "material": "white", "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }] });
+    scene["shapes"][0] = json!({ "type": "disk", "radius": 0.05, "material": "white", "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }] });
     let strip = |height: f64| (1.5 / (4.0f64 + height * height).sqrt()).atan() / (4.0 + height * height).sqrt() * 2.0;
     // Irradiance of a vertical strip seen along its normal: E = (atan(w/d) - d / sqrt(d² + h²) atan(w / sqrt(d² + h²)))
     // for half-width w.
@@ -171,13 +178,15 @@ fn environments_of_several_sizes_are_right_at_the_pole_and_across_the_seam() {
             let theta = (f64::from(j) + 0.5) / f64::from(n) * PI;
             let mut row = 0.0;
             for i in 0..n {
-                let (x, y) = ((f64::from(i) + 0.5) / f64::from(n) * size[0] as f64 - 0.5, theta / PI * size[1] as f64 - 0.5);
+                let (x, y) =
+                    ((f64::from(i) + 0.5) / f64::from(n) * size[0] as f64 - 0.5, theta / PI * size[1] as f64 - 0.5);
                 let (fx, fy) = (x - x.floor(), y - y.floor());
                 let at = |dx: i64, dy: i64| {
                     let column = (x.floor() as i64 + dx).rem_euclid(size[0] as i64) as usize;
                     f64::from(texel(column, (y.floor() as i64 + dy).clamp(0, size[1] as i64 - 1) as usize))
                 };
-                row += (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy) + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy;
+                row +=
+                    (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy) + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy;
             }
             sum += row * theta.sin() * theta.cos();
         }
@@ -261,7 +270,10 @@ fn roulette_gives_the_survivors_the_weight_of_the_dead_on_every_material_and_fro
         for rr_depth in [1, 3, 5] {
             let with = mean(rr_depth);
             let error = with.error.hypot(without.error);
-            assert!((with.mean - without.mean).abs() < 5.5 * error, "{material}, from {rr_depth}: {with:?} {without:?}");
+            assert!(
+                (with.mean - without.mean).abs() < 5.5 * error,
+                "{material}, from {rr_depth}: {with:?} {without:?}"
+            );
         }
     }
 }

@@ -109,7 +109,10 @@ fn bounds_do_not_mix_up_their_axes() {
     let bounds = folder.compile(&json!({ "camera": { "position": [0, 0, 9], "look_at": [0, 0, 0] }, "shapes": [mesh],
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] }));
     let bounds = bounds.unwrap().geometry.bounds();
-    assert!((bounds.min - min).abs().max_element() < 1e-3 && (bounds.max - max).abs().max_element() < 1e-2, "{bounds:?}");
+    assert!(
+        (bounds.min - min).abs().max_element() < 1e-3 && (bounds.max - max).abs().max_element() < 1e-2,
+        "{bounds:?}"
+    );
 }
 
 /// Derivatives that exist on one kind of shape only, or are solved with the wrong component.
@@ -141,7 +144,9 @@ fn derivatives_by_uv_are_those_of_every_shape() {
             let look = |x: f32, y: f32| meet(&scene, &Ray::new(vec3(x, y, 5.0), -Vec3::Z));
             let Some((at, dp_dv)) = look(x, y) else { continue };
             for (dx, dy) in [(step, 0.0), (0.0, step)] {
-                let (Some((after, _)), Some((before, _))) = (look(x + dx, y + dy), look(x - dx, y - dy)) else { continue };
+                let (Some((after, _)), Some((before, _))) = (look(x + dx, y + dy), look(x - dx, y - dy)) else {
+                    continue;
+                };
                 let duv = after.uv - before.uv;
                 let dp = (after.p - before.p).as_vec3();
                 // Away from seams, rims and edges, where a step is far longer than its projection.

@@ -84,8 +84,10 @@ fn everything_has_a_name() {
 
 #[test]
 fn names_of_many_shapes_take_little_memory() {
-    let spheres: Vec<Value> = (0..20_000).map(|i| json!({ "type": "sphere", "transform": [{ "translate": [i, 0, 0] }] })).collect();
-    let instances: Vec<Value> = (0..10_000).map(|i| json!({ "object": "o", "transform": [{ "translate": [i, 3, 0] }] })).collect();
+    let spheres: Vec<Value> =
+        (0..20_000).map(|i| json!({ "type": "sphere", "transform": [{ "translate": [i, 0, 0] }] })).collect();
+    let instances: Vec<Value> =
+        (0..10_000).map(|i| json!({ "object": "o", "transform": [{ "translate": [i, 3, 0] }] })).collect();
     let mut scene = scene();
     scene["shapes"] = json!(spheres);
     scene["objects"] = json!({ "o": { "shapes": [{ "type": "sphere" }] } });

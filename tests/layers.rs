@@ -12,7 +12,9 @@ use steradian::render::{Overrides, Settings};
 use steradian::{compile, import};
 
 use crate::util::folder::set;
-use crate::util::render::{AssertIs, Estimate, Prepared, assert_blocks_agree, block_means, merge, prepare, render_with};
+use crate::util::render::{
+    AssertIs, Estimate, Prepared, assert_blocks_agree, block_means, merge, prepare, render_with,
+};
 
 /// The parts of the light by how it came.
 const PARTS: [LayerKind; 8] = [
@@ -62,7 +64,10 @@ fn assert_sum(image: &Image, layers: &[&Layer], what: &str) {
             let terms = layers.iter().map(|layer| f64::from(layer.data[3 * i + channel]));
             let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), term| (sum + term, size + f64::abs(term)));
             let expected = f64::from(expected);
-            assert!((sum - expected).abs() <= 1e-5 * size.max(expected.abs()) + 1e-9, "{what}, pixel {i}: {sum} for {expected}");
+            assert!(
+                (sum - expected).abs() <= 1e-5 * size.max(expected.abs()) + 1e-9,
+                "{what}, pixel {i}: {sum} for {expected}"
+            );
             lit += usize::from(size > 0.0);
         }
     }
@@ -170,7 +175,10 @@ fn a_furnace_parts_light_by_bounces() {
                 part(&image, kind, channel).assert_is(0.0, strategy);
             }
         }
-        assert_eq!(groups(&image)[0].pixels().next(), image.layer(LayerKind::Color).unwrap().pixels().next().map(|p| &p[..3]));
+        assert_eq!(
+            groups(&image)[0].pixels().next(),
+            image.layer(LayerKind::Color).unwrap().pixels().next().map(|p| &p[..3])
+        );
         assert!(groups(&image)[1].data.iter().all(|value| *value == 0.0));
     }
 }
@@ -273,7 +281,10 @@ fn groups_show_what_their_lights_alone_give() {
         let group = *groups(&both).iter().find(|layer| layer.group.as_deref() == Some(name)).unwrap();
         let pairs = group.pixels().zip(alone.layer(LayerKind::Color).unwrap().pixels());
         for (found, expected) in pairs {
-            assert!((0..3).all(|c| (found[c] - expected[c]).abs() <= 2e-6 * expected[c]), "{name}: {found:?} {expected:?}");
+            assert!(
+                (0..3).all(|c| (found[c] - expected[c]).abs() <= 2e-6 * expected[c]),
+                "{name}: {found:?} {expected:?}"
+            );
         }
     }
     // Paths choose among lights: by Welch's test on blocks of pixels.
@@ -311,10 +322,15 @@ fn denoisers_see_what_is_in_mirrors() {
         "lights": [{ "type": "environment", "radiance": [0.25, 3.0, 0.0] }]
     }));
     let image = full_of(&scene);
-    let at = |kind: LayerKind, y: u32| image.pixel(kind, 12, y).unwrap().iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
+    let at =
+        |kind: LayerKind, y: u32| image.pixel(kind, 12, y).unwrap().iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
     let close = |found: Vec<f64>, expected: [f64; 3]| found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 1e-5);
     // Below, the wall; above, the sky, as far as it is not brighter than white.
-    assert!(close(at(LayerKind::FeatureAlbedo, 20), [0, 1, 2].map(|c| tint[c] * ALBEDO[c])), "{:?}", at(LayerKind::FeatureAlbedo, 20));
+    assert!(
+        close(at(LayerKind::FeatureAlbedo, 20), [0, 1, 2].map(|c| tint[c] * ALBEDO[c])),
+        "{:?}",
+        at(LayerKind::FeatureAlbedo, 20)
+    );
     assert!(close(at(LayerKind::FeatureNormal, 20), [-1.0, 0.0, 0.0]), "{:?}", at(LayerKind::FeatureNormal, 20));
     assert!(close(at(LayerKind::FeatureAlbedo, 2), [0.125, 0.8, 0.0]), "{:?}", at(LayerKind::FeatureAlbedo, 2));
     assert!(close(at(LayerKind::FeatureNormal, 2), [0.0; 3]));
@@ -335,8 +351,7 @@ fn motion_is_that_of_things_and_of_the_camera() {
     let is = |found: &[[f32; 2]], expected: [f32; 2]| {
         assert!(found.iter().all(|p| (0..2).all(|k| (p[k] - expected[k]).abs() < 1e-3)), "{found:?} for {expected:?}");
     };
-    let large =
-        |motion: Value| json!({ "type": "quad", "origin": [-9, -9, 0], "edge_u": [18, 0, 0], "edge_v": [0, 18, 0], "motion": motion });
+    let large = |motion: Value| json!({ "type": "quad", "origin": [-9, -9, 0], "edge_u": [18, 0, 0], "edge_v": [0, 18, 0], "motion": motion });
     let slide = json!([{ "time": 0 }, { "time": 1, "transform": [{ "translate": [0.5, 0.25, 0] }] }]);
     is(&ahead(json!({}), large(json!([]))), [0.0, 0.0]);
     is(&ahead(json!({}), large(slide.clone())), [6.0, -3.0]);

@@ -21,7 +21,9 @@ fn a_measured_light_has_the_intensity_of_its_file() {
     let angle = 22.5f64.to_radians();
     let fall = 0.5 * angle.cos().powi(3);
     // Half of the way from 0 to 45 degrees.
-    for (at, turned, candela) in [([1.0, 0.0, 0.0], 0.0, 9.0), ([0.0, 0.0, 1.0], 0.0, 8.0), ([0.0, 0.0, -1.0], 90.0, 9.0)] {
+    for (at, turned, candela) in
+        [([1.0, 0.0, 0.0], 0.0, 9.0), ([0.0, 0.0, 1.0], 0.0, 8.0), ([0.0, 0.0, -1.0], 90.0, 9.0)]
+    {
         let mut scene = floor_probe(at.map(|x| x * angle.tan()), json!([]));
         scene["lights"] = lamp(turned);
         assert_irradiance(&scene, candela * fall, &format!("{at:?}"));
@@ -94,8 +96,7 @@ fn a_textured_light_shines_where_its_texture_is_bright() {
     };
     let expected = corner(1.0, 1.0) + (corner(2.0, 2.0) - 2.0 * corner(1.0, 2.0) + corner(1.0, 1.0));
     let emission = json!({ "radiance": [1, 1, 1], "texture": "board" });
-    let quad =
-        json!({ "type": "quad", "material": "black", "origin": [0, 1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "emission": emission });
+    let quad = json!({ "type": "quad", "material": "black", "origin": [0, 1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "emission": emission });
     let mesh = json!({
         "type": "mesh", "material": "black", "emission": emission, "positions": [[0, 1, 0], [2, 1, 0], [2, 1, 2], [0, 1, 2]],
         "triangles": [[0, 1, 2], [0, 2, 3]], "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]]
@@ -122,9 +123,10 @@ fn lamps_inside_objects_light_from_every_place_they_are_put() {
 
 #[test]
 fn a_flat_lamp_that_shines_on_both_sides_does_not_light_itself() {
-    for (material, edge) in
-        [(json!({ "type": "diffuse", "albedo": 0.9 }), [2.0, 0.0, 0.0]), (json!({ "type": "principled" }), [2.0, 0.3, 0.0])]
-    {
+    for (material, edge) in [
+        (json!({ "type": "diffuse", "albedo": 0.9 }), [2.0, 0.0, 0.0]),
+        (json!({ "type": "principled" }), [2.0, 0.3, 0.0]),
+    ] {
         let quad = json!({ "type": "quad", "material": "m", "edge_u": edge, "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } },
             { "translate": [10.1, 20.7, -3.3] }], "emission": { "radiance": [1, 1, 1], "two_sided": true } });
         let camera = json!({ "position": [10.1, 20.7, 1.7], "look_at": [10.1, 20.7, -3.3], "vertical_fov_degrees": 5 });
@@ -170,8 +172,10 @@ fn whitteds_direct_light_of_anything_with_an_extent_is_all_of_it() {
     // The same from an image; from a ball as a lamp, pi (R / d)² cos above a corner of the floor; from a wide sun.
     let folder = Folder::new();
     // Two texels of 128 / 256 * 2^(130 - 128).
-    let image =
-        folder.write("sky.hdr", [&b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"[..], &[128, 128, 128, 130].repeat(2)].concat());
+    let image = folder.write(
+        "sky.hdr",
+        [&b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"[..], &[128, 128, 128, 130].repeat(2)].concat(),
+    );
     let mut scene = floor_probe([0.0; 3], json!([]));
     scene["lights"] = json!([{ "type": "environment", "file": image }]);
     direct(scene.clone(), 2.0, "image");
@@ -199,7 +203,10 @@ fn corner(integrator: Value) -> Value {
             ]
         }),
     );
-    merge(&mut scene, json!({ "camera": { "vertical_fov_degrees": 40 }, "sampler": { "spp": 16 }, "integrator": { "type": "path" } }));
+    merge(
+        &mut scene,
+        json!({ "camera": { "vertical_fov_degrees": 40 }, "sampler": { "spp": 16 }, "integrator": { "type": "path" } }),
+    );
     merge(&mut scene["integrator"], integrator);
     scene
 }
@@ -218,7 +225,10 @@ fn clamping_takes_only_from_indirect_light_and_never_more_than_the_limit() {
     let mut changed = 0;
     for ((d, l), f) in direct.iter().zip(&limited).zip(&free) {
         // Eight contributions at most of up to 0.05 each.
-        assert!((0..3).all(|c| l[c] <= f[c] * 1.000_01 && l[c] >= d[c] && l[c] <= d[c] + 8.0 * 0.05), "{d:?} {l:?} {f:?}");
+        assert!(
+            (0..3).all(|c| l[c] <= f[c] * 1.000_01 && l[c] >= d[c] && l[c] <= d[c] + 8.0 * 0.05),
+            "{d:?} {l:?} {f:?}"
+        );
         changed += usize::from(l[1] < f[1] * 0.99);
     }
     assert!(changed > 20, "{changed} of {}", free.len());
@@ -243,7 +253,8 @@ fn regularized_caustics_vary_less_and_keep_their_light() {
         let pixels = a.iter().zip(b).chain(c.iter().zip(d)).zip(shades.iter().cycle());
         pixels.map(|((a, b), shade)| f64::from(a[1] - b[1]).powi(2) / shade).sum()
     };
-    let light = |pictures: &[Vec<[f32; 3]>; 4]| -> f64 { pictures.iter().flatten().map(|pixel| f64::from(pixel[1])).sum() };
+    let light =
+        |pictures: &[Vec<[f32; 3]>; 4]| -> f64 { pictures.iter().flatten().map(|pixel| f64::from(pixel[1])).sum() };
     assert!(noise(&rougher) < 0.2 * noise(&free), "{} {}", noise(&rougher), noise(&free));
     assert!((light(&rougher) / light(&free) - 1.0).abs() < 0.05, "{} {}", light(&rougher), light(&free));
 }
@@ -256,7 +267,10 @@ fn assert_fault(folder: &Folder, path: &str, value: &Value, kind: ErrorKind, pla
     let error = folder.compile(&scene).err().unwrap_or_else(|| panic!("{path} compiles with {value}"));
     let message = error.to_string();
     assert_eq!(error.kind(), kind, "{message}");
-    assert!(message.contains(place) && message.contains(word) && message.contains("scene.json"), "{place}, {word}: {message}");
+    assert!(
+        message.contains(place) && message.contains(word) && message.contains("scene.json"),
+        "{place}, {word}: {message}"
+    );
 }
 
 #[test]
@@ -281,7 +295,13 @@ fn wrong_lights_are_refused_with_their_place() {
         ("lights[0].group", json!("key light"), ErrorKind::Scene, "lights[0].group", "key light"),
         ("lights[3].group", json!(""), ErrorKind::Scene, "lights[3].group", "letters"),
         ("shapes[1].emission.group", json!("a.b"), ErrorKind::Scene, "shapes[1].emission.group", "a.b"),
-        ("shapes[1].emission.texture", json!("tile"), ErrorKind::Scene, "shapes[1].emission.texture", "did you mean \"tiles\"?"),
+        (
+            "shapes[1].emission.texture",
+            json!("tile"),
+            ErrorKind::Scene,
+            "shapes[1].emission.texture",
+            "did you mean \"tiles\"?",
+        ),
         ("integrator.clamp", json!(0), ErrorKind::Scene, "integrator.clamp", "0"),
         ("integrator.clamp", json!(-2), ErrorKind::Scene, "integrator.clamp", "-2"),
     ] {
@@ -302,7 +322,11 @@ fn wrong_cameras_are_refused_with_their_place() {
         (json!({ "type": "fisheye" }), "camera", "fisheye"),
         (json!({ "type": "orthographic" }), "camera", "`view_height`"),
         (json!({ "type": "orthographic", "view_height": 0 }), "camera.view_height", "0"),
-        (json!({ "type": "orthographic", "view_height": 1, "vertical_fov_degrees": 30 }), "camera.vertical_fov_degrees", "orthographic"),
+        (
+            json!({ "type": "orthographic", "view_height": 1, "vertical_fov_degrees": 30 }),
+            "camera.vertical_fov_degrees",
+            "orthographic",
+        ),
         (json!({ "type": "environment", "shift": [0, 1] }), "camera.shift", "environment"),
         (json!({ "type": "environment", "pixel_aspect": 1 }), "camera.pixel_aspect", "environment"),
         (json!({ "type": "environment", "lens": { "radius": 1, "focus_distance": 1 } }), "camera.lens", "environment"),
@@ -313,18 +337,42 @@ fn wrong_cameras_are_refused_with_their_place() {
         (json!({ "shutter": [1, 0.5] }), "camera.shutter", "[1.0, 0.5]"),
         (json!({ "shutter": [-1e308, 1e308] }), "camera.shutter", "1e308"),
         (json!({ "motion": [{ "time": 0 }, { "time": 0 }] }), "camera.motion[1].time", "grow"),
-        (json!({ "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "scale": 2 }] }] }), "camera.motion[1].transform", "scaled"),
-        (json!({ "motion": [{ "time": 0, "transform": [{ "scale": [1, 1, -1] }] }] }), "camera.motion[0].transform", "rotation"),
+        (
+            json!({ "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "scale": 2 }] }] }),
+            "camera.motion[1].transform",
+            "scaled",
+        ),
+        (
+            json!({ "motion": [{ "time": 0, "transform": [{ "scale": [1, 1, -1] }] }] }),
+            "camera.motion[0].transform",
+            "rotation",
+        ),
         (json!({ "motion": [{ "when": 0 }] }), "camera.motion[0]", "when"),
-        (json!({ "lens": { "radius": 1, "focus_distance": 1, "blades": { "count": 2 } } }), "camera.lens.blades.count", "2"),
-        (json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_distance": 0.05 } }), "camera.lens", "nothing is in focus"),
+        (
+            json!({ "lens": { "radius": 1, "focus_distance": 1, "blades": { "count": 2 } } }),
+            "camera.lens.blades.count",
+            "2",
+        ),
+        (
+            json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_distance": 0.05 } }),
+            "camera.lens",
+            "nothing is in focus",
+        ),
         (
             json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_distance": 0.2, "focus_distance": 1 } }),
             "camera.lens",
             "one too many",
         ),
-        (json!({ "lens": { "radius": 1, "sensor_height": 0.1, "sensor_distance": 0.2, "focus_distance": 1 } }), "camera.lens", "either"),
-        (json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_height": -1 } }), "camera.lens.sensor_height", "-1"),
+        (
+            json!({ "lens": { "radius": 1, "sensor_height": 0.1, "sensor_distance": 0.2, "focus_distance": 1 } }),
+            "camera.lens",
+            "either",
+        ),
+        (
+            json!({ "lens": { "radius": 1, "focal_length": 0.1, "sensor_height": -1 } }),
+            "camera.lens.sensor_height",
+            "-1",
+        ),
     ] {
         assert_fault(&folder, "camera", &camera(value), ErrorKind::Scene, place, word);
     }
@@ -359,7 +407,8 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
                 }))
             };
             let (shown, hidden, beyond) = (picture(false, 0.0), picture(true, 0.0), picture(false, 4.8));
-            let of = |image: &steradian::film::Image, x: u32, y: u32| image.pixel(LayerKind::Color, x, y).unwrap().to_vec();
+            let of =
+                |image: &steradian::film::Image, x: u32, y: u32| image.pixel(LayerKind::Color, x, y).unwrap().to_vec();
             assert_eq!((of(&shown, 12, 12)[0] >= 5.0, of(&shown, 12, 12)[3]), (!turned, 1.0), "{kind}");
             assert_eq!(
                 [of(&shown, 0, 0), of(&hidden, 0, 0), of(&beyond, 0, 0)],

@@ -54,7 +54,11 @@ fn the_picture_does_not_depend_on_how_lights_are_chosen() {
             .map(|seed| {
                 let mut scene = scene.clone();
                 scene["integrator"]["strategy"] = json!(strategy);
-                let overrides = Overrides { threads: Some(2), seed: Some(seed + 100 * strategy.len() as u64), ..Overrides::default() };
+                let overrides = Overrides {
+                    threads: Some(2),
+                    seed: Some(seed + 100 * strategy.len() as u64),
+                    ..Overrides::default()
+                };
                 let mut prepared = prepare(&scene, &overrides);
                 assert_eq!(prepared.scene.lights.selection(), LightSelection::Tree);
                 let lights = prepared.scene.lights.lights().to_vec();

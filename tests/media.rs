@@ -80,7 +80,8 @@ fn a_slab_of_absorbing_glass_gives_the_closed_form() {
 #[test]
 fn color_and_distance_say_what_is_left() {
     for (distance, thickness) in [(1.0, 0.5), (0.25, 0.5), (8.0, 2.0)] {
-        let medium = json!({ "m": { "type": "dielectric", "ior": 1, "absorption": { "color": RED, "distance": distance } } });
+        let medium =
+            json!({ "m": { "type": "dielectric", "ior": 1, "absorption": { "color": RED, "distance": distance } } });
         let found = exact(&through(5.0, medium, json!([block("m", [0.0, thickness])])));
         assert_close(found, left(RED, thickness / distance), 1e-5, "thickness in distances");
     }
@@ -203,7 +204,8 @@ fn overlapping_media_look_like_boundaries_modelled_one_by_one() {
         // A gap, which wrong priorities or no overlap leave, looks different.
         let mut gap = hollow.clone();
         gap["shapes"][4]["radius"] = json!(0.7);
-        let differ = pixels(&render(&gap)).zip(pixels(&render(&apart))).filter(|(p, q)| (p[0] - q[0]).abs() > 0.05).count();
+        let differ =
+            pixels(&render(&gap)).zip(pixels(&render(&apart))).filter(|(p, q)| (p[0] - q[0]).abs() > 0.05).count();
         assert!(differ > 50, "{differ}");
     }
 }
@@ -352,7 +354,8 @@ fn a_camera_starts_in_the_media_around_it() {
         // The same as parts of a moved instance.
         scene["objects"] = json!({ "balls": { "shapes": scene["shapes"] } });
         scene["shapes"] = json!([]);
-        scene["instances"] = json!([{ "object": "balls", "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } }] }]);
+        scene["instances"] =
+            json!([{ "object": "balls", "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } }] }]);
         assert_close(exact(&scene), expected, 1e-4, &format!("instance from {z}"));
     }
 }
@@ -439,17 +442,57 @@ fn media_that_make_no_sense() {
         ("materials.glass.absorption", json!([1, 2, 3]), "materials.glass.absorption[0]", "1"),
         ("materials.glass.absorption", json!({ "distance": 1 }), "materials.glass.absorption", "`color`"),
         ("materials.glass.absorption", json!({ "color": tint, "depth": 1 }), "materials.glass.absorption", "`depth`"),
-        ("materials.glass.absorption", absorption(json!([0, 1, 1]), json!(1)), "materials.glass.absorption.color", "above 0 and at most 1"),
-        ("materials.glass.absorption", absorption(json!([-0.1, 1, 1]), json!(1)), "materials.glass.absorption.color", "-0.1"),
-        ("materials.glass.absorption", absorption(json!([1, 1, 1.01]), json!(1)), "materials.glass.absorption.color", "1.01"),
-        ("materials.glass.absorption", absorption(json!([1, 1e39, 1]), json!(1)), "materials.glass.absorption.color", "inf"),
+        (
+            "materials.glass.absorption",
+            absorption(json!([0, 1, 1]), json!(1)),
+            "materials.glass.absorption.color",
+            "above 0 and at most 1",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(json!([-0.1, 1, 1]), json!(1)),
+            "materials.glass.absorption.color",
+            "-0.1",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(json!([1, 1, 1.01]), json!(1)),
+            "materials.glass.absorption.color",
+            "1.01",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(json!([1, 1e39, 1]), json!(1)),
+            "materials.glass.absorption.color",
+            "inf",
+        ),
         ("materials.glass.absorption", absorption(tint.clone(), json!(0)), "materials.glass.absorption.distance", "0"),
-        ("materials.glass.absorption", absorption(tint.clone(), json!(-2)), "materials.glass.absorption.distance", "-2"),
-        ("materials.glass.absorption", absorption(tint.clone(), json!(1e39)), "materials.glass.absorption.distance", "inf"),
-        ("materials.glass.absorption", absorption(tint, json!(1e-42)), "materials.glass.absorption.distance", "too small"),
+        (
+            "materials.glass.absorption",
+            absorption(tint.clone(), json!(-2)),
+            "materials.glass.absorption.distance",
+            "-2",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(tint.clone(), json!(1e39)),
+            "materials.glass.absorption.distance",
+            "inf",
+        ),
+        (
+            "materials.glass.absorption",
+            absorption(tint, json!(1e-42)),
+            "materials.glass.absorption.distance",
+            "too small",
+        ),
         ("materials.glass.abbe", json!(0), "materials.glass.abbe", "from 1 to 1000"),
         ("materials.glass.abbe", json!(1001), "materials.glass.abbe", "from 1 to 1000"),
-        ("materials.glass", json!({ "type": "dielectric", "ior": 10, "abbe": 1 }), "materials.glass.abbe", "indices of refraction"),
+        (
+            "materials.glass",
+            json!({ "type": "dielectric", "ior": 10, "abbe": 1 }),
+            "materials.glass.abbe",
+            "indices of refraction",
+        ),
         ("materials.glass", json!({ "type": "dielectric", "ior": 11, "priority": 1 }), "materials.glass.ior", "11"),
     ]);
     let mut scene = good_scene();
@@ -458,9 +501,11 @@ fn media_that_make_no_sense() {
     folder.compile(&scene).unwrap();
     set(&mut scene, "materials.m", json!({ "type": "mix", "materials": ["glass", "Gold"] }));
     folder.compile(&scene).unwrap();
-    for other in
-        [json!({ "type": "dielectric", "priority": 2 }), json!({ "type": "thin_dielectric" }), json!({ "type": "diffuse_transmission" })]
-    {
+    for other in [
+        json!({ "type": "dielectric", "priority": 2 }),
+        json!({ "type": "thin_dielectric" }),
+        json!({ "type": "diffuse_transmission" }),
+    ] {
         set(&mut scene, "materials.other", other);
         set(&mut scene, "materials.m", json!({ "type": "mix", "materials": ["glass", "other"] }));
         assert_error(&folder, &scene, ErrorKind::Scene, &["materials.m: ", "same medium"]);
@@ -468,6 +513,10 @@ fn media_that_make_no_sense() {
     set(&mut scene, "materials.m", json!({ "type": "two_sided", "front": "glass", "back": "Gold" }));
     assert_error(&folder, &scene, ErrorKind::Scene, &["materials.m.front: ", "lets light through"]);
     set(&mut scene, "materials.m", Value::Null);
-    set(&mut scene, "shapes[0]", json!({ "type": "sphere", "material": "glass", "emission": { "radiance": [1, 1, 1] } }));
+    set(
+        &mut scene,
+        "shapes[0]",
+        json!({ "type": "sphere", "material": "glass", "emission": { "radiance": [1, 1, 1] } }),
+    );
     assert_error(&folder, &scene, ErrorKind::Scene, &["shapes[0]: ", "medium", "light"]);
 }

@@ -78,7 +78,8 @@ fn what_turns_about_its_centre_stays_in_place_in_every_accelerator() {
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
     });
     let scene = Folder::new().compile(&scene).unwrap();
-    let accelerators = AccelKind::ALL.iter().map(|&(kind, _)| build(kind, &scene.geometry, 1).unwrap()).collect::<Vec<_>>();
+    let accelerators =
+        AccelKind::ALL.iter().map(|&(kind, _)| build(kind, &scene.geometry, 1).unwrap()).collect::<Vec<_>>();
     let mut rng = Rng::new(7);
     let mut hits = [0; 2];
     for i in 0..6_000 {
@@ -137,11 +138,17 @@ fn a_card_is_seen_as_long_as_it_is_there() {
         ("deforming mesh", passing_card(json!([deforming]), json!({}))),
         (
             "instance",
-            passing_card(json!([]), json!({ "objects": { "o": { "shapes": [card] } }, "instances": [{ "object": "o", "motion": path }] })),
+            passing_card(
+                json!([]),
+                json!({ "objects": { "o": { "shapes": [card] } }, "instances": [{ "object": "o", "motion": path }] }),
+            ),
         ),
         (
             "shape in an instance",
-            passing_card(json!([]), json!({ "objects": { "o": { "shapes": [moving] } }, "instances": [{ "object": "o" }] })),
+            passing_card(
+                json!([]),
+                json!({ "objects": { "o": { "shapes": [moving] } }, "instances": [{ "object": "o" }] }),
+            ),
         ),
     ];
     for (what, scene) in scenes {

@@ -96,7 +96,8 @@ fn a_threshold_makes_all_or_nothing_of_an_opacity_for_every_accelerator() {
     ImageBuffer::from_fn(4, 1, |x, _| Luma([51 * (x as u8 + 1)])).save(folder.path("steps.png")).unwrap();
     let solid = |opacity: Value, filter: &str| -> Vec<bool> {
         let mut scene = card_before_a_wall(quad(opacity));
-        scene["textures"] = json!({ "steps": { "type": "image", "file": "steps.png", "filter": filter, "wrap": "clamp" } });
+        scene["textures"] =
+            json!({ "steps": { "type": "image", "file": "steps.png", "filter": filter, "wrap": "clamp" } });
         scene["materials"]["leaf"]["albedo"] = json!(0.5);
         let scene = folder.compile(&scene).unwrap();
         let mut found: Option<Vec<bool>> = None;
@@ -119,7 +120,10 @@ fn a_threshold_makes_all_or_nothing_of_an_opacity_for_every_accelerator() {
     // a texel before.
     for (threshold, first) in [(0.5, 100), (0.45, 88)] {
         let found = solid(part(threshold), "bilinear");
-        assert!(found.iter().enumerate().all(|(i, hit)| *hit == (i >= first) || i.abs_diff(first) <= 1), "{threshold}: {found:?}");
+        assert!(
+            found.iter().enumerate().all(|(i, hit)| *hit == (i >= first) || i.abs_diff(first) <= 1),
+            "{threshold}: {found:?}"
+        );
     }
     let veil = count(&solid(json!({ "texture": "steps" }), "nearest"));
     assert!((60..140).contains(&veil), "{veil}");
@@ -196,8 +200,10 @@ fn light_comes_from_what_is_there_of_a_shape_with_holes() {
         "dim": { "type": "checker", "color0": [0.4, 0.4, 0.4], "color1": [0.6, 0.6, 0.6], "scale": [1, 0] } });
     let f = FRAC_1_SQRT_2 * FRAC_1_SQRT_2.atan() / PI;
     let half = json!({ "texture": "half" });
-    let quad = json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": half });
-    let veil = json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": 0.5 });
+    let quad =
+        json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": half });
+    let veil =
+        json!({ "type": "quad", "origin": [-1, 1, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "opacity": 0.5 });
     let mesh = json!({
         "type": "mesh", "positions": [[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], "triangles": [[0, 1, 2], [0, 2, 3]],
         "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]], "opacity": half
@@ -205,11 +211,18 @@ fn light_comes_from_what_is_there_of_a_shape_with_holes() {
     let mut cut = quad.clone();
     cut["opacity"] = json!({ "texture": "dim", "threshold": 0.5 });
     let sphere = json!({ "type": "sphere", "radius": 0.5, "opacity": 0.5, "transform": [{ "translate": [0, 1, 0] }] });
-    for (shape, two_sided, expected) in
-        [(quad, false, 2.0 * f), (cut, false, 2.0 * f), (veil, false, 2.0 * f), (mesh, false, 2.0 * f), (sphere, true, 0.75 * 0.25)]
-    {
+    for (shape, two_sided, expected) in [
+        (quad, false, 2.0 * f),
+        (cut, false, 2.0 * f),
+        (veil, false, 2.0 * f),
+        (mesh, false, 2.0 * f),
+        (sphere, true, 0.75 * 0.25),
+    ] {
         let mut light = shape.clone();
-        merge(&mut light, json!({ "material": "black", "emission": { "radiance": [1, 1, 1], "two_sided": two_sided } }));
+        merge(
+            &mut light,
+            json!({ "material": "black", "emission": { "radiance": [1, 1, 1], "two_sided": two_sided } }),
+        );
         let mut scene = floor_probe([0.0; 3], json!([light]));
         scene["textures"] = textures.clone();
         assert_irradiance(&scene, f64::from(PI * expected), &shape.to_string());

@@ -36,8 +36,15 @@ fn a_plane_is_met_up_to_the_horizon_by_every_accelerator() {
             let direction = ray.direction.as_dvec3();
             let expected = DVec3::Y - direction / direction.y;
             let distance = expected.length();
-            assert!((at.p - expected).length() < 1e-9 * distance && at.p.y.abs() < 1e-10, "{name} {i}: {} {expected}", at.p);
-            assert!((f64::from(hit.t) - -1.0 / direction.y).abs() < 1e-6 * distance && at.n_g == DVec3::Y.as_vec3(), "{name}: {hit:?}");
+            assert!(
+                (at.p - expected).length() < 1e-9 * distance && at.p.y.abs() < 1e-10,
+                "{name} {i}: {} {expected}",
+                at.p
+            );
+            assert!(
+                (f64::from(hit.t) - -1.0 / direction.y).abs() < 1e-6 * distance && at.n_g == DVec3::Y.as_vec3(),
+                "{name}: {hit:?}"
+            );
             // u is +x cross +y, v +y cross u, in units of length.
             let uv = [expected.z, expected.x];
             assert!((0..2).all(|k| (f64::from(at.uv[k]) - uv[k]).abs() < 1e-6 * distance), "{name}: {at:?}");

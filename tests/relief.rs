@@ -104,13 +104,21 @@ fn normal_maps_tilt_along_u_and_v_of_every_shape_wherever_it_stands() {
                         scene["shapes"] = json!([shape]);
                     }
                     let compiled = folder.compile(&scene).unwrap();
-                    let (at, dp_dv) = meet(&compiled, &Ray::new(vec3(0.31, 0.17, 5.0), -Vec3::Z)).unwrap_or_else(|| panic!("{scene}"));
+                    let (at, dp_dv) = meet(&compiled, &Ray::new(vec3(0.31, 0.17, 5.0), -Vec3::Z))
+                        .unwrap_or_else(|| panic!("{scene}"));
                     // The part of the derivative across the other one: what grows u without changing v, seen in the
                     // surface.
                     let (t, b) = (at.dp_du - at.n_g * at.n_g.dot(at.dp_du), dp_dv - at.n_g * at.n_g.dot(dp_dv));
-                    let expected = if along_v { at.n_g.cross(t).normalize() * at.n_g.cross(t).dot(b).signum() } else { t.normalize() };
+                    let expected = if along_v {
+                        at.n_g.cross(t).normalize() * at.n_g.cross(t).dot(b).signum()
+                    } else {
+                        t.normalize()
+                    };
                     let cos = at.n_s.dot(expected);
-                    assert!((cos - tilt).abs() < 2e-4 && (at.n_s.dot(at.n_g) - 0.8).abs() < 2e-4, "{shape} {transform}: {at:?}");
+                    assert!(
+                        (cos - tilt).abs() < 2e-4 && (at.n_s.dot(at.n_g) - 0.8).abs() < 2e-4,
+                        "{shape} {transform}: {at:?}"
+                    );
                     assert!((at.n_s.length() - 1.0).abs() < 1e-5);
                 }
             }
@@ -188,9 +196,11 @@ fn no_light_leaks_into_a_closed_box_whatever_its_normals_say() {
         Rgb(n.to_array().map(|x| (x * 127.5 + 127.5) as u8))
     });
     wild.save(folder.path("map.png")).unwrap();
-    for material in
-        [json!({ "type": "diffuse", "albedo": 0.9 }), json!({ "type": "mirror" }), json!({ "type": "plastic", "roughness": 0.4 })]
-    {
+    for material in [
+        json!({ "type": "diffuse", "albedo": 0.9 }),
+        json!({ "type": "mirror" }),
+        json!({ "type": "plastic", "roughness": 0.4 }),
+    ] {
         for integrator in ["path", "whitted"] {
             let mut scene = scene_of(
                 json!([{ "type": "cube", "material": "m", "transform": [{ "scale": 3 }] }, { "type": "sphere", "material": "m" }]),
@@ -260,7 +270,10 @@ fn ball(n: u32, shading: &str) -> Value {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for j in 0..=n {
         for i in 0..=2 * n {
-            let (theta, phi) = (std::f64::consts::PI * f64::from(j) / f64::from(n), std::f64::consts::PI * f64::from(i) / f64::from(n));
+            let (theta, phi) = (
+                std::f64::consts::PI * f64::from(j) / f64::from(n),
+                std::f64::consts::PI * f64::from(i) / f64::from(n),
+            );
             positions.push([theta.sin() * phi.cos(), theta.cos(), -theta.sin() * phi.sin()]);
         }
     }
@@ -313,7 +326,10 @@ fn a_coarse_smooth_ball_is_shaded_like_a_round_one() {
     // compared.
     let mean = |image: &steradian::film::Image| {
         let inside = |x: u32, y: u32| (x as f32 + 0.5 - 48.0).hypot(y as f32 + 0.5 - 48.0) < 45.0;
-        let values = (0..96 * 96).map(|i| (i % 96, i / 96)).filter(|&(x, y)| inside(x, y)).map(|(x, y)| image.rgb(x, y).unwrap()[1]);
+        let values = (0..96 * 96)
+            .map(|i| (i % 96, i / 96))
+            .filter(|&(x, y)| inside(x, y))
+            .map(|(x, y)| image.rgb(x, y).unwrap()[1]);
         values.map(f64::from).sum::<f64>()
     };
     let ratio = mean(&smooth) / mean(&round);

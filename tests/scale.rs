@@ -123,8 +123,9 @@ fn meshes_with_map_coordinates_keep_their_digits() {
     let far = near.map(|p| [0, 1, 2].map(|k| offset[k] + p[k]));
     assert_eq!(picture(json!({ "positions": far, "triangles": faces }), offset), expected);
 
-    let lines =
-        |prefix: &str, rows: &[[f64; 3]]| -> String { rows.iter().map(|[x, y, z]| format!("{prefix}{x:?} {y:?} {z:?}\n")).collect() };
+    let lines = |prefix: &str, rows: &[[f64; 3]]| -> String {
+        rows.iter().map(|[x, y, z]| format!("{prefix}{x:?} {y:?} {z:?}\n")).collect()
+    };
     let obj_faces: String = faces.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1)).collect();
     folder.write("m.obj", format!("{}{obj_faces}", lines("v ", &far)));
     assert_eq!(picture(json!({ "file": "m.obj" }), offset), expected);
@@ -228,7 +229,10 @@ fn coincident_faces_that_differ_are_one_warning() {
     ] {
         let lines = two(first.clone(), second.clone());
         assert_eq!(lines.len(), usize::from(warned), "{first} {second}: {lines:?}");
-        for part in lines.iter().flat_map(|line| ["shapes[1]: 1 triangle coincides", "shapes[2]", "remove one"].map(|part| (line, part))) {
+        for part in lines
+            .iter()
+            .flat_map(|line| ["shapes[1]: 1 triangle coincides", "shapes[2]", "remove one"].map(|part| (line, part)))
+        {
             assert!(part.0.contains(part.1), "{part:?}");
         }
         // Of an object that is placed twice, once; and with none of another object or of the world.
@@ -245,7 +249,10 @@ fn coincident_faces_that_differ_are_one_warning() {
                 "transform": [{ "rotate": { "axis": [-0.1016, -0.0028, 0.2143], "degrees": 236.0464 } }] })
     };
     let within = warnings(vec![sides(Value::Null)], vec![elsewhere.clone()]);
-    assert!(within.len() == 1 && within[0].contains("shapes[0]: 1 triangle") && within[0].contains("of the same mesh"), "{within:?}");
+    assert!(
+        within.len() == 1 && within[0].contains("shapes[0]: 1 triangle") && within[0].contains("of the same mesh"),
+        "{within:?}"
+    );
     // Those of emitters are dropped already.
     assert!(warnings(vec![sides(json!({ "radiance": [11, 11, 11] }))], vec![elsewhere.clone()]).is_empty());
 }

@@ -126,7 +126,8 @@ fn raised_rays_make_no_light() {
 fn a_sheet_above_a_smooth_mesh_keeps_its_shadow() {
     let corners = [[-1.5, -1.0, 0.0], [1.5, -1.0, 0.0], [0.0, 1.6, 0.0]];
     let normals = corners.map(|[x, y, _]: [f64; 3]| [x, y, 1.5]);
-    let dome = json!({ "type": "mesh", "material": "m", "positions": corners, "normals": normals, "triangles": [[0, 1, 2]] });
+    let dome =
+        json!({ "type": "mesh", "material": "m", "positions": corners, "normals": normals, "triangles": [[0, 1, 2]] });
     let sheet = json!({ "type": "quad", "material": "m", "origin": [-0.6, -0.6, 0.2], "edge_u": [1.2, 0, 0], "edge_v": [0, 1.2, 0] });
     let brightness = |shapes: Value| {
         let changes = json!({

@@ -37,7 +37,8 @@ const MAX_LINES: usize = 500;
 const MAX_COLUMNS: usize = 120;
 /// Files that the rules for functions and comments do not cover yet.
 const UNCHECKED: &[&str] = &[];
-const UNSAFE_HOMES: [&str; 4] = ["src/accel/embree/", "src/denoise/oidn/", "src/math/prefetch.rs", "src/bin/steradian/memory.rs"];
+const UNSAFE_HOMES: [&str; 4] =
+    ["src/accel/embree/", "src/denoise/oidn/", "src/math/prefetch.rs", "src/bin/steradian/memory.rs"];
 
 struct Source {
     path: String,
@@ -90,7 +91,8 @@ fn layers() -> HashMap<&'static str, u32> {
         let (layer, modules) = line.strip_prefix("//! | ")?.trim_end_matches(" |").split_once(" | ")?;
         Some((layer.parse().ok()?, modules))
     });
-    let modules = rows.flat_map(|(layer, modules)| modules.split(", ").map(move |module| (module.trim_matches('`'), layer)));
+    let modules =
+        rows.flat_map(|(layer, modules)| modules.split(", ").map(move |module| (module.trim_matches('`'), layer)));
     modules.collect()
 }
 
@@ -112,7 +114,8 @@ fn modules_import_only_from_lower_layers() {
                     continue;
                 }
                 // The crate root re-exports only the error type.
-                let target = if ["Error", "ErrorKind", "Result"].contains(&target.as_str()) { "error" } else { &target };
+                let target =
+                    if ["Error", "ErrorKind", "Result"].contains(&target.as_str()) { "error" } else { &target };
                 let allowed = layer(target).is_some_and(|l| l < own);
                 let narrow = NARROW.iter().find(|(m, _)| *m == module).is_none_or(|(_, list)| list.contains(&target));
                 if !allowed || !narrow {
@@ -138,8 +141,17 @@ fn files_stay_below_the_line_limit() {
 fn comments_fit_on_their_lines() {
     let mut faults = Vec::new();
     for source in sources(&["src"]).iter().filter(|s| !UNCHECKED.iter().any(|u| s.path.starts_with(u))) {
-        let is_long = |line: &str| line.chars().count() > MAX_COLUMNS && (line.trim_start().starts_with("//") || line.contains("; // "));
-        faults.extend(source.text.lines().enumerate().filter(|(_, l)| is_long(l)).map(|(i, _)| format!("{}:{}", source.path, i + 1)));
+        let is_long = |line: &str| {
+            line.chars().count() > MAX_COLUMNS && (line.trim_start().starts_with("//") || line.contains("; // "))
+        };
+        faults.extend(
+            source
+                .text
+                .lines()
+                .enumerate()
+                .filter(|(_, l)| is_long(l))
+                .map(|(i, _)| format!("{}:{}", source.path, i + 1)),
+        );
     }
     assert!(faults.is_empty(), "over {MAX_COLUMNS} columns:\n{}", faults.join("\n"));
 }
@@ -169,7 +181,16 @@ fn the_library_neither_prints_nor_exits() {
     let mut faults = Vec::new();
     for source in sources(&["src"]).iter().filter(|s| !s.path.starts_with("src/bin/")) {
         for (line, code) in source.code() {
-            let words = ["println!", "eprintln!", "print!(", "eprint!(", "process::exit", "process::abort", "todo!(", "unimplemented!("];
+            let words = [
+                "println!",
+                "eprintln!",
+                "print!(",
+                "eprint!(",
+                "process::exit",
+                "process::abort",
+                "todo!(",
+                "unimplemented!(",
+            ];
             if let Some(word) = words.iter().find(|word| code.contains(*word)) {
                 faults.push(format!("{}:{line}: {word}", source.path));
             }
@@ -183,7 +204,9 @@ fn files_are_opened_in_one_place() {
     // The system's own files, tests, and benchmarks with their children are exempt.
     let exempt = ["src/file/", "src/bench/", "src/bin/steradian/stats.rs", "/tests/"];
     let mut faults = Vec::new();
-    for source in sources(&["src"]).iter().filter(|s| !exempt.iter().any(|e| s.path.contains(e)) && !s.path.ends_with("tests.rs")) {
+    for source in
+        sources(&["src"]).iter().filter(|s| !exempt.iter().any(|e| s.path.contains(e)) && !s.path.ends_with("tests.rs"))
+    {
         for (line, code) in source.code().take_while(|(_, code)| !code.contains("#[cfg(test)]")) {
             let words = [
                 "File::open(",
@@ -225,16 +248,20 @@ fn every_known_flaw_has_its_tests() {
     let text = fs::read_to_string("docs/flaws.md").unwrap();
     let files = sources(&["src", "tests"]);
     let is_test = |name: &str| {
-        files
-            .iter()
-            .any(|file| file.text.contains(&format!("#[test]\n    fn {name}()")) || file.text.contains(&format!("#[test]\nfn {name}()")))
+        files.iter().any(|file| {
+            file.text.contains(&format!("#[test]\n    fn {name}()"))
+                || file.text.contains(&format!("#[test]\nfn {name}()"))
+        })
     };
-    let rows: Vec<&str> =
-        text.lines().filter(|line| line.starts_with("| A") || line.starts_with("| B") || line.starts_with("| C")).collect();
+    let rows: Vec<&str> = text
+        .lines()
+        .filter(|line| line.starts_with("| A") || line.starts_with("| B") || line.starts_with("| C"))
+        .collect();
     assert!(rows.len() >= 40, "{}", rows.len());
     let mut faults = Vec::new();
     for row in rows {
-        let names: Vec<&str> = row.rsplit('|').nth(1).unwrap().split(',').map(|name| name.trim().trim_matches('`')).collect();
+        let names: Vec<&str> =
+            row.rsplit('|').nth(1).unwrap().split(',').map(|name| name.trim().trim_matches('`')).collect();
         faults.extend(names.into_iter().filter(|name| !is_test(name)).map(|name| format!("{name}: {row}")));
     }
     assert!(faults.is_empty(), "no such test:\n{}", faults.join("\n"));

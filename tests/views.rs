@@ -60,7 +60,9 @@ fn a_png_has_its_view_and_an_exr_none() {
     run_ok(dir, "render view.json -q --integrator normal -o n.exr -o n.png --float");
     let (normal, code) = (colors(&dir.join("n.exr")), image::open(dir.join("n.png")).unwrap().into_rgb8());
     let middle = 8 * 24 + 12;
-    assert!((f32::from(code.get_pixel(12, 8).0[2]) - 255.0 * srgb_from_linear(normal[4 * middle + 2].min(1.0))).abs() < 1.0);
+    assert!(
+        (f32::from(code.get_pixel(12, 8).0[2]) - 255.0 * srgb_from_linear(normal[4 * middle + 2].min(1.0))).abs() < 1.0
+    );
     assert_eq!(run(dir, "render view.json --view film").status.code(), Some(2));
     write_scene(dir, false, r#"{ "file": "a.png", "view": "film" }"#);
     assert_eq!(run(dir, "render view.json").status.code(), Some(3));

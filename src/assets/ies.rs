@@ -39,7 +39,9 @@ impl Numbers<'_> {
     fn next(&mut self, what: &str) -> Result<(usize, f64), String> {
         let (line, word) = self.words.next().ok_or_else(|| format!("the file ends where {what} should be"))?;
         let number = word.parse::<f64>().ok().filter(|n| n.is_finite());
-        number.map(|number| (line, number)).ok_or_else(|| format!("line {line}: {what} should be a number, not \"{word}\""))
+        number
+            .map(|number| (line, number))
+            .ok_or_else(|| format!("line {line}: {what} should be a number, not \"{word}\""))
     }
 
     fn positive(&mut self, what: &str) -> Result<f64, String> {
@@ -63,7 +65,10 @@ impl Numbers<'_> {
             let (line, angle) = self.next(what)?;
             let angle = angle as f32;
             if angles.last().is_some_and(|last| *last >= angle) {
-                return Err(format!("line {line}: {what}s must increase; {angle} follows {}", angles[angles.len() - 1]));
+                return Err(format!(
+                    "line {line}: {what}s must increase; {angle} follows {}",
+                    angles[angles.len() - 1]
+                ));
             }
             angles.push(angle);
         }
@@ -91,9 +96,12 @@ impl Numbers<'_> {
 
 fn parse(text: &str) -> Result<IesData, String> {
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line));
-    let tilt = lines.find_map(|(_, line)| line.trim().to_ascii_uppercase().strip_prefix("TILT=").map(|tilt| tilt.trim().to_owned()));
+    let tilt = lines.find_map(|(_, line)| {
+        line.trim().to_ascii_uppercase().strip_prefix("TILT=").map(|tilt| tilt.trim().to_owned())
+    });
     let tilt = tilt.ok_or("there is no line with TILT=: not an LM-63 file")?;
-    let words = lines.flat_map(|(i, line)| line.split([' ', '\t', ',']).filter(|word| !word.is_empty()).map(move |word| (i, word)));
+    let words = lines
+        .flat_map(|(i, line)| line.split([' ', '\t', ',']).filter(|word| !word.is_empty()).map(move |word| (i, word)));
     let mut numbers = Numbers { words: words.collect::<Vec<_>>().into_iter() };
 
     if tilt != "INCLUDE" && tilt != "NONE" {
@@ -129,7 +137,8 @@ fn parse(text: &str) -> Result<IesData, String> {
     if vertical_count.saturating_mul(horizontal_count) > MAX_VALUES {
         return Err(format!("{vertical_count} x {horizontal_count} directions are too many"));
     }
-    let (vertical, horizontal) = (numbers.vertical_angles(vertical_count)?, numbers.horizontal_angles(horizontal_count)?);
+    let (vertical, horizontal) =
+        (numbers.vertical_angles(vertical_count)?, numbers.horizontal_angles(horizontal_count)?);
     let scale = multiplier * ballast * photometric;
     let mut candela = Vec::new();
     for _ in 0..vertical_count * horizontal_count {

@@ -141,7 +141,10 @@ macro_rules! naive {
     ($new:expr) => {{
         let build: Build = Box::new(|geometry| {
             let counter = $new(geometry);
-            Ok(Subject { accel: Box::new($new(geometry)), tests: Box::new(move |_, ray| Some(counter.tests(ray) as f64)) })
+            Ok(Subject {
+                accel: Box::new($new(geometry)),
+                tests: Box::new(move |_, ray| Some(counter.tests(ray) as f64)),
+            })
         });
         build
     }};
@@ -158,7 +161,8 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
         Entry("octree", None, false, ours(AccelKind::Octree)),
         Entry("embree", Some("0.5 s"), false, ours(AccelKind::EMBREE)),
     ];
-    let mut comparison = compare("A head of 968 triangles: linear, octree, Embree", &head(968), &entries, options, watch)?;
+    let mut comparison =
+        compare("A head of 968 triangles: linear, octree, Embree", &head(968), &entries, options, watch)?;
     comparison.claim = "120 s linear, 3.5 s octree, 0.5 s Embree, at 1200x800 with one sample a pixel and one thread (ratios 240 : 7 : 1).";
     comparison.sources = vec![
         "Stated by the report: the three times.".into(),
@@ -229,7 +233,12 @@ fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
 fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     let entries = [
         Entry("linear", Some("1"), true, ours(AccelKind::Linear)),
-        Entry("BVH as in the report, wrong leaves", Some("17.61 times faster"), true, naive!(NaiveBvh::with_wrong_leaves)),
+        Entry(
+            "BVH as in the report, wrong leaves",
+            Some("17.61 times faster"),
+            true,
+            naive!(NaiveBvh::with_wrong_leaves),
+        ),
         Entry("BVH as in the report, right leaves", None, false, naive!(NaiveBvh::new)),
         Entry("bvh:binary", None, false, ours(AccelKind::Bvh(accel::BvhOptions { binary: true }))),
         Entry("bvh", None, false, ours(AccelKind::Bvh(accel::BvhOptions::default()))),
@@ -270,19 +279,27 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
     Ok(comparison)
 }
 
-fn compare(title: &'static str, mesh: &Mesh, entries: &[Entry], options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
+fn compare(
+    title: &'static str,
+    mesh: &Mesh,
+    entries: &[Entry],
+    options: &ReportsOptions,
+    watch: &dyn Watch,
+) -> Result<Comparison> {
     let triangles = mesh.triangles().len();
     let benchmark = FrameBenchmark { title, mesh, entries, options, watch };
     let [normals, paths] = [Kind::Normals, Kind::Paths].map(|kind| measure(benchmark, kind));
     let (normals, paths) = (normals?, paths?);
-    let rows = entries.iter().zip(normals).zip(paths).map(|((Entry(name, reported, ..), of_normals), of_paths)| ComparisonRow {
-        name: (*name).to_owned(),
-        reported: *reported,
-        build_milliseconds: of_normals.build_milliseconds,
-        normals: of_normals.timing,
-        paths: of_paths.timing,
-        tests_per_ray: of_normals.tests_per_ray,
-        different_pixels: of_normals.different_pixels,
+    let rows = entries.iter().zip(normals).zip(paths).map(|((Entry(name, reported, ..), of_normals), of_paths)| {
+        ComparisonRow {
+            name: (*name).to_owned(),
+            reported: *reported,
+            build_milliseconds: of_normals.build_milliseconds,
+            normals: of_normals.timing,
+            paths: of_paths.timing,
+            tests_per_ray: of_normals.tests_per_ray,
+            different_pixels: of_normals.different_pixels,
+        }
     });
     Ok(Comparison { title, triangles, claim: "", sources: Vec::new(), rows: rows.collect(), reasons: Vec::new() })
 }
@@ -300,16 +317,23 @@ mod tests {
         for comparison in &report.comparisons {
             let linear = comparison.rows[0].tests_per_ray.unwrap();
             assert_eq!(linear, comparison.triangles as f64);
-            assert!(comparison.rows.len() >= 5 && !comparison.claim.is_empty() && comparison.reasons.len() >= 2, "{comparison:?}");
+            assert!(
+                comparison.rows.len() >= 5 && !comparison.claim.is_empty() && comparison.reasons.len() >= 2,
+                "{comparison:?}"
+            );
             assert!(comparison.sources.iter().any(|source| source.starts_with("Inferred")), "{comparison:?}");
             for row in &comparison.rows {
                 // The wrong leaves of the report lose one leaf; Embree rounds otherwise at edges.
                 let allowed = if row.name.contains("wrong") || row.name == "embree" { 12 } else { 0 };
                 assert!(row.different_pixels <= allowed, "{row:?}");
-                let is_tree = row.normals.scaled_from.is_none() && !row.name.starts_with("linear") && !row.name.contains("wrong");
+                let is_tree =
+                    row.normals.scaled_from.is_none() && !row.name.starts_with("linear") && !row.name.contains("wrong");
                 assert!(!is_tree || row.tests_per_ray.is_none_or(|tests| tests < 0.1 * linear), "{row:?}");
                 let timings = [row.normals, row.paths];
-                assert!(timings.iter().all(|t| t.accel_seconds > 0.0 && t.frame_seconds[1] >= t.accel_seconds), "{row:?}");
+                assert!(
+                    timings.iter().all(|t| t.accel_seconds > 0.0 && t.frame_seconds[1] >= t.accel_seconds),
+                    "{row:?}"
+                );
             }
         }
         let folder = tempfile::tempdir().unwrap();
@@ -317,7 +341,11 @@ mod tests {
         let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
         let (page, text) = (read("reports.html"), read("reports.md"));
         assert_eq!((page.matches("<svg").count(), page.matches("<table>").count()), (3, 3));
-        assert!([&page, &text].iter().all(|text| text.contains("Inferred: 1200x800") && text.contains("path traced: frame s")));
+        assert!(
+            [&page, &text]
+                .iter()
+                .all(|text| text.contains("Inferred: 1200x800") && text.contains("path traced: frame s"))
+        );
         assert!(serde_json::from_str::<serde_json::Value>(&read("reports.json")).is_ok());
     }
 }

@@ -6,15 +6,20 @@ use std::fmt::Debug;
 use super::CompileContext;
 use super::textures::{TextureTable, TextureUse};
 use crate::assets::ObjMaterial;
-use crate::bsdf::{Beckmann, Coat, Conductor, Dielectric, Ggx, Lambert, Mirror, Plastic, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
+use crate::bsdf::{
+    Beckmann, Coat, Conductor, Dielectric, Ggx, Lambert, Mirror, Plastic, SeparableGgx, diffuse_mean,
+    mitsuba_diffuse_mean,
+};
 use crate::color::Rgb;
 use crate::desc::{
-    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc, ScalarDesc,
-    SceneDesc, UsedNames,
+    ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
+    ScalarDesc, SceneDesc, UsedNames,
 };
 use crate::error::Result;
 use crate::id::{MaterialId, NormalPerturbationId, TextureId};
-use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial};
+use crate::material::{
+    AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, RangedInput, ScalarInput, TexturedMaterial,
+};
 use crate::medium::{Media, Medium};
 use crate::metal::{Metal, MetalNames};
 use crate::normal_perturbation::NormalPerturbation;
@@ -116,7 +121,8 @@ impl MaterialTable {
     /// Whether a surface with it needs uv.
     pub fn needs_uv(&self, binding: &MaterialBinding) -> bool {
         let cut_out = binding.opacity.is_some_and(|id| self.textures.get(id).uses_uv());
-        let needs = |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.normal_perturbation_of(id).is_some();
+        let needs =
+            |id: MaterialId| self.has_texture(id, Texture::uses_uv) || self.normal_perturbation_of(id).is_some();
         cut_out || binding.normal_perturbation.is_some() || self.any_part(binding.material, &needs)
     }
 
@@ -127,9 +133,11 @@ impl MaterialTable {
     /// Whether a surface's normals come from a normal map.
     pub fn has_normal_map(&self, binding: &MaterialBinding) -> bool {
         let is_map = |normal_perturbation: Option<NormalPerturbationId>| {
-            normal_perturbation.is_some_and(|id| matches!(self.normal_perturbations[id.index()], NormalPerturbation::NormalMap { .. }))
+            normal_perturbation
+                .is_some_and(|id| matches!(self.normal_perturbations[id.index()], NormalPerturbation::NormalMap { .. }))
         };
-        is_map(binding.normal_perturbation) || self.any_part(binding.material, &|id| is_map(self.normal_perturbation_of(id)))
+        is_map(binding.normal_perturbation)
+            || self.any_part(binding.material, &|id| is_map(self.normal_perturbation_of(id)))
     }
 
     /// The material of a name, or the default.
@@ -138,7 +146,9 @@ impl MaterialTable {
             return Ok(MaterialBinding::plain(Self::DEFAULT));
         };
         let found = self.names.get(name).copied();
-        found.ok_or_else(|| files.unknown(&format!("{path}.material"), "material", name, self.names.keys().map(String::as_str)))
+        found.ok_or_else(|| {
+            files.unknown(&format!("{path}.material"), "material", name, self.names.keys().map(String::as_str))
+        })
     }
 }
 
@@ -157,11 +167,13 @@ impl Compiler<'_> {
             }
             .into(),
             MaterialDesc::DiffuseTransmission { reflectance, transmittance } => {
-                let [reflectance, transmittance] = self.sum_to_one(path, ["reflectance", "transmittance"], [reflectance, transmittance])?;
+                let [reflectance, transmittance] =
+                    self.sum_to_one(path, ["reflectance", "transmittance"], [reflectance, transmittance])?;
                 TexturedMaterial::DiffuseTransmission { reflectance, transmittance }.into()
             }
             MaterialDesc::Mirror { reflectance } => {
-                TexturedMaterial::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }.into()
+                TexturedMaterial::Mirror { reflectance: self.color(&format!("{path}.reflectance"), reflectance)? }
+                    .into()
             }
             MaterialDesc::Conductor { metal, eta, k, roughness, alpha, distribution, tint, multiscatter } => {
                 let (eta, k) = self.metal(path, metal.as_deref(), *eta, *k)?;
@@ -178,7 +190,11 @@ impl Compiler<'_> {
             MaterialDesc::Phong { diffuse, specular, exponent, lobe } => {
                 let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
                     let is_sound = exponent >= 0.0 && exponent.is_finite();
-                    if is_sound { Ok(()) } else { Err(files.error(path, format!("must be finite and not negative, not {exponent}"))) }
+                    if is_sound {
+                        Ok(())
+                    } else {
+                        Err(files.error(path, format!("must be finite and not negative, not {exponent}")))
+                    }
                 })?;
                 let [diffuse, specular] = self.sum_to_one(path, ["diffuse", "specular"], [diffuse, specular])?;
                 TexturedMaterial::Phong { diffuse, specular, exponent, cosine: *lobe == PhongLobeDesc::Cosine }.into()
@@ -191,11 +207,16 @@ impl Compiler<'_> {
                 if let (ScalarInput::Constant(d), ScalarInput::Constant(s)) = (d, s)
                     && d + s > 1.0 + 1e-6
                 {
-                    return Err(files.error(path, format!("`d` and `s` must not exceed 1 together, but are {d} and {s}")));
+                    return Err(
+                        files.error(path, format!("`d` and `s` must not exceed 1 together, but are {d} and {s}"))
+                    );
                 }
                 TexturedMaterial::CookTorrance { albedo, d, s, m, f0 }.into()
             }
-            MaterialDesc::Mix { .. } | MaterialDesc::TwoSided { .. } | MaterialDesc::Coated { .. } | MaterialDesc::Relief { .. } => {
+            MaterialDesc::Mix { .. }
+            | MaterialDesc::TwoSided { .. }
+            | MaterialDesc::Coated { .. }
+            | MaterialDesc::Relief { .. } => {
                 return Err(files.error(path, "cannot be part of a material"));
             }
             MaterialDesc::Plastic(desc) => self.plastic(path, desc)?.into(),
@@ -207,7 +228,8 @@ impl Compiler<'_> {
         let ior = self.glass_ior(path, &desc.ior)?;
         let alpha = self.alpha(path, desc.roughness.as_ref(), desc.alpha.as_ref())?;
         let tints = self.tints(path, &desc.reflection_tint, &desc.transmission_tint)?;
-        let boundary = TexturedMaterial::Dielectric { ior, alpha, facets: facets(desc.distribution, desc.multiscatter), tints };
+        let boundary =
+            TexturedMaterial::Dielectric { ior, alpha, facets: facets(desc.distribution, desc.multiscatter), tints };
         // The relative index at a medium's surface depends on what is around it.
         Ok(if desc.is_medium() { Material::varying(boundary) } else { boundary.into() })
     }
@@ -225,19 +247,25 @@ impl Compiler<'_> {
     fn plastic_coat(&self, path: &str, desc: &PlasticDesc) -> Result<PlasticCoat> {
         let ior = self.ranged(&format!("{path}.ior"), &desc.ior, |path, ior| {
             let is_sound = ior > 1.0 && ior <= 10.0;
-            if is_sound { Ok(()) } else { Err(self.files.error(path, format!("must be above 1 and at most 10, not {ior}"))) }
+            if is_sound {
+                Ok(())
+            } else {
+                Err(self.files.error(path, format!("must be above 1 and at most 10, not {ior}")))
+            }
         })?;
         let alpha = self.alpha(path, desc.roughness.as_ref(), desc.alpha.as_ref())?;
         let facets = facets(desc.distribution, desc.multiscatter);
         if facets == Facets::Ggx {
             return Ok(PlasticCoat::Ggx(CoatInput::new(ior, alpha)));
         }
-        let (RangedInput::Constant(ior), [ScalarInput::Constant(u), ScalarInput::Constant(v)]) = (ior, alpha.axes) else {
+        let (RangedInput::Constant(ior), [ScalarInput::Constant(u), ScalarInput::Constant(v)]) = (ior, alpha.axes)
+        else {
             let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come from textures";
             return Err(self.files.error(path, message));
         };
         if u != v {
-            let message = "with a `distribution` or without `multiscatter`, the roughness must be the same along both axes";
+            let message =
+                "with a `distribution` or without `multiscatter`, the roughness must be the same along both axes";
             return Err(self.files.error(path, message));
         }
         let alpha = [if alpha.squared { u * u } else { u }; 2];
@@ -245,14 +273,21 @@ impl Compiler<'_> {
             Facets::Ggx | Facets::SingleGgx => {
                 PlasticCoat::Ggx(CoatInput::Constant(Coat::single_scattering(ior, Ggx::new(alpha), diffuse_mean)))
             }
-            Facets::SeparableGgx => PlasticCoat::SeparableGgx(Coat::single_scattering(ior, SeparableGgx::new(alpha), mitsuba_diffuse_mean)),
-            Facets::Beckmann => PlasticCoat::Beckmann(Coat::single_scattering(ior, Beckmann::new(alpha), mitsuba_diffuse_mean)),
+            Facets::SeparableGgx => {
+                PlasticCoat::SeparableGgx(Coat::single_scattering(ior, SeparableGgx::new(alpha), mitsuba_diffuse_mean))
+            }
+            Facets::Beckmann => {
+                PlasticCoat::Beckmann(Coat::single_scattering(ior, Beckmann::new(alpha), mitsuba_diffuse_mean))
+            }
         })
     }
 
     /// Factors on what glass reflects and on what crosses it.
     fn tints(&self, path: &str, reflection: &ColorDesc, transmission: &ColorDesc) -> Result<[ColorInput; 2]> {
-        Ok([self.color(&format!("{path}.reflection_tint"), reflection)?, self.color(&format!("{path}.transmission_tint"), transmission)?])
+        Ok([
+            self.color(&format!("{path}.reflection_tint"), reflection)?,
+            self.color(&format!("{path}.transmission_tint"), transmission)?,
+        ])
     }
 
     pub(super) fn color(&self, path: &str, desc: &ColorDesc) -> Result<ColorInput> {
@@ -266,7 +301,9 @@ impl Compiler<'_> {
     /// A number within `[0, 1]`.
     pub(super) fn scalar(&self, path: &str, desc: &ScalarDesc) -> Result<ScalarInput> {
         Ok(match desc {
-            ScalarDesc::Constant(value) => ScalarInput::Constant(self.files.within(path, f64::from(*value), 0.0, 1.0)? as f32),
+            ScalarDesc::Constant(value) => {
+                ScalarInput::Constant(self.files.within(path, f64::from(*value), 0.0, 1.0)? as f32)
+            }
             ScalarDesc::Texture { texture } => {
                 let id = self.textures.find(self.files, path, texture, TextureUse::Data)?;
                 match self.textures.get(id) {
@@ -283,22 +320,32 @@ impl Compiler<'_> {
         if let [ColorInput::Constant(x), ColorInput::Constant(y)] = inputs
             && (x + y).max_channel() > 1.0 + 1e-6
         {
-            let message =
-                format!("`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it receives");
+            let message = format!(
+                "`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it receives"
+            );
             return Err(self.files.error(path, message));
         }
         Ok(inputs)
     }
 
-    fn metal(&self, path: &str, metal: Option<&str>, eta: Option<[f32; 3]>, k: Option<[f32; 3]>) -> Result<([f32; 3], [f32; 3])> {
+    fn metal(
+        &self,
+        path: &str,
+        metal: Option<&str>,
+        eta: Option<[f32; 3]>,
+        k: Option<[f32; 3]>,
+    ) -> Result<([f32; 3], [f32; 3])> {
         match (metal, eta, k) {
             (Some(name), None, None) => {
-                let unknown = || self.files.unknown(&format!("{path}.metal"), "metal", name, Metal::names(MetalNames::Steradian));
+                let unknown =
+                    || self.files.unknown(&format!("{path}.metal"), "metal", name, Metal::names(MetalNames::Steradian));
                 Metal::find(MetalNames::Steradian, name).map(|metal| (metal.eta, metal.k)).ok_or_else(unknown)
             }
             (None, Some(eta), Some(k)) => {
                 if !eta.iter().all(|&e| e > 0.0 && e.is_finite()) {
-                    return Err(self.files.error(&format!("{path}.eta"), format!("{eta:?} must be finite and above 0")));
+                    return Err(self
+                        .files
+                        .error(&format!("{path}.eta"), format!("{eta:?} must be finite and above 0")));
                 }
                 Ok((eta, self.files.emitted(&format!("{path}.k"), k)?))
             }
@@ -307,7 +354,12 @@ impl Compiler<'_> {
     }
 
     /// GGX alpha along u and v; zero for a smooth surface.
-    pub(super) fn alpha(&self, path: &str, roughness: Option<&RoughnessDesc>, alpha: Option<&RoughnessDesc>) -> Result<AlphaInput> {
+    pub(super) fn alpha(
+        &self,
+        path: &str,
+        roughness: Option<&RoughnessDesc>,
+        alpha: Option<&RoughnessDesc>,
+    ) -> Result<AlphaInput> {
         let (key, desc, squared) = match (roughness, alpha) {
             (None, None) => return Ok(AlphaInput { axes: [ScalarInput::Constant(0.0); 2], squared: false }),
             (Some(roughness), None) => ("roughness", roughness, true),
@@ -315,28 +367,37 @@ impl Compiler<'_> {
             (Some(_), Some(_)) => return Err(self.files.error(path, "give either `roughness` or `alpha`")),
         };
         let path = format!("{path}.{key}");
-        let constant = |value: f32| self.files.within(&path, f64::from(value), 0.0, 1.0).map(|value| ScalarInput::Constant(value as f32));
+        let constant = |value: f32| {
+            self.files.within(&path, f64::from(value), 0.0, 1.0).map(|value| ScalarInput::Constant(value as f32))
+        };
         let axes = match desc {
             RoughnessDesc::Isotropic(a) => [constant(*a)?; 2],
             RoughnessDesc::Anisotropic([u, v]) => [constant(*u)?, constant(*v)?],
-            RoughnessDesc::Texture { texture } => [self.scalar(&path, &ScalarDesc::Texture { texture: texture.clone() })?; 2],
-            RoughnessDesc::Axes { u, v } => [self.scalar(&format!("{path}.u"), u)?, self.scalar(&format!("{path}.v"), v)?],
+            RoughnessDesc::Texture { texture } => {
+                [self.scalar(&path, &ScalarDesc::Texture { texture: texture.clone() })?; 2]
+            }
+            RoughnessDesc::Axes { u, v } => {
+                [self.scalar(&format!("{path}.u"), u)?, self.scalar(&format!("{path}.v"), v)?]
+            }
         };
         Ok(AlphaInput { axes, squared })
     }
 
     /// The parameter `ior`, from `least` to 10.
     pub(super) fn ior(&self, path: &str, desc: &RangedDesc, least: f64) -> Result<RangedInput> {
-        self.ranged(&format!("{path}.ior"), desc, |path, ior| self.files.within(path, f64::from(ior), least, 10.0).map(|_| ()))
+        self.ranged(&format!("{path}.ior"), desc, |path, ior| {
+            self.files.within(path, f64::from(ior), least, 10.0).map(|_| ())
+        })
     }
 
     /// The index of refraction of what is inside of a dielectric.
     pub(super) fn glass_ior(&self, path: &str, desc: &RangedDesc) -> Result<f32> {
         match self.ior(path, desc, 0.1)? {
             RangedInput::Constant(ior) => Ok(ior),
-            RangedInput::Texture { .. } => {
-                Err(self.files.error(&format!("{path}.ior"), "cannot come from a texture: what is inside has one index of refraction"))
-            }
+            RangedInput::Texture { .. } => Err(self.files.error(
+                &format!("{path}.ior"),
+                "cannot come from a texture: what is inside has one index of refraction",
+            )),
         }
     }
 
@@ -383,7 +444,9 @@ pub struct MtlSurface {
 ///
 /// The error names the invalid number.
 pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
-    let fault = |key: &str, value: &dyn Debug, must: &str| Err(format!("material \"{}\": {key} {value:?} must be {must}", mtl.name));
+    let fault = |key: &str, value: &dyn Debug, must: &str| {
+        Err(format!("material \"{}\": {key} {value:?} must be {must}", mtl.name))
+    };
     for (key, color) in [("Kd", mtl.diffuse), ("Ks", mtl.specular)] {
         if let Some(color) = color.filter(|c| !c.iter().all(|v| (0.0..=1.0).contains(v))) {
             return fault(key, &color, "within 0 and 1");
@@ -457,7 +520,10 @@ mod tests {
         let color = Rgb::new(0.9, 0.5, 0.1);
         let Material::Constant(metal) = metal_of_color(color, [0.0; 2]) else { panic!("varies") };
         let weight = metal.sample(Vec3::Z, 0.5, [0.5; 2]).unwrap().weight;
-        assert!([weight.r - color.r, weight.g - color.g, weight.b - color.b].iter().all(|d| d.abs() < 1e-5), "{weight:?}");
+        assert!(
+            [weight.r - color.r, weight.g - color.g, weight.b - color.b].iter().all(|d| d.abs() < 1e-5),
+            "{weight:?}"
+        );
     }
 
     #[test]

@@ -38,7 +38,8 @@ impl MeshStore {
         });
         let meshes: Vec<(String, &MeshDesc)> = meshes.collect();
         let attributes = desc.attribute_names(used);
-        let loaded = meshes.into_par_iter().map(|(path, mesh)| (path.clone(), load(files, &path, mesh, &attributes))).collect();
+        let loaded =
+            meshes.into_par_iter().map(|(path, mesh)| (path.clone(), load(files, &path, mesh, &attributes))).collect();
         Self { loaded, attributes }
     }
 
@@ -136,9 +137,8 @@ fn load_file(
     let extension = asset.extension().map(|e| e.to_string_lossy().to_lowercase());
     let loaded = match extension.as_deref() {
         Some("ply") => assets::read_ply_attributes(&asset, Some(attributes)).map(|data| vec![plain(data, None)]),
-        Some("obj") => {
-            assets::read_obj(&asset, with_materials).map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect())
-        }
+        Some("obj") => assets::read_obj(&asset, with_materials)
+            .map(|meshes| meshes.into_iter().map(|mesh| plain(mesh.mesh, mesh.material)).collect()),
         _ => Err(AssetError::Malformed("meshes are .obj or .ply files".into())),
     };
     loaded.map_err(|e| files.asset_error(place, &asset, e))
@@ -162,14 +162,22 @@ pub struct Placement<'a> {
 /// The error about a mesh, in its file if it has one.
 pub fn refusal(files: &CompileContext, path: &str, file: Option<&str>, message: String) -> Error {
     match file {
-        Some(file) => files.asset_error(&format!("{path}.file"), &files.source.asset(file), AssetError::Malformed(message)),
+        Some(file) => {
+            files.asset_error(&format!("{path}.file"), &files.source.asset(file), AssetError::Malformed(message))
+        }
         None => files.error(path, message),
     }
 }
 
 /// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the
 /// front. Triangles without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
-pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<MeshData>, placement: Placement) -> Result<Option<Mesh>> {
+pub fn place(
+    files: &CompileContext,
+    path: &str,
+    data: MeshData,
+    later: Vec<MeshData>,
+    placement: Placement,
+) -> Result<Option<Mesh>> {
     let refuse = |error: MeshError| refusal(files, path, placement.file, error.to_string());
     let count = data.positions.len();
     if let Some((triangle, index)) = out_of_range(&data) {
@@ -209,7 +217,11 @@ pub fn place(files: &CompileContext, path: &str, data: MeshData, later: Vec<Mesh
     let mut steps = vec![MeshStep { positions, normals: data.normals }];
     for step in later {
         if step.positions.len() != count {
-            return Err(refuse(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices: count }));
+            return Err(refuse(MeshError::Count {
+                what: "positions at a later time",
+                count: step.positions.len(),
+                vertices: count,
+            }));
         }
         steps.push(MeshStep { positions: place_positions(step.positions, step.origin), normals: step.normals });
     }
@@ -290,8 +302,11 @@ impl Faces {
         self.retain(has_area);
         let dropped = before - self.triangles.len();
         if self.triangles.is_empty() {
-            let why =
-                if before == 0 { "the mesh has no triangles".into() } else { format!("all {before} triangles of the mesh have no area") };
+            let why = if before == 0 {
+                "the mesh has no triangles".into()
+            } else {
+                format!("all {before} triangles of the mesh have no area")
+            };
             files.warn(path, format_args!("{why}: the shape is skipped"));
         } else if dropped > 0 {
             files.warn(path, format_args!("{dropped} of {before} triangles have no area and were dropped"));

@@ -9,7 +9,9 @@ use crate::color::Rgb;
 use crate::error::Result;
 use crate::id::TextureId;
 use crate::light::Emission;
-use crate::material::{AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, ScalarInput, TexturedMaterial};
+use crate::material::{
+    AlphaInput, CoatInput, ColorInput, Facets, Material, PlasticCoat, ScalarInput, TexturedMaterial,
+};
 use crate::math::Vec2;
 use crate::normal_perturbation::NormalPerturbation;
 use crate::texture::{Bitmap, Channel, Decoding, Texture, UvTransform, Wrap};
@@ -23,12 +25,22 @@ pub struct MtlBinding {
 
 impl Builder {
     /// The material of the faces with a material of an OBJ file; maps need uv. `path` is the shape, `file` the OBJ.
-    pub(super) fn mtl_binding(&mut self, path: &str, file: Option<&str>, mtl: &ObjMaterial, has_uvs: bool) -> Result<MtlBinding> {
+    pub(super) fn mtl_binding(
+        &mut self,
+        path: &str,
+        file: Option<&str>,
+        mtl: &ObjMaterial,
+        has_uvs: bool,
+    ) -> Result<MtlBinding> {
         let maps = &mtl.maps;
         let every = [&maps.diffuse, &maps.bump, &maps.normal, &maps.opacity, &maps.specular, &maps.emission];
         let has_maps = every.iter().any(|map| map.is_some());
         if has_maps && !has_uvs {
-            tracing::warn!("{}: {path}: material \"{}\": faces without uv have no maps", self.files.source.file.display(), mtl.name);
+            tracing::warn!(
+                "{}: {path}: material \"{}\": faces without uv have no maps",
+                self.files.source.file.display(),
+                mtl.name
+            );
         }
         let with_uvs = |map: &Option<ObjMap>| map.clone().filter(|_| has_uvs);
         let (diffuse, opacity) = (with_uvs(&maps.diffuse), with_uvs(&maps.opacity));
@@ -36,7 +48,9 @@ impl Builder {
 
         let mut plain = mtl.clone();
         // Exporters leave a colour black, or out, where a map gives all of it.
-        for (color, map) in [(&mut plain.diffuse, &diffuse), (&mut plain.specular, &specular), (&mut plain.emissive, &emission)] {
+        for (color, map) in
+            [(&mut plain.diffuse, &diffuse), (&mut plain.specular, &specular), (&mut plain.emissive, &emission)]
+        {
             if map.is_some() {
                 *color = Some(color.filter(|color| color.iter().any(|&c| c != 0.0)).unwrap_or([1.0; 3]));
             }
@@ -52,12 +66,19 @@ impl Builder {
         let mut unused: Vec<&str> = maps.unused.iter().map(String::as_str).collect();
         if let Some(map) = &specular {
             match specular_tint(&material) {
-                Some(tint) => material = with_specular(material, ColorInput::Texture(self.reflectance_map(path, map, tint)?)),
+                Some(tint) => {
+                    material = with_specular(material, ColorInput::Texture(self.reflectance_map(path, map, tint)?))
+                }
                 None => unused.push("map_Ks"),
             }
         }
         if !unused.is_empty() {
-            tracing::warn!("{}: {path}: material \"{}\": {} not used", self.files.source.file.display(), mtl.name, unused.join(", "));
+            tracing::warn!(
+                "{}: {path}: material \"{}\": {} not used",
+                self.files.source.file.display(),
+                mtl.name,
+                unused.join(", ")
+            );
         }
         let mut binding = MaterialBinding::plain(self.materials.push(material));
         // Glass lets through what it does not reflect.
@@ -98,7 +119,8 @@ impl Builder {
 
     fn reflectance_map(&mut self, path: &str, map: &ObjMap, tint: Rgb) -> Result<TextureId> {
         let bitmap = Texture::Bitmap(Bitmap { channel: None, ..self.map_texture(path, map, TextureUse::Color)? });
-        let texture = if tint == Rgb::WHITE { bitmap } else { Texture::Product([bitmap, Texture::Constant(tint)].into()) };
+        let texture =
+            if tint == Rgb::WHITE { bitmap } else { Texture::Product([bitmap, Texture::Constant(tint)].into()) };
         let id = self.materials.textures.push(texture);
         let fault = |message| meshes::refusal(&self.files, path, None, format!("{}: {message}", map.file.display()));
         self.materials.textures.check_reflectance(id).map_err(fault)?;
@@ -107,7 +129,13 @@ impl Builder {
 
     /// `d` times `map_d` (the channel it names, or the image's alpha, or else its luminance), or times the alpha of
     /// `map_Kd`.
-    fn mtl_opacity(&mut self, path: &str, d: Option<f32>, map: Option<&ObjMap>, diffuse: Option<&ObjMap>) -> Result<Option<TextureId>> {
+    fn mtl_opacity(
+        &mut self,
+        path: &str,
+        d: Option<f32>,
+        map: Option<&ObjMap>,
+        diffuse: Option<&ObjMap>,
+    ) -> Result<Option<TextureId>> {
         let bitmap = match (map, diffuse) {
             (Some(map), _) => {
                 let bitmap = self.map_texture(path, map, TextureUse::Data)?;
@@ -171,7 +199,9 @@ fn with_specular(material: Material, color: ColorInput) -> Material {
 /// The material with a texture for its diffuse colour, where it has one.
 fn with_albedo(material: Material, albedo: ColorInput) -> Material {
     match material {
-        Material::Constant(Bsdf::Lambert(_)) => TexturedMaterial::Diffuse { albedo, roughness: ScalarInput::Constant(0.0) }.into(),
+        Material::Constant(Bsdf::Lambert(_)) => {
+            TexturedMaterial::Diffuse { albedo, roughness: ScalarInput::Constant(0.0) }.into()
+        }
         Material::Constant(Bsdf::Plastic(Plastic { coat, nonlinear, tint, .. })) => {
             let coat = PlasticCoat::Ggx(CoatInput::Constant(coat));
             TexturedMaterial::Plastic { coat, albedo, tint: ColorInput::Constant(tint), nonlinear }.into()

@@ -103,7 +103,13 @@ impl PreparedShape {
 impl Builder {
     /// Loads and checks one shape of the scene file, that with this number of its list; an OBJ file may contain
     /// several. Where it is not used, its files are not read.
-    pub(super) fn prepare(&mut self, path: &str, number: usize, desc: &ShapeDesc, is_used: bool) -> Result<Vec<PreparedShape>> {
+    pub(super) fn prepare(
+        &mut self,
+        path: &str,
+        number: usize,
+        desc: &ShapeDesc,
+        is_used: bool,
+    ) -> Result<Vec<PreparedShape>> {
         let common = desc.common();
         let identity = self.identities.shape(&self.files, number, desc);
         let mut binding = self.materials.find(&self.files, path, common.material)?;
@@ -123,7 +129,8 @@ impl Builder {
         let form = match desc {
             ShapeDesc::Mesh(mesh) if !is_used && mesh.file.is_some() => {
                 self.smoothing(path, mesh)?;
-                let later = mesh.deform_files.iter().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
+                let later =
+                    mesh.deform_files.iter().enumerate().map(|(i, file)| (format!("{path}.deform_files[{i}]"), file));
                 for (path, file) in mesh.file.iter().map(|file| (format!("{path}.file"), file)).chain(later) {
                     self.files.warn_of_missing(&path, file);
                 }
@@ -203,7 +210,9 @@ impl Builder {
 
     fn smoothing(&self, path: &str, desc: &MeshDesc) -> Result<Smoothing> {
         let crease = desc.crease_angle_degrees;
-        let crease = crease.map(|angle| self.files.within(&format!("{path}.crease_angle_degrees"), angle, 0.0, 180.0)).transpose()?;
+        let crease = crease
+            .map(|angle| self.files.within(&format!("{path}.crease_angle_degrees"), angle, 0.0, 180.0))
+            .transpose()?;
         // A rounding must not make creases where triangles are coplanar or the angle is that of all edges.
         let crease_cosine = crease.filter(|&angle| angle < 180.0).map(|angle| angle.to_radians().cos() - 1e-6);
         Ok(Smoothing { weight: desc.normal_weight, crease_cosine, by: desc.smooth_by })
@@ -239,7 +248,8 @@ impl Builder {
         let size = f64::from(bounds.size().max_element());
         if matches!(shape, Shape::Mesh(_)) && size > 0.0 && size < SMALLEST_MESH {
             let [size, least] = [size, SMALLEST_MESH].map(|length| space.world_length(length));
-            let message = format!("the mesh measures {size:e}: beside the rest of the scene, at least {least:e} can be rendered");
+            let message =
+                format!("the mesh measures {size:e}: beside the rest of the scene, at least {least:e} can be rendered");
             return Err(self.files.error(path, message));
         }
         Ok(())
@@ -247,12 +257,24 @@ impl Builder {
 
     /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`; `None` if it is a mesh of
     /// which nothing has an area. One that emits must end up in the world's.
-    pub(super) fn place(&mut self, prepared: PreparedShape, outer: &DAffine3, space: &RenderSpace) -> Result<Option<ShapeId>> {
-        let PreparedShape { form, map, motion, reverse_normal, surface: PreparedSurface { binding, emission, identity }, path } = prepared;
+    pub(super) fn place(
+        &mut self,
+        prepared: PreparedShape,
+        outer: &DAffine3,
+        space: &RenderSpace,
+    ) -> Result<Option<ShapeId>> {
+        let PreparedShape {
+            form,
+            map,
+            motion,
+            reverse_normal,
+            surface: PreparedSurface { binding, emission, identity },
+            path,
+        } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
-        let transform =
-            Transform::new(space.place(&(*outer * map))).ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
+        let transform = Transform::new(space.place(&(*outer * map)))
+            .ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
         let analytic = |surface: Analytic| {
             let mut placed = TransformedShape::new(surface, transform);
             placed.reverse_normal = reverse_normal;
@@ -285,7 +307,9 @@ impl Builder {
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
         let medium = self.materials.medium(binding.material);
         if medium.is_some() && emission.is_some() {
-            return Err(self.files.error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
+            return Err(self
+                .files
+                .error(&path, "the surface of a medium cannot give off light: it may turn out to be no boundary"));
         }
         let (material, normal_perturbation) = (binding.material, binding.normal_perturbation);
         let mut surface = Surface { material, normal_perturbation, medium, first_light: None, single_light: false };

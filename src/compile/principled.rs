@@ -41,7 +41,9 @@ impl Compiler<'_> {
         }
         let inputs = principled_parameters!(inputs);
         if !desc.thin && inputs.diffuse_transmission != ScalarInput::Constant(0.0) {
-            return Err(self.files.error(&format!("{path}.diffuse_transmission"), "needs `thin`: a solid has no other side here"));
+            return Err(self
+                .files
+                .error(&format!("{path}.diffuse_transmission"), "needs `thin`: a solid has no other side here"));
         }
         if !desc.thin && !inputs.transmission.is_zero() {
             let textured = [

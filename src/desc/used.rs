@@ -32,7 +32,8 @@ impl SceneDesc {
             }
         }
         let objects = self.objects.iter().filter(|(name, _)| used.objects.contains(*name));
-        let shapes: Vec<&ShapeDesc> = self.shapes.iter().chain(objects.flat_map(|(_, object)| &object.shapes)).collect();
+        let shapes: Vec<&ShapeDesc> =
+            self.shapes.iter().chain(objects.flat_map(|(_, object)| &object.shapes)).collect();
         for shape in shapes {
             let common = shape.common();
             common.material.into_iter().for_each(|name| self.use_name(name, &mut used));
@@ -50,7 +51,11 @@ impl SceneDesc {
             TextureDesc::MeshAttribute { name, .. } => Some(name.clone()),
             _ => None,
         };
-        self.textures.iter().filter(|(name, _)| used.textures.contains(*name)).filter_map(|(_, texture)| name(texture)).collect()
+        self.textures
+            .iter()
+            .filter(|(name, _)| used.textures.contains(*name))
+            .filter_map(|(_, texture)| name(texture))
+            .collect()
     }
 
     /// Adds what a word names, and what that refers to.
@@ -75,7 +80,9 @@ impl SceneDesc {
                 Value::String(word) => self.use_name(&word, used),
                 Value::Array(values) => open.extend(values),
                 // A type is no name.
-                Value::Object(keys) => open.extend(keys.into_iter().filter(|(key, _)| key != "type").map(|(_, value)| value)),
+                Value::Object(keys) => {
+                    open.extend(keys.into_iter().filter(|(key, _)| key != "type").map(|(_, value)| value))
+                }
                 _ => {}
             }
         }

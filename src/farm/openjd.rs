@@ -53,8 +53,9 @@ pub fn openjd_template(job: &Job) -> Value {
 /// is a command: program, scene, folder of the work, and `further`.
 fn script(text: &str, further: &[String]) -> Value {
     let strings = ["Program", "Scene", "Work"].into_iter().chain(further.iter().map(String::as_str));
-    let args: Vec<String> =
-        std::iter::once("{{Task.File.Run}}".to_owned()).chain(strings.map(|name| format!("{{{{Param.{name}}}}}"))).collect();
+    let args: Vec<String> = std::iter::once("{{Task.File.Run}}".to_owned())
+        .chain(strings.map(|name| format!("{{{{Param.{name}}}}}")))
+        .collect();
     json!({
         "embeddedFiles": [{ "name": "Run", "type": "TEXT", "filename": "run.sh", "data": text }],
         "actions": {

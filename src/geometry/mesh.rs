@@ -148,7 +148,11 @@ impl Mesh {
         let mut has_slivers = self.has_slivers;
         for step in later {
             if step.positions.len() != vertices {
-                return Err(MeshError::Count { what: "positions at a later time", count: step.positions.len(), vertices });
+                return Err(MeshError::Count {
+                    what: "positions at a later time",
+                    count: step.positions.len(),
+                    vertices,
+                });
             }
             let normals = step.normals.filter(|_| self.has_normals());
             if self.has_normals() && normals.is_none() {
@@ -224,7 +228,9 @@ impl Mesh {
     /// Bounds of one triangle over the whole shutter interval.
     pub fn triangle_bounds(&self, prim: PrimId) -> Aabb {
         let corners = self.triangles[prim.index()];
-        let of = |bounds: Aabb, positions: &[[f32; 3]]| corners.iter().fold(bounds, |b, &i| b.extended(Vec3::from(positions[i as usize])));
+        let of = |bounds: Aabb, positions: &[[f32; 3]]| {
+            corners.iter().fold(bounds, |b, &i| b.extended(Vec3::from(positions[i as usize])))
+        };
         let moved = self.padded_steps().fold(Aabb::EMPTY, of);
         if !self.is_deforming() {
             return moved;
@@ -302,9 +308,13 @@ impl Mesh {
     pub fn bounds(&self) -> Aabb {
         *self.bounds.get_or_init(|| {
             if self.is_deforming() {
-                return (0..self.triangles.len()).fold(Aabb::EMPTY, |b, i| b.union(&self.triangle_bounds(PrimId::new(i))));
+                return (0..self.triangles.len())
+                    .fold(Aabb::EMPTY, |b, i| b.union(&self.triangle_bounds(PrimId::new(i))));
             }
-            self.triangles.iter().flatten().fold(Aabb::EMPTY, |b, &i| b.extended(Vec3::from(self.positions[i as usize])))
+            self.triangles
+                .iter()
+                .flatten()
+                .fold(Aabb::EMPTY, |b, &i| b.extended(Vec3::from(self.positions[i as usize])))
         })
     }
 
@@ -313,11 +323,18 @@ impl Mesh {
         let normals = self.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
         let uvs = self.uvs.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
         let attributes: usize = self.attributes.iter().map(|attribute| size_of_val(attribute.values.numbers())).sum();
-        let of_step =
-            |step: &MeshStep| size_of_val(step.positions.as_slice()) + step.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()));
+        let of_step = |step: &MeshStep| {
+            size_of_val(step.positions.as_slice()) + step.normals.as_ref().map_or(0, |n| size_of_val(n.as_slice()))
+        };
         let later: usize = self.later.iter().map(of_step).sum();
         let tangents: usize = self.tangents.iter().map(|t| size_of_val(t.as_slice())).sum();
-        size_of_val(self.positions.as_slice()) + size_of_val(self.triangles.as_slice()) + normals + uvs + attributes + later + tangents
+        size_of_val(self.positions.as_slice())
+            + size_of_val(self.triangles.as_slice())
+            + normals
+            + uvs
+            + attributes
+            + later
+            + tangents
     }
 
     /// The interaction for a hit of `ray`; see [`Geometry::interaction`](super::Geometry::interaction).
@@ -328,7 +345,12 @@ impl Mesh {
 
     /// The interaction with the change of the point with v.
     #[inline(always)]
-    pub(super) fn interaction_and_dp_dv(&self, detail: Detail, ray: &Ray, hit: &Hit) -> Option<(SurfaceInteraction, Vec3)> {
+    pub(super) fn interaction_and_dp_dv(
+        &self,
+        detail: Detail,
+        ray: &Ray,
+        hit: &Hit,
+    ) -> Option<(SurfaceInteraction, Vec3)> {
         let points = self.triangle_points_at(hit.prim, ray.time);
 
         let place = points.place(ray.origin, ray.direction);
@@ -343,7 +365,11 @@ impl Mesh {
         }
 
         let (n_s, length) = self.shading_normal(hit, n_g, ray.time);
-        let parameters = if detail == Detail::Full { self.parameters(hit, &points, n_s, length, ray.time) } else { Parameters::default() };
+        let parameters = if detail == Detail::Full {
+            self.parameters(hit, &points, n_s, length, ray.time)
+        } else {
+            Parameters::default()
+        };
         let at = SurfaceInteraction {
             p,
             t: place.t as f32,

@@ -32,8 +32,8 @@ pub use interaction::{Detail, SpawnPoint, SurfaceInteraction};
 pub(crate) use mesh::interpolated_normal;
 pub use mesh::{Mesh, MeshError, MeshStep, TrianglePoints};
 pub use placed::{
-    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, RayPacket, ShapeSample, SurfacePoint, TransformedShape, WorldNormalRows,
-    WorldPointRows, WorldSampleRows,
+    Analytic, LocalHit, LocalSurface, PACKET_SIZE, PacketHits, RayPacket, ShapeSample, SurfacePoint, TransformedShape,
+    WorldNormalRows, WorldPointRows, WorldSampleRows,
 };
 pub use profile::Profile;
 pub use quad::Quad;

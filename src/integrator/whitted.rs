@@ -70,7 +70,10 @@ impl Integrator for Whitted {
             let mut tally = Tally { light_aovs: &mut out.light_aovs, index: i, rays: counts, sample, light_samples: 0 };
             let view = View { depth: 1, throughput: segment.transmittance, way: None };
             out.pixels[i] = match &segment.end {
-                Some(at) => PixelSample { radiance: self.shade(pass, &segment, at, view, &mut tally) * segment.transmittance, alpha: 1.0 },
+                Some(at) => PixelSample {
+                    radiance: self.shade(pass, &segment, at, view, &mut tally) * segment.transmittance,
+                    alpha: 1.0,
+                },
                 None if self.hide_emitters || !pass.render.shows_background => PixelSample::default(),
                 None => PixelSample {
                     radiance: segment.escaped(world, View { throughput: Rgb::WHITE, ..view }, &mut tally),
@@ -178,7 +181,14 @@ impl Segment {
 
 impl Whitted {
     /// Radiance leaving `at`, the end of the segment, against that.
-    fn shade(&self, pass: &PassContext, segment: &Segment, at: &SurfaceInteraction, view: View, tally: &mut Tally) -> Rgb {
+    fn shade(
+        &self,
+        pass: &PassContext,
+        segment: &Segment,
+        at: &SurfaceInteraction,
+        view: View,
+        tally: &mut Tally,
+    ) -> Rgb {
         let (world, Segment { ray, cone, media, .. }) = (pass.world, segment);
         let mut radiance = world.emitted(at, -ray.direction);
         if tally.sorts() {
@@ -197,7 +207,12 @@ impl Whitted {
             let ambient = self.ambient * vertex.bsdf.albedo(vertex.wo);
             radiance += ambient;
             if tally.sorts() {
-                tally.add(world, view.throughput * ambient, view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE)), None);
+                tally.add(
+                    world,
+                    view.throughput * ambient,
+                    view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE)),
+                    None,
+                );
             }
             for id in (0..world.scene.lights.lights().len()).map(LightId::new) {
                 let Some((light, wi)) = self.direct_light(world, segment, &vertex, id, tally) else { continue };
@@ -221,9 +236,11 @@ impl Whitted {
             }
             tally.rays.indirect += 1;
             let current = world.media_toward(at, ray.direction, direction, &media.current);
-            let next = Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), current, tally.rays);
+            let next =
+                Segment::trace(world, at.spawn(direction), cone.map(|cone| cone.moved(at.t)), current, tally.rays);
             let way = view.way.unwrap_or_else(|| LobeWeights::of_sample(&vertex.bsdf, vertex.wo, &lobe));
-            let behind = View { depth: view.depth + 1, throughput: view.throughput * lobe.weight * lobe.pdf, way: Some(way) };
+            let behind =
+                View { depth: view.depth + 1, throughput: view.throughput * lobe.weight * lobe.pdf, way: Some(way) };
             let arriving = match &next.end {
                 Some(end) => {
                     let behind = View { throughput: behind.throughput * next.transmittance, ..behind };
@@ -237,7 +254,14 @@ impl Whitted {
     }
 
     /// Light that arrives from one light along a sampled direction and is scattered back, with that direction.
-    fn direct_light(&self, world: &World, segment: &Segment, vertex: &Vertex, id: LightId, tally: &mut Tally) -> Option<(Rgb, Vec3)> {
+    fn direct_light(
+        &self,
+        world: &World,
+        segment: &Segment,
+        vertex: &Vertex,
+        id: LightId,
+        tally: &mut Tally,
+    ) -> Option<(Rgb, Vec3)> {
         let set = dimensions::light(0).wrapping_add(tally.light_samples);
         tally.light_samples = tally.light_samples.wrapping_add(1);
         let [u, v, ..] = self.sampler.sample_4d(tally.sample.seed, tally.sample.sample, set);

@@ -89,7 +89,8 @@ impl Pictures {
             let variant = report.variants.get(variant)?;
             Some(format!("{}, {}", variant.name, variant.points.get(budget)?.budget))
         };
-        let tests = self.tests.iter().map(|(v, b, data)| Test { name: name(*v, *b).unwrap_or_default(), data }).collect();
+        let tests =
+            self.tests.iter().map(|(v, b, data)| Test { name: name(*v, *b).unwrap_or_default(), data }).collect();
         let data = Data { size: self.size, floor: RELATIVE_FLOOR, reference: &self.reference, tests };
         // A name could hold the end of the element that holds the text.
         Ok(serde_json::to_string(&data).map_err(|e| Error::Internal(e.to_string()))?.replace('<', "\\u003c"))
@@ -100,7 +101,8 @@ impl Pictures {
 fn pack(image: &Image) -> String {
     let Some(layer) = image.layer(LayerKind::Color) else { return String::new() };
     let largest = f16::MAX.to_f32();
-    let bits = |x: &f32| f16::from_f32(if x.is_finite() { x.clamp(-largest, largest) } else { *x }).to_bits().to_be_bytes();
+    let bits =
+        |x: &f32| f16::from_f32(if x.is_finite() { x.clamp(-largest, largest) } else { *x }).to_bits().to_be_bytes();
     let values: Vec<[u8; 2]> = layer.pixels().flat_map(|pixel| pixel.iter().take(3).map(bits)).collect();
     let bytes: Vec<u8> = values.iter().map(|v| v[0]).chain(values.iter().map(|v| v[1])).collect();
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
@@ -137,7 +139,8 @@ impl ErrorReport {
         }
         out.push_str("</ul>\n");
         let by_time: Vec<Curve> = self.variants.iter().map(|v| named(&v.name, v.slope_of_time, v.curve())).collect();
-        let by_spp: Vec<Curve> = self.variants.iter().map(|v| named(&v.name, v.slope_of_spp, v.curve_of_spp())).collect();
+        let by_spp: Vec<Curve> =
+            self.variants.iter().map(|v| named(&v.name, v.slope_of_spp, v.curve_of_spp())).collect();
         for (curves, axis, caption) in [
             (by_time, "seconds", "Error against time, medians; the steeper and the further left the better."),
             (by_spp, "samples per pixel", "Error against samples: what sampling alone does."),
@@ -173,7 +176,9 @@ mod tests {
 
     #[test]
     fn base64_is_that_of_the_standard() {
-        for (bytes, text) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")] {
+        for (bytes, text) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")]
+        {
             assert_eq!(base64(bytes.as_bytes()), text);
         }
     }

@@ -91,7 +91,12 @@ impl ErrorReport {
     /// Where and how it was measured.
     pub(super) fn header(&self) -> String {
         let cut = if self.interrupted { " Interrupted: what is missing was not measured." } else { "" };
-        format!("{}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}", self.machine.line(), self.command, self.repeats)
+        format!(
+            "{}; `{}`. Medians of {} repeats in turn (lowest to highest).{cut}",
+            self.machine.line(),
+            self.command,
+            self.repeats
+        )
     }
 
     /// What the columns mean.
@@ -181,12 +186,18 @@ impl ErrorReport {
             }
             row
         });
-        Table { title: "Convergence (least squares of the logarithms; -1: independent samples)".into(), heads, rows: rows.collect() }
+        Table {
+            title: "Convergence (least squares of the logarithms; -1: independent samples)".into(),
+            heads,
+            rows: rows.collect(),
+        }
     }
 }
 
 fn tax(tax: &TaxReport) -> Table {
-    let heads = ["variant", "picture", "rays", "threads", "render s", "bare replay s", "render / replay"].map(str::to_owned).to_vec();
+    let heads = ["variant", "picture", "rays", "threads", "render s", "bare replay s", "render / replay"]
+        .map(str::to_owned)
+        .to_vec();
     let [width, height] = tax.size;
     let same = if tax.same_hits { "" } else { " (the replay found other hits)" };
     let row = vec![
@@ -198,7 +209,10 @@ fn tax(tax: &TaxReport) -> Table {
         range(tax.replay_seconds),
         range(tax.ratio),
     ];
-    let title = format!("Shading tax: the render beside bare calls of {} with its own rays, in the same packets", tax.accelerator);
+    let title = format!(
+        "Shading tax: the render beside bare calls of {} with its own rays, in the same packets",
+        tax.accelerator
+    );
     Table { title, heads, rows: vec![row] }
 }
 
@@ -213,7 +227,9 @@ fn row(name: &str, point: &Point) -> Vec<String> {
         number(point.relmse_trimmed[0]),
         number(point.mse[0]),
         point.flip.map_or_else(|| "-".into(), number),
-        point.bias.map_or_else(|| "-".into(), |bias| format!("{:.4} ({:.4} to {:.4})", bias.ratio, bias.low, bias.high)),
+        point
+            .bias
+            .map_or_else(|| "-".into(), |bias| format!("{:.4} ({:.4} to {:.4})", bias.ratio, bias.low, bias.high)),
         point.not_finite.to_string(),
         optional(point.msamples_per_second),
         optional(point.mrays_per_second),

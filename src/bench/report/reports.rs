@@ -45,9 +45,11 @@ impl ReportsReport {
     pub fn html(&self) -> Result<String> {
         let mut out = html::begin(TITLE, &header(self));
         for comparison in &self.comparisons {
-            let _ = write!(out, "<h2>{}</h2>\n<p>Reported: {}</p>\n", escape(comparison.title), escape(comparison.claim));
+            let _ =
+                write!(out, "<h2>{}</h2>\n<p>Reported: {}</p>\n", escape(comparison.title), escape(comparison.claim));
             add_list(&mut out, &comparison.sources);
-            let caption = "How many times faster than the first accelerator, within the accelerator, on a logarithmic axis.";
+            let caption =
+                "How many times faster than the first accelerator, within the accelerator, on a logarithmic axis.";
             figure(&mut out, &ratios(comparison)?, caption);
             add_table(&mut out, &table(comparison));
             add_list(&mut out, &comparison.reasons);
@@ -61,7 +63,10 @@ impl ReportsReport {
     /// # Errors
     /// [`Error::Output`] naming the file.
     pub fn write_to(&self, folder: &Path) -> Result<()> {
-        write_files(folder, &[("reports.json", self.json()?), ("reports.md", self.markdown()), ("reports.html", self.html()?)])
+        write_files(
+            folder,
+            &[("reports.json", self.json()?), ("reports.md", self.markdown()), ("reports.html", self.html()?)],
+        )
     }
 }
 
@@ -88,10 +93,15 @@ fn times_faster(comparison: &Comparison, accel_seconds: fn(&ComparisonRow) -> f6
 }
 
 fn ratios(comparison: &Comparison) -> Result<String> {
-    let kinds = [times_faster(comparison, |row| row.normals.accel_seconds), times_faster(comparison, |row| row.paths.accel_seconds)];
+    let kinds = [
+        times_faster(comparison, |row| row.normals.accel_seconds),
+        times_faster(comparison, |row| row.paths.accel_seconds),
+    ];
     let bar = |ratio: f64| Some([ratio; 3]).filter(|_| ratio.is_finite() && ratio > 0.0);
-    let series =
-        |(i, row): (usize, &ComparisonRow)| Series { name: row.name.clone(), values: kinds.iter().map(|kind| bar(kind[i])).collect() };
+    let series = |(i, row): (usize, &ComparisonRow)| Series {
+        name: row.name.clone(),
+        values: kinds.iter().map(|kind| bar(kind[i])).collect(),
+    };
     let series: Vec<_> = comparison.rows.iter().enumerate().map(series).collect();
     plot::log_bars(&["normals", "path traced"], &series, "times faster")
 }
@@ -110,8 +120,10 @@ fn table(comparison: &Comparison) -> Table {
         "triangles per ray",
         "different pixels",
     ];
-    let [of_normals, of_paths] =
-        [times_faster(comparison, |row| row.normals.accel_seconds), times_faster(comparison, |row| row.paths.accel_seconds)];
+    let [of_normals, of_paths] = [
+        times_faster(comparison, |row| row.normals.accel_seconds),
+        times_faster(comparison, |row| row.paths.accel_seconds),
+    ];
     let rows = comparison.rows.iter().enumerate().map(|(i, row)| {
         let frame = |timing: &crate::bench::FrameTiming| {
             let scaled = timing.scaled_from.map_or(String::new(), |[w, h]| format!(", from {w}x{h}"));

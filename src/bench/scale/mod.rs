@@ -62,7 +62,8 @@ pub fn bench_scale(
 fn in_a_process(mut program: Command, case: &Case, stop: &AtomicBool) -> Result<Option<Measured>> {
     let failed = |message: String| Error::Internal(message);
     let case = serde_json::to_string(case).map_err(|e| failed(e.to_string()))?;
-    let Some(Ended { status, stdout, stderr, .. }) = child::run(&mut program, Some(&case), stop).map_err(failed)? else {
+    let Some(Ended { status, stdout, stderr, .. }) = child::run(&mut program, Some(&case), stop).map_err(failed)?
+    else {
         return Ok(None);
     };
     if !status.success() {
@@ -107,11 +108,16 @@ mod tests {
         };
         let report = bench_scale(&options("depth"), program, &Unwatched, &AtomicBool::new(false), |_| Ok(())).unwrap();
         let failures = report.failures();
-        assert!(failures.len() == 1 && failures[0].starts_with("depth 4: ") && failures[0].ends_with("no memory"), "{failures:?}");
+        assert!(
+            failures.len() == 1 && failures[0].starts_with("depth 4: ") && failures[0].ends_with("no memory"),
+            "{failures:?}"
+        );
         assert!(!report.interrupted && report.markdown().contains("Failed: depth 4"));
         let runs: Vec<usize> = report.sweeps[0].points.iter().map(|point| point.runs.len()).collect();
         assert_eq!(runs, [2, 2, 0, 2, 2, 2]);
-        assert!(report.sweeps[0].slopes.iter().all(|law| law.fit.slope.abs() < 1e-12 && law.fit.standard_error.is_some()));
+        assert!(
+            report.sweeps[0].slopes.iter().all(|law| law.fit.slope.abs() < 1e-12 && law.fit.standard_error.is_some())
+        );
     }
 
     #[test]

@@ -33,12 +33,19 @@ pub(super) fn make(case: &Case) -> Result<Imported> {
     let mut desc: SceneDesc = serde_json::from_value(scene).map_err(|e| Error::Internal(e.to_string()))?;
     if let Subject::Instances { count, .. } = case.subject {
         let object: Value = json!({ "shapes": [mesh_shape(1.0)] });
-        desc.objects.insert("sphere".into(), serde_json::from_value(object).map_err(|e| Error::Internal(e.to_string()))?);
+        desc.objects
+            .insert("sphere".into(), serde_json::from_value(object).map_err(|e| Error::Internal(e.to_string()))?);
         desc.instances = instances(count);
     }
     let mut assets = Assets::default();
     assets.meshes.extend(mesh.map(|mesh| (MESH.to_owned(), mesh)));
-    Ok(Imported { desc, assets: assets.into(), report: Default::default(), files: Default::default(), places: Default::default() })
+    Ok(Imported {
+        desc,
+        assets: assets.into(),
+        report: Default::default(),
+        files: Default::default(),
+        places: Default::default(),
+    })
 }
 
 fn mesh_shape(scale: f64) -> Value {
@@ -49,8 +56,10 @@ fn mesh_shape(scale: f64) -> Value {
 fn on_a_floor(mut shapes: Value) -> Value {
     if let Some(shapes) = shapes.as_array_mut() {
         shapes.push(json!({ "type": "quad", "material": "grey", "origin": [-20, -20, -1.2], "edge_u": [40, 0, 0], "edge_v": [0, 40, 0] }));
-        shapes.push(json!({ "type": "quad", "material": "grey", "origin": [-1, -2, 4], "edge_u": [0, 1, 0], "edge_v": [1, 0, 0],
-                            "emission": { "radiance": [20, 18, 15] } }));
+        shapes.push(
+            json!({ "type": "quad", "material": "grey", "origin": [-1, -2, 4], "edge_u": [0, 1, 0], "edge_v": [1, 0, 0],
+                            "emission": { "radiance": [20, 18, 15] } }),
+        );
     }
     json!({
         "camera": { "position": [0, -3.4, 1.2], "look_at": [0, 0, -0.1], "up": [0, 0, 1], "vertical_fov_degrees": 40 },
@@ -134,7 +143,10 @@ fn instances(count: usize) -> Vec<InstanceDesc> {
     let mut place = |i: usize| {
         let corner = [i % cells, i / cells % cells, i / cells / cells].map(|n| -1.1 + cell * (n as f64 + 0.5));
         let steps = vec![
-            TransformStepDesc::Rotate { axis: [rng.range(-1.0, 1.0), rng.range(-1.0, 1.0), 1.5], degrees: rng.range(0.0, 360.0) },
+            TransformStepDesc::Rotate {
+                axis: [rng.range(-1.0, 1.0), rng.range(-1.0, 1.0), 1.5],
+                degrees: rng.range(0.0, 360.0),
+            },
             TransformStepDesc::Scale(ScaleDesc::Uniform(cell * rng.range(0.3, 0.5))),
             TransformStepDesc::Translate(corner),
         ];
@@ -164,7 +176,10 @@ mod tests {
                 .sum();
             let scene = below_lamps(count);
             let radiance = scene["shapes"][2]["emission"]["radiance"][0].as_f64().unwrap();
-            assert!((f64::from(area) * radiance / (10.0 * 16.0 * 0.08) - 1.0).abs() < 1e-4, "{count}: {area} {radiance}");
+            assert!(
+                (f64::from(area) * radiance / (10.0 * 16.0 * 0.08) - 1.0).abs() < 1e-4,
+                "{count}: {area} {radiance}"
+            );
         }
     }
 }

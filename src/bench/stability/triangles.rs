@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::geometry::{Rng, closest, cube, grid, instances, mesh, meshes, ray, ray_through, sphere_mesh, transform, triangle, world};
+use super::geometry::{
+    Rng, closest, cube, grid, instances, mesh, meshes, ray, ray_through, sphere_mesh, transform, triangle, world,
+};
 use super::{Effort, Outcome};
 use crate::accel::{self, AccelKind, Accelerator, LinearAccel};
 use crate::geometry::{Analytic, Geometry, Mesh, MeshStep, Quad, Shape, SurfaceInteraction, TransformedShape};
@@ -66,7 +68,10 @@ impl Tally {
         self.rays += rays.len();
         for (name, accel) in accels {
             let rays = if *name == "linear" { &rays[..rays.len() / 8] } else { rays };
-            let lost: usize = rays.iter().map(|ray| usize::from(accel.intersect(ray).is_none()) + usize::from(!accel.occluded(ray))).sum();
+            let lost: usize = rays
+                .iter()
+                .map(|ray| usize::from(accel.intersect(ray).is_none()) + usize::from(!accel.occluded(ray)))
+                .sum();
             match self.lost.iter_mut().find(|(known, _)| known == name) {
                 Some((_, sum)) => *sum += lost,
                 None => self.lost.push((name, lost)),
@@ -231,7 +236,8 @@ fn a6_bumpy_mesh(effort: Effort) -> Outcome {
     let mut tally = Tally::default();
     for _ in 0..10 {
         let smooth = sphere_mesh(DVec3::ZERO, 1.0, 16, 16);
-        let positions = smooth.positions().iter().map(|p| DVec3::from_array(p.map(f64::from)) * (1.0 + 5.0 * rng.unit()));
+        let positions =
+            smooth.positions().iter().map(|p| DVec3::from_array(p.map(f64::from)) * (1.0 + 5.0 * rng.unit()));
         let bumpy = mesh(&positions.collect::<Vec<_>>(), smooth.triangles().to_vec());
         let geometry = meshes(vec![bumpy]);
         let next = || ray(0.25 * rng.cube(), rng.direction());
@@ -346,18 +352,25 @@ fn a8_solid_angle(effort: Effort) -> Outcome {
 }
 
 fn a9_bad_cases(_: Effort) -> Outcome {
-    let collinear =
-        [[-1113.45459, -79.049614, -56.2431908], [-1113.45459, -87.0922699, -56.2431908], [-1113.45459, -79.2090149, -56.2431908]];
-    let across =
-        Ray { t_max: 0.9999, ..Ray::new(Vec3::new(-1_081.479_2, 99.999_95, 87.770_11), Vec3::new(-32.107_3, -183.355_87, -144.607_64)) };
-    let line = [[-1113.4546, -79.049614, -56.24319], [-1113.4546, -79.049614, -56.24319], [-1113.4547, -79.04961, -56.24319]];
+    let collinear = [
+        [-1113.45459, -79.049614, -56.2431908],
+        [-1113.45459, -87.0922699, -56.2431908],
+        [-1113.45459, -79.2090149, -56.2431908],
+    ];
+    let across = Ray {
+        t_max: 0.9999,
+        ..Ray::new(Vec3::new(-1_081.479_2, 99.999_95, 87.770_11), Vec3::new(-32.107_3, -183.355_87, -144.607_64))
+    };
+    let line =
+        [[-1113.4546, -79.049614, -56.24319], [-1113.4546, -79.049614, -56.24319], [-1113.4547, -79.04961, -56.24319]];
     let along = Ray::new(Vec3::ZERO, Vec3::new(-1_113.454_6, -79.049_61, -56.243_19));
     let (mut hits, mut not_finite) = (0, 0);
     for (corners, ray) in [(collinear, across), (line, along)] {
         let [a, b, c] = corners.map(DVec3::from_array);
         let mesh = triangle(a, b, c);
         let sample = mesh.triangle_points(PrimId(0)).sample([0.3, 0.4]);
-        not_finite += usize::from(sample.is_some_and(|s| !(s.p.is_finite() && s.n.is_finite() && s.pdf_area.is_finite())));
+        not_finite +=
+            usize::from(sample.is_some_and(|s| !(s.p.is_finite() && s.n.is_finite() && s.pdf_area.is_finite())));
         let geometry = meshes(vec![mesh]);
         for (_, accel) in accelerators(&geometry) {
             hits += usize::from(accel.intersect(&ray).is_some()) + usize::from(accel.occluded(&ray));
@@ -369,10 +382,13 @@ fn a9_bad_cases(_: Effort) -> Outcome {
 fn a10_both_sides(effort: Effort) -> Outcome {
     let mut rng = Rng::new(10);
     let (mut missed, mut wrong_side) = (0, 0);
-    let mirror = transform(DMat3::from_diagonal(DVec3::new(-1.5, 0.8, 1.2)) * rng.rotation(), DVec3::new(3.0, 1.0, -2.0));
+    let mirror =
+        transform(DMat3::from_diagonal(DVec3::new(-1.5, 0.8, 1.2)) * rng.rotation(), DVec3::new(3.0, 1.0, -2.0));
     let (a, b, c) = (rng.cube(), rng.cube(), rng.cube());
     let shape = || Shape::Mesh(triangle(a, b, c));
-    for (geometry, placement) in [(world(vec![shape()]), Transform::IDENTITY), (instances(vec![shape()], &[mirror]), mirror)] {
+    for (geometry, placement) in
+        [(world(vec![shape()]), Transform::IDENTITY), (instances(vec![shape()], &[mirror]), mirror)]
+    {
         let accels = accelerators(&geometry);
         let front = placement.normal((b - a).cross(c - a)).normalize();
         for i in 0..effort.pick(1_000, 100_000) {
@@ -383,7 +399,8 @@ fn a10_both_sides(effort: Effort) -> Outcome {
             for (_, accel) in &accels {
                 let found: Option<SurfaceInteraction> = closest(&**accel, &geometry, &ray).found;
                 missed += usize::from(found.is_none()) + usize::from(!accel.occluded(&ray));
-                wrong_side += usize::from(found.is_some_and(|si| si.n_g.dot(ray.direction) * side.dot(front) as f32 >= 0.0));
+                wrong_side +=
+                    usize::from(found.is_some_and(|si| si.n_g.dot(ray.direction) * side.dot(front) as f32 >= 0.0));
             }
         }
     }
@@ -392,7 +409,8 @@ fn a10_both_sides(effort: Effort) -> Outcome {
     for (_, accel) in accelerators(&geometry) {
         for _ in 0..effort.pick(200, 20_000) {
             let ray = ray(0.5 * rng.cube(), rng.direction());
-            wrong_side += usize::from(closest(&*accel, &geometry, &ray).found.is_none_or(|si| si.n_g.dot(ray.direction) <= 0.0));
+            wrong_side +=
+                usize::from(closest(&*accel, &geometry, &ray).found.is_none_or(|si| si.n_g.dot(ray.direction) <= 0.0));
         }
     }
     Outcome::new().none("missed", missed).none("normals on the wrong side", wrong_side)
@@ -406,9 +424,12 @@ fn a11_axes(effort: Effort) -> Outcome {
     for x in places.clone() {
         for y in places.clone() {
             for zero in [0.0, -0.0] {
-                for d in
-                    [DVec3::new(zero, zero, 1.0), DVec3::new(zero, 1.0, zero), DVec3::new(-1.0, zero, zero), DVec3::new(-1.0, 1.0, zero)]
-                {
+                for d in [
+                    DVec3::new(zero, zero, 1.0),
+                    DVec3::new(zero, 1.0, zero),
+                    DVec3::new(-1.0, zero, zero),
+                    DVec3::new(-1.0, 1.0, zero),
+                ] {
                     rays.push(ray(DVec3::new(x, y, 0.25), d));
                 }
             }

@@ -75,7 +75,18 @@ mod tests {
 
     #[test]
     fn blender_gets_the_names_of_its_passes() {
-        let names = ["R", "A", "Z", "N.X", "specular_indirect.G", "light_key.R", "object_id.id", "CryptoObject00.r", "variance.R", "uv.U"];
+        let names = [
+            "R",
+            "A",
+            "Z",
+            "N.X",
+            "specular_indirect.G",
+            "light_key.R",
+            "object_id.id",
+            "CryptoObject00.r",
+            "variance.R",
+            "uv.U",
+        ];
         let passes = [
             "R",
             "A",

@@ -122,9 +122,11 @@ fn f1_closest_hits(effort: Effort) -> Outcome {
             *sum = Agreement { flags: sum.flags + flags, distances: sum.distances + distances, ties: sum.ties + ties };
         }
     }
-    let outcome = Outcome::new().record("rays", rays as f64).record("hits", hits as f64).none("scenes hardly hit", poor);
     let outcome =
-        counts.into_iter().fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
+        Outcome::new().record("rays", rays as f64).record("hits", hits as f64).none("scenes hardly hit", poor);
+    let outcome = counts
+        .into_iter()
+        .fold(outcome, |outcome, (name, lost)| outcome.none(format!("answers of {name} that differ in a bit"), lost));
     ["Embree", "packets"].iter().zip(rounding).fold(outcome, |outcome, (name, Agreement { flags, distances, ties })| {
         outcome
             .none(format!("distances of {name} beyond their rounding"), distances)
@@ -153,7 +155,10 @@ fn f2_ties(_: Effort) -> Outcome {
     let mut wrong = 0;
     for (_, accel) in own(&geometry) {
         let is_first = |hit: Hit, first: &Option<usize>| hit.shape == ShapeId(0) && Some(hit.prim.index()) == *first;
-        wrong += expected.iter().filter(|(ray, first)| !accel.intersect(ray).is_some_and(|hit| is_first(hit, first))).count();
+        wrong += expected
+            .iter()
+            .filter(|(ray, first)| !accel.intersect(ray).is_some_and(|hit| is_first(hit, first)))
+            .count();
     }
     // Embree may take any of them; through corners it loses some rays (A5).
     let embree = build(AccelKind::EMBREE, &geometry);

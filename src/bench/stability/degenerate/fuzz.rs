@@ -26,8 +26,7 @@ const PLY: &str = "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 4
                    property float v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n\
                    3 0 1 2\n4 0 1 2 3\n";
 
-const IES: &str =
-    "IESNA:LM-63-2002\n[TEST] 1\n[MANUFAC] none\nTILT=NONE\n1 1000 1 3 2 1 2 0.1 0.1 0\n1 1 50\n0 45 90\n0 90\n10 8 0\n9 7 0\n";
+const IES: &str = "IESNA:LM-63-2002\n[TEST] 1\n[MANUFAC] none\nTILT=NONE\n1 1000 1 3 2 1 2 0.1 0.1 0\n1 1 50\n0 45 90\n0 90\n10 8 0\n9 7 0\n";
 
 /// What is put in place of numbers and between bytes.
 const WORDS: [&str; 24] = [
@@ -162,7 +161,7 @@ pub(super) fn e10_mutated_files(effort: Effort) -> Outcome {
         ("PLY files", effort.pick(200, 8_000), &[PLY], &ply),
         ("IES files", effort.pick(200, 8_000), &[IES], &ies),
     ];
-    parts
-        .into_iter()
-        .fold(Outcome::new(), |outcome, (what, count, seeds, read)| Tally::of(&mut rng, count, seeds, read).report(outcome, what))
+    parts.into_iter().fold(Outcome::new(), |outcome, (what, count, seeds, read)| {
+        Tally::of(&mut rng, count, seeds, read).report(outcome, what)
+    })
 }

@@ -97,7 +97,8 @@ pub(super) fn e7_scenes_of_every_size(effort: Effort) -> Outcome {
     let mut tests = 0;
     for name in ["embree", "bvh"] {
         let Ok(kind) = name.parse() else { continue };
-        let blocks = |s: f64, first: u64| (0..runs).map(|i| block_means(&picture(s, kind, first + i))).collect::<Vec<_>>();
+        let blocks =
+            |s: f64, first: u64| (0..runs).map(|i| block_means(&picture(s, kind, first + i))).collect::<Vec<_>>();
         let (expected, same_seed) = (blocks(1.0, 1), picture(1.0, kind, 1));
         let noise = difference(&picture(1.0, kind, 2), &same_seed);
         let (mut curve, mut level) = (Vec::new(), Vec::new());

@@ -16,7 +16,8 @@ use crate::accel::AccelKind;
 use crate::color::Rgb;
 use crate::desc::{FilterDesc, FilterSamplesDesc};
 use crate::film::{
-    Crop, Film, FilmShape, FilmTile, Filter, Image, LayerKind, LayerSet, LightAovSample, PixelSample, Sample, Splats, SurfaceSample,
+    Crop, Film, FilmShape, FilmTile, Filter, Image, LayerKind, LayerSet, LightAovSample, PixelSample, Sample, Splats,
+    SurfaceSample,
 };
 use crate::render::Overrides;
 
@@ -84,14 +85,16 @@ fn mean_by_film(values: impl Iterator<Item = f32>) -> f64 {
 }
 
 fn m3_constants(effort: Effort) -> Outcome {
-    let mut filtering = Filtering { filter: Filter::new(&FilterDesc::default()), rng: Rng::new(3), splats: Splats::default() };
+    let mut filtering =
+        Filtering { filter: Filter::new(&FilterDesc::default()), rng: Rng::new(3), splats: Splats::default() };
     let (mut worst, mut short) = (0f64, 0);
     let error = |image: &Image| image.layers[0].data.iter().map(|v| f64::from((v - 1.0).abs())).fold(0.0, f64::max);
     for (desc, tile_size) in filters().flat_map(|desc| [1, 7, 64].map(|size| (desc, size))) {
         filtering.filter = Filter::new(&desc);
         for crop in [Crop::full([20, 13]), Crop { x: 3, y: 5, width: 11, height: 7 }] {
             for _ in 0..effort.pick(1, 40) {
-                let mut film = film(FilmShape { filter: desc, ..FilmShape::new([20, 13], crop, LayerSet::COLOR) }, tile_size);
+                let mut film =
+                    film(FilmShape { filter: desc, ..FilmShape::new([20, 13], crop, LayerSet::COLOR) }, tile_size);
                 for tile in film.tiles_mut() {
                     for pixel in 0..tile.size().iter().product::<u32>() as usize {
                         for sample in 0..(1 + pixel as u32 % 5) {
@@ -117,7 +120,11 @@ fn m3_constants(effort: Effort) -> Outcome {
                 scene["film"]["crop"] = crop;
             }
             let image = render(&scene);
-            rendered = image.layers[0].pixels().flat_map(|p| &p[..3]).map(|v| f64::from((v - 1.0).abs())).fold(rendered, f64::max);
+            rendered = image.layers[0]
+                .pixels()
+                .flat_map(|p| &p[..3])
+                .map(|v| f64::from((v - 1.0).abs()))
+                .fold(rendered, f64::max);
         }
     }
     Outcome::new().at_most("error of films", worst, 2e-6).none("pictures without all of their pixels", short).at_most(
@@ -150,7 +157,8 @@ fn bytes(image: &Image) -> Vec<u8> {
 
 /// A film whose tiles are filled in this order, each sample in that of its index.
 fn filled(order: &[usize], desc: &FilterDesc) -> Film {
-    let mut film = film(FilmShape { filter: *desc, ..FilmShape::new([40, 30], Crop::full([40, 30]), LayerSet::FULL) }, 8);
+    let mut film =
+        film(FilmShape { filter: *desc, ..FilmShape::new([40, 30], Crop::full([40, 30]), LayerSet::FULL) }, 8);
     let mut filtering = Filtering { filter: Filter::new(desc), rng: Rng::new(0), splats: Splats::default() };
     for &tile in order {
         // Films of shared samples have more.
@@ -255,7 +263,8 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
             for sample in 0..effort.pick(50, 20_000) {
                 if rng.below(4) == 0 {
                     let (value, surface, weight) = spoilt(&mut rng);
-                    let value = Sample { pixel: &value, surface: Some(&surface), light_aovs: LightAovSample::default() };
+                    let value =
+                        Sample { pixel: &value, surface: Some(&surface), light_aovs: LightAovSample::default() };
                     bad += 1;
                     taken += usize::from(tile.add(pixel, sample, value, weight));
                 } else {

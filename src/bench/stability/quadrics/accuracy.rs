@@ -214,16 +214,25 @@ pub(super) fn c1_hit_accuracy(effort: Effort) -> Outcome {
             alone.error
         };
         let base = Setting { distance: 10.0, offset: 0.0, scale: 1.0, is_turned: false };
-        let variants =
-            |s: Setting| [s, Setting { is_turned: true, ..s }, Setting { offset: 1e3, ..s }, Setting { offset: 1e3, is_turned: true, ..s }];
+        let variants = |s: Setting| {
+            [
+                s,
+                Setting { is_turned: true, ..s },
+                Setting { offset: 1e3, ..s },
+                Setting { offset: 1e3, is_turned: true, ..s },
+            ]
+        };
         let distances = DISTANCES.map(|distance| (distance, run(&variants(Setting { distance, ..base }))));
-        let scales =
-            SCALES.map(|scale| (scale, run(&[Setting { scale, ..base }, Setting { scale, is_turned: true, offset: 1e3, distance: 1e4 }])));
+        let scales = SCALES.map(|scale| {
+            (scale, run(&[Setting { scale, ..base }, Setting { scale, is_turned: true, offset: 1e3, distance: 1e4 }]))
+        });
         outcome = outcome.at_most(format!("{}: error of the point in 2^-24 max|p|", case.name), worst, 1.0);
         by_distance.push((case.name.to_string(), distances.to_vec()));
         by_scale.push((case.name.to_string(), scales.to_vec()));
     }
-    let naive = |settings: &dyn Fn(f64) -> Setting, xs: &[f64], case: &Case| naive_curve(settings, xs, case, effort.pick(300, 5_000));
+    let naive = |settings: &dyn Fn(f64) -> Setting, xs: &[f64], case: &Case| {
+        naive_curve(settings, xs, case, effort.pick(300, 5_000))
+    };
     for case in &cases[..2] {
         let base = Setting { distance: 10.0, offset: 0.0, scale: 1.0, is_turned: false };
         by_distance.push(naive(&|distance| Setting { distance, ..base }, &DISTANCES, case));
@@ -263,7 +272,8 @@ fn naive_error(rng: &mut Rng, case: &Case, setting: Setting, rays: usize) -> f64
         let d = ray.direction;
         let radius = (case.size.min(1.0) * setting.scale) as f32;
         let flat = |v: Vec3| if matches!(case.shape, Analytic::Sphere(_)) { v } else { Vec3::new(v.x, v.y, 0.0) };
-        let (a, b, c) = (flat(d).length_squared(), 2.0 * flat(o).dot(flat(d)), flat(o).length_squared() - radius * radius);
+        let (a, b, c) =
+            (flat(d).length_squared(), 2.0 * flat(o).dot(flat(d)), flat(o).length_squared() - radius * radius);
         let discriminant = b * b - 4.0 * a * c;
         if discriminant < 0.0 {
             continue;
@@ -300,7 +310,11 @@ pub fn compare_with_oracle(cases: &[Case], rays: usize, seed: u64) -> Agreement 
             }
         }
     }
-    Agreement { wrong: all.missed + all.invented, error: all.error, undecidable: all.undecidable as f64 / all.rays as f64 }
+    Agreement {
+        wrong: all.missed + all.invented,
+        error: all.error,
+        undecidable: all.undecidable as f64 / all.rays as f64,
+    }
 }
 
 pub(super) fn c7_partial_shapes(effort: Effort) -> Outcome {
@@ -354,8 +368,9 @@ pub(super) fn c13_stored_vectors(_: Effort) -> Outcome {
             }
             match (case.answer(&ExactTransform::new(&at), &ray, 0.0), hit) {
                 (Answer::Hit { t, p }, Some((exact_t, exact_p))) => {
-                    oracle_error =
-                        oracle_error.max((t / exact_t - 1.0).abs()).max((p - exact_p).abs().max_element() / exact_p.abs().max_element());
+                    oracle_error = oracle_error
+                        .max((t / exact_t - 1.0).abs())
+                        .max((p - exact_p).abs().max_element() / exact_p.abs().max_element());
                 }
                 (Answer::Miss, None) => {}
                 _ => oracle += 1,

@@ -8,8 +8,8 @@ pub use accuracy::compare_with_oracle;
 use accuracy::{c1_hit_accuracy, c7_partial_shapes, c13_stored_vectors};
 use equations::c10_quadratic_solver;
 use properties::{
-    c2_choice_of_root, c3_grid_of_rays, c4_derivatives, c5_parameters_round_trip, c6_singularities, c8_bounds, c9_both_queries_agree,
-    c11_capped_solids, c12_nudged_points,
+    c2_choice_of_root, c3_grid_of_rays, c4_derivatives, c5_parameters_round_trip, c6_singularities, c8_bounds,
+    c9_both_queries_agree, c11_capped_solids, c12_nudged_points,
 };
 
 checks! {

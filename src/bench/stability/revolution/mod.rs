@@ -38,7 +38,8 @@ const VASE: &[[f64; 2]] = &[[0.0, -1.0], [0.9, -1.0], [1.2, -0.3], [0.5, 0.2], [
 const LOOPING: &[[f64; 2]] = &[[0.2, -0.8], [2.5, 1.2], [0.1, 1.4], [1.2, -0.7], [1.6, -1.2], [0.3, 0.4], [0.5, 1.0]];
 /// Half a circle in two segments.
 const ROUND: f64 = 0.552_284_749_8;
-const CIRCLE: &[[f64; 2]] = &[[0.0, -1.0], [ROUND, -1.0], [1.0, -ROUND], [1.0, 0.0], [1.0, ROUND], [ROUND, 1.0], [0.0, 1.0]];
+const CIRCLE: &[[f64; 2]] =
+    &[[0.0, -1.0], [ROUND, -1.0], [1.0, -ROUND], [1.0, 0.0], [1.0, ROUND], [ROUND, 1.0], [0.0, 1.0]];
 /// A cubic with a loop, tall and thin.
 const CURL: &[[f64; 2]] = &[[0.1, -2.0], [0.9, 3.0], [0.0, -1.5], [0.5, 2.0]];
 
@@ -64,8 +65,16 @@ fn hits_of(shape: &Revolution, ray: &RayF64) -> Vec<f64> {
 }
 
 /// Kinds of rays that have troubled solvers.
-const KINDS: [&str; 8] =
-    ["general", "near tangent", "nearly level", "level", "nearly along the axis", "through the axis", "along the axis", "on the axis"];
+const KINDS: [&str; 8] = [
+    "general",
+    "near tangent",
+    "nearly level",
+    "level",
+    "nearly along the axis",
+    "through the axis",
+    "along the axis",
+    "on the axis",
+];
 
 fn test_ray(rng: &mut Rng, shape: &Revolution, kind: usize) -> RayF64 {
     let target = shape.sample([rng.unit(), rng.unit()]);
@@ -118,7 +127,10 @@ fn d1_all_roots_are_found(effort: Effort) -> Outcome {
         .at_least("share of rays with the right number", equal.iter().sum::<usize>() as f64 / rays as f64, 0.999)
         .record("rays that lose hits", lost as f64)
         .record("rays with too many", invented as f64);
-    KINDS.iter().zip(equal).fold(outcome, |outcome, (kind, equal)| outcome.at_least(*kind, equal as f64 / (4 * per_kind) as f64, 0.99))
+    KINDS
+        .iter()
+        .zip(equal)
+        .fold(outcome, |outcome, (kind, equal)| outcome.at_least(*kind, equal as f64 / (4 * per_kind) as f64, 0.99))
 }
 
 /// The equation of D1 at a point of the surface: the squared distance of the surface from the axis less that of the ray
@@ -148,8 +160,11 @@ fn d2_roots_are_accurate(effort: Effort) -> Outcome {
     // What a residual of 1e-13 moves along a ray that passes inside a tangent by 1e-7, with a half chord of sqrt(2e-7).
     let implied = 1e-13 / (2.0 * 2e-7f64.sqrt());
     let worst = distance.iter().copied().fold(0.0, f64::max);
-    let mut outcome =
-        Outcome::new().at_most("residual of the equation / size²", residual, 1e-13).at_most("error of the distance / size", worst, implied);
+    let mut outcome = Outcome::new().at_most("residual of the equation / size²", residual, 1e-13).at_most(
+        "error of the distance / size",
+        worst,
+        implied,
+    );
     if worst > 1e-11 {
         outcome = outcome
             .short("a distance near a tangent is known as well as the residual over the slope; the catalogue requires 1e-11 of fewer rays");
@@ -160,7 +175,9 @@ fn d2_roots_are_accurate(effort: Effort) -> Outcome {
 fn d8_stored_vectors(_: Effort) -> Outcome {
     let (mut rays, mut excluded, mut unequal, mut oracle) = (0usize, 0, 0, 0);
     let (mut distance, mut oracle_error) = (0f64, 0f64);
-    let worst = |found: &[f64], exact: &[f64]| found.iter().zip(exact).fold(0f64, |worst, (t, exact)| worst.max((t - exact).abs()));
+    let worst = |found: &[f64], exact: &[f64]| {
+        found.iter().zip(exact).fold(0f64, |worst, (t, exact)| worst.max((t - exact).abs()))
+    };
     for ((_, text), points) in vectors::PROFILES.iter().zip([VASE, LOOPING, CIRCLE]) {
         let shape = turned(points);
         excluded += vectors::excluded(text);
@@ -173,7 +190,8 @@ fn d8_stored_vectors(_: Effort) -> Outcome {
             if found.len() == vector.hits.len() {
                 distance = distance.max(worst(&found, &vector.hits) * ray.direction.length() / ray.origin.length());
             }
-            oracle_error = oracle_error.max(worst(&reference, &vector.hits) * ray.direction.length() / ray.origin.length());
+            oracle_error =
+                oracle_error.max(worst(&reference, &vector.hits) * ray.direction.length() / ray.origin.length());
         }
     }
     Outcome::new()
@@ -201,7 +219,9 @@ fn d9_nearest_first(effort: Effort) -> Outcome {
                 None => lost += 1,
             }
         }
-        behind += usize::from(shape.intersect(&endless(ray.origin + ray.direction.normalize() * 1e3, ray.direction)).is_some());
+        behind += usize::from(
+            shape.intersect(&endless(ray.origin + ray.direction.normalize() * 1e3, ray.direction)).is_some(),
+        );
     }
     Outcome::new()
         .none("hits out of order", disordered)

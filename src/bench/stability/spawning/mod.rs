@@ -66,8 +66,9 @@ type Named<'g> = (&'static str, Box<dyn Accelerator + 'g>);
 /// The accelerators that leave a surface each in its way: Embree and packets with `f32`, and the others (one primitive
 /// test) by the bounding volume hierarchy.
 fn accelerators(geometry: &Geometry) -> Vec<Named<'_>> {
-    let single =
-        |name: &'static str| (name, accel::build(name.parse().expect("names of accelerators"), geometry, 1).expect("accelerators build"));
+    let single = |name: &'static str| {
+        (name, accel::build(name.parse().expect("names of accelerators"), geometry, 1).expect("accelerators build"))
+    };
     vec![single("embree"), single("bvh"), ("packets", packets(geometry))]
 }
 
@@ -127,7 +128,14 @@ struct Leavings {
 
 impl Leavings {
     /// Leaves in `direction`, without an end and to a point `distance` away.
-    fn leave(&mut self, accel: &dyn Accelerator, geometry: &Geometry, si: &SurfaceInteraction, direction: DVec3, distance: f64) {
+    fn leave(
+        &mut self,
+        accel: &dyn Accelerator,
+        geometry: &Geometry,
+        si: &SurfaceInteraction,
+        direction: DVec3,
+        distance: f64,
+    ) {
         let ray = si.spawn(direction.as_vec3());
         let Closest { found, retraces } = closest(accel, geometry, &ray);
         self.rays += 1;

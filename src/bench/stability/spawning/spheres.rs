@@ -23,8 +23,11 @@ struct View {
 /// A white sphere that fills most of the picture. Either the camera or the sphere is at the world's origin.
 fn scene(View { radius, distance, camera_moves }: View, samples: usize, light: Value, strategy: &str) -> Value {
     let far = distance * radius;
-    let (camera, sphere) =
-        if camera_moves { ([far * 0.6, far * 0.48, far * 0.64], [0.0; 3]) } else { ([0.0; 3], [far * 0.6, far * 0.48, far * 0.64]) };
+    let (camera, sphere) = if camera_moves {
+        ([far * 0.6, far * 0.48, far * 0.64], [0.0; 3])
+    } else {
+        ([0.0; 3], [far * 0.6, far * 0.48, far * 0.64])
+    };
     json!({
         "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
         "camera": { "position": camera, "look_at": sphere, "up": [0, 0, 1], "vertical_fov_degrees": 2.1 * (1.0 / distance).asin().to_degrees() },
@@ -55,7 +58,8 @@ pub(super) fn b10_spheres(effort: Effort) -> Outcome {
     // From the smallest radius to the others, by distance.
     let mut differences = [[0f64; 2]; DISTANCES.len()];
     for camera_moves in [false, true] {
-        let nearby = picture(&scene(View { radius: 1.0, distance: DISTANCES[0], camera_moves }, samples, sun.clone(), "light"));
+        let nearby =
+            picture(&scene(View { radius: 1.0, distance: DISTANCES[0], camera_moves }, samples, sun.clone(), "light"));
         for (distance, differences) in DISTANCES.into_iter().zip(&mut differences) {
             let pictures = RADII.map(|radius| {
                 let view = View { radius, distance, camera_moves };

@@ -23,10 +23,12 @@ fn with(mut m: Value, rest: Value) -> Value {
 
 /// Every material at its whitest, with the bound of `docs/materials.md`; the object has the material `m`.
 fn materials() -> Vec<(&'static str, Whiteness, Value)> {
-    let metal = |rest: Value| with(json!({ "type": "conductor", "eta": [0.01, 0.01, 0.01], "k": [1e4, 1e4, 1e4] }), rest);
+    let metal =
+        |rest: Value| with(json!({ "type": "conductor", "eta": [0.01, 0.01, 0.01], "k": [1e4, 1e4, 1e4] }), rest);
     let glass = |rest: Value| with(json!({ "type": "dielectric", "ior": 1.5 }), rest);
     let plastic = |alpha: Value| json!({ "m": { "type": "plastic", "albedo": 1.0, "ior": 1.5, "alpha": alpha } });
-    let coated = |alpha: Value, base: Value| json!({ "m": { "type": "coated", "base": "b", "alpha": alpha }, "b": base });
+    let coated =
+        |alpha: Value, base: Value| json!({ "m": { "type": "coated", "base": "b", "alpha": alpha }, "b": base });
     let white = json!({ "type": "diffuse", "albedo": 1.0 });
     let mirror = json!({ "type": "mirror", "reflectance": 1.0 });
     let principled = |rest: Value| with(json!({ "type": "principled", "base_color": 1.0 }), rest);
@@ -34,7 +36,11 @@ fn materials() -> Vec<(&'static str, Whiteness, Value)> {
         ("diffuse", Exact, json!({ "m": white })),
         ("rough diffuse", Exact, json!({ "m": { "type": "diffuse", "albedo": 1.0, "roughness": 0.5 } })),
         ("roughest diffuse", Exact, json!({ "m": { "type": "diffuse", "albedo": 1.0, "roughness": 1.0 } })),
-        ("diffuse transmission", Exact, json!({ "m": { "type": "diffuse_transmission", "reflectance": 0.5, "transmittance": 0.5 } })),
+        (
+            "diffuse transmission",
+            Exact,
+            json!({ "m": { "type": "diffuse_transmission", "reflectance": 0.5, "transmittance": 0.5 } }),
+        ),
         ("mirror", Exact, json!({ "m": mirror })),
         ("smooth metal", Exact, metal(json!({}))),
         ("glass", Exact, glass(json!({}))),
@@ -44,8 +50,16 @@ fn materials() -> Vec<(&'static str, Whiteness, Value)> {
         ("glass as a medium", Exact, glass(json!({ "priority": 1 }))),
         ("dispersive glass", Exact, glass(json!({ "abbe": 30 }))),
         ("pane", Exact, json!({ "m": { "type": "thin_dielectric", "ior": 1.5 } })),
-        ("mix", Exact, json!({ "m": { "type": "mix", "materials": ["a", "b"], "amount": 0.3 }, "a": white, "b": mirror })),
-        ("two sides", Exact, json!({ "m": { "type": "two_sided", "front": "a", "back": "b" }, "a": white, "b": mirror })),
+        (
+            "mix",
+            Exact,
+            json!({ "m": { "type": "mix", "materials": ["a", "b"], "amount": 0.3 }, "a": white, "b": mirror }),
+        ),
+        (
+            "two sides",
+            Exact,
+            json!({ "m": { "type": "two_sided", "front": "a", "back": "b" }, "a": white, "b": mirror }),
+        ),
         ("smooth plastic", Tabulated(0.002), json!({ "m": { "type": "plastic", "albedo": 1.0, "ior": 1.5 } })),
         ("plastic, alpha 0.1", Tabulated(0.002), plastic(json!(0.1))),
         ("plastic, alpha 0.5", Tabulated(0.002), plastic(json!(0.5))),
@@ -68,7 +82,11 @@ fn materials() -> Vec<(&'static str, Whiteness, Value)> {
         ("principled cloth", Lossy, principled(json!({ "sheen": 1, "subsurface": 1, "roughness": 1 }))),
         ("principled lacquer", Lossy, principled(json!({ "clearcoat": 1, "specular": 1 }))),
         ("phong", Lossy, json!({ "m": { "type": "phong", "diffuse": 0.5, "specular": 0.5 } })),
-        ("phong, cosine lobe", Lossy, json!({ "m": { "type": "phong", "diffuse": 0.5, "specular": 0.5, "lobe": "cosine" } })),
+        (
+            "phong, cosine lobe",
+            Lossy,
+            json!({ "m": { "type": "phong", "diffuse": 0.5, "specular": 0.5, "lobe": "cosine" } }),
+        ),
         ("cook and torrance", Lossy, json!({ "m": { "type": "cook_torrance", "albedo": 1.0, "f0": 1.0 } })),
     ]
 }

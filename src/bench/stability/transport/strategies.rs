@@ -32,7 +32,8 @@ pub(super) fn i7_strategies(effort: Effort) -> Outcome {
     for alpha in [0.03, 0.1, 0.3, 0.7] {
         for radius in [0.1, 1.0] {
             let scene = plate(spp, side, alpha, radius);
-            let found: Vec<Estimate> = STRATEGIES.iter().map(|strategy| mean(&with_strategy(&scene, strategy), 0)).collect();
+            let found: Vec<Estimate> =
+                STRATEGIES.iter().map(|strategy| mean(&with_strategy(&scene, strategy), 0)).collect();
             let name = format!("alpha {alpha}, lamp {radius}");
             let [mis, light, bsdf] = [found[0], found[1], found[2]];
             tests.same(&format!("{name}: both and light"), mis, light, pixels);

@@ -156,5 +156,6 @@ pub struct BenchAccelArgs {
 fn parse_range(text: &str) -> Result<[usize; 2], String> {
     let number = |word: &str| word.trim().parse::<f64>().ok().filter(|n| (100.0..=1e9).contains(n)).map(|n| n as usize);
     let ends = text.split_once("..").and_then(|(from, to)| Some([number(from)?, number(to)?]));
-    ends.filter(|[from, to]| from <= to).ok_or_else(|| "expected two numbers of triangles from 100 to 1e9, such as 1e3..1e7".to_owned())
+    ends.filter(|[from, to]| from <= to)
+        .ok_or_else(|| "expected two numbers of triangles from 100 to 1e9, such as 1e3..1e7".to_owned())
 }

@@ -115,5 +115,9 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 fn parse_external(text: &str) -> Result<(String, String), String> {
     let (name, command) = text.split_once('=').ok_or_else(|| "expected NAME=COMMAND".to_owned())?;
     let (name, command) = (name.trim(), command.trim());
-    if name.is_empty() || command.is_empty() { Err("expected NAME=COMMAND".into()) } else { Ok((name.to_owned(), command.to_owned())) }
+    if name.is_empty() || command.is_empty() {
+        Err("expected NAME=COMMAND".into())
+    } else {
+        Ok((name.to_owned(), command.to_owned()))
+    }
 }

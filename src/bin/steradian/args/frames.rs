@@ -40,5 +40,8 @@ fn progress_help() -> String {
 }
 
 fn parse_fps(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|fps: &f64| *fps > 0.0 && fps.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
+    text.parse()
+        .ok()
+        .filter(|fps: &f64| *fps > 0.0 && fps.is_finite())
+        .ok_or_else(|| "expected a number above 0".to_owned())
 }

@@ -79,7 +79,13 @@ fn pbrt_from_ours(kind: &str) -> DMat3 {
 }
 
 /// Sets the projection of a camera; `scale` is that of its transformation.
-fn set_projection(draft: &mut Draft, camera: &mut CameraDesc, directive: &CameraDirective, size: [u32; 2], scale: f64) -> Result<()> {
+fn set_projection(
+    draft: &mut Draft,
+    camera: &mut CameraDesc,
+    directive: &CameraDirective,
+    size: [u32; 2],
+    scale: f64,
+) -> Result<()> {
     let params = &directive.params;
     match directive.kind.as_str() {
         "perspective" => {

@@ -4,8 +4,8 @@ use super::colors::{Colors, Meaning};
 use super::params::Params;
 use super::textures::{Texture, Textures};
 use crate::desc::{
-    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PlasticDesc, RangedDesc,
-    RoughnessDesc, TextureDesc, TextureFilterDesc, WrapDesc,
+    BumpMapDesc, ColorDesc, ColorSpaceDesc, DielectricDesc, DistributionDesc, MaterialDesc, NormalMapDesc, PlasticDesc,
+    RangedDesc, RoughnessDesc, TextureDesc, TextureFilterDesc, WrapDesc,
 };
 use crate::error::Result;
 use crate::import::foreign::Draft;
@@ -28,14 +28,26 @@ pub struct Materials<'a> {
 impl Materials<'_> {
     /// Adds a material of a kind under a name like `name`; the result is its name. `find` gives materials by pbrt's
     /// names.
-    pub fn add(&mut self, name: &str, kind: &str, params: &Params, find: impl Fn(&str) -> Option<String>) -> Result<String> {
+    pub fn add(
+        &mut self,
+        name: &str,
+        kind: &str,
+        params: &Params,
+        find: impl Fn(&str) -> Option<String>,
+    ) -> Result<String> {
         let desc = self.desc(name, kind, params, find)?;
         let desc = self.with_relief(name, params, desc)?;
         params.report(self.draft);
         Ok(self.draft.add_material(name, &params.place, desc))
     }
 
-    fn desc(&mut self, name: &str, kind: &str, params: &Params, find: impl Fn(&str) -> Option<String>) -> Result<MaterialDesc> {
+    fn desc(
+        &mut self,
+        name: &str,
+        kind: &str,
+        params: &Params,
+        find: impl Fn(&str) -> Option<String>,
+    ) -> Result<MaterialDesc> {
         Ok(match kind {
             "diffuse" => MaterialDesc::Diffuse { albedo: self.color(params, "reflectance", 0.5)?, roughness: zero() },
             "coateddiffuse" => {
@@ -70,7 +82,12 @@ impl Materials<'_> {
             "diffusetransmission" => self.diffuse_transmission(params)?,
             "mix" => self.mix(params, find)?,
             "subsurface" => {
-                self.draft.approximated(&params.place, &params.element, "", "plastic, for light does not travel below surfaces");
+                self.draft.approximated(
+                    &params.place,
+                    &params.element,
+                    "",
+                    "plastic, for light does not travel below surfaces",
+                );
                 for parameter in ["mfp", "mfreepath", "sigma_a", "sigma_s", "g", "scale", "name"] {
                     params.ignore(parameter, "light does not travel below surfaces");
                 }
@@ -79,7 +96,10 @@ impl Materials<'_> {
             "hair" => {
                 self.draft.approximated(&params.place, &params.element, "", "diffuse");
                 let brown = Texture::Constant([0.2, 0.1, 0.05]);
-                let color = self.textures.get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?.unwrap_or(brown);
+                let color = self
+                    .textures
+                    .get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?
+                    .unwrap_or(brown);
                 MaterialDesc::Diffuse { albedo: color.color(self.draft, &params.place), roughness: zero() }
             }
             "measured" => {
@@ -126,7 +146,12 @@ impl Materials<'_> {
 
     /// What pbrt's walk through layers has and ours has not.
     fn note_layers(&mut self, params: &Params) {
-        self.draft.approximated(&params.place, &params.element, "", "a closed form in place of a random walk between layers");
+        self.draft.approximated(
+            &params.place,
+            &params.element,
+            "",
+            "a closed form in place of a random walk between layers",
+        );
         for parameter in ["thickness", "albedo", "g", "maxdepth", "nsamples"] {
             params.ignore(parameter, "there is nothing between the layers");
         }
@@ -223,7 +248,9 @@ impl Materials<'_> {
 
     fn diffuse_transmission(&mut self, params: &Params) -> Result<MaterialDesc> {
         let scale = params.number_or("scale", 1.0)? as f32;
-        let part = |name: &str| -> Result<Texture> { Ok(self.textures.reflectance(params, &self.colors, name, 0.25)?.times([scale; 3])) };
+        let part = |name: &str| -> Result<Texture> {
+            Ok(self.textures.reflectance(params, &self.colors, name, 0.25)?.times([scale; 3]))
+        };
         let (mut reflectance, mut transmittance) = (part("reflectance")?, part("transmittance")?);
         if let (Texture::Constant(r), Texture::Constant(t)) = (&mut reflectance, &mut transmittance) {
             let sum = (0..3).map(|i| r[i] + t[i]).fold(0.0, f32::max);

@@ -38,7 +38,8 @@ fn a_chain_of_nodes_may_be_long() {
 fn transforms_are_finite() {
     let mut asset = Asset::new(json!([{ "children": [1], "scale": [3e38, 1, 1] }]));
     let last = 11;
-    let chain = (1..=last).map(|i| if i < last { json!({ "children": [i + 1], "scale": [3e38, 1, 1] }) } else { json!({}) });
+    let chain =
+        (1..=last).map(|i| if i < last { json!({ "children": [i + 1], "scale": [3e38, 1, 1] }) } else { json!({}) });
     asset.json["nodes"].as_array_mut().unwrap().extend(chain);
     assert!(message(&asset).contains("the transform is not finite"));
     asset.json["nodes"] = json!([{ "rotation": [0, 0, 0, 0] }]);
@@ -176,7 +177,17 @@ fn any_value_may_be_anything() {
     let mut paths = Vec::new();
     collect(&whole, &mut String::new(), &mut paths);
     assert!(paths.len() > 150, "{}", paths.len());
-    let odd = [json!(0), json!(1), json!(-1), json!(4_294_967_295u64), json!(1e30), json!("x"), json!([]), json!({}), Value::Null];
+    let odd = [
+        json!(0),
+        json!(1),
+        json!(-1),
+        json!(4_294_967_295u64),
+        json!(1e30),
+        json!("x"),
+        json!([]),
+        json!({}),
+        Value::Null,
+    ];
     for path in paths {
         for value in &odd {
             asset.json = whole.clone();

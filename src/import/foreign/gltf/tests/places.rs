@@ -54,7 +54,8 @@ fn an_extension_places_a_mesh_many_times() {
     let mut asset = Asset::new(json!([{ "mesh": 0, "translation": [0, 0, 5], "name": "grass" }]));
     asset.square(json!({}));
     let places = asset.floats(&[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
-    asset.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": places } } });
+    asset.json["nodes"][0]["extensions"] =
+        json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": places } } });
     let imported = asset.read();
     assert_eq!(imported.desc.instances.len(), 3);
     assert!(imported.desc.instances.iter().all(|instance| instance.name.is_none()));
@@ -118,7 +119,8 @@ fn without_a_camera_all_is_seen_and_without_a_light_it_is_lit() {
     for corner in [[100.0, 0.0, -30.0], [140.0, 0.0, -30.0], [100.0, 2.0, -30.0], [140.0, 2.0, -30.0]] {
         let p = DVec3::from(corner) - from;
         let depth = p.dot(forward);
-        let room = [1.0 - p.dot(up).abs() / (depth * tangent), 1.0 - p.dot(right).abs() / (depth * tangent * 16.0 / 9.0)];
+        let room =
+            [1.0 - p.dot(up).abs() / (depth * tangent), 1.0 - p.dot(right).abs() / (depth * tangent * 16.0 / 9.0)];
         assert!(depth > 0.0 && room.iter().all(|room| *room > 0.0), "{corner:?} {room:?}");
         nearest = room.into_iter().fold(nearest, f64::min);
     }
@@ -144,7 +146,8 @@ fn lights_shine_along_minus_z_by_their_units() {
         { "type": "spot", "intensity": 2, "spot": { "innerConeAngle": 0.1 } }
     ] } });
     let imported = asset.read();
-    let [LightDesc::Point(point), LightDesc::Directional(sun), LightDesc::Spot(spot)] = imported.desc.lights.as_slice() else {
+    let [LightDesc::Point(point), LightDesc::Directional(sun), LightDesc::Spot(spot)] = imported.desc.lights.as_slice()
+    else {
         panic!("{:?}", imported.desc.lights);
     };
     assert_eq!((point.position, point.intensity), ([1.0, 2.0, 3.0], [8.0, 4.0, 2.0]));

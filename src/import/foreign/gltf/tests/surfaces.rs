@@ -89,7 +89,10 @@ fn accessors_that_reach_too_far_are_errors() {
         let error = asset.try_read().unwrap_err().to_string();
         assert!(error.contains(message) && error.contains("scene.gltf"), "{error}");
     };
-    broken(&|a| a.json["accessors"][0]["count"] = json!(5), "5 elements do not fit into bufferViews[0], which has 48 bytes");
+    broken(
+        &|a| a.json["accessors"][0]["count"] = json!(5),
+        "5 elements do not fit into bufferViews[0], which has 48 bytes",
+    );
     broken(&|a| a.json["accessors"][0]["count"] = json!(u64::MAX), "elements do not fit");
     broken(&|a| a.json["accessors"][0]["byteOffset"] = json!(4), "4 elements do not fit");
     broken(&|a| a.json["accessors"][0]["byteOffset"] = json!(u64::MAX), "4 elements do not fit");

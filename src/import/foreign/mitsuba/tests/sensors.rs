@@ -45,8 +45,13 @@ fn steps_of_transforms_act_in_their_order() {
 #[test]
 fn every_axis_of_the_field_of_view() {
     let fov = |axis: &str| {
-        let axis = if axis.is_empty() { String::new() } else { format!("<string name=\"fov_axis\" value=\"{axis}\"/>") };
-        (0.5 * camera("perspective", &format!("<float name=\"fov\" value=\"60\"/>{axis}")).vertical_fov_degrees.unwrap()).to_radians().tan()
+        let axis =
+            if axis.is_empty() { String::new() } else { format!("<string name=\"fov_axis\" value=\"{axis}\"/>") };
+        (0.5 * camera("perspective", &format!("<float name=\"fov\" value=\"60\"/>{axis}"))
+            .vertical_fov_degrees
+            .unwrap())
+        .to_radians()
+        .tan()
     };
     let half = 30f64.to_radians().tan();
     assert_near(fov(""), half / 2.0);
@@ -77,7 +82,10 @@ fn a_scale_of_the_camera_is_dropped_or_is_its_size() {
 
 #[test]
 fn thin_lenses_and_shifts() {
-    let lens = camera("thinlens", r#"<float name="aperture_radius" value="0.5"/><float name="focus_distance" value="7"/>"#).lens.unwrap();
+    let lens =
+        camera("thinlens", r#"<float name="aperture_radius" value="0.5"/><float name="focus_distance" value="7"/>"#)
+            .lens
+            .unwrap();
     assert_eq!((lens.radius, lens.focus_distance), (Some(0.5), Some(7.0)));
     let shift = camera(
         "perspective",
@@ -89,7 +97,9 @@ fn thin_lenses_and_shifts() {
 #[test]
 fn films_and_filters() {
     let film = |inside: &str| {
-        let text = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\">{inside}</film></sensor></scene>");
+        let text = format!(
+            "<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\">{inside}</film></sensor></scene>"
+        );
         read_with(&text, &[], &[]).unwrap().desc
     };
     let desc = film("");
@@ -114,7 +124,8 @@ fn samplers_and_integrators() {
     assert_eq!((sampler.spp, sampler.seed, sampler.kind), (9, 3, SamplerKindDesc::Sobol));
     let independent = sensor("perspective", r#"<sampler type="independent"/>"#);
     assert_eq!((independent.desc.sampler.kind, independent.report.is_exact()), (SamplerKindDesc::Sobol, true));
-    let is_noted = |entry: &ReportEntry| entry.element == "sampler independent" && entry.note.contains("--sampler independent");
+    let is_noted =
+        |entry: &ReportEntry| entry.element == "sampler independent" && entry.note.contains("--sampler independent");
     assert!(independent.report.entries.iter().any(is_noted));
     let integrator = |text: &str| match scene(text).integrator {
         IntegratorDesc::Path { max_depth, rr_depth, .. } => (max_depth, rr_depth),
@@ -127,8 +138,14 @@ fn samplers_and_integrators() {
     assert_eq!(integrator(r#"<integrator type="direct"/>"#).0, 2);
     let hidden = r#"<integrator type="KIND"><boolean name="hide_emitters" value="true"/></integrator>"#;
     assert!(notes(&hidden.replace("KIND", "path")).is_empty());
-    assert!(matches!(scene(&hidden.replace("KIND", "direct")).integrator, IntegratorDesc::Path { hide_emitters: true, .. }));
+    assert!(matches!(
+        scene(&hidden.replace("KIND", "direct")).integrator,
+        IntegratorDesc::Path { hide_emitters: true, .. }
+    ));
     let depth = notes(&hidden.replace("KIND", "depth"));
-    assert!(depth.iter().any(|(outcome, name, _)| *outcome == Outcome::Ignored && name == "hide_emitters"), "{depth:?}");
+    assert!(
+        depth.iter().any(|(outcome, name, _)| *outcome == Outcome::Ignored && name == "hide_emitters"),
+        "{depth:?}"
+    );
     assert!(notes(r#"<integrator type="path"><boolean name="hide_emitters" value="false"/></integrator>"#).is_empty());
 }

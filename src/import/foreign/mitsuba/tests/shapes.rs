@@ -41,7 +41,11 @@ fn images_have_their_origin_at_the_top_left() {
     assert_near(degrees.abs(), 90.0);
     assert_near(f64::from(scale[0] * scale[1]), 1.0);
     let mesh = |kind: &str, flip: &str| {
-        let flip = if flip.is_empty() { String::new() } else { format!("<boolean name=\"flip_tex_coords\" value=\"{flip}\"/>") };
+        let flip = if flip.is_empty() {
+            String::new()
+        } else {
+            format!("<boolean name=\"flip_tex_coords\" value=\"{flip}\"/>")
+        };
         image(&format!("<shape type=\"{kind}\"><string name=\"filename\" value=\"a.{kind}\"/>{flip}BSDF</shape>"), "")
     };
     // Mitsuba turns the v of OBJ files over, not that of PLY files.
@@ -92,7 +96,8 @@ fn meshes_without_uv_have_barycentric_ones_where_textures_need_them() {
     };
     let checker = r#"<texture type="checkerboard" name="reflectance"/>"#;
     // The v of OBJ files is one minus Mitsuba's.
-    let uvs = [("m.ply", ply, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), ("m.obj", obj, [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]])];
+    let uvs =
+        [("m.ply", ply, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), ("m.obj", obj, [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]])];
     for (file, text, corners) in uvs {
         let imported = read(file, checker, text);
         let desc = mesh(&imported.desc, 0);
@@ -100,7 +105,9 @@ fn meshes_without_uv_have_barycentric_ones_where_textures_need_them() {
         assert_eq!(data.uvs, Some(corners.repeat(2)), "{file}");
         assert_eq!((data.positions.len(), &data.triangles[1], desc.smooth_by), (6, &[3, 4, 5], SmoothByDesc::Position));
         assert_eq!(data.positions[3..], [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
-        assert!(imported.report.entries.iter().any(|entry| entry.parameter == "uv" && entry.outcome == Outcome::Mapped));
+        assert!(
+            imported.report.entries.iter().any(|entry| entry.parameter == "uv" && entry.outcome == Outcome::Mapped)
+        );
         let plain = read(file, "", text);
         assert_eq!((plain.assets.meshes.len(), mesh(&plain.desc, 0).file.as_deref()), (0, Some(file)));
     }
@@ -182,8 +189,9 @@ fn mirrored_shapes_are_inside_out_where_mitsubas_are() {
         r#"<shape type="ply"><string name="filename" value="a.ply"/><boolean name="face_normals" value="true"/>MIRROR</shape>"#
     ));
     let with = |header: &str| {
-        let text =
-            format!(r#"<scene version="3.0.0">{SENSOR}<shape type="ply"><string name="filename" value="a.ply"/>{mirror}</shape></scene>"#);
+        let text = format!(
+            r#"<scene version="3.0.0">{SENSOR}<shape type="ply"><string name="filename" value="a.ply"/>{mirror}</shape></scene>"#
+        );
         let imported = read_with(&text, &[], &[("a.ply", header.as_bytes())]).unwrap();
         imported.desc.shapes[0].common().reverse_normal
     };

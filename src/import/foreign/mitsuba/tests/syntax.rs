@@ -26,7 +26,10 @@ fn the_first_default_counts_unless_the_user_defines_another_value() {
 fn values_that_multiply_are_refused() {
     let mut text = "<scene version=\"3.0.0\"><default name=\"a0\" value=\"0123456789\"/>".to_owned();
     for i in 1..40 {
-        text += &format!("<default name=\"b{i}\" value=\"$a{0}$a{0}\"/><default name=\"a{i}\" value=\"$b{i}$b{i}\"/>", i - 1);
+        text += &format!(
+            "<default name=\"b{i}\" value=\"$a{0}$a{0}\"/><default name=\"a{i}\" value=\"$b{i}$b{i}\"/>",
+            i - 1
+        );
     }
     let error = read_with(&(text + "</scene>"), &[], &[]).unwrap_err();
     assert!(error.to_string().contains("too long"), "{error}");
@@ -69,20 +72,32 @@ fn references_may_point_forward_and_have_other_names() {
 #[test]
 fn mistakes_have_a_place_and_a_suggestion() {
     let cases = [
-        ("\n<shape type=\"spere\"/>", "s.xml:3:1: Mitsuba has no shape of the type \"spere\" (did you mean \"sphere\"?)"),
+        (
+            "\n<shape type=\"spere\"/>",
+            "s.xml:3:1: Mitsuba has no shape of the type \"spere\" (did you mean \"sphere\"?)",
+        ),
         ("\n <shpae type=\"sphere\"/>", "s.xml:3:2: unknown element <shpae> (did you mean <shape>?)"),
         (
             "\n<shape type=\"sphere\"><ref id=\"gold\"/></shape><bsdf type=\"diffuse\" id=\"Gold\"/>",
             "s.xml:3:22: nothing has the id \"gold\" (did you mean \"Gold\"?)",
         ),
         ("\n<shape type=\"sphere\"><float name=\"radius\" value=\"x\"/></shape>", "s.xml:3:22: \"x\" is not a number"),
-        ("\n<shape type=\"sphere\"><string name=\"radius\" value=\"1\"/></shape>", "s.xml:3:22: \"radius\" must be a number"),
-        ("\n<bsdf type=\"diffuse\" id=\"a\"/><bsdf type=\"diffuse\" id=\"a\"/>", "s.xml:3:30: the id \"a\" is given twice"),
+        (
+            "\n<shape type=\"sphere\"><string name=\"radius\" value=\"1\"/></shape>",
+            "s.xml:3:22: \"radius\" must be a number",
+        ),
+        (
+            "\n<bsdf type=\"diffuse\" id=\"a\"/><bsdf type=\"diffuse\" id=\"a\"/>",
+            "s.xml:3:30: the id \"a\" is given twice",
+        ),
         (
             "\n<shape type=\"sphere\"><float name=\"radius\" value=\"1\"/><float name=\"radius\" value=\"1\"/></shape>",
             "\"radius\" is given twice",
         ),
-        ("\n<shape type=\"sphere\"><transform name=\"to_world\"><tarnslate x=\"1\"/></transform></shape>", "did you mean <translate>?"),
+        (
+            "\n<shape type=\"sphere\"><transform name=\"to_world\"><tarnslate x=\"1\"/></transform></shape>",
+            "did you mean <translate>?",
+        ),
         (
             "\n<shape type=\"sphere\"><bsdf type=\"roughdielectric\"><string name=\"int_ior\" value=\"dimond\"/></bsdf></shape>",
             "did you mean \"diamond\"?",
@@ -123,7 +138,9 @@ fn what_refers_to_itself_is_an_error() {
 
 #[test]
 fn damaged_texts_are_errors() {
-    let whole = format!("<scene version=\"3.0.0\">{SENSOR}<shape type=\"sphere\"><float name=\"radius\" value=\"2\"/></shape></scene>");
+    let whole = format!(
+        "<scene version=\"3.0.0\">{SENSOR}<shape type=\"sphere\"><float name=\"radius\" value=\"2\"/></shape></scene>"
+    );
     assert!(read_with(&whole, &[], &[]).is_ok());
     for end in 0..whole.len() {
         let error = read_with(&whole[..end], &[], &[]).unwrap_err().to_string();
@@ -131,7 +148,8 @@ fn damaged_texts_are_errors() {
     }
     let deep = format!("<scene version=\"3.0.0\">{}", "<shape type=\"merge\">".repeat(100_000));
     assert!(read_with(&deep, &[], &[]).is_err());
-    let closed = format!("<scene version=\"3.0.0\">{}{}</scene>", "<shape type=\"merge\">".repeat(500), "</shape>".repeat(500));
+    let closed =
+        format!("<scene version=\"3.0.0\">{}{}</scene>", "<shape type=\"merge\">".repeat(500), "</shape>".repeat(500));
     let error = read_with(&closed, &[], &[]).unwrap_err().to_string();
     assert!(error.contains("nested more than") || error.contains("not valid XML"), "{error}");
     let many = format!("<scene version=\"3.0.0\">{}</scene>", "<a/>".repeat(10_000));
@@ -150,8 +168,7 @@ fn names_of_old_versions_are_understood() {
 
 #[test]
 fn nothing_is_dropped_in_silence() {
-    let unknown =
-        r#"<shape type="sphere"><float name="colour" value="1"/><bsdf type="diffuse"><float name="shine" value="1"/></bsdf></shape>"#;
+    let unknown = r#"<shape type="sphere"><float name="colour" value="1"/><bsdf type="diffuse"><float name="shine" value="1"/></bsdf></shape>"#;
     let names: Vec<String> = notes(unknown).into_iter().map(|(_, name, _)| name).collect();
     assert_eq!(names, ["shine", "colour"]);
     let lacking = r#"<shape type="sdfgrid"/><medium type="homogeneous"/><emitter type="timed_sunsky"/>
@@ -185,7 +202,10 @@ fn elements_have_a_bounded_number_of_attributes() {
         let file = folder.path().join("s.xml");
         std::fs::write(
             &file,
-            format!("<!-- {} -->\n<scene version=\"3.0.0\">\n<default name=\"a\" value=\"b\"{attributes}/></scene>", "= ".repeat(500)),
+            format!(
+                "<!-- {} -->\n<scene version=\"3.0.0\">\n<default name=\"a\" value=\"b\"{attributes}/></scene>",
+                "= ".repeat(500)
+            ),
         )
         .unwrap();
         super::super::xml::read(&file, &[]).map(|_| ()).map_err(|e| e.to_string())
