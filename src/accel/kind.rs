@@ -23,7 +23,7 @@ pub enum AccelKind {
     Auto,
     /// Embree.
     Embree(EmbreeOptions),
-    /// A bounding volume hierarchy of ours.
+    /// The bounding volume hierarchy of this crate.
     Bvh(BvhOptions),
     /// A bounding volume hierarchy for packets of rays.
     Packets,

@@ -1,5 +1,5 @@
-//! Three comparisons that course reports quote, repeated: accelerators as such reports wrote them, beside ours and
-//! Embree, on pictures of normals and on path-traced ones.
+//! Three comparisons that course reports quote, repeated: accelerators as such reports wrote them, beside Steradian's
+//! and Embree, on pictures of normals and on path-traced ones.
 
 mod frames;
 
@@ -120,7 +120,7 @@ struct Subject<'g> {
     tests: Box<Count<'g>>,
 }
 
-/// One of ours, or Embree.
+/// One of Steradian's, or Embree.
 fn ours(kind: AccelKind) -> Build {
     Box::new(move |geometry| {
         let all = geometry.shapes.iter().map(crate::geometry::Shape::prim_count).sum::<usize>() as f64;
@@ -187,7 +187,7 @@ fn octree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
                 matrices.normals.accel_seconds / embree.normals.accel_seconds
             ),
             format!(
-                "The report's octree is {:.1} times slower than ours: cells of up to 64 triangles by their boxes in place of exact overlap \
+                "The report's octree is {:.1} times slower than Steradian's: cells of up to 64 triangles by their boxes in place of exact overlap \
                  ({:.1} against {:.1} triangles tested per ray), a queue without order, no end at the first hit.",
                 naive.normals.accel_seconds / ours.normals.accel_seconds,
                 naive.tests_per_ray.unwrap_or(f64::NAN),
@@ -216,7 +216,7 @@ fn kd_tree(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
         comparison.reasons = vec![
             format!(
                 "The report's tree (axes in turn, median of lower bounds, both children visited even after a near hit) is {:.0} times faster \
-                 than the linear loop within the accelerator, ours {:.0} times; they test {:.1} and {:.1} triangles per ray.",
+                 than the linear loop within the accelerator, Steradian's {:.0} times; they test {:.1} and {:.1} triangles per ray.",
                 linear.normals.accel_seconds / naive.normals.accel_seconds,
                 linear.normals.accel_seconds / ours.normals.accel_seconds,
                 naive.tests_per_ray.unwrap_or(f64::NAN),
@@ -266,7 +266,7 @@ fn bvh(options: &ReportsOptions, watch: &dyn Watch) -> Result<Comparison> {
              loop (4 threads busy) and 192 for the BVH (up to 48), and the ratio was taken per sample."
                 .into(),
             format!(
-                "With right leaves the same tree is {:.0} times faster than the linear loop within the accelerator, and ours {:.0} times; on \
+                "With right leaves the same tree is {:.0} times faster than the linear loop within the accelerator, and Steradian's {:.0} times; on \
                  path-traced frames, which the report's were, {:.0} and {:.0} times, and the wrong leaves {:.1} times.",
                 linear.normals.accel_seconds / right.normals.accel_seconds,
                 linear.normals.accel_seconds / ours.normals.accel_seconds,

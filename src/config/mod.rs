@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn entries_have_their_lines() {
-        let text = "# ours\nspp = 1_000\n\nguiding = true\ntarget_error = 1e-3\nlayers = [\"Z\", \"N\"]\n";
+        let text = "# project\nspp = 1_000\n\nguiding = true\ntarget_error = 1e-3\nlayers = [\"Z\", \"N\"]\n";
         let entries = parse(Path::new("s.toml"), Trust::Project, text).unwrap();
         let words = |words: &[&str]| Words::Many(words.iter().map(|word| (*word).to_owned()).collect());
         let entry = |key: &str, words: Words, line: usize| Entry { key: key.to_owned(), words, line };

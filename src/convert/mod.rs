@@ -41,7 +41,7 @@ pub fn write_scene(
     mut uses: FileUses,
 ) -> Result<usize> {
     if !target.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-        return Err(Error::Usage(format!("{}: scenes of ours end with .json", target.display())));
+        return Err(Error::Usage(format!("{}: Steradian's scene files end with .json", target.display())));
     }
     check_creatable(target)?;
     uses.read(source, "the scene")?;

@@ -16,7 +16,7 @@ use crate::file::{self, write_atomically};
 use crate::film::{LayerInfo, LayerSource};
 use crate::output::write_image;
 
-/// Names of layers that hold albedo, in lower case, the best first: ours, then those of Blender, pbrt, Mitsuba.
+/// Names of layers that hold albedo, in lower case, the best first: Steradian's, then those of Blender, pbrt, Mitsuba.
 const ALBEDO: [&str; 4] = ["feature_albedo", "denoising albedo", "albedo", "diffuse_albedo"];
 
 /// The same for normals. Where a file has two kinds, the shading normals are the better ones.

@@ -51,7 +51,7 @@ impl Budget {
 #[derive(Clone, Debug)]
 pub enum Subject {
     /// This program, with these settings; samples, seed and time limit are those of the run.
-    Ours(Box<Settings>),
+    Steradian(Box<Settings>),
     /// Another program.
     External(External),
 }
@@ -81,7 +81,7 @@ pub struct ErrorOptions {
     pub scene: String,
     /// The command line.
     pub command: String,
-    /// What is compared; the first must be ours unless there is a reference.
+    /// What is compared; the first must be a Steradian render unless there is a reference.
     pub variants: Vec<Variant>,
     /// What each may take, in turn.
     pub budgets: Vec<Budget>,
@@ -136,7 +136,7 @@ impl<'a> Program<'a> {
     pub(super) fn new(scene: &'a Scene, options: &'a ErrorOptions, stop: &'a AtomicBool) -> Result<Self> {
         let mut accels: Vec<(AccelKind, Box<dyn Accelerator + 'a>)> = Vec::new();
         for variant in &options.variants {
-            if let Subject::Ours(settings) = &variant.subject
+            if let Subject::Steradian(settings) = &variant.subject
                 && accels.iter().all(|(kind, _)| *kind != settings.accel)
             {
                 accels.push((settings.accel, accel::build(settings.accel, &scene.geometry, settings.threads)?));
@@ -145,14 +145,14 @@ impl<'a> Program<'a> {
         Ok(Self { scene, options, stop, accels, seconds_per_sample: vec![0.0; options.variants.len()] })
     }
 
-    /// The accelerator of a variant of ours.
+    /// The accelerator of a variant that Steradian renders.
     pub(super) fn accel(&self, settings: &Settings) -> Option<&dyn Accelerator> {
         self.accels.iter().find(|(kind, _)| *kind == settings.accel).map(|(_, accel)| &**accel)
     }
 
-    /// Renders one sample with a variant of ours, so that pages and caches are as they are in the middle of a run.
+    /// Renders one sample with a variant of Steradian, so that pages and caches are as they are in the middle of a run.
     pub(super) fn warm_up(&mut self, variant: usize) -> Result<()> {
-        if let Subject::Ours(_) = self.options.variants[variant].subject
+        if let Subject::Steradian(_) = self.options.variants[variant].subject
             && let Some(measured) = self.render(variant, Budget::Spp(1), self.options.seed)?
         {
             self.seconds_per_sample[variant] = measured.seconds;
@@ -164,7 +164,7 @@ impl<'a> Program<'a> {
     pub(super) fn render(&self, variant: usize, budget: Budget, seed: u64) -> Result<Option<Measured>> {
         let settings = match &self.options.variants[variant].subject {
             Subject::External(external) => return external.run(budget, seed, self.stop),
-            Subject::Ours(settings) => settings,
+            Subject::Steradian(settings) => settings,
         };
         let Some(accel) = self.accel(settings) else { return Ok(None) };
         let (spp, time_limit) = match budget {

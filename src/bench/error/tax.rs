@@ -57,14 +57,14 @@ pub struct TaxReport {
 /// If there is none.
 pub(super) fn subject(options: &ErrorOptions) -> Result<(&str, &Settings, EmbreeOptions)> {
     let found = options.variants.iter().find_map(|variant| match &variant.subject {
-        Subject::Ours(settings) => match settings.accel {
+        Subject::Steradian(settings) => match settings.accel {
             AccelKind::Embree(embree) => Some((variant.name.as_str(), &**settings, embree)),
             AccelKind::Auto => Some((variant.name.as_str(), &**settings, EmbreeOptions::default())),
             _ => None,
         },
         Subject::External(_) => None,
     });
-    found.ok_or_else(|| Error::Usage("--tax: no variant of ours renders with embree".into()))
+    found.ok_or_else(|| Error::Usage("--tax: no variant rendered by Steradian uses embree".into()))
 }
 
 /// Measures the [`subject`]; `None` if interrupted.

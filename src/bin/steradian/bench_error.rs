@@ -119,8 +119,10 @@ fn variants(arguments: &BenchErrorArgs, desc: &SceneDesc) -> Result<Vec<Variant>
                         ];
                         let parts: Vec<String> = parts.into_iter().flatten().collect();
                         let name = if parts.is_empty() { "steradian".to_owned() } else { parts.join(", ") };
-                        variants
-                            .push(Variant { name, subject: Subject::Ours(Box::new(Settings::new(desc, &overrides)?)) });
+                        variants.push(Variant {
+                            name,
+                            subject: Subject::Steradian(Box::new(Settings::new(desc, &overrides)?)),
+                        });
                     }
                 }
             }
@@ -150,7 +152,7 @@ fn name(value: impl Serialize) -> Option<String> {
 
 /// A reference of another size is found before the first render.
 fn check_size(arguments: &BenchErrorArgs, variants: &[Variant], reference: &Standard) -> Result<()> {
-    let (Standard::File(file, image), Some(Variant { subject: Subject::Ours(settings), .. })) =
+    let (Standard::File(file, image), Some(Variant { subject: Subject::Steradian(settings), .. })) =
         (reference, variants.first())
     else {
         return Ok(());

@@ -54,8 +54,8 @@ impl Imported {
     }
 }
 
-/// Reads a scene file of any kind that its extension names: `.json` (ours, and any other name), `.xml` (Mitsuba 3),
-/// `.pbrt` (pbrt-v4), `.gltf` and `.glb` (glTF 2.0). Files that the scene names are looked up beside it.
+/// Reads a scene file of any kind that its extension names: `.json` (Steradian's, and any other name), `.xml` (Mitsuba
+/// 3), `.pbrt` (pbrt-v4), `.gltf` and `.glb` (glTF 2.0). Files that the scene names are looked up beside it.
 ///
 /// # Errors
 /// [`Error::Missing`](crate::Error::Missing) if it cannot be read, [`Error::Parse`](crate::Error::Parse) or

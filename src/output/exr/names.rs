@@ -51,8 +51,8 @@ pub fn plain_word(word: &str) -> String {
     if plain.starts_with(|c: char| c.is_ascii_digit()) { format!("_{plain}") } else { plain }
 }
 
-/// The channels of the layer `motion` and their description, where a profile's program expects others than ours: in
-/// pixels to the right and up, either from the begin of the shutter interval to its end, or from its middle to its
+/// The channels of the layer `motion` and their description, where a profile's program expects others than the default:
+/// in pixels to the right and up, either from the begin of the shutter interval to its end, or from its middle to its
 /// begin and to its end.
 pub fn motion_channels(profile: ExrProfileDesc) -> Option<(&'static [&'static str], &'static str)> {
     match profile {

@@ -96,6 +96,6 @@ pub fn read_settings(path: &Path) -> Result<serde_json::Value> {
         Some(AttributeValue::Text(settings)) => {
             serde_json::from_slice(settings.as_slice()).map_err(|e| malformed(format!("{SETTINGS}: {e}")))
         }
-        _ => Err(malformed(format!("there is no attribute {SETTINGS}: no render of ours wrote it"))),
+        _ => Err(malformed(format!("there is no attribute {SETTINGS}: Steradian did not write this file"))),
     }
 }

@@ -12,7 +12,7 @@ const BENCH_REPORTS_ABOUT: &str = "\
 Reproduce the comparisons of linear loops, octree, kd-tree and BVH in course reports, and explain the ratios
 
 Three pictures of normals on one thread: a head of 968 triangles (\"120 s linear, 3.5 s octree, 0.5 s Embree\"), a mesh of 1,000 triangles (\"kd-tree \
-about 10 times faster\"), one of 70,000 (\"BVH 17.61 times faster\"). Each is drawn with the accelerators as the reports wrote them, with ours and with \
+about 10 times faster\"), one of 70,000 (\"BVH 17.61 times faster\"). Each is drawn with the accelerators as the reports wrote them, with Steradian's and with \
 Embree. Where every triangle is tested, a smaller picture is timed and its time scaled up, unless --full is given.";
 
 const BENCH_ACCEL_EXAMPLES: &str = "\

@@ -10,7 +10,7 @@ use crate::names;
 pub const ABOUT: &str = "\
 Denoise an EXR file with Intel Open Image Denoise
 
-The colour of any renderer's EXR file is denoised, with the help of its layers of albedo and normals: ours (feature_albedo, feature_normal), else those \
+The colour of any renderer's EXR file is denoised, with the help of its layers of albedo and normals: Steradian's (feature_albedo, feature_normal), else those \
 of Blender (Denoising Albedo, Denoising Normal), pbrt (Albedo, Ns, N), Mitsuba (albedo, sh_normal). They are denoised first. Light groups (light_NAME) \
 that add up to the colour still do so afterwards. All other layers and attributes stay as they are; the colour as it was becomes layer noisy.";
 

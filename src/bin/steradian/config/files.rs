@@ -44,7 +44,7 @@ mod tests {
     #[test]
     fn keys_are_options_and_values_what_they_take() {
         let found = parsed(
-            "# ours\nspp = 64\ntarget_error = 1e-3\nsize = \"64x32\"\ncrop = [1, 2, 3, 4]\noutput = [\"a.exr\", \"b.png\"]\nguiding = true\nfloat = true\n",
+            "# project\nspp = 64\ntarget_error = 1e-3\nsize = \"64x32\"\ncrop = [1, 2, 3, 4]\noutput = [\"a.exr\", \"b.png\"]\nguiding = true\nfloat = true\n",
         );
         let found: Vec<_> =
             found.unwrap().into_iter().map(|s| format!("{}={} {}", s.key, s.values.join(";"), s.origin)).collect();

@@ -102,7 +102,7 @@ impl Triangles {
         let name = format!("TEXCOORD_{set}");
         let reader = PrimitiveReader { source, path, primitive, count: self.count };
         let uvs = reader.column(&name, Semantic::TexCoords(set), &[Type::Vec2], AccessorUse::Floats)?;
-        // Their origin is the upper left corner; ours is the lower left one.
+        // Their origin is the upper left corner; Steradian's is the lower left one.
         let flipped =
             |uvs: Column| self.used.iter().map(|&i| uvs.floats::<2>(i as usize)).map(|[u, v]| [u, 1.0 - v]).collect();
         self.data.uvs = uvs.map(flipped);

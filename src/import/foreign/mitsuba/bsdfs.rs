@@ -17,7 +17,7 @@ use crate::suggestion::did_you_mean;
 pub(crate) struct BsdfBinding {
     /// The material by name.
     pub material: String,
-    /// Whether Mitsuba's is black from behind, and ours not.
+    /// Whether Mitsuba's is black from behind and Steradian's is not.
     pub one_sided: bool,
     /// How much of a surface with it is there.
     pub opacity: Option<OpacityDesc>,
@@ -362,7 +362,7 @@ impl<'a> Reader<'a> {
             );
         }
         let (normal_map, bump_map) = if is_normal_map {
-            // Ours turn with the image, Mitsuba's do not: on v that grows downward green is the other way round.
+            // Steradian's turn with the image, Mitsuba's do not: on v that grows downward green is the other way round.
             let flip_y = match self.draft.desc.textures.get(&texture) {
                 Some(TextureDesc::Image { scale, rotation_degrees, .. }) => {
                     if *rotation_degrees != 0.0 || scale[0] < 0.0 {

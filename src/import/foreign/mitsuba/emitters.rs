@@ -242,7 +242,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Turns Mitsuba's environment, whose first column is -Z, into ours, whose middle is.
+/// Turns Mitsuba's environment, whose first column is -Z, into Steradian's, whose middle is.
 fn rotation(element: &mut Element, map: &DAffine3) -> Option<TransformDesc> {
     let m = map.matrix3;
     let x = m.x_axis.normalize_or(DVec3::X);

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::import::foreign::draft::SOBOL_FOR_INDEPENDENT;
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// Mitsuba's camera looks along +Z with +X to the left of the picture; this turns ours into it.
+/// Mitsuba's camera looks along +Z with +X to the left of the picture; this turns Steradian's camera into it.
 const HALF_TURN: DMat3 = DMat3 { x_axis: DVec3::NEG_X, y_axis: DVec3::Y, z_axis: DVec3::NEG_Z };
 
 /// The lens of a `thinlens`; `None` if it is a pinhole.

@@ -49,7 +49,7 @@ const MIRROR: DAffine3 =
     DAffine3 { matrix3: DMat3 { x_axis: DVec3::X, y_axis: DVec3::NEG_Y, z_axis: DVec3::Z }, translation: DVec3::Y };
 
 impl UvOrigin {
-    /// Mitsuba's uv from ours.
+    /// Mitsuba's uv from Steradian's.
     fn to_mitsuba(self) -> DAffine3 {
         match self {
             Self::Mitsuba => DAffine3::IDENTITY,

@@ -70,10 +70,10 @@ pub fn shutter(params: Option<&Params>) -> Result<[f64; 2]> {
 /// From the space of our camera to that of pbrt's, x to the right, y up, z forward.
 fn pbrt_from_ours(kind: &str) -> DMat3 {
     if kind == "spherical" {
-        // Columns begin at pbrt's x axis and turn towards z; ours begin at z and turn towards -x.
+        // Columns begin at pbrt's x axis and turn towards z; Steradian's begin at z and turn towards -x.
         DMat3::from_rotation_y(std::f64::consts::FRAC_PI_2)
     } else {
-        // Ours looks backward along z.
+        // Steradian's camera looks backward along z.
         DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0))
     }
 }
@@ -142,7 +142,7 @@ fn set_projection(
     Ok(())
 }
 
-/// Sets the camera; the result is the map from its world to ours.
+/// Sets the camera; the result is the map from its world to Steradian's.
 pub fn set_camera(draft: &mut Draft, directive: &CameraDirective, size: [u32; 2], times: Times) -> Result<World> {
     let params = &directive.params;
     let Some(world_from_camera) = directive.camera_from_world.inverse() else {

@@ -14,7 +14,7 @@ use crate::math::{DMat3, DVec3};
 pub struct Lights<'a> {
     /// How colours are read.
     pub colors: Colors<'a>,
-    /// How the world becomes ours.
+    /// The map from pbrt's world to Steradian's.
     pub world: World,
     /// The film's.
     pub exposure: f64,

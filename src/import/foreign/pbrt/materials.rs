@@ -144,7 +144,7 @@ impl Materials<'_> {
         })))
     }
 
-    /// What pbrt's walk through layers has and ours has not.
+    /// What pbrt's walk through layers has and Steradian's lacks.
     fn note_layers(&mut self, params: &Params) {
         self.draft.approximated(
             &params.place,

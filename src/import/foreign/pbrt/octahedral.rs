@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn lat_long_keeps_directions() {
-        // One bright quarter: x and y above 0 and z above 0, which is ours x > 0, z < 0 and y > 0.
+        // One bright quarter: x and y above 0 and z above 0, which in Steradian is x > 0, z < 0 and y > 0.
         let n = 64;
         let color = |d: DVec3| if d.min_element() > 0.0 { [1.0; 3] } else { [0.0; 3] };
         let at =

@@ -29,7 +29,7 @@ pub struct Shapes<'a> {
     pub textures: &'a Textures,
     /// How colours are read.
     pub colors: Colors<'a>,
-    /// How the world becomes ours; not mirrored within an object.
+    /// The map from pbrt's world to Steradian's; not mirrored within an object.
     pub world: World,
     /// The scene file.
     pub scene: &'a Path,
@@ -39,7 +39,7 @@ pub struct Shapes<'a> {
 
 /// A shape's form.
 enum Form {
-    /// A shape of ours, after a transform of its own; pbrt turns its normals inside out where the transform mirrors.
+    /// A Steradian shape, after a transform of its own; pbrt turns its normals inside out where the transform mirrors.
     Analytic { shape: Box<ShapeDesc>, inner: DAffine3, area: f64 },
     /// Triangles, and as how many shapes pbrt counts them.
     Mesh(MeshData, usize),

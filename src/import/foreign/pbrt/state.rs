@@ -108,10 +108,11 @@ impl Graphics {
     }
 }
 
-/// How the world is turned into ours.
+/// The map from pbrt's world to Steradian's.
 ///
-/// pbrt's camera space is left-handed (x right, y up, z forward), ours right-handed (z backward). Where the camera's
-/// transform has no mirror in it, the world is left-handed too and all of it is mirrored: pictures stay the same.
+/// pbrt's camera space is left-handed (x right, y up, z forward), Steradian's right-handed (z backward). Where the
+/// camera's transform has no mirror in it, the world is left-handed too and all of it is mirrored: pictures stay the
+/// same.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct World {
     /// Whether x is negated.

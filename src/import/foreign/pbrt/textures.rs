@@ -245,7 +245,7 @@ fn checkerboard(draft: &mut Draft, name: &str, params: &Params, first: &Texture,
             params.ignore(key, "a checkerboard begins at the origin of uv");
         }
     }
-    // A square of pbrt's is one unit wide, ours half a repetition.
+    // A square of pbrt's is one unit wide, Steradian's half a repetition.
     let scale = [0.5 * params.number_or("uscale", 1.0)? as f32, 0.5 * params.number_or("vscale", 1.0)? as f32];
     let name = draft.add_texture(name, &params.place, TextureDesc::Checker { color0, color1, scale });
     Ok(Texture::Named { name, factor: [1.0; 3] })

@@ -102,7 +102,7 @@ impl Builder<'_, '_> {
         }
         let across = self.inputs.share(roughness).powi(2).max(0.001);
         let along = across + (1.0 - across) * strength * strength;
-        // Ours: alpha over an aspect along u, times it across, with aspect² = 1 - 0.9 anisotropic.
+        // Steradian's: alpha over an aspect along u, times it across, with aspect² = 1 - 0.9 anisotropic.
         let anisotropic = ((1.0 - across / along) / 0.9).min(1.0);
         desc.anisotropic = ScalarDesc::Constant(anisotropic);
         let is_constant = matches!(desc.roughness, ScalarDesc::Constant(_));
