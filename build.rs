@@ -100,8 +100,13 @@ fn bind(arguments: &[&str]) -> Result<(), String> {
         .header("ffi/wrapper.h")
         .clang_args(arguments)
         .allowlist_function("st_.*|rtc(New|Release)(Device|Scene|Geometry)|rtc(Get|Set)Device.*")
-        .allowlist_function("rtcSet(SharedGeometryBuffer|Geometry(InstancedScene|Transform|TimeStepCount|BuildQuality|UserPrimitiveCount))")
-        .allowlist_function("rtcSetScene(Flags|BuildQuality)|rtcCommit(Geometry|Scene)|rtcAttachGeometryByID|rtcGetSceneBounds")
+        .allowlist_function(
+            "rtcSet(SharedGeometryBuffer|Geometry(InstancedScene|Transform|TimeStepCount|BuildQuality|\
+             UserPrimitiveCount))",
+        )
+        .allowlist_function(
+            "rtcSetScene(Flags|BuildQuality)|rtcCommit(Geometry|Scene)|rtcAttachGeometryByID|rtcGetSceneBounds",
+        )
         .allowlist_var("RTC_VERSION_MAJOR")
         .prepend_enum_name(false)
         .generate_comments(false)

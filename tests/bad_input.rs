@@ -487,7 +487,8 @@ fn assets_that_are_malformed() {
     let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     folder.write("bad.mtl", "newmtl m\nKd 1 2 3\n");
     folder.write("short.mtl", "newmtl m\nKd 1 2\n");
-    let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+    let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                  element face 1\n\
                   property list uchar int vertex_indices\nend_header\n";
     let files: &[(&str, String, &str)] = &[
         ("a.obj", format!("{vertices}f 1 2 4\n"), "line 4: a face refers to vertex 4"),

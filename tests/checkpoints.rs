@@ -25,7 +25,8 @@ pub fn scene(filter: &str) -> Value {
         "sampler": { "spp": 24 },
         "integrator": { "type": "path", "max_depth": 5 },
         "materials": {
-            "grey": { "type": "diffuse" }, "glass": { "type": "dielectric" }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
+            "grey": { "type": "diffuse" }, "glass": { "type": "dielectric" },
+            "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
         },
         "shapes": [
             { "type": "quad", "material": "grey", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
@@ -384,7 +385,8 @@ fn a_checkpoint_that_cannot_be_written_is_reported_and_ends_nothing() {
 
 // What follows runs the program.
 
-const SLOW: &str = "render scene.json --checkpoint a.state --threads 2 --spp 64 --size 96x72 --layers Z,N,albedo,variance,samples --float -q -o a.exr";
+const SLOW: &str = "render scene.json --checkpoint a.state --threads 2 --spp 64 --size 96x72 --layers \
+                    Z,N,albedo,variance,samples --float -q -o a.exr";
 
 fn command(folder: &Path, line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_steradian"));

@@ -52,7 +52,10 @@ fn room(spp: u32, layers: &[&str]) -> Value {
     let cube = |size: f64, x: f64, z: f64, degrees: f64, material: &str| {
         json!({
             "type": "cube", "material": material,
-            "transform": [{ "scale": [0.3, size, 0.3] }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } }, { "translate": [x, size, z] }]
+            "transform": [
+                { "scale": [0.3, size, 0.3] }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } },
+                { "translate": [x, size, z] }
+            ]
         })
     };
     json!({
@@ -236,7 +239,9 @@ fn mirror(spp: u32, strategy: &str) -> Value {
                 "mirror": { "type": "mirror", "reflectance": 0.9 },
                 "tiles": { "type": "diffuse", "albedo": { "texture": "tiles" } }
             },
-            "textures": { "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0.25, 0.25, 0.25], "scale": [8, 8] } }
+            "textures": {
+                "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0.25, 0.25, 0.25], "scale": [8, 8] }
+            }
         }),
     );
     let shapes = scene["shapes"].as_array_mut().unwrap();
@@ -246,8 +251,10 @@ fn mirror(spp: u32, strategy: &str) -> Value {
         json!({ "type": "quad", "origin": [1, 0, 1], "edge_u": [-2, 0, 0], "edge_v": [0, 2, 0], "material": "tiles" }),
         json!({ "type": "quad", "origin": [-1, 0, 1], "edge_u": [2, 0, 0], "edge_v": [0, 0, -2], "material": "white" }),
         json!({ "type": "quad", "origin": [-1, 0, 1], "edge_u": [0, 0, -2], "edge_v": [0, 2, 0], "material": "red" }),
-        json!({ "type": "quad", "origin": [-0.4, 1.98, -0.4], "edge_u": [0.8, 0, 0], "edge_v": [0, 0, 0.4], "material": "white",
-                "emission": { "radiance": [10, 10, 10] } }),
+        json!({
+            "type": "quad", "origin": [-0.4, 1.98, -0.4], "edge_u": [0.8, 0, 0], "edge_v": [0, 0, 0.4],
+            "material": "white", "emission": { "radiance": [10, 10, 10] }
+        }),
     ]);
     scene
 }

@@ -57,7 +57,8 @@ fn folder() -> tempfile::TempDir {
     );
     write(
         "s.pbrt",
-        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8\nWorldBegin\nInclude \"part.pbrt\"\nShape \"sphere\"\n",
+        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8\nWorldBegin\nInclude \"part.pbrt\"\n\
+         Shape \"sphere\"\n",
     );
     write("part.pbrt", "LightSource \"infinite\" \"string filename\" \"sky.exr\"\n");
     for name in ["studio.exr", "sky.exr", "noisy.exr", "ref.exr"] {

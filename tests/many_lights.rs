@@ -26,9 +26,15 @@ fn room() -> Value {
         shapes.push(json!({
             "type": kinds[i % 5], "material": "black",
             "emission": { "radiance": [5.0 * power, 4.0 * power, 6.0 * power], "two_sided": i % 2 == 0 },
-            "transform": [{ "scale": rng.range(0.02, 0.1) }, { "rotate": { "axis": [1, 2, 3], "degrees": degrees } }, { "translate": place }]
+            "transform": [
+                { "scale": rng.range(0.02, 0.1) }, { "rotate": { "axis": [1, 2, 3], "degrees": degrees } },
+                { "translate": place }
+            ]
         }));
-        let spot = json!({ "type": "spot", "position": place, "look_at": [0, 0, 0], "intensity": [0.1, 0.1, 0.1], "cutoff_angle_degrees": 10.0 + degrees / 5.0 });
+        let spot = json!({
+            "type": "spot", "position": place, "look_at": [0, 0, 0], "intensity": [0.1, 0.1, 0.1],
+            "cutoff_angle_degrees": 10.0 + degrees / 5.0
+        });
         let point = json!({ "type": "point", "position": place, "intensity": [0.02, 0.03, 0.02] });
         lights.extend(if i % 3 == 0 { Some(spot) } else { (i % 3 == 1).then_some(point) });
     }
@@ -39,7 +45,8 @@ fn room() -> Value {
         "integrator": { "type": "path", "max_depth": 4 },
         "materials": {
             "grey": { "type": "diffuse", "albedo": 0.6 }, "black": { "type": "diffuse", "albedo": 0 },
-            "metal": { "type": "conductor", "metal": "silver", "alpha": 0.3 }, "glass": { "type": "dielectric", "alpha": 0.3 }
+            "metal": { "type": "conductor", "metal": "silver", "alpha": 0.3 },
+            "glass": { "type": "dielectric", "alpha": 0.3 }
         },
         "shapes": shapes,
         "lights": lights

@@ -24,7 +24,10 @@ fn assert_close(found: [f64; 3], expected: [f64; 3], tolerance: f64, what: &str)
 
 /// A block with its lower and upper z, 4 wide.
 fn block(material: &str, z: [f64; 2]) -> Value {
-    json!({ "type": "cube", "material": material, "transform": [{ "scale": [2, 2, 0.5 * (z[1] - z[0])] }, { "translate": [0, 0, 0.5 * (z[0] + z[1])] }] })
+    json!({
+        "type": "cube", "material": material,
+        "transform": [{ "scale": [2, 2, 0.5 * (z[1] - z[0])] }, { "translate": [0, 0, 0.5 * (z[0] + z[1])] }]
+    })
 }
 
 /// A white sky seen through blocks along -z from `z`, along the axis or not.
@@ -157,8 +160,13 @@ fn balls(materials: Value, balls: Value) -> Value {
     });
     merge(&mut scene["materials"], materials);
     let mut shapes = vec![
-        json!({ "type": "quad", "origin": [-3, -3, -4], "edge_u": [3, 0, 0], "edge_v": [0, 6, 0], "emission": { "radiance": [3, 1, 0.2] }, "material": "black" }),
-        json!({ "type": "quad", "origin": [-3, -1.2, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -7], "material": "white" }),
+        json!({
+            "type": "quad", "origin": [-3, -3, -4], "edge_u": [3, 0, 0], "edge_v": [0, 6, 0],
+            "emission": { "radiance": [3, 1, 0.2] }, "material": "black"
+        }),
+        json!({
+            "type": "quad", "origin": [-3, -1.2, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -7], "material": "white"
+        }),
     ];
     shapes.extend(balls.as_array().unwrap().iter().cloned());
     scene["shapes"] = json!(shapes);
@@ -212,7 +220,12 @@ fn overlapping_media_look_like_boundaries_modelled_one_by_one() {
 
 #[test]
 fn clear_nested_media_vanish_in_a_white_environment() {
-    let sphere = |material: &str, radius: f64, x: f64, reverse: bool| json!({ "type": "sphere", "radius": radius, "material": material, "reverse_normal": reverse, "transform": [{ "translate": [x, 0, 0] }] });
+    let sphere = |material: &str, radius: f64, x: f64, reverse: bool| {
+        json!({
+            "type": "sphere", "radius": radius, "material": material, "reverse_normal": reverse,
+            "transform": [{ "translate": [x, 0, 0] }]
+        })
+    };
     let mut scene = json!({
         "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
         "camera": { "position": [0, 0, 6], "look_at": [0, 0, 0], "vertical_fov_degrees": 18 },
@@ -264,7 +277,10 @@ fn light_within_a_medium_is_absorbed_on_its_way_to_and_from_a_surface() {
                 "paper": { "type": "diffuse_transmission", "reflectance": 0.25, "transmittance": 0.75 }
             },
             "shapes": [
-                { "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] },
+                {
+                    "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0],
+                    "edge_v": [0, 0, -18]
+                },
                 { "type": "sphere", "radius": 50, "material": "m" }
             ],
             "lights": [{ "type": "point", "position": [0, 1, 0], "intensity": [1, 1, 1] }]
@@ -301,10 +317,19 @@ fn a_lamp_in_a_medium_is_as_bright_by_every_strategy() {
             json!({
                 "sampler": { "spp": 256 },
                 "integrator": { "type": "path", "max_depth": 2, "strategy": strategy },
-                "materials": { "white": { "type": "diffuse", "albedo": 1 }, "black": { "type": "diffuse", "albedo": 0 }, "m": medium },
+                "materials": {
+                    "white": { "type": "diffuse", "albedo": 1 }, "black": { "type": "diffuse", "albedo": 0 },
+                    "m": medium
+                },
                 "shapes": [
-                    { "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] },
-                    { "type": "sphere", "radius": 0.02, "material": "black", "emission": { "radiance": [1e4, 1e4, 1e4] }, "transform": [{ "translate": [0, 2, 0] }] },
+                    {
+                        "type": "quad", "material": "white", "origin": [-9, 0, 9], "edge_u": [18, 0, 0],
+                        "edge_v": [0, 0, -18]
+                    },
+                    {
+                        "type": "sphere", "radius": 0.02, "material": "black",
+                        "emission": { "radiance": [1e4, 1e4, 1e4] }, "transform": [{ "translate": [0, 2, 0] }]
+                    },
                     { "type": "sphere", "radius": 50, "material": "m" }
                 ]
             }),
@@ -412,7 +437,10 @@ fn a_prism_parts_colours_by_snells_law() {
             [0.0; 3],
             json!({
                 "integrator": { "type": "path", "max_depth": 3 },
-                "materials": { "black": { "type": "diffuse", "albedo": 0 }, "prism": { "type": "dielectric", "ior": ior, "abbe": abbe } }
+                "materials": {
+                    "black": { "type": "diffuse", "albedo": 0 },
+                    "prism": { "type": "dielectric", "ior": ior, "abbe": abbe }
+                }
             }),
         );
         scene["shapes"] = json!([lamp, wedge]);

@@ -209,7 +209,9 @@ fn the_program_splits_and_merges() {
     let folder = folder.path();
     let mut scene = scene("mitchell");
     let layers = ["Z", "N", "albedo", "variance", "samples", "light_groups", "diffuse_direct"];
-    scene["outputs"] = serde_json::json!([{ "file": "x.exr", "layers": layers, "pixel_type": "float" }, { "file": "x.png", "exposure": 1 }]);
+    scene["outputs"] = serde_json::json!([
+        { "file": "x.exr", "layers": layers, "pixel_type": "float" }, { "file": "x.png", "exposure": 1 }
+    ]);
     std::fs::write(folder.join("scene.json"), scene.to_string()).unwrap();
     assert_code(&run(folder, "render scene.json -q"), 0, "");
     for shard in 1..=3 {

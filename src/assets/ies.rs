@@ -106,7 +106,8 @@ fn parse(text: &str) -> Result<IesData, String> {
 
     if tilt != "INCLUDE" && tilt != "NONE" {
         return Err(format!(
-            "TILT={tilt}: data of the tilt cannot be read from a file of its own; give TILT=NONE, or TILT=INCLUDE and the data"
+            "TILT={tilt}: data of the tilt cannot be read from a file of its own; give TILT=NONE, or TILT=INCLUDE and \
+             the data"
         ));
     }
     // How the lamp's output depends on the luminaire's tilt; at rest the factor is 1.
@@ -159,7 +160,8 @@ fn parse(text: &str) -> Result<IesData, String> {
 mod tests {
     use super::*;
 
-    const SMALL: &str = "IESNA:LM-63-2002\n[TEST] none\n[MANUFAC] Steradian\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n\
+    const SMALL: &str = "IESNA:LM-63-2002\n[TEST] none\n[MANUFAC] Steradian\nTILT=NONE\n\
+                         1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n\
                          0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10, 6, 0\n";
 
     #[test]

@@ -158,7 +158,8 @@ fn compile_lens(files: &CompileContext, desc: &LensDesc, camera: &Transform, hal
     // Any two of focal length, sensor distance and focus distance give the third.
     let (focal_length, focus_distance) = match (focal_length, sensor, focus) {
         (Some(_), Some(_), Some(_)) => {
-            let message = "`focal_length`, the sensor and the focus are one too many: two of them give the third by the lens equation";
+            let message = "`focal_length`, the sensor and the focus are one too many: two of them give the third by \
+                           the lens equation";
             return Err(files.error("camera.lens", message));
         }
         (Some(f), Some(a), None) => {

@@ -260,7 +260,8 @@ impl Compiler<'_> {
         }
         let (RangedInput::Constant(ior), [ScalarInput::Constant(u), ScalarInput::Constant(v)]) = (ior, alpha.axes)
         else {
-            let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come from textures";
+            let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come \
+                           from textures";
             return Err(self.files.error(path, message));
         };
         if u != v {
@@ -321,7 +322,8 @@ impl Compiler<'_> {
             && (x + y).max_channel() > 1.0 + 1e-6
         {
             let message = format!(
-                "`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it receives"
+                "`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it \
+                 receives"
             );
             return Err(self.files.error(path, message));
         }

@@ -68,7 +68,9 @@ fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeS
             for (i, file) in desc.deform_files.iter().enumerate() {
                 let place = format!("{path}.deform_files[{i}]");
                 let later = load_file(files, &place, file, desc.material.is_none(), &BTreeSet::new())?;
-                if later.len() != meshes.len() || meshes.iter().zip(&later).any(|(a, b)| a.data.triangles != b.data.triangles) {
+                if later.len() != meshes.len()
+                    || meshes.iter().zip(&later).any(|(a, b)| a.data.triangles != b.data.triangles)
+                {
                     return Err(files.error(&place, "the triangles are not those of `file`: only positions may differ"));
                 }
                 for (mesh, later) in meshes.iter_mut().zip(later) {
@@ -96,7 +98,8 @@ fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeS
         }
         _ => Err(files.error(
             path,
-            "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs`, `colors` and `attributes`)",
+            "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs`, `colors` and \
+             `attributes`)",
         )),
     }
 }
@@ -329,8 +332,8 @@ impl Faces {
         if dropped > 0 {
             let file = files.source.file.display();
             tracing::warn!(
-                "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped (for both sides: \
-                 emission.two_sided)"
+                "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped \
+                 (for both sides: emission.two_sided)"
             );
         }
     }

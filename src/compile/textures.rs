@@ -121,7 +121,8 @@ impl TextureTable {
         let id = self.find(files, path, name, texture_use)?;
         if !self.get(id).attributes().is_empty() {
             let message = format!(
-                "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and emission of shapes can"
+                "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and \
+                 emission of shapes can"
             );
             return Err(files.error(path, message));
         }

@@ -128,7 +128,8 @@ pub fn open_first<T>(
         looked.push("in Python's packages, of which there are none".to_owned());
     }
     let message = format!(
-        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` installs it, and --oidn-library or {VARIABLE} name its file or folder; looked {}",
+        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` installs it, and --oidn-library or \
+         {VARIABLE} name its file or folder; looked {}",
         looked.join(", ")
     );
     Err(Error::Missing { file: FILE_NAME.into(), message })

@@ -289,7 +289,8 @@ mod tests {
             [check_memory(&path, &headers, 0).unwrap_err(), allocate(&path, &headers[1], 1, 0.0f32).unwrap_err()]
         {
             assert!(
-                matches!(&error, Error::Malformed { message, .. } if message.contains("32768 x 32769 pixels are too many")),
+                matches!(&error, Error::Malformed { message, .. } if message.contains("32768 x 32769 pixels are too \
+                                                                                       many")),
                 "{error}"
             );
         }

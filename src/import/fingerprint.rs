@@ -153,9 +153,10 @@ mod tests {
         std::fs::remove_file(folder.path().join("m/a.obj")).unwrap();
         let imported = read_scene(&folder.path().join("scene.json"), &ImportOptions::default()).unwrap();
         let error = scene_fingerprint(&imported, &folder.path().join("scene.json")).unwrap_err();
-        assert!(
-            matches!(&error, Error::Missing { file, message } if file.ends_with("m/a.obj") && message.contains("shapes[0].file"))
-        );
+        assert!(matches!(
+            &error,
+            Error::Missing { file, message } if file.ends_with("m/a.obj") && message.contains("shapes[0].file")
+        ));
     }
 
     #[test]

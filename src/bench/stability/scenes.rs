@@ -36,7 +36,8 @@ pub fn all(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)
 }
 
 /// Why bounds on Embree's distances are weaker on some processors.
-pub const INEXACT_RECIPROCALS: &str = "on a processor without AVX-512, Embree divides by refined estimates of reciprocals: distances to triangles may be 2^-22 off";
+pub const INEXACT_RECIPROCALS: &str = "on a processor without AVX-512, Embree divides by refined estimates of \
+                                       reciprocals: distances to triangles may be 2^-22 off";
 
 /// The relative error of an accelerator's distances to triangles, from [`all`].
 pub fn distance_error(name: &str) -> f32 {

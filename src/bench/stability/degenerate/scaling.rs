@@ -32,8 +32,14 @@ fn scene(s: f64, offset: [f64; 3]) -> Value {
             "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
         },
         "shapes": [
-            { "type": "quad", "material": "grey", "origin": at([-4.0, 0.0, 4.0]), "edge_u": along([8.0, 0.0, 0.0]), "edge_v": along([0.0, 0.0, -8.0]) },
-            { "type": "sphere", "material": "glass", "radius": 0.5 * s, "transform": [{ "translate": at([-0.7, 0.5, 0.3]) }] },
+            {
+                "type": "quad", "material": "grey", "origin": at([-4.0, 0.0, 4.0]), "edge_u": along([8.0, 0.0, 0.0]),
+                "edge_v": along([0.0, 0.0, -8.0])
+            },
+            {
+                "type": "sphere", "material": "glass", "radius": 0.5 * s,
+                "transform": [{ "translate": at([-0.7, 0.5, 0.3]) }]
+            },
             { "type": "cone", "material": "grey", "radius": 0.4 * s, "height": 0.9 * s,
               "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": -90 } }, { "translate": at([0.2, 0.0, -0.9]) }] },
             { "type": "mesh", "material": "grey", "triangles": [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],

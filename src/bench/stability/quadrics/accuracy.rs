@@ -13,8 +13,10 @@ use crate::math::{Bounds, DMat3, DVec3, Ray, Transform, Vec3};
 const DISTANCES: [f64; 7] = [3.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 const SCALES: [f64; 7] = [1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6];
 
-const EMBREE_BOXES: &str = "Embree tests boxes of user geometry with an error of half a unit in the last place of the ray's origin; \
-    boxes are padded by a unit in the last place of their own bounds, so rays from afar are lost where they pass the edge of a box more closely than that; the catalogue requires none";
+const EMBREE_BOXES: &str = "Embree tests boxes of user geometry with an error of half a unit in the last place of the \
+                            ray's origin; boxes are padded by a unit in the last place of their own bounds, so rays \
+                            from afar are lost where they pass the edge of a box more closely than that; the catalogue \
+                            requires none";
 
 /// How a ray is made.
 #[derive(Clone, Copy)]

@@ -140,8 +140,8 @@ pub(super) fn i3_white_furnace(effort: Effort) -> Outcome {
         .record(format!("largest distance from 1 with tabulated energies ({})", tabulated.1), tabulated.0)
         .record(format!("radiance of the darkest that is not compensated ({})", lossy.1), lossy.0)
         .short(
-            "1 ± 4 standard errors is asked of all compensated materials: energies of rough surfaces come from tables, with the slack that \
-             docs/materials.md states (plastic 0.2 %, coats 0.5 %, metal 1 %, glass 3 %); anisotropic glass, principled, phong and cook_torrance \
-             are not compensated, and only must not gain",
+            "1 ± 4 standard errors is asked of all compensated materials: energies of rough surfaces come from tables, \
+             with the slack that docs/materials.md states (plastic 0.2 %, coats 0.5 %, metal 1 %, glass 3 %); \
+             anisotropic glass, principled, phong and cook_torrance are not compensated, and only must not gain",
         )
 }

@@ -51,8 +51,10 @@ Examples:
   steradian info scene.json                        What is in the scene
   steradian compare reference.exr test.exr         How far two pictures differ
 
-Exit codes: 0 done, 1 internal failure, 2 wrong usage, 3 scene invalid, 4 file missing, 5 output not writable, 6 checkpoint or
-shard does not match, 33 out of memory, 130 interrupted and 143 terminated (with checkpoint and picture so far written).";
+Exit codes: 0 done, 1 internal failure, 2 wrong usage, 3 scene invalid, 4 file missing, 5 output not writable, 6 \
+checkpoint or
+shard does not match, 33 out of memory, 130 interrupted and 143 terminated (with checkpoint and picture so far \
+written).";
 
 const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -438,8 +440,10 @@ mod tests {
 
     #[test]
     fn every_option_reaches_the_overrides() {
-        let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path --accel linear \
-                    --sampler independent --max-depth 3 --strategy light --clamp 2.5 --regularize 0.2 --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic --no-depth-of-field --transparent -vv";
+        let line = "-o a.exr -o b.png --spp 5 --size 20x10 --crop 1,2,3,4 --threads 2 --seed 9 --integrator path \
+                    --accel linear --sampler independent --max-depth 3 --strategy light --clamp 2.5 --regularize 0.2 \
+                    --guiding on --time-limit 1.5 --layers Z,albedo --float --exposure -1.5 --view filmic \
+                    --no-depth-of-field --transparent -vv";
         let arguments = render(&line.split_whitespace().collect::<Vec<_>>()).unwrap();
         let o = arguments.overrides(vec!["d.exr".to_owned()]);
         assert_eq!(

@@ -26,7 +26,11 @@ fn backs_are_black_unless_both_sides_are_wanted() {
             _ => None,
         }
     };
-    let is_black = |m: Option<MaterialDesc>| matches!(m, Some(MaterialDesc::Diffuse { albedo: ColorDesc::Grey(v), .. }) if v == 0.0);
+    let is_black = |m: Option<MaterialDesc>| {
+        matches!(
+            m, Some(MaterialDesc::Diffuse { albedo: ColorDesc::Grey(v), .. }) if v == 0.0
+        )
+    };
     for kind in ["diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "principled"] {
         assert!(is_black(back(&format!("<bsdf type=\"{kind}\"/>"))), "{kind}");
         assert!(back(&format!("<bsdf type=\"twosided\"><bsdf type=\"{kind}\"/></bsdf>")).is_none(), "{kind}");
@@ -173,16 +177,22 @@ fn attributes_of_meshes_are_colours_of_vertices() {
     };
     let shape = |bsdf: &str| format!(r#"<shape type="ply"><string name="filename" value="m.ply"/>{bsdf}</shape>"#);
     let desc = scene(&shape(&attribute("vertex_color", "")));
-    let is_attribute = |desc: &SceneDesc, expected: &str, factor: f32| matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::MeshAttribute { name, scale }] if name == expected && *scale == factor);
+    let is_attribute = |desc: &SceneDesc, expected: &str, factor: f32| {
+        matches!(
+            desc.textures.values().collect::<Vec<_>>()[..],
+            [TextureDesc::MeshAttribute { name, scale }] if name == expected && *scale == factor
+        )
+    };
     assert!(is_attribute(&desc, "vertex_color", 1.0));
     let scaled = scene(&shape(&attribute("vertex_color", r#"<float name="scale" value="0.5"/>"#)));
     assert!(is_attribute(&scaled, "vertex_color", 0.5));
     assert!(is_attribute(&scene(&shape(&attribute("face_temp", ""))), "face_temp", 1.0));
     assert!(message(&shape(&attribute("temp", ""))).contains("vertex_ or face_"));
     let hole = r#"<bsdf type="mask"><texture type="mesh_attribute" name="opacity"><string name="name" value="vertex_a"/></texture><bsdf type="diffuse"/></bsdf>"#;
-    assert!(
-        matches!(scene(&shape(hole)).shapes[0].common().opacity, Some(OpacityDesc::Texture { texture, .. }) if texture == "vertex_a")
-    );
+    assert!(matches!(
+        scene(&shape(hole)).shapes[0].common().opacity,
+        Some(OpacityDesc::Texture { texture, .. }) if texture == "vertex_a"
+    ));
     let light = r#"<emitter type="area"><texture type="mesh_attribute" name="radiance"><string name="name" value="vertex_color"/></texture></emitter>"#;
     assert_eq!(scene(&shape(light)).shapes[0].common().emission.unwrap().texture.as_deref(), Some("vertex_color"));
     assert!(notes(&shape(light)).is_empty());
@@ -266,7 +276,11 @@ fn parts_and_textures_may_be_references() {
     );
     let nested =
         |bsdf: &str| scene(&format!("{shared}<shape type=\"sphere\"><bsdf type=\"twosided\">{bsdf}</bsdf></shape>"));
-    let is_red = |desc: &SceneDesc, name: &str| matches!(&desc.materials[name], MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(c), .. } if *c == [1.0, 0.0, 0.0]);
+    let is_red = |desc: &SceneDesc, name: &str| {
+        matches!(
+            &desc.materials[name], MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(c), .. } if *c == [1.0, 0.0, 0.0]
+        )
+    };
     for (bsdf, texture) in [("normalmap", "normalmap"), ("bumpmap", "arbitrary")] {
         for part in
             ["<ref id=\"d\"/>", "<ref name=\"bsdf\" id=\"d\"/>", "<bsdf type=\"twosided\"><ref id=\"d\"/></bsdf>"]

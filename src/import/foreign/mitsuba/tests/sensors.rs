@@ -98,7 +98,8 @@ fn thin_lenses_and_shifts() {
 fn films_and_filters() {
     let film = |inside: &str| {
         let text = format!(
-            "<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\">{inside}</film></sensor></scene>"
+            "<scene version=\"3.0.0\"><sensor type=\"perspective\">\
+             <film type=\"hdrfilm\">{inside}</film></sensor></scene>"
         );
         read_with(&text, &[], &[]).unwrap().desc
     };

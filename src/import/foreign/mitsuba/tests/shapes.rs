@@ -84,7 +84,8 @@ fn one_texture_on_different_shapes_becomes_two() {
 
 #[test]
 fn meshes_without_uv_have_barycentric_ones_where_textures_need_them() {
-    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+               element face 1\n\
                property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
     let obj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
     let read = |file: &str, color: &str, text: &str| {

@@ -99,11 +99,13 @@ fn mistakes_have_a_place_and_a_suggestion() {
             "did you mean <translate>?",
         ),
         (
-            "\n<shape type=\"sphere\"><bsdf type=\"roughdielectric\"><string name=\"int_ior\" value=\"dimond\"/></bsdf></shape>",
+            "\n<shape type=\"sphere\"><bsdf type=\"roughdielectric\">\
+             <string name=\"int_ior\" value=\"dimond\"/></bsdf></shape>",
             "did you mean \"diamond\"?",
         ),
         (
-            "\n<shape type=\"sphere\"><bsdf type=\"conductor\"><string name=\"material\" value=\"Agg\"/></bsdf></shape>",
+            "\n<shape type=\"sphere\"><bsdf type=\"conductor\">\
+             <string name=\"material\" value=\"Agg\"/></bsdf></shape>",
             "no material named \"Agg\"",
         ),
         ("\n<shape type=\"sphere\">text</shape>", "s.xml:3:22: text outside of elements"),
@@ -129,7 +131,8 @@ fn what_refers_to_itself_is_an_error() {
     let mut doubled = "<bsdf type=\"diffuse\" id=\"b0\"/><shape type=\"disk\"><ref id=\"b60\"/></shape>".to_owned();
     for i in 1..=60 {
         doubled += &format!(
-            "<bsdf type=\"blendbsdf\" id=\"b{i}\"><float name=\"weight\" value=\"0.5\"/><ref id=\"b{0}\"/><ref id=\"b{0}\"/></bsdf>",
+            "<bsdf type=\"blendbsdf\" id=\"b{i}\"><float name=\"weight\" value=\"0.5\"/><ref id=\"b{0}\"/>\
+             <ref id=\"b{0}\"/></bsdf>",
             i - 1
         );
     }
