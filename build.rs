@@ -1,5 +1,5 @@
-//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name. On docs.rs, which has neither Embree nor
-//! libclang, checked-in bindings serve.
+//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name. On docs.rs, which has
+//! neither Embree nor libclang, checked-in bindings serve.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -59,7 +59,8 @@ fn build() -> Result<(), String> {
     Ok(())
 }
 
-/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3, without the checks of layouts.
+/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3, without
+/// the checks of layouts.
 fn use_checked_in_bindings() -> Result<(), String> {
     let file = "ffi/embree_docs.rs";
     std::fs::copy(file, bindings_file()?).map(drop).map_err(|error| format!("cannot copy {file}: {error}"))

@@ -78,7 +78,8 @@ fn colours_of_vertices_and_uv_that_a_file_lacks_are_converted() {
 fn files_that_nothing_uses_need_not_be_there() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.json");
-    let scene = r#"{ "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] }, "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+    let scene = r#"{ "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] },
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
         "shapes": [{ "type": "sphere" }], "textures": { "t": { "type": "image", "file": "gone.png" } },
         "objects": { "o": { "shapes": [{ "type": "mesh", "file": "gone.ply" }] } } }"#;
     std::fs::write(&path, scene).unwrap();

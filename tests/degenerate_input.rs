@@ -141,7 +141,8 @@ fn imported_scenes_are_rendered_without_what_has_no_area() {
         "s.xml",
         r#"<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/>
         <integer name="height" value="8"/></film></sensor>
-        <shape type="obj"><string name="filename" value="empty.obj"/><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>
+        <shape type="obj"><string name="filename" value="empty.obj"/><emitter type="area">
+        <rgb name="radiance" value="1"/></emitter></shape>
         <shape type="cylinder"><float name="radius" value="0"/></shape></scene>"#,
     );
     for path in [pbrt, mitsuba] {

@@ -42,11 +42,15 @@ fn picture(size: [u32; 2], pixel: impl Fn(u32, u32) -> [f32; 4]) -> Image {
 
 /// A room of coloured walls with a diffuse and a glossy box, lit by two lamps of two groups.
 fn room(spp: u32, layers: &[&str]) -> Value {
-    let quad = |origin: [f64; 3], u: [f64; 3], v: [f64; 3], material: &str| json!({ "type": "quad", "origin": origin, "edge_u": u, "edge_v": v, "material": material });
+    let quad = |origin: [f64; 3], u: [f64; 3], v: [f64; 3], material: &str| {
+        json!({
+            "type": "quad", "origin": origin, "edge_u": u, "edge_v": v, "material": material
+        })
+    };
     let lamp = |x: f64, radiance: [f64; 3], group: &str| {
         json!({
-            "type": "quad", "origin": [x, 1.98, -0.2], "edge_u": [0.4, 0, 0], "edge_v": [0, 0, 0.4], "material": "white",
-            "emission": { "radiance": radiance, "group": group }
+            "type": "quad", "origin": [x, 1.98, -0.2], "edge_u": [0.4, 0, 0], "edge_v": [0, 0, 0.4],
+            "material": "white", "emission": { "radiance": radiance, "group": group }
         })
     };
     let cube = |size: f64, x: f64, z: f64, degrees: f64, material: &str| {
@@ -247,7 +251,9 @@ fn mirror(spp: u32, strategy: &str) -> Value {
     let shapes = scene["shapes"].as_array_mut().unwrap();
     shapes.truncate(0);
     shapes.extend([
-        json!({ "type": "quad", "origin": [-1, 0, -1], "edge_u": [2, 0, 0], "edge_v": [0, 2, 0], "material": "mirror" }),
+        json!({
+            "type": "quad", "origin": [-1, 0, -1], "edge_u": [2, 0, 0], "edge_v": [0, 2, 0], "material": "mirror"
+        }),
         json!({ "type": "quad", "origin": [1, 0, 1], "edge_u": [-2, 0, 0], "edge_v": [0, 2, 0], "material": "tiles" }),
         json!({ "type": "quad", "origin": [-1, 0, 1], "edge_u": [2, 0, 0], "edge_v": [0, 0, -2], "material": "white" }),
         json!({ "type": "quad", "origin": [-1, 0, 1], "edge_u": [0, 0, -2], "edge_v": [0, 2, 0], "material": "red" }),

@@ -14,7 +14,8 @@ const SCENE: &str = r#"{
     "film": { "width": 40, "height": 30 },
     "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0], "vertical_fov_degrees": 40 },
     "sampler": { "spp": 16 },
-    "materials": { "red clay": { "type": "diffuse", "albedo": [0.8, 0.2, 0.1] }, "chalk": { "type": "diffuse", "albedo": 0.8 } },
+    "materials": { "red clay": { "type": "diffuse", "albedo": [0.8, 0.2, 0.1] },
+    "chalk": { "type": "diffuse", "albedo": 0.8 } },
     "shapes": [
         { "type": "sphere", "radius": 1, "name": "равнина", "material": "red clay" },
         { "type": "mesh", "file": "wall.obj", "name": "wall", "material": "chalk" }

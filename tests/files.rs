@@ -75,7 +75,8 @@ fn what_never_ends_is_not_read() {
         r#""shapes": [{ "type": "mesh", "file": "FILE" }]"#,
         r#""shapes": [{ "type": "mesh", "file": "named.obj" }]"#,
         r#""textures": { "t": { "type": "image", "file": "FILE" } },
-           "materials": { "m": { "type": "diffuse", "albedo": { "texture": "t" } } }, "shapes": [{ "type": "sphere", "material": "m" }]"#,
+           "materials": { "m": { "type": "diffuse", "albedo": { "texture": "t" } } },
+           "shapes": [{ "type": "sphere", "material": "m" }]"#,
         r#""lights": [{ "type": "environment", "file": "FILE" }]"#,
     ];
     let commands = [

@@ -89,10 +89,16 @@ fn the_strategies_agree_on_three_scenes() {
             { "type": "quad", "material": "grey", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
             { "type": "disk", "radius": 0.6, "inner_radius": 0.2, "phi_max_degrees": 200, "material": "black",
               "emission": { "radiance": [3, 2, 1], "two_sided": true }, "transform": [{ "translate": [-1, 1, -0.5] }] },
-            { "type": "cone", "radius": 0.4, "height": 0.8, "phi_max_degrees": 280, "material": "black",
-              "emission": { "radiance": [1, 3, 2], "two_sided": true }, "transform": [{ "translate": [0.2, 0.8, -0.5] }] },
-            { "type": "sphere", "radius": 0.4, "z_max": 0.1, "phi_max_degrees": 270, "material": "black",
-              "emission": { "radiance": [2, 1, 3], "two_sided": true }, "transform": [{ "translate": [1.2, 0.8, 0.3] }] },
+            {
+                "type": "cone", "radius": 0.4, "height": 0.8, "phi_max_degrees": 280, "material": "black",
+                "emission": { "radiance": [1, 3, 2], "two_sided": true },
+                "transform": [{ "translate": [0.2, 0.8, -0.5] }]
+            },
+            {
+                "type": "sphere", "radius": 0.4, "z_max": 0.1, "phi_max_degrees": 270, "material": "black",
+                "emission": { "radiance": [2, 1, 3], "two_sided": true },
+                "transform": [{ "translate": [1.2, 0.8, 0.3] }]
+            },
             {
                 "type": "revolution", "profile": { "bezier": [[0.1, 0], [0.4, 0.2], [0, 0.5], [0.2, 0.8]] },
                 "material": "black", "emission": { "radiance": [2, 2, 2] },

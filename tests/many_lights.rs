@@ -15,7 +15,9 @@ fn room() -> Value {
         json!({ "type": "quad", "material": "grey", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] }),
         json!({ "type": "quad", "material": "grey", "origin": [-3, 0, -3], "edge_u": [6, 0, 0], "edge_v": [0, 3, 0] }),
         json!({ "type": "sphere", "material": "metal", "radius": 0.6, "transform": [{ "translate": [-0.8, 0.6, 0] }] }),
-        json!({ "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [0.9, 0.5, 0.6] }] }),
+        json!({
+            "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [0.9, 0.5, 0.6] }]
+        }),
     ];
     let mut lights = vec![json!({ "type": "environment", "radiance": [0.05, 0.05, 0.08] })];
     let kinds = ["sphere", "quad", "disk", "cone", "cube"];

@@ -184,7 +184,11 @@ fn assert_same_picture(a: &Value, b: &Value, what: &str) {
 
 #[test]
 fn overlapping_media_look_like_boundaries_modelled_one_by_one() {
-    let sphere = |material: &str, radius: f64, reverse: bool| json!({ "type": "sphere", "radius": radius, "material": material, "reverse_normal": reverse });
+    let sphere = |material: &str, radius: f64, reverse: bool| {
+        json!({
+            "type": "sphere", "radius": radius, "material": material, "reverse_normal": reverse
+        })
+    };
     for roughness in [0.0, 0.3] {
         // Every boundary by itself: the outer one of glass in air, the inner one of water in glass.
         let boundary = |ior: f64| json!({ "type": "dielectric", "ior": ior, "roughness": roughness });
@@ -193,7 +197,11 @@ fn overlapping_media_look_like_boundaries_modelled_one_by_one() {
             json!([sphere("outer", 1.0, false), sphere("inner", 0.8, false)]),
         );
         // Media: solid glass that water of a higher priority displaces.
-        let medium = |ior: f64, priority: i32| json!({ "type": "dielectric", "ior": ior, "roughness": roughness, "priority": priority });
+        let medium = |ior: f64, priority: i32| {
+            json!({
+                "type": "dielectric", "ior": ior, "roughness": roughness, "priority": priority
+            })
+        };
         let solid = balls(
             json!({ "glass": medium(1.5, 1), "water": medium(1.33, 2) }),
             json!([sphere("glass", 1.0, false), sphere("water", 0.8, false)]),
@@ -429,9 +437,17 @@ fn a_prism_parts_colours_by_snells_law() {
             "transform": [{ "translate": [-far * turned.sin(), 0, -far * turned.cos()] }] });
         let (x0, x1) = (-2.0, 1.0);
         let at = |x: f64| x * tilt.tan();
-        let wedge = json!({ "type": "mesh", "material": "prism", "positions": [
-            [x0, -1, 2], [x1, -1, 2], [x1, 1, 2], [x0, 1, 2], [x0, -1, at(x0)], [x1, -1, at(x1)], [x1, 1, at(x1)], [x0, 1, at(x0)]],
-            "triangles": [[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6], [0, 5, 1], [0, 4, 5], [3, 2, 6], [3, 6, 7], [1, 5, 6], [1, 6, 2], [0, 3, 7], [0, 7, 4]] });
+        let wedge = json!({
+            "type": "mesh", "material": "prism",
+            "positions": [
+                [x0, -1, 2], [x1, -1, 2], [x1, 1, 2], [x0, 1, 2], [x0, -1, at(x0)], [x1, -1, at(x1)], [x1, 1, at(x1)],
+                [x0, 1, at(x0)]
+            ],
+            "triangles": [
+                [0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6], [0, 5, 1], [0, 4, 5], [3, 2, 6], [3, 6, 7], [1, 5, 6],
+                [1, 6, 2], [0, 3, 7], [0, 7, 4]
+            ]
+        });
         let mut scene = probe(
             [0.0, 0.0, 5.0],
             [0.0; 3],

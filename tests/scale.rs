@@ -38,8 +38,13 @@ fn scene(s: f64, offset: [f64; 3]) -> Value {
                 "type": "sphere", "material": "tea", "radius": 0.5 * s,
                 "transform": [{ "translate": at([-0.75, 0.5, 0.25]) }]
             },
-            { "type": "mesh", "material": "grey", "triangles": [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
-              "positions": [at([-1.5, 0.0625, -0.75]), at([-1.0, 0.0625, -0.5]), at([-1.25, 0.0625, -1.5]), at([-1.25, 1.0, -1.0])] },
+            {
+                "type": "mesh", "material": "grey", "triangles": [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+                "positions": [
+                    at([-1.5, 0.0625, -0.75]), at([-1.0, 0.0625, -0.5]), at([-1.25, 0.0625, -1.5]),
+                    at([-1.25, 1.0, -1.0])
+                ]
+            },
             { "type": "disk", "radius": 0.5 * s, "emission": { "radiance": [9, 8, 7] },
               "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": at([0.0, 2.5, 0.0]) }] }
         ],
@@ -220,7 +225,8 @@ fn coincident_faces_that_differ_are_one_warning() {
     let folder = tempfile::tempdir().unwrap();
     let face = |triangle: [usize; 3], material: &str| {
         json!({
-            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [triangle], "material": material
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [triangle],
+            "material": material
         })
     };
     let instanced = |x: f64| json!({ "object": "o", "transform": [{ "translate": [x, 0, 0] }] });

@@ -133,7 +133,8 @@ fn a_recipe_holds_how_the_scene_was_read() {
         dir.join("defined.xml"),
         r#"<scene version="3.0.0"><default name="r" value="0.2"/><sensor type="perspective"><film type="hdrfilm">
         <integer name="width" value="16"/><integer name="height" value="8"/></film></sensor><emitter type="constant"/>
-        <shape type="sphere"><float name="radius" value="$r"/><point name="center" x="0" y="0" z="3"/></shape></scene>"#,
+        <shape type="sphere"><float name="radius" value="$r"/><point name="center" x="0" y="0" z="3"/></shape>
+        </scene>"#,
     )
     .unwrap();
     for (line, file) in [

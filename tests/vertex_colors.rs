@@ -256,8 +256,12 @@ fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
 fn attributes_of_inline_meshes_and_their_faults() {
     let folder = Folder::new();
     folder.write("m.ply", attributes_ply());
-    let inline = json!({ "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]],
-        "attributes": { "face_tint": [[1, 0, 0.5], [0, 1, 0.5]], "vertex_a": [0, 0.1, 0.2, 0.3], "vertex_unused": [-1, 9, 9, 9] } });
+    let inline = json!({
+        "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]],
+        "attributes": {
+            "face_tint": [[1, 0, 0.5], [0, 1, 0.5]], "vertex_a": [0, 0.1, 0.2, 0.3], "vertex_unused": [-1, 9, 9, 9]
+        }
+    });
     let with = |shape: &Value, attribute: &str| {
         let mut scene = scene_of(shape.clone());
         set(&mut scene, "textures.colors", json!({ "type": "mesh_attribute", "name": attribute }));

@@ -13,7 +13,11 @@ use super::job::{Job, quote};
 /// A task that is cancelled gets two minutes to write its checkpoint.
 pub fn openjd_template(job: &Job) -> Value {
     // Paths are strings: the specification requires defaults of type PATH to be relative to the template.
-    let text = |name: &str, value: &str, what: &str| json!({ "name": name, "type": "STRING", "default": value, "description": what });
+    let text = |name: &str, value: &str, what: &str| {
+        json!({
+            "name": name, "type": "STRING", "default": value, "description": what
+        })
+    };
     let mut parameters = vec![
         text("Scene", &job.scene.to_string_lossy(), "The scene"),
         text("Work", &job.folder.to_string_lossy(), "The folder of shards and checkpoints"),

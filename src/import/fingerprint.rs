@@ -121,7 +121,8 @@ mod tests {
         scene_fingerprint(&read_scene(&path, &ImportOptions::default()).unwrap(), &path).unwrap()
     }
 
-    const SCENE: &str = r#"{ "camera": {}, "sampler": { "spp": 4 }, "shapes": [{ "type": "mesh", "file": "m/a.obj" }, { "type": "sphere" }] }"#;
+    const SCENE: &str = r#"{ "camera": {}, "sampler": { "spp": 4 }, "shapes": [{ "type": "mesh", "file": "m/a.obj" },
+        { "type": "sphere" }] }"#;
 
     #[test]
     fn what_a_scene_shows_counts_and_nothing_else() {

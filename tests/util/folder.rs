@@ -95,7 +95,9 @@ pub fn good_scene() -> Value {
         "lights": [
             { "type": "point", "position": [0, 5, 0], "intensity": [1, 1, 1] },
             { "type": "spot", "position": [0, 5, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1] },
-            { "type": "directional", "direction": [0, -1, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 0.5 },
+            {
+                "type": "directional", "direction": [0, -1, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 0.5
+            },
             { "type": "environment", "radiance": [0.1, 0.1, 0.1] }
         ],
         "outputs": [{ "file": "out.exr", "layers": ["Z", "albedo"] }]

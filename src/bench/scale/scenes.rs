@@ -80,8 +80,12 @@ fn room() -> Value {
         })
     };
     let block = |at: [f64; 3], degrees: f64, size: [f64; 3]| {
-        json!({ "type": "cube", "material": "white",
-                "transform": [{ "scale": size }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } }, { "translate": at }] })
+        json!({
+            "type": "cube", "material": "white",
+            "transform": [
+                { "scale": size }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } }, { "translate": at }
+            ]
+        })
     };
     json!({
         "camera": { "position": [0, 1, 0.98], "look_at": [0, 1, -1], "vertical_fov_degrees": 80 },

@@ -141,7 +141,9 @@ mod tests {
                 "glass": { "type": "dielectric", "ior": 1.5, "roughness": 0.3 }
             },
             "shapes": [
-                { "type": "quad", "material": "white", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6] },
+                {
+                    "type": "quad", "material": "white", "origin": [-3, 0, 3], "edge_u": [6, 0, 0], "edge_v": [0, 0, -6]
+                },
                 { "type": "sphere", "material": "glass", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] },
                 {
                     "type": "mesh", "material": "white", "positions": [[-1, 0, -1], [1, 0, -1], [0, 2, -1]],

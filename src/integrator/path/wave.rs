@@ -102,7 +102,11 @@ pub(super) struct ShadowQueue {
 
 /// Appends the chosen `$lanes` of rows, and of rows of vectors, to columns of a block and the next.
 macro_rules! append {
-    ($lanes:expr, $at:expr, $to:expr, $next:expr, { $($row:expr => $column:ident,)* }, { $($vectors:expr => $vector_column:ident,)* }) => {{
+    (
+        $lanes:expr, $at:expr, $to:expr, $next:expr,
+        { $($row:expr => $column:ident,)* },
+        { $($vectors:expr => $vector_column:ident,)* }
+    ) => {{
         let (to, mut next) = ($to, $next);
         $($lanes.append(&$row, &mut to.$column, next.as_mut().map(|next| &mut next.$column), $at);)*
         $(

@@ -56,7 +56,11 @@ fn scene(rest: Value) -> Value {
 
 /// A room with a lamp that fills its ceiling, and two balls; paths of up to four segments.
 fn room() -> Value {
-    let wall = |origin: [f64; 3], u: [f64; 3], v: [f64; 3]| json!({ "type": "quad", "material": "grey", "origin": origin, "edge_u": u, "edge_v": v });
+    let wall = |origin: [f64; 3], u: [f64; 3], v: [f64; 3]| {
+        json!({
+            "type": "quad", "material": "grey", "origin": origin, "edge_u": u, "edge_v": v
+        })
+    };
     let mut lamp = wall([-1.0, 1.0, -1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]);
     lamp["emission"] = json!({ "radiance": [5, 4, 3] });
     scene(json!({
@@ -72,7 +76,9 @@ fn room() -> Value {
             wall([-1.0, -1.0, -1.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
             wall([-1.0, -1.0, 1.0], [0.0, 0.0, -2.0], [0.0, 2.0, 0.0]),
             wall([1.0, -1.0, -1.0], [0.0, 0.0, 2.0], [0.0, 2.0, 0.0]),
-            { "type": "sphere", "material": "metal", "radius": 0.4, "transform": [{ "translate": [-0.4, -0.6, -0.2] }] },
+            {
+                "type": "sphere", "material": "metal", "radius": 0.4, "transform": [{ "translate": [-0.4, -0.6, -0.2] }]
+            },
             lamp,
             { "type": "sphere", "material": "clay", "radius": 0.35, "transform": [{ "translate": [0.45, -0.65, 0.2] }] }
         ]
