@@ -28,8 +28,8 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
 /// Reads the bytes as a file of `kind`.
 ///
 /// # Panics
-/// If that takes more memory than such a file explains. Images are compressed and have a limit of their own, a number of
-/// pixels; and subdivision surfaces have no bound on their triangles.
+/// If that takes more memory than such a file explains. Images are compressed and have a limit of their own, a number
+/// of pixels; and subdivision surfaces have no bound on their triangles.
 pub fn run(kind: &str, data: &[u8]) {
     LazyLock::force(&FOLDER);
     ALLOCATOR.reset_peak_usage();

@@ -172,6 +172,18 @@ pub fn refusal(files: &CompileContext, path: &str, file: Option<&str>, message: 
     }
 }
 
+/// Checks that lists are as long as others require.
+fn check_counts(data: &MeshData) -> Result<(), String> {
+    let count = data.positions.len();
+    if let Some((triangle, index)) = out_of_range(data) {
+        return Err(MeshError::Index { triangle, index, count }.to_string());
+    }
+    if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
+        return Err(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }.to_string());
+    }
+    attributes::check_counts(&data.attributes, count, data.triangles.len())
+}
+
 /// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the
 /// front. Triangles without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
 pub fn place(
@@ -183,14 +195,7 @@ pub fn place(
 ) -> Result<Option<Mesh>> {
     let refuse = |error: MeshError| refusal(files, path, placement.file, error.to_string());
     let count = data.positions.len();
-    if let Some((triangle, index)) = out_of_range(&data) {
-        return Err(refuse(MeshError::Index { triangle, index, count }));
-    }
-    if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
-        return Err(refuse(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }));
-    }
-    attributes::check_counts(&data.attributes, count, data.triangles.len())
-        .map_err(|message| refusal(files, path, placement.file, message))?;
+    check_counts(&data).map_err(|message| refusal(files, path, placement.file, message))?;
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
     let place_positions = |mut positions: Vec<[f32; 3]>, origin: [f64; 3]| {

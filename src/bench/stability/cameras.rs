@@ -321,17 +321,19 @@ fn project(projection: &Projection, framing: &Framing, p: DVec3) -> DVec2 {
     }
 }
 
+/// What [`k5_projection`] goes through.
+const PROJECTIONS: [&str; 6] = [
+    "perspective",
+    "perspective with framing",
+    "orthographic",
+    "orthographic with framing",
+    "environment",
+    "moving perspective",
+];
+
 fn k5_projection(effort: Effort) -> Outcome {
     let mut rng = Rng::new(5);
-    let names = [
-        "perspective",
-        "perspective with framing",
-        "orthographic",
-        "orthographic with framing",
-        "environment",
-        "moving perspective",
-    ];
-    let mut worst = [0f64; 6];
+    let mut worst = [0f64; PROJECTIONS.len()];
     let mut corner = 0f64;
     for _ in 0..effort.pick(2_000, 300_000) {
         let half_height = rng.magnitude(-1.0, 0.3);
@@ -379,7 +381,7 @@ fn k5_projection(effort: Effort) -> Outcome {
         corner = corner.max(((upright - exact) / exact).abs().max_element() / (2.0 * UNIT_ROUNDOFF));
     }
     let outcome = Outcome::new().at_most("error of the picture's corners, in ulp", corner, 2.0);
-    names.iter().zip(worst).fold(outcome, |outcome, (name, worst)| {
+    PROJECTIONS.iter().zip(worst).fold(outcome, |outcome, (name, worst)| {
         outcome.at_most(format!("error over the picture's height, {name}"), worst, 1e-6)
     })
 }
