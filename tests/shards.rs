@@ -8,7 +8,8 @@ use steradian::film::{FilmTile, Image, SumPlane};
 use steradian::math::Rng;
 use steradian::render::{self, Overrides, Shard, StateFile};
 
-use crate::checkpoints::{Kit, channels, scene};
+use crate::checkpoints::{Kit, scene};
+use crate::interrupted::channels;
 
 /// Writes shards, and returns their files.
 fn written(kit: &Kit, folder: &Path, shards: impl IntoIterator<Item = Shard>) -> Vec<PathBuf> {
