@@ -1,6 +1,6 @@
 //! Files of a scene that are missing or malformed, and those that nothing uses.
 
-use serde_json::json;
+use serde_json::{Value, json};
 use steradian::{ErrorKind, import};
 
 use crate::bad_input::assert_error;
