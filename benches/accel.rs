@@ -72,7 +72,7 @@ fn time(
 ) {
     group.throughput(Throughput::Elements(set.rays.len() as u64));
     group.bench_function(name, |bencher| {
-        bencher.iter(|| black_box(&set.rays).iter().filter(|ray| closest(ray)).count())
+        bencher.iter(|| black_box(&set.rays).iter().filter(|ray| closest(ray)).count());
     });
 }
 

@@ -262,10 +262,10 @@ impl TexturedMaterial {
         let mut found = Vec::new();
         match self {
             Self::Diffuse { albedo, roughness } => {
-                found.extend(albedo.texture().into_iter().chain(roughness.texture()))
+                found.extend(albedo.texture().into_iter().chain(roughness.texture()));
             }
             Self::DiffuseTransmission { reflectance: a, transmittance: b } => {
-                found.extend(a.texture().into_iter().chain(b.texture()))
+                found.extend(a.texture().into_iter().chain(b.texture()));
             }
             Self::Phong { diffuse, specular, exponent, .. } => {
                 found.extend([diffuse.texture(), specular.texture(), exponent.texture()].into_iter().flatten());

@@ -292,7 +292,7 @@ fn headers_that_make_no_sense_are_refused() {
     ];
     for (place, value, part) in cases {
         with_header(&folder.join("a.shard"), &folder.join("altered_a.shard"), |header| {
-            *header.pointer_mut(place).unwrap() = value.clone()
+            *header.pointer_mut(place).unwrap() = value.clone();
         });
         let output = run(folder, "merge altered_a.shard --partial -o a.exr");
         assert_code(&output, 6, part);
@@ -308,7 +308,7 @@ fn headers_that_make_no_sense_are_refused() {
     assert_code(&run(folder, "merge large.shard --partial -o a.exr"), 6, "a part is missing");
     // A name out of the shard does not leave the folder.
     with_header(&folder.join("a.shard"), &folder.join("outside.shard"), |header| {
-        header["outputs"][0]["file"] = json!("../out.exr")
+        header["outputs"][0]["file"] = json!("../out.exr");
     });
     assert_code(&run(folder, "merge outside.shard --partial"), 2, "-o");
     assert_code(&run(folder, "merge outside.shard --partial -o a.exr"), 0, "wrote a.exr");

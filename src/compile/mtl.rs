@@ -57,7 +57,7 @@ impl Builder {
         if let Some(map) = &specular {
             match specular_tint(&material) {
                 Some(tint) => {
-                    material = with_specular(material, ColorInput::Texture(self.reflectance_map(path, map, tint)?))
+                    material = with_specular(material, ColorInput::Texture(self.reflectance_map(path, map, tint)?));
                 }
                 None => unused.push("map_Ks"),
             }

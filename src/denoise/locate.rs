@@ -109,7 +109,7 @@ pub fn open_first<T>(
     match open(Path::new(FILE_NAME)) {
         Ok(library) => return Ok(library),
         Err(Unusable(why)) if why.contains("No such file") => {
-            looked.push("where the system keeps libraries".to_owned())
+            looked.push("where the system keeps libraries".to_owned());
         }
         Err(Unusable(why)) => looked.push(format!("where the system keeps libraries ({why})")),
     }

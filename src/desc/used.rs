@@ -81,7 +81,7 @@ impl SceneDesc {
                 Value::Array(values) => open.extend(values),
                 // A type is no name.
                 Value::Object(keys) => {
-                    open.extend(keys.into_iter().filter(|(key, _)| key != "type").map(|(_, value)| value))
+                    open.extend(keys.into_iter().filter(|(key, _)| key != "type").map(|(_, value)| value));
                 }
                 _ => {}
             }

@@ -180,7 +180,7 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
     if let Some(depth) = overrides.max_depth {
         match &mut integrator {
             IntegratorDesc::Path { max_depth, .. } | IntegratorDesc::Whitted { max_depth, .. } if depth > 0 => {
-                *max_depth = depth
+                *max_depth = depth;
             }
             IntegratorDesc::Path { .. } | IntegratorDesc::Whitted { .. } => {
                 return Err(usage("--max-depth 0: depth counts from 1, directly visible light"));

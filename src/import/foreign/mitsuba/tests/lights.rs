@@ -95,7 +95,7 @@ fn emitted_spectra_are_seen_as_they_are() {
         other => panic!("{other:?}"),
     };
     let near = |a: [f32; 3], b: [f32; 3]| {
-        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.004 * b), "{a:?} is not {b:?}")
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.004 * b), "{a:?} is not {b:?}");
     };
     // As Mitsuba has them: equal energy is warmer than white, and a plain number is white.
     near(intensity(r#"<spectrum name="intensity" value="0.5"/>"#), [0.602397, 0.474146, 0.454458]);
