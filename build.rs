@@ -1,5 +1,5 @@
-//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name. On docs.rs, which has neither Embree nor
-//! libclang, checked-in bindings serve.
+//! Finds Embree, binds it and compiles the shim; a missing package ends the build with its name. On docs.rs, which has
+//! neither Embree nor libclang, checked-in bindings serve.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -59,7 +59,8 @@ fn build() -> Result<(), String> {
     Ok(())
 }
 
-/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3, without the checks of layouts.
+/// Enough for documentation, which is never linked. `ffi/embree_docs.rs` is what [`bind`] writes with Embree 3, without
+/// the checks of layouts.
 fn use_checked_in_bindings() -> Result<(), String> {
     let file = "ffi/embree_docs.rs";
     std::fs::copy(file, bindings_file()?).map(drop).map_err(|error| format!("cannot copy {file}: {error}"))
@@ -100,8 +101,13 @@ fn bind(arguments: &[&str]) -> Result<(), String> {
         .header("ffi/wrapper.h")
         .clang_args(arguments)
         .allowlist_function("st_.*|rtc(New|Release)(Device|Scene|Geometry)|rtc(Get|Set)Device.*")
-        .allowlist_function("rtcSet(SharedGeometryBuffer|Geometry(InstancedScene|Transform|TimeStepCount|BuildQuality|UserPrimitiveCount))")
-        .allowlist_function("rtcSetScene(Flags|BuildQuality)|rtcCommit(Geometry|Scene)|rtcAttachGeometryByID|rtcGetSceneBounds")
+        .allowlist_function(
+            "rtcSet(SharedGeometryBuffer|Geometry(InstancedScene|Transform|TimeStepCount|BuildQuality|\
+             UserPrimitiveCount))",
+        )
+        .allowlist_function(
+            "rtcSetScene(Flags|BuildQuality)|rtcCommit(Geometry|Scene)|rtcAttachGeometryByID|rtcGetSceneBounds",
+        )
         .allowlist_var("RTC_VERSION_MAJOR")
         .prepend_enum_name(false)
         .generate_comments(false)

@@ -57,7 +57,8 @@ fn agree(
         let count = set.rays.len();
         assert!(different * 100 <= count, "{name}: {different} of {count} answers differ");
         println!(
-            "{}, {}: {name} differs on {different} of {count} rays and finds the surface again that they leave on {again}",
+            "{}, {}: {name} differs on {different} of {count} rays and finds the surface again that they leave on \
+             {again}",
             model.name, set.name
         );
     }
@@ -71,7 +72,7 @@ fn time(
 ) {
     group.throughput(Throughput::Elements(set.rays.len() as u64));
     group.bench_function(name, |bencher| {
-        bencher.iter(|| black_box(&set.rays).iter().filter(|ray| closest(ray)).count())
+        bencher.iter(|| black_box(&set.rays).iter().filter(|ray| closest(ray)).count());
     });
 }
 

@@ -57,7 +57,7 @@ fn renders(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(u64::from(SIZE[0] * SIZE[1] * SPP)));
         for (accel_name, accel) in &accels {
             group.bench_function(**accel_name, |bencher| {
-                bencher.iter(|| render(&scene, black_box(&**accel), &settings))
+                bencher.iter(|| render(&scene, black_box(&**accel), &settings));
             });
         }
         group.finish();

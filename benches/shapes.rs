@@ -64,10 +64,10 @@ fn shape_tests(criterion: &mut Criterion) {
         group.sample_size(20).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_millis(1000));
         group.throughput(Throughput::Elements(RAYS as u64));
         group.bench_function("test alone", |b| {
-            b.iter(|| black_box(&rays).iter().filter(|ray| direct(ray).is_some()).count())
+            b.iter(|| black_box(&rays).iter().filter(|ray| direct(ray).is_some()).count());
         });
         group.bench_function("embree", |b| {
-            b.iter(|| black_box(&rays).iter().filter(|ray| embree.intersect(ray).is_some()).count())
+            b.iter(|| black_box(&rays).iter().filter(|ray| embree.intersect(ray).is_some()).count());
         });
         if name == "sphere" {
             for cells in [4, 16, 64] {

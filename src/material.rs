@@ -173,6 +173,13 @@ impl Facets {
     }
 }
 
+/// What exceeds 1 together with `specular` is taken from `diffuse`.
+#[inline]
+fn limited(diffuse: Rgb, specular: Rgb) -> Rgb {
+    let left = Rgb::WHITE - specular;
+    Rgb::new(diffuse.r.min(left.r), diffuse.g.min(left.g), diffuse.b.min(left.b))
+}
+
 impl TexturedMaterial {
     /// The scattering over `footprint`.
     pub fn bsdf(&self, textures: &[Texture], footprint: &Footprint) -> Bsdf {
@@ -194,11 +201,8 @@ impl TexturedMaterial {
                 facets.dielectric(*ior, alpha.at(textures, footprint), tints.map(|tint| tint.at(textures, footprint)))
             }
             Self::Phong { diffuse, specular, exponent, cosine } => {
-                // What exceeds 1 together is taken from the diffuse part.
                 let specular = specular.at(textures, footprint);
-                let diffuse = diffuse.at(textures, footprint);
-                let left = Rgb::WHITE - specular;
-                let diffuse = Rgb::new(diffuse.r.min(left.r), diffuse.g.min(left.g), diffuse.b.min(left.b));
+                let diffuse = limited(diffuse.at(textures, footprint), specular);
                 let exponent = exponent.at(textures, footprint);
                 if *cosine {
                     Bsdf::Phong(Phong::new(diffuse, specular, exponent))
@@ -258,10 +262,10 @@ impl TexturedMaterial {
         let mut found = Vec::new();
         match self {
             Self::Diffuse { albedo, roughness } => {
-                found.extend(albedo.texture().into_iter().chain(roughness.texture()))
+                found.extend(albedo.texture().into_iter().chain(roughness.texture()));
             }
             Self::DiffuseTransmission { reflectance: a, transmittance: b } => {
-                found.extend(a.texture().into_iter().chain(b.texture()))
+                found.extend(a.texture().into_iter().chain(b.texture()));
             }
             Self::Phong { diffuse, specular, exponent, .. } => {
                 found.extend([diffuse.texture(), specular.texture(), exponent.texture()].into_iter().flatten());

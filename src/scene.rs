@@ -170,7 +170,7 @@ impl Scene {
         }
         let mut found = None;
         self.descend(surface.material, at, direction, |id| {
-            found = self.part_normal_perturbations[id.index()].or(found)
+            found = self.part_normal_perturbations[id.index()].or(found);
         });
         found
     }

@@ -20,8 +20,10 @@ fn room() -> Value {
         "shapes": [
             { "type": "quad", "material": "floor", "origin": [-2, 0, -2], "edge_u": [0, 0, 4], "edge_v": [4, 0, 0] },
             { "type": "sphere", "material": "mirror", "radius": 0.6, "transform": [{ "translate": [0.3, 0.6, 0] }] },
-            { "type": "quad", "material": "floor", "origin": [-1.6, 3, -0.2], "edge_u": [0.6, 0, 0], "edge_v": [0, 0, 0.6],
-              "emission": { "radiance": [40, 36, 30] } }
+            {
+                "type": "quad", "material": "floor", "origin": [-1.6, 3, -0.2], "edge_u": [0.6, 0, 0],
+                "edge_v": [0, 0, 0.6], "emission": { "radiance": [40, 36, 30] }
+            }
         ]
     })
 }
@@ -179,14 +181,22 @@ fn yard() -> Value {
         "camera": { "position": [0, 1.6, 4], "look_at": [0, 0.4, 0], "vertical_fov_degrees": 40 },
         "film": {},
         "integrator": { "type": "path", "max_depth": 5 },
-        "textures": { "tiles": { "type": "checker", "color0": [0.8, 0.7, 0.6], "color1": [0.1, 0.2, 0.3], "scale": [6, 6] } },
-        "materials": { "tiled": { "type": "diffuse", "albedo": { "texture": "tiles" } }, "painted": { "type": "diffuse", "albedo": [0.6, 0.1, 0.1] } },
+        "textures": {
+            "tiles": { "type": "checker", "color0": [0.8, 0.7, 0.6], "color1": [0.1, 0.2, 0.3], "scale": [6, 6] }
+        },
+        "materials": {
+            "tiled": { "type": "diffuse", "albedo": { "texture": "tiles" } },
+            "painted": { "type": "diffuse", "albedo": [0.6, 0.1, 0.1] }
+        },
         "shapes": [
             { "type": "quad", "material": "tiled", "origin": [-3, 0, -3], "edge_u": [0, 0, 6], "edge_v": [6, 0, 0] },
             { "type": "sphere", "material": "painted", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] }
         ],
         "lights": [
-            { "type": "directional", "direction": [-1, -1.5, -0.5], "irradiance": [3, 2.8, 2.5], "angular_diameter_degrees": 8 },
+            {
+                "type": "directional", "direction": [-1, -1.5, -0.5], "irradiance": [3, 2.8, 2.5],
+                "angular_diameter_degrees": 8
+            },
             { "type": "environment", "radiance": [0.2, 0.25, 0.3] }
         ]
     })
@@ -223,8 +233,8 @@ fn of_200_pictures_95_in_100_are_as_good_as_promised_with_every_filter() {
             let estimated = mean(&|i| results[i].stats.estimated_error.unwrap());
             let samples = mean(&|i| results[i].stats.samples as f64) / reference.len() as f64;
             let line = format!(
-                "{name}, {}: {kept} of 200 within {target}; mean error {error:.3e}, estimated {estimated:.3e}, {samples:.1} samples per pixel, \
-                 reference {own:.1e}",
+                "{name}, {}: {kept} of 200 within {target}; mean error {error:.3e}, estimated {estimated:.3e}, \
+                 {samples:.1} samples per pixel, reference {own:.1e}",
                 filter["type"]
             );
             eprintln!("{line}");

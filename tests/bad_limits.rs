@@ -51,7 +51,10 @@ fn outputs_and_films_that_cannot_be_written() {
 fn meshes_with_more_times_than_embree_has() {
     let mesh = |times: usize| {
         let positions = json!([[-1, -1, 0], [1, -1, 0], [0, 1, 0]]);
-        json!({ "type": "mesh", "positions": positions, "triangles": [[0, 1, 2]], "deform_positions": vec![positions.clone(); times] })
+        json!({
+            "type": "mesh", "positions": positions, "triangles": [[0, 1, 2]],
+            "deform_positions": vec![positions.clone(); times]
+        })
     };
     assert_faults(&[("shapes[0]", mesh(129), "shapes[0].deform_positions", "129 further times: there can be 128")]);
     let mut scene = good_scene();

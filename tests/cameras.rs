@@ -13,7 +13,10 @@ fn scene(camera: Value) -> Value {
         "sampler": { "spp": 1 },
         "integrator": { "type": "normal" },
         "camera": { "position": [0, 0, 5], "look_at": [0, 0, 0] },
-        "shapes": [{ "type": "cube", "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 30 } }, { "translate": [0.3, 0.1, 0] }] }],
+        "shapes": [{
+            "type": "cube",
+            "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 30 } }, { "translate": [0.3, 0.1, 0] }]
+        }],
         "outputs": [{ "file": "a.exr", "layers": ["Z", "P"] }]
     });
     merge(&mut scene["camera"], camera);
@@ -125,7 +128,10 @@ fn blades_shape_what_is_out_of_focus() {
         let mut scene = json!({
             "film": { "width": 33, "height": 33, "filter": { "type": "box" } },
             "sampler": { "spp": 512 },
-            "camera": { "position": [0, 0, 1], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "lens": { "radius": 0.25, "focus_distance": 1e6 } },
+            "camera": {
+                "position": [0, 0, 1], "look_at": [0, 0, 0], "vertical_fov_degrees": 40,
+                "lens": { "radius": 0.25, "focus_distance": 1e6 }
+            },
             "shapes": [{ "type": "sphere", "radius": 0.03, "emission": { "radiance": [1, 1, 1] } }],
             "integrator": { "type": "path", "max_depth": 1 }
         });
@@ -163,7 +169,10 @@ fn blurred(camera: Value, motion: Value) -> Image {
 
 /// Along x, from one place to another.
 fn flight(times: [f64; 2], places: [f64; 2]) -> Value {
-    json!([{ "time": times[0], "transform": [{ "translate": [places[0], 0, 0] }] }, { "time": times[1], "transform": [{ "translate": [places[1], 0, 0] }] }])
+    json!([
+        { "time": times[0], "transform": [{ "translate": [places[0], 0, 0] }] },
+        { "time": times[1], "transform": [{ "translate": [places[1], 0, 0] }] }
+    ])
 }
 
 /// Rounding may turn a sample at an outline into a miss, in few pixels and by few samples.
@@ -221,7 +230,8 @@ fn the_shutter_chooses_a_part_of_the_motion() {
         &blurred(
             json!({}),
             json!([
-                { "time": 0 }, { "time": 0.5, "transform": [{ "translate": [0.5, 0, 0] }] }, { "time": 1, "transform": [{ "translate": [0.5, 0, 0] }] }
+                { "time": 0 }, { "time": 0.5, "transform": [{ "translate": [0.5, 0, 0] }] },
+                { "time": 1, "transform": [{ "translate": [0.5, 0, 0] }] }
             ]),
         ),
         "the end",

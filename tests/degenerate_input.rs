@@ -77,9 +77,14 @@ fn meshes_without_area_are_skipped() {
     folder.write("m.mtl", "newmtl a\nKd 1 1 1\nKe 1 1 1\nnewmtl b\nKd 1 1 1\n");
     folder.write(
         "cloud.ply",
-        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n",
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
+         0 0 0\n",
     );
-    let inline = |triangles: Value| json!({ "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [3, 0, 0]], "triangles": triangles });
+    let inline = |triangles: Value| {
+        json!({
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [3, 0, 0]], "triangles": triangles
+        })
+    };
     let file = |name: &str| json!({ "type": "mesh", "file": name });
     let with = |mut shape: Value, key: &str, value: Value| {
         shape[key] = value;
@@ -136,7 +141,8 @@ fn imported_scenes_are_rendered_without_what_has_no_area() {
         "s.xml",
         r#"<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/>
         <integer name="height" value="8"/></film></sensor>
-        <shape type="obj"><string name="filename" value="empty.obj"/><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>
+        <shape type="obj"><string name="filename" value="empty.obj"/><emitter type="area">
+        <rgb name="radiance" value="1"/></emitter></shape>
         <shape type="cylinder"><float name="radius" value="0"/></shape></scene>"#,
     );
     for path in [pbrt, mitsuba] {

@@ -42,17 +42,24 @@ fn picture(size: [u32; 2], pixel: impl Fn(u32, u32) -> [f32; 4]) -> Image {
 
 /// A room of coloured walls with a diffuse and a glossy box, lit by two lamps of two groups.
 fn room(spp: u32, layers: &[&str]) -> Value {
-    let quad = |origin: [f64; 3], u: [f64; 3], v: [f64; 3], material: &str| json!({ "type": "quad", "origin": origin, "edge_u": u, "edge_v": v, "material": material });
+    let quad = |origin: [f64; 3], u: [f64; 3], v: [f64; 3], material: &str| {
+        json!({
+            "type": "quad", "origin": origin, "edge_u": u, "edge_v": v, "material": material
+        })
+    };
     let lamp = |x: f64, radiance: [f64; 3], group: &str| {
         json!({
-            "type": "quad", "origin": [x, 1.98, -0.2], "edge_u": [0.4, 0, 0], "edge_v": [0, 0, 0.4], "material": "white",
-            "emission": { "radiance": radiance, "group": group }
+            "type": "quad", "origin": [x, 1.98, -0.2], "edge_u": [0.4, 0, 0], "edge_v": [0, 0, 0.4],
+            "material": "white", "emission": { "radiance": radiance, "group": group }
         })
     };
     let cube = |size: f64, x: f64, z: f64, degrees: f64, material: &str| {
         json!({
             "type": "cube", "material": material,
-            "transform": [{ "scale": [0.3, size, 0.3] }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } }, { "translate": [x, size, z] }]
+            "transform": [
+                { "scale": [0.3, size, 0.3] }, { "rotate": { "axis": [0, 1, 0], "degrees": degrees } },
+                { "translate": [x, size, z] }
+            ]
         })
     };
     json!({
@@ -236,18 +243,24 @@ fn mirror(spp: u32, strategy: &str) -> Value {
                 "mirror": { "type": "mirror", "reflectance": 0.9 },
                 "tiles": { "type": "diffuse", "albedo": { "texture": "tiles" } }
             },
-            "textures": { "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0.25, 0.25, 0.25], "scale": [8, 8] } }
+            "textures": {
+                "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0.25, 0.25, 0.25], "scale": [8, 8] }
+            }
         }),
     );
     let shapes = scene["shapes"].as_array_mut().unwrap();
     shapes.truncate(0);
     shapes.extend([
-        json!({ "type": "quad", "origin": [-1, 0, -1], "edge_u": [2, 0, 0], "edge_v": [0, 2, 0], "material": "mirror" }),
+        json!({
+            "type": "quad", "origin": [-1, 0, -1], "edge_u": [2, 0, 0], "edge_v": [0, 2, 0], "material": "mirror"
+        }),
         json!({ "type": "quad", "origin": [1, 0, 1], "edge_u": [-2, 0, 0], "edge_v": [0, 2, 0], "material": "tiles" }),
         json!({ "type": "quad", "origin": [-1, 0, 1], "edge_u": [2, 0, 0], "edge_v": [0, 0, -2], "material": "white" }),
         json!({ "type": "quad", "origin": [-1, 0, 1], "edge_u": [0, 0, -2], "edge_v": [0, 2, 0], "material": "red" }),
-        json!({ "type": "quad", "origin": [-0.4, 1.98, -0.4], "edge_u": [0.8, 0, 0], "edge_v": [0, 0, 0.4], "material": "white",
-                "emission": { "radiance": [10, 10, 10] } }),
+        json!({
+            "type": "quad", "origin": [-0.4, 1.98, -0.4], "edge_u": [0.8, 0, 0], "edge_v": [0, 0, 0.4],
+            "material": "white", "emission": { "radiance": [10, 10, 10] }
+        }),
     ]);
     scene
 }

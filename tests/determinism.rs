@@ -12,13 +12,17 @@ fn scene() -> Value {
         "camera": { "position": [0, 1.2, 4], "look_at": [0, 0.5, 0], "lens": { "radius": 0.05, "focus_distance": 4 } },
         "sampler": { "spp": 7 },
         "materials": {
-            "grey": { "type": "diffuse" }, "glass": { "type": "dielectric" }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
+            "grey": { "type": "diffuse" }, "glass": { "type": "dielectric" },
+            "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
         },
         "shapes": [
             { "type": "quad", "material": "grey", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
             { "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [-0.6, 0.5, 0] }] },
             { "type": "cube", "material": "gold", "transform": [{ "scale": 0.4 }, { "translate": [0.7, 0.4, -0.3] }] },
-            { "type": "disk", "emission": { "radiance": [9, 8, 7] }, "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 3, 0] }] }
+            {
+                "type": "disk", "emission": { "radiance": [9, 8, 7] },
+                "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 3, 0] }]
+            }
         ],
         "lights": [{ "type": "environment", "radiance": [0.2, 0.3, 0.4] }]
     })

@@ -14,7 +14,8 @@ const SCENE: &str = r#"{
     "film": { "width": 40, "height": 30 },
     "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0], "vertical_fov_degrees": 40 },
     "sampler": { "spp": 16 },
-    "materials": { "red clay": { "type": "diffuse", "albedo": [0.8, 0.2, 0.1] }, "chalk": { "type": "diffuse", "albedo": 0.8 } },
+    "materials": { "red clay": { "type": "diffuse", "albedo": [0.8, 0.2, 0.1] },
+    "chalk": { "type": "diffuse", "albedo": 0.8 } },
     "shapes": [
         { "type": "sphere", "radius": 1, "name": "равнина", "material": "red clay" },
         { "type": "mesh", "file": "wall.obj", "name": "wall", "material": "chalk" }
@@ -27,9 +28,10 @@ const SCENE: &str = r#"{
 
 const WALL: &str = "v -1 -1 -2\nv 1 -1 -2\nv 1 2 -2\nv -1 2 -2\nf 1 2 3 4\n";
 
-const ALL_LAYERS: &str = "Z,N,Ng,P,uv,motion,albedo,diffuse_direct,diffuse_indirect,specular_direct,specular_indirect,transmission_direct,\
-transmission_indirect,emission,background,light_groups,variance,samples,feature_albedo,feature_normal,object_id,material_id,instance_id,\
-crypto_object,crypto_material,crypto_asset";
+const ALL_LAYERS: &str = "Z,N,Ng,P,uv,motion,albedo,diffuse_direct,diffuse_indirect,specular_direct,specular_indirect,\
+                          transmission_direct,transmission_indirect,emission,background,light_groups,variance,samples,\
+                          feature_albedo,feature_normal,object_id,material_id,instance_id,crypto_object,\
+                          crypto_material,crypto_asset";
 
 const PROFILES: [&str; 4] = ["default", "nuke", "blender", "multipart"];
 

@@ -97,7 +97,8 @@ fn a_job_is_submitted_as_arrays_and_the_merges_that_wait_for_them() {
     assert_eq!(
         lines[1],
         format!(
-            "sbatch --parsable --dependency=afterok:41 --kill-on-invalid-dep=yes {folder}/room.farm/merge.sh 7 {folder}/out.0007.exr"
+            "sbatch --parsable --dependency=afterok:41 --kill-on-invalid-dep=yes {folder}/room.farm/merge.sh 7 \
+             {folder}/out.0007.exr"
         )
     );
     // What is there is not submitted again.
@@ -117,8 +118,9 @@ fn a_task_renders_its_shard_and_the_merge_takes_all_of_them() {
     assert_eq!(
         calls,
         format!(
-            "render {folder}/room.json --frames=7 --layers Z,N --shard 2/2 -o {folder}/room.farm/shards/frame#.2-of-2.shard \
-             --checkpoint {folder}/room.farm/shards/frame#.2-of-2.checkpoint --every 5 --resume --progress plain\n"
+            "render {folder}/room.json --frames=7 --layers Z,N --shard 2/2 -o \
+             {folder}/room.farm/shards/frame#.2-of-2.shard --checkpoint \
+             {folder}/room.farm/shards/frame#.2-of-2.checkpoint --every 5 --resume --progress plain\n"
         )
     );
     // Such options exist: all but those of shards, which the render has in its own words.
@@ -237,7 +239,8 @@ fn an_openjd_template_renders_shards_and_merges_them() {
     assert!(called.contains("--resume --progress openjd"));
     let called = run(1);
     let expected = format!(
-        "merge {shards}/frame7.1-of-2.shard {shards}/frame7.2-of-2.shard -o {folder}/out/a.0007.exr -o {folder}/b.07.png\n"
+        "merge {shards}/frame7.1-of-2.shard {shards}/frame7.2-of-2.shard -o {folder}/out/a.0007.exr -o \
+         {folder}/b.07.png\n"
     );
     assert_eq!(called, expected);
 }

@@ -57,7 +57,8 @@ fn folder() -> tempfile::TempDir {
     );
     write(
         "s.pbrt",
-        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8\nWorldBegin\nInclude \"part.pbrt\"\nShape \"sphere\"\n",
+        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8\nWorldBegin\nInclude \"part.pbrt\"\n\
+         Shape \"sphere\"\n",
     );
     write("part.pbrt", "LightSource \"infinite\" \"string filename\" \"sky.exr\"\n");
     for name in ["studio.exr", "sky.exr", "noisy.exr", "ref.exr"] {
@@ -236,7 +237,8 @@ fn conversions_overwrite_no_file_that_they_copy() {
     for (name, byte) in [("a_files/t.png", 10), ("t.png", 200)] {
         image::GrayImage::from_pixel(2, 2, image::Luma([byte])).save(dir.join(name)).unwrap();
     }
-    let textures = r#""textures": { "a": { "type": "image", "file": "t.png" }, "b": { "type": "image", "file": "a_files/t.png" } },"#;
+    let textures = r#""textures": { "a": { "type": "image", "file": "t.png" },
+        "b": { "type": "image", "file": "a_files/t.png" } },"#;
     std::fs::write(dir.join("src.json"), SCENE.replacen('{', &format!("{{ {textures}"), 1)).unwrap();
     assert_refused(
         dir,

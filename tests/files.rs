@@ -48,7 +48,8 @@ fn statistics_go_to_devices_pipes_and_open_files() {
     assert!(text.starts_with("before\n{") && text.ends_with("}\nafter\n"), "{text}");
     let output = shell(
         folder.path(),
-        "mkfifo p.exr p.json; cat p.exr >b.exr & cat p.json >b.json & \"$0\" render scene.json -q -o p.exr --json p.json && wait",
+        "mkfifo p.exr p.json; cat p.exr >b.exr & cat p.json >b.json & \"$0\" render scene.json -q -o p.exr --json \
+         p.json && wait",
     );
     assert!(output.status.success(), "{}", stderr_of(&output));
     assert!(is_statistics(&std::fs::read(folder.path().join("b.json")).unwrap()));
@@ -74,7 +75,8 @@ fn what_never_ends_is_not_read() {
         r#""shapes": [{ "type": "mesh", "file": "FILE" }]"#,
         r#""shapes": [{ "type": "mesh", "file": "named.obj" }]"#,
         r#""textures": { "t": { "type": "image", "file": "FILE" } },
-           "materials": { "m": { "type": "diffuse", "albedo": { "texture": "t" } } }, "shapes": [{ "type": "sphere", "material": "m" }]"#,
+           "materials": { "m": { "type": "diffuse", "albedo": { "texture": "t" } } },
+           "shapes": [{ "type": "sphere", "material": "m" }]"#,
         r#""lights": [{ "type": "environment", "file": "FILE" }]"#,
     ];
     let commands = [
@@ -112,7 +114,8 @@ fn what_never_ends_is_not_read() {
 #[test]
 fn killed_writers_leave_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = "render scene.json -q --size 256x192 --spp 8000 --layers Z,N,P --checkpoint a.state --every 0 --resume -o a.exr --json a.json";
+    let arguments = "render scene.json -q --size 256x192 --spp 8000 --layers Z,N,P --checkpoint a.state --every 0 \
+                     --resume -o a.exr --json a.json";
     let left = || hidden(folder.path()).into_iter().filter(|name| name != ".a.state.lock").collect::<Vec<_>>();
     let mut killed = 0;
     for i in 0..8 {
@@ -186,7 +189,8 @@ fn memory_that_runs_out_is_one_error() {
     for accel in ["embree", "bvh"] {
         for megabytes in [20, 30, 40, 50, 90, 150, 210, 250, 265, 280, 320].map(|more| least + more) {
             let line = format!(
-                "ulimit -c 0; ulimit -v {megabytes}000; exec \"$0\" render m.json -q -o a.png --accel {accel} --threads 3"
+                "ulimit -c 0; ulimit -v {megabytes}000; exec \"$0\" render m.json -q -o a.png --accel {accel} \
+                 --threads 3"
             );
             let start = Instant::now();
             let output = shell(folder.path(), &line);
@@ -242,7 +246,8 @@ fn threads_that_cannot_be_started_are_one_error() {
     assert!(output.status.success(), "{:?} {}", output.status, stderr_of(&output));
     for (accel, limit) in [("embree", 1), ("embree", 2), ("embree", 3), ("embree", 4), ("bvh", 3), ("bvh", 5)] {
         let line = format!(
-            "ulimit -c 0; {user} >/dev/null; exec $user bash -c 'ulimit -u {limit}; exec ./steradian render scene.json -q -o a.png --threads 7 --accel {accel}'"
+            "ulimit -c 0; {user} >/dev/null; exec $user bash -c 'ulimit -u {limit}; exec ./steradian render scene.json \
+             -q -o a.png --threads 7 --accel {accel}'"
         );
         let output = shell(folder.path(), &line);
         let text = stderr_of(&output);

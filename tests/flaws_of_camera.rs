@@ -13,7 +13,10 @@ fn symmetric(size: [u32; 2], filter: Value) -> Value {
         "sampler": { "spp": 4096 },
         "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0], "vertical_fov_degrees": 40 },
         "integrator": { "type": "path", "max_depth": 1 },
-        "shapes": [{ "type": "quad", "origin": [-0.6, -0.6, 0], "edge_u": [1.2, 0, 0], "edge_v": [0, 1.2, 0], "emission": { "radiance": [1, 1, 1] } }]
+        "shapes": [{
+            "type": "quad", "origin": [-0.6, -0.6, 0], "edge_u": [1.2, 0, 0], "edge_v": [0, 1.2, 0],
+            "emission": { "radiance": [1, 1, 1] }
+        }]
     })
 }
 
@@ -84,7 +87,10 @@ fn the_lens_is_sampled_by_area_and_not_by_radius() {
     let scene = json!({
         "film": { "width": 32, "height": 32, "filter": { "type": "box" } },
         "sampler": { "spp": 1024 },
-        "camera": { "position": [0, 0, 1], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "lens": { "radius": 0.25, "focus_distance": 1e6 } },
+        "camera": {
+            "position": [0, 0, 1], "look_at": [0, 0, 0], "vertical_fov_degrees": 40,
+            "lens": { "radius": 0.25, "focus_distance": 1e6 }
+        },
         "integrator": { "type": "path", "max_depth": 1 },
         "shapes": [{ "type": "sphere", "radius": 0.02, "emission": { "radiance": [1, 1, 1] } }]
     });

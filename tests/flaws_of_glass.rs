@@ -138,7 +138,12 @@ fn exact_zeros_of_a_profile_are_hits() {
 fn glass_ball(shape: Value) -> Image {
     let mut shape = shape;
     shape["material"] = json!("glass");
-    let half = |x: f64, radiance: [f64; 3]| json!({ "type": "quad", "origin": [x, -9, -6], "edge_u": [9, 0, 0], "edge_v": [0, 18, 0], "material": "black", "emission": { "radiance": radiance } });
+    let half = |x: f64, radiance: [f64; 3]| {
+        json!({
+            "type": "quad", "origin": [x, -9, -6], "edge_u": [9, 0, 0], "edge_v": [0, 18, 0], "material": "black",
+            "emission": { "radiance": radiance }
+        })
+    };
     render(&json!({
         "film": { "width": 24, "height": 24, "filter": { "type": "box" } },
         "camera": { "position": [0, 0, 8], "look_at": [0, 0, 0], "vertical_fov_degrees": 17 },
@@ -316,7 +321,10 @@ fn paths_between_facing_mirrors_end() {
             "shapes": [
                 { "type": "quad", "material": "mirror", "transform": [{ "scale": 99 }, { "translate": [0, 0, 2] }] },
                 { "type": "quad", "material": "mirror", "transform": [{ "scale": 99 }, { "translate": [0, 0, -2] }] },
-                { "type": "sphere", "radius": 0.01, "transform": [{ "translate": [50, 50, 0] }], "emission": { "radiance": [1, 1, 1] } }
+                {
+                    "type": "sphere", "radius": 0.01, "transform": [{ "translate": [50, 50, 0] }],
+                    "emission": { "radiance": [1, 1, 1] }
+                }
             ]
         }));
         assert!(pixels(&image).all(|p| p.iter().all(|c| c.is_finite())), "{integrator}");

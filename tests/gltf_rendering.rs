@@ -31,7 +31,9 @@ fn square(material: Value) -> Value {
             { "camera": 0, "translation": [0, 0, 5] },
             { "translation": [0, 0, 900], "extensions": { "KHR_lights_punctual": { "light": 0 } } }
         ],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2, "material": 0 }] }],
+        "meshes": [{
+            "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2, "material": 0 }]
+        }],
         "cameras": [{ "type": "orthographic", "orthographic": { "xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 10 } }],
         "materials": [material],
         "textures": [{ "source": 0, "sampler": 0 }],

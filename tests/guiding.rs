@@ -35,12 +35,19 @@ fn room() -> Value {
         "camera": { "position": [-0.6, 1.0, 1.8], "look_at": [-1.2, 0.8, -1.0], "vertical_fov_degrees": 60 },
         "film": { "width": 72, "height": 72, "filter": { "type": "box" } },
         "integrator": { "type": "path", "max_depth": 12 },
-        "materials": { "white": { "type": "diffuse", "albedo": 0.7 }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 } },
+        "materials": {
+            "white": { "type": "diffuse", "albedo": 0.7 },
+            "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
+        },
         "shapes": walls_and(vec![
             quad("white", [0.4, 0.0, -2.0], [0.0, 0.0, 3.7], [0.0, 2.0, 0.0]),
-            json!({ "type": "sphere", "material": "gold", "radius": 0.3, "transform": [{ "translate": [-1.1, 0.3, -0.4] }] }),
-            json!({ "type": "quad", "material": "white", "origin": [1.6, 1.8, -1.6], "edge_u": [0.3, 0, 0], "edge_v": [0, 0, 0.3],
-              "emission": { "radiance": [90, 80, 60] } }),
+            json!({
+                "type": "sphere", "material": "gold", "radius": 0.3, "transform": [{ "translate": [-1.1, 0.3, -0.4] }]
+            }),
+            json!({
+                "type": "quad", "material": "white", "origin": [1.6, 1.8, -1.6], "edge_u": [0.3, 0, 0],
+                "edge_v": [0, 0, 0.3], "emission": { "radiance": [90, 80, 60] }
+            }),
         ])
     })
 }
@@ -60,8 +67,10 @@ fn room_with_shaft() -> Value {
             wall(-half, half, [2.0 * half, 0.0, 0.0]),
             wall(-half, -half, [0.0, 0.0, 2.0 * half]),
             wall(half, -half, [0.0, 0.0, 2.0 * half]),
-            json!({ "type": "quad", "material": "black", "origin": [-half, bottom, -half], "edge_u": [0, 0, 2.0 * half], "edge_v": [2.0 * half, 0, 0],
-              "emission": { "radiance": [400, 400, 400] } }),
+            json!({
+                "type": "quad", "material": "black", "origin": [-half, bottom, -half], "edge_u": [0, 0, 2.0 * half],
+                "edge_v": [2.0 * half, 0, 0], "emission": { "radiance": [400, 400, 400] }
+            }),
         ])
     })
 }

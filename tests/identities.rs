@@ -26,12 +26,19 @@ fn scene() -> Value {
             { "type": "sphere", "material": "red", "name": "ball" },
             { "type": "sphere" },
             { "type": "mesh", "file": "models/two.obj" },
-            { "type": "quad", "name": "slider", "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }] },
+            {
+                "type": "quad", "name": "slider",
+                "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "translate": [1, 0, 0] }] }]
+            },
             { "type": "disk", "name": "quad_5" },
             { "type": "quad" }
         ],
         "objects": {
-            "lamp": { "shapes": [{ "type": "sphere", "name": "bulb", "emission": { "radiance": [1, 1, 1] } }, { "type": "cylinder" }] },
+            "lamp": {
+                "shapes": [
+                    { "type": "sphere", "name": "bulb", "emission": { "radiance": [1, 1, 1] } }, { "type": "cylinder" }
+                ]
+            },
             "room": { "shapes": [{ "type": "cube", "material": "red" }],
                       "instances": [{ "object": "lamp", "name": "left" }, { "object": "lamp" }] }
         },

@@ -130,8 +130,14 @@ fn parts_and_groups_sum_to_the_picture_whatever_the_integrator_does() {
         }
         // Two suns and a sky in groups of their own.
         let lights = json!([
-            { "type": "directional", "direction": [0.2, -1, 0.3], "irradiance": [1, 2, 3], "angular_diameter_degrees": 20, "group": "sun" },
-            { "type": "directional", "direction": [-0.2, -1, 0.3], "irradiance": [3, 2, 1], "angular_diameter_degrees": 30 },
+            {
+                "type": "directional", "direction": [0.2, -1, 0.3], "irradiance": [1, 2, 3],
+                "angular_diameter_degrees": 20, "group": "sun"
+            },
+            {
+                "type": "directional", "direction": [-0.2, -1, 0.3], "irradiance": [3, 2, 1],
+                "angular_diameter_degrees": 30
+            },
             { "type": "environment", "radiance": [0.2, 0.1, 0.3], "group": "sky" }
         ]);
         scene["lights"] = lights;
@@ -163,7 +169,10 @@ const ALBEDO: [f64; 3] = [0.8, 0.5, 0.2];
 fn a_furnace_parts_light_by_bounces() {
     // Within a sphere of albedo a and radiance 1: 1 is seen, a is scattered once, a² + a³ more often on at most 4
     // segments.
-    let shapes = json!([{ "type": "sphere", "radius": 10, "material": "m", "reverse_normal": true, "emission": { "radiance": [1, 1, 1], "group": "walls" } }]);
+    let shapes = json!([{
+        "type": "sphere", "radius": 10, "material": "m", "reverse_normal": true,
+        "emission": { "radiance": [1, 1, 1], "group": "walls" }
+    }]);
     for strategy in ["mis", "bsdf"] {
         let scene = room(json!({ "integrator": { "strategy": strategy }, "shapes": shapes }));
         let image = full_of(&scene);
@@ -189,7 +198,10 @@ fn a_pane_parts_reflection_from_transmission() {
     let scene = room(json!({
         "camera": { "type": "orthographic", "view_height": 1 },
         "materials": { "pane": { "type": "thin_dielectric", "ior": 1.5 } },
-        "shapes": [{ "type": "quad", "material": "pane" }, { "type": "quad", "material": "m", "transform": [{ "translate": [0, 0, -1] }] }],
+        "shapes": [
+            { "type": "quad", "material": "pane" },
+            { "type": "quad", "material": "m", "transform": [{ "translate": [0, 0, -1] }] }
+        ],
         "lights": [{ "type": "environment", "radiance": [0.5, 0.5, 0.5] }]
     }));
     let mut scene = scene;
@@ -217,13 +229,18 @@ fn highlights_and_what_is_below_are_parted_by_their_lobes() {
     for material in [
         json!({ "type": "plastic", "albedo": [0.8, 0.5, 0.2], "roughness": 0.4 }),
         json!({ "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20 }),
-        json!({ "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20, "lobe": "cosine" }),
+        json!({
+            "type": "phong", "diffuse": [0.6, 0.5, 0.2], "specular": [0.3, 0.3, 0.3], "exponent": 20, "lobe": "cosine"
+        }),
         json!({ "type": "plastic", "albedo": [0.8, 0.5, 0.2] }),
     ] {
         let floor = |material: Value| {
             full_of(&room(json!({
                 "camera": { "position": [0, 2, 4], "vertical_fov_degrees": 1 }, "materials": { "floor": material },
-                "shapes": [{ "type": "quad", "material": "floor", "origin": [-9, 0, 9], "edge_u": [18, 0, 0], "edge_v": [0, 0, -18] }],
+                "shapes": [{
+                    "type": "quad", "material": "floor", "origin": [-9, 0, 9], "edge_u": [18, 0, 0],
+                    "edge_v": [0, 0, -18]
+                }],
                 "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
             })))
         };
@@ -351,7 +368,11 @@ fn motion_is_that_of_things_and_of_the_camera() {
     let is = |found: &[[f32; 2]], expected: [f32; 2]| {
         assert!(found.iter().all(|p| (0..2).all(|k| (p[k] - expected[k]).abs() < 1e-3)), "{found:?} for {expected:?}");
     };
-    let large = |motion: Value| json!({ "type": "quad", "origin": [-9, -9, 0], "edge_u": [18, 0, 0], "edge_v": [0, 18, 0], "motion": motion });
+    let large = |motion: Value| {
+        json!({
+            "type": "quad", "origin": [-9, -9, 0], "edge_u": [18, 0, 0], "edge_v": [0, 18, 0], "motion": motion
+        })
+    };
     let slide = json!([{ "time": 0 }, { "time": 1, "transform": [{ "translate": [0.5, 0.25, 0] }] }]);
     is(&ahead(json!({}), large(json!([]))), [0.0, 0.0]);
     is(&ahead(json!({}), large(slide.clone())), [6.0, -3.0]);
@@ -361,7 +382,9 @@ fn motion_is_that_of_things_and_of_the_camera() {
 
     // What a camera that turns sees at infinity goes the other way.
     let mut scene = room(json!({
-        "camera": { "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 1 } }] }] },
+        "camera": {
+            "motion": [{ "time": 0 }, { "time": 1, "transform": [{ "rotate": { "axis": [0, 1, 0], "degrees": 1 } }] }]
+        },
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
     }));
     scene["camera"]["position"] = json!([0, 0, 0]);

@@ -11,13 +11,18 @@ use crate::util::folder::{Folder, good_scene, set};
 use crate::util::render::{AssertIs, Estimate, assert_irradiance, floor_probe, merge, pixels, probe, render};
 
 /// 10 candela downwards; 8 (in the plane of horizontal angle 0) or 6 (in that of 90) at 45 degrees; nothing at 90.
-const LAMP: &str = "IESNA:LM-63-2002\n[TEST] none\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10 6 0\n";
+const LAMP: &str = "IESNA:LM-63-2002\n[TEST] none\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n0.5 1.0 10\n0 45 90\n\
+                    0 90\n10 8 0\n10 6 0\n";
 
 #[test]
 fn a_measured_light_has_the_intensity_of_its_file() {
     let folder = Folder::new();
     let file = folder.write("lamp.ies", LAMP);
-    let lamp = |turned: f64| json!([{ "type": "ies", "file": file, "position": [0, 1, 0], "intensity": [0.5, 0.5, 0.5], "rotation_degrees": turned }]);
+    let lamp = |turned: f64| {
+        json!([{
+            "type": "ies", "file": file, "position": [0, 1, 0], "intensity": [0.5, 0.5, 0.5], "rotation_degrees": turned
+        }])
+    };
     let angle = 22.5f64.to_radians();
     let fall = 0.5 * angle.cos().powi(3);
     // Half of the way from 0 to 45 degrees.
@@ -34,12 +39,16 @@ fn a_measured_light_has_the_intensity_of_its_file() {
 /// quarters, else 0.75.
 #[test]
 fn projectors_and_textured_spots_throw_pictures() {
-    let textures = json!({ "board": { "type": "checker", "color0": [0.25, 0.25, 0.25], "color1": [0.75, 0.75, 0.75], "scale": [2, 2] } });
+    let textures = json!({
+        "board": { "type": "checker", "color0": [0.25, 0.25, 0.25], "color1": [0.75, 0.75, 0.75], "scale": [2, 2] }
+    });
     // Above the floor at height 1, looking down with -Z up: u grows with x and v against z, over 2 x 1 of the floor for
     // the projector.
     let lights = [
-        json!({ "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "irradiance": [2, 2, 2], "texture": "board",
-            "vertical_fov_degrees": 2.0 * 0.5f64.atan().to_degrees(), "aspect": 2 }),
+        json!({
+            "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "irradiance": [2, 2, 2],
+            "texture": "board", "vertical_fov_degrees": 2.0 * 0.5f64.atan().to_degrees(), "aspect": 2
+        }),
         json!({ "type": "spot", "position": [0, 1, 0], "look_at": [0, 0, 0], "intensity": [2, 2, 2], "texture": "board",
             "cutoff_angle_degrees": 45, "beam_angle_degrees": 45 }),
     ];
@@ -66,7 +75,9 @@ fn projectors_and_textured_spots_throw_pictures() {
 fn wrong_projectors_are_refused_with_their_place() {
     let folder = Folder::new();
     let light = json!({ "type": "projector", "position": [0, 1, 0], "look_at": [0, 0, 0], "vertical_fov_degrees": 40 });
-    let spot = json!({ "type": "spot", "position": [0, 1, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1], "texture": "tiles" });
+    let spot = json!({
+        "type": "spot", "position": [0, 1, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1], "texture": "tiles"
+    });
     for (light, key, value) in [
         (&light, "vertical_fov_degrees", json!(180)),
         (&light, "aspect", json!(0)),
@@ -96,9 +107,13 @@ fn a_textured_light_shines_where_its_texture_is_bright() {
     };
     let expected = corner(1.0, 1.0) + (corner(2.0, 2.0) - 2.0 * corner(1.0, 2.0) + corner(1.0, 1.0));
     let emission = json!({ "radiance": [1, 1, 1], "texture": "board" });
-    let quad = json!({ "type": "quad", "material": "black", "origin": [0, 1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "emission": emission });
+    let quad = json!({
+        "type": "quad", "material": "black", "origin": [0, 1, 0], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2],
+        "emission": emission
+    });
     let mesh = json!({
-        "type": "mesh", "material": "black", "emission": emission, "positions": [[0, 1, 0], [2, 1, 0], [2, 1, 2], [0, 1, 2]],
+        "type": "mesh", "material": "black", "emission": emission,
+        "positions": [[0, 1, 0], [2, 1, 0], [2, 1, 2], [0, 1, 2]],
         "triangles": [[0, 1, 2], [0, 2, 3]], "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]]
     });
     for (what, shape) in [("quad", quad), ("mesh", mesh)] {
@@ -127,11 +142,16 @@ fn a_flat_lamp_that_shines_on_both_sides_does_not_light_itself() {
         (json!({ "type": "diffuse", "albedo": 0.9 }), [2.0, 0.0, 0.0]),
         (json!({ "type": "principled" }), [2.0, 0.3, 0.0]),
     ] {
-        let quad = json!({ "type": "quad", "material": "m", "edge_u": edge, "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } },
-            { "translate": [10.1, 20.7, -3.3] }], "emission": { "radiance": [1, 1, 1], "two_sided": true } });
+        let quad = json!({
+            "type": "quad", "material": "m", "edge_u": edge,
+            "transform": [{ "rotate": { "axis": [1, 2, 3], "degrees": 40 } }, { "translate": [10.1, 20.7, -3.3] }],
+            "emission": { "radiance": [1, 1, 1], "two_sided": true }
+        });
         let camera = json!({ "position": [10.1, 20.7, 1.7], "look_at": [10.1, 20.7, -3.3], "vertical_fov_degrees": 5 });
-        let scene = json!({ "camera": camera, "film": { "width": 16, "height": 16 }, "sampler": { "spp": 64 }, "materials": { "m": material },
-            "shapes": [quad] });
+        let scene = json!({
+            "camera": camera, "film": { "width": 16, "height": 16 }, "sampler": { "spp": 64 },
+            "materials": { "m": material }, "shapes": [quad]
+        });
         for pixel in pixels(&Folder::new().render(&scene)) {
             assert_eq!(pixel, [1.0; 3]);
         }
@@ -179,11 +199,14 @@ fn whitteds_direct_light_of_anything_with_an_extent_is_all_of_it() {
     let mut scene = floor_probe([0.0; 3], json!([]));
     scene["lights"] = json!([{ "type": "environment", "file": image }]);
     direct(scene.clone(), 2.0, "image");
-    let sun = json!({ "type": "directional", "direction": [0.6, -0.8, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 30 });
+    let sun = json!({
+        "type": "directional", "direction": [0.6, -0.8, 0], "irradiance": [1, 1, 1], "angular_diameter_degrees": 30
+    });
     scene["lights"] = json!([sun]);
     direct(scene, 0.8 / PI, "sun");
     let lamp = json!({
-        "type": "sphere", "material": "black", "radius": 0.5, "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": [1.2, 1.6, 0] }]
+        "type": "sphere", "material": "black", "radius": 0.5, "emission": { "radiance": [1, 1, 1] },
+        "transform": [{ "translate": [1.2, 1.6, 0] }]
     });
     direct(floor_probe([0.0; 3], json!([lamp])), 0.8 / 16.0, "ball");
 }
@@ -194,12 +217,18 @@ fn corner(integrator: Value) -> Value {
         [3.0, 2.0, 4.0],
         [0.0, 0.6, 0.0],
         json!({
-            "materials": { "grey": { "type": "diffuse", "albedo": 0.7 }, "metal": { "type": "conductor", "metal": "silver", "alpha": 0.1 } },
+            "materials": {
+                "grey": { "type": "diffuse", "albedo": 0.7 },
+                "metal": { "type": "conductor", "metal": "silver", "alpha": 0.1 }
+            },
             "shapes": [
                 { "type": "quad", "material": "grey", "origin": [-2, 0, 2], "edge_u": [4, 0, 0], "edge_v": [0, 0, -4] },
                 { "type": "quad", "material": "grey", "origin": [-2, 0, -2], "edge_u": [4, 0, 0], "edge_v": [0, 4, 0] },
                 { "type": "sphere", "material": "metal", "radius": 0.6, "transform": [{ "translate": [0, 0.6, 0] }] },
-                { "type": "sphere", "radius": 0.2, "emission": { "radiance": [20, 18, 15] }, "transform": [{ "translate": [-1, 2, 0.5] }] }
+                {
+                    "type": "sphere", "radius": 0.2, "emission": { "radiance": [20, 18, 15] },
+                    "transform": [{ "translate": [-1, 2, 0.5] }]
+                }
             ]
         }),
     );
@@ -392,9 +421,13 @@ fn a_hidden_lamp_shows_what_is_behind_it() {
                     "integrator": { "type": kind, "hide_emitters": hide },
                     "materials": { "white": { "type": "diffuse", "albedo": 0.8 } },
                     "shapes": [
-                        { "type": "quad", "material": "white", "origin": [-1.2, -1.2, 0], "edge_u": [2.4, 0, 0], "edge_v": [0, 2.4, 0] },
                         {
-                            "type": "quad", "origin": [-0.5, -0.5, 1], "edge_u": [1, 0, 0], "edge_v": [0, 1, 0], "reverse_normal": turned,
+                            "type": "quad", "material": "white", "origin": [-1.2, -1.2, 0], "edge_u": [2.4, 0, 0],
+                            "edge_v": [0, 2.4, 0]
+                        },
+                        {
+                            "type": "quad", "origin": [-0.5, -0.5, 1], "edge_u": [1, 0, 0], "edge_v": [0, 1, 0],
+                            "reverse_normal": turned,
                             "emission": { "radiance": [5, 5, 5] }
                         },
                         // Another lamp behind it.

@@ -381,7 +381,8 @@ fn a_port_in_use_ends_the_program_before_the_render() {
     );
     std::fs::write(
         folder.path().join("ball.json"),
-        r#"{ "film": { "width": 8, "height": 8 }, "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] }, "shapes": [{ "type": "sphere" }], "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] }"#,
+        r#"{ "film": { "width": 8, "height": 8 }, "camera": { "position": [0, 0, 4], "look_at": [0, 0, 0] },
+        "shapes": [{ "type": "sphere" }], "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] }"#,
     )
     .unwrap();
     let line = format!("render ball.json --preview {}", address.port());

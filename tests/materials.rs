@@ -38,7 +38,8 @@ fn a_mix_of_mixes_is_mixed_independently() {
     // A quarter of white: the choices within must not depend on the choices without.
     let materials = json!({
         "black": { "type": "diffuse", "albedo": 0.0 }, "white": { "type": "diffuse", "albedo": 1.0 },
-        "half": { "type": "mix", "materials": ["black", "white"] }, "m": { "type": "mix", "materials": ["black", "half"] }
+        "half": { "type": "mix", "materials": ["black", "white"] },
+        "m": { "type": "mix", "materials": ["black", "half"] }
     });
     look(true, materials).assert_is(0.25, "nested mix");
 }
@@ -102,7 +103,10 @@ fn roughness_and_colours_can_be_textures() {
         let see = |material: &Value| {
             let mut scene = square(
                 true,
-                json!({ "textures": textures, "materials": { "m": material, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.5 } } }),
+                json!({
+                    "textures": textures,
+                    "materials": { "m": material, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.5 } }
+                }),
             );
             scene["camera"]["look_at"] = json!([0.5, 0.5, 0.0]);
             scene["sampler"]["spp"] = json!(64);
@@ -133,7 +137,9 @@ fn see_tiled(material: &Value) -> Estimate {
     let mut scene = square(
         true,
         json!({
-            "textures": { "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0, 0, 0], "scale": [1, 1] } },
+            "textures": {
+                "tiles": { "type": "checker", "color0": [0.5, 0.5, 0.5], "color1": [0, 0, 0], "scale": [1, 1] }
+            },
             "materials": { "m": material, "base": { "type": "diffuse", "albedo": [0.1, 0.7, 0.3] } }
         }),
     );
@@ -257,7 +263,8 @@ fn a_metal_with_beckmanns_microfacets_has_their_density() {
     // at these angles.
     let lit = |distribution: &str| {
         lit_from_the_right(&json!({
-            "type": "conductor", "eta": [1e-6, 1e-6, 1e-6], "k": [1, 1, 1], "alpha": 0.3, "distribution": distribution, "multiscatter": false
+            "type": "conductor", "eta": [1e-6, 1e-6, 1e-6], "k": [1, 1, 1], "alpha": 0.3, "distribution": distribution,
+            "multiscatter": false
         }))
     };
     let unit = |v: [f64; 3]| v.map(|x| x / v.iter().map(|x| x * x).sum::<f64>().sqrt());

@@ -34,7 +34,8 @@ fn names_steer_neither_farms_nor_terminals() {
         scene["materials"][name] = json!({ "type": "mirror" });
     });
     let missing = scene(|scene| scene["shapes"][0] = json!({ "type": "mesh", "file": format!("{name}.obj") }));
-    let xml = "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"><string name=\"a&#10;openjd_env: x&#27;[2J\" value=\"b\"/></shape></scene>";
+    let xml = "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"><string \
+               name=\"a&#10;openjd_env: x&#27;[2J\" value=\"b\"/></shape></scene>";
     for (file, text) in
         [("unknown.json", &*unknown), ("named.json", &named), ("missing.json", &missing), ("import.xml", xml)]
     {

@@ -78,7 +78,9 @@ fn a_plane_reflects_what_falls_on_it() {
     // The same plane by another point and normal, under a transform that turns its back to the camera.
     scene["shapes"][0] = json!({
         "type": "plane", "material": "grey", "point": [7, -3, 4], "normal": [0, 0, 3],
-        "transform": [{ "translate": [0, 0, -4] }, { "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "scale": [3, 0.5, 2] }]
+        "transform": [
+            { "translate": [0, 0, -4] }, { "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "scale": [3, 0.5, 2] }
+        ]
     });
     Estimate::of(&render(&scene), 1).assert_is(expected, "placed");
 }

@@ -52,7 +52,8 @@ fn save_normal(folder: &Folder, n: [f32; 3]) {
 
 fn square(uvs: Value) -> Value {
     json!({
-        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], "triangles": [[0, 1, 2], [0, 2, 3]],
+        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]],
+        "triangles": [[0, 1, 2], [0, 2, 3]],
         "uvs": uvs
     })
 }
@@ -69,7 +70,9 @@ fn shapes() -> Vec<Value> {
             "type": "cylinder", "material": "m", "height": 2,
             "transform": [{ "translate": [0, 0, -1] }, { "rotate": { "axis": [0, 1, 0], "degrees": 70 } }]
         }),
-        json!({ "type": "revolution", "material": "m", "profile": { "bezier": [[0.5, -1], [1.5, -1], [1.5, 1], [0.5, 1]] } }),
+        json!({
+            "type": "revolution", "material": "m", "profile": { "bezier": [[0.5, -1], [1.5, -1], [1.5, 1], [0.5, 1]] }
+        }),
         json!({ "type": "cube", "material": "m" }),
         square(json!([[0, 0], [1, 0], [1, 1], [0, 1]])),
         square(json!([[1, 0], [0, 0], [0, 1], [1, 1]])),
@@ -166,7 +169,8 @@ fn bump_maps_have_the_slopes_of_their_heights() {
     for (height, filter) in [(0.5, "bilinear"), (-0.25, "bilinear")] {
         for (size, instanced) in [([2.0, 2.0, 0.0], false), ([5.0, 1.0, 0.0], true)] {
             let shape = json!({
-                "type": "quad", "material": "m", "origin": [-0.5 * size[0], -0.5 * size[1], 0.0], "edge_u": [size[0], 0, 0], "edge_v": [0, size[1], 0]
+                "type": "quad", "material": "m", "origin": [-0.5 * size[0], -0.5 * size[1], 0.0],
+                "edge_u": [size[0], 0, 0], "edge_v": [0, size[1], 0]
             });
             let mut scene = scene_of(json!([]), json!({ "bump_map": { "texture": "map", "height": height } }));
             scene["textures"]["map"]["filter"] = json!(filter);
@@ -203,7 +207,10 @@ fn no_light_leaks_into_a_closed_box_whatever_its_normals_say() {
     ] {
         for integrator in ["path", "whitted"] {
             let mut scene = scene_of(
-                json!([{ "type": "cube", "material": "m", "transform": [{ "scale": 3 }] }, { "type": "sphere", "material": "m" }]),
+                json!([
+                    { "type": "cube", "material": "m", "transform": [{ "scale": 3 }] },
+                    { "type": "sphere", "material": "m" }
+                ]),
                 normal_map(),
             );
             scene["materials"]["plain"] = material.clone();
@@ -284,7 +291,10 @@ fn ball(n: u32, shading: &str) -> Value {
             triangles.push([index(i, j), index(i + 1, j + 1), index(i + 1, j)]);
         }
     }
-    json!({ "type": "mesh", "material": "plain", "positions": positions, "normals": positions, "triangles": triangles, "shading": shading })
+    json!({
+        "type": "mesh", "material": "plain", "positions": positions, "normals": positions, "triangles": triangles,
+        "shading": shading
+    })
 }
 
 fn lit(shape: Value) -> Value {
@@ -355,8 +365,13 @@ fn creases_are_edges_and_what_is_flatter_is_smooth() {
     let folder = Folder::new();
     let cube = json!({
         "type": "mesh", "material": "plain", "shading": "smooth",
-        "positions": [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
-        "triangles": [[4, 5, 6], [4, 6, 7], [1, 0, 3], [1, 3, 2], [5, 1, 2], [5, 2, 6], [0, 4, 7], [0, 7, 3], [7, 6, 2], [7, 2, 3], [0, 1, 5], [0, 5, 4]]
+        "positions": [
+            [-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]
+        ],
+        "triangles": [
+            [4, 5, 6], [4, 6, 7], [1, 0, 3], [1, 3, 2], [5, 1, 2], [5, 2, 6], [0, 4, 7], [0, 7, 3], [7, 6, 2],
+            [7, 2, 3], [0, 1, 5], [0, 5, 4]
+        ]
     });
     let normal = |shape: &Value| {
         let mut scene = scene_of(json!([shape]), json!({}));

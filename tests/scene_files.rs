@@ -106,7 +106,8 @@ fn fronts_stay_fronts_in_a_mirror_and_turn_on_demand() {
     let folder = Folder::new();
     for (scale, reverse, front) in [(1.0, false, 1.0), (-1.0, false, 1.0), (1.0, true, -1.0), (-1.0, true, -1.0)] {
         let triangle = json!({
-            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "normals": vec![[0.6, 0.0, 0.8]; 3],
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]],
+            "normals": vec![[0.6, 0.0, 0.8]; 3],
             "transform": [{ "scale": [scale, 1.0, 2.0] }], "reverse_normal": reverse
         });
         let scene = folder.compile(&lit(triangle)).unwrap();
@@ -129,7 +130,9 @@ fn triangles_without_area_are_dropped() {
 fn shading_chooses_the_normals() {
     let folder = Folder::new();
     let has_normals = |normals: bool, shading: Value| {
-        let mut triangle = json!({ "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "shading": shading });
+        let mut triangle = json!({
+            "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "shading": shading
+        });
         if normals {
             triangle["normals"] = json!(vec![[0.0, 0.0, 1.0]; 3]);
         }
@@ -293,10 +296,15 @@ fn what_emits_in_an_object_stands_in_the_world_for_each_instance() {
                 "shapes": [
                     { "type": "cube" },
                     { "type": "mesh", "file": "m.obj" },
-                    { "type": "sphere", "radius": 0.5, "emission": { "radiance": [1, 1, 1] }, "transform": [{ "translate": [1, 0, 0] }] }
+                    {
+                        "type": "sphere", "radius": 0.5, "emission": { "radiance": [1, 1, 1] },
+                        "transform": [{ "translate": [1, 0, 0] }]
+                    }
                 ]
             },
-            "outer": { "instances": [{ "object": "inner" }, { "object": "inner", "transform": [{ "translate": [0, 10, 0] }] }] },
+            "outer": {
+                "instances": [{ "object": "inner" }, { "object": "inner", "transform": [{ "translate": [0, 10, 0] }] }]
+            },
             "idle": { "shapes": [{ "type": "disk" }] }
         },
         "instances": [{ "object": "outer", "transform": [{ "scale": 2 }] }, { "object": "inner" }]

@@ -8,7 +8,8 @@ use steradian::film::{FilmTile, Image, SumPlane};
 use steradian::math::Rng;
 use steradian::render::{self, Overrides, Shard, StateFile};
 
-use crate::checkpoints::{Kit, channels, scene};
+use crate::checkpoints::{Kit, scene};
+use crate::interrupted::channels;
 
 /// Writes shards, and returns their files.
 fn written(kit: &Kit, folder: &Path, shards: impl IntoIterator<Item = Shard>) -> Vec<PathBuf> {
@@ -209,7 +210,9 @@ fn the_program_splits_and_merges() {
     let folder = folder.path();
     let mut scene = scene("mitchell");
     let layers = ["Z", "N", "albedo", "variance", "samples", "light_groups", "diffuse_direct"];
-    scene["outputs"] = serde_json::json!([{ "file": "x.exr", "layers": layers, "pixel_type": "float" }, { "file": "x.png", "exposure": 1 }]);
+    scene["outputs"] = serde_json::json!([
+        { "file": "x.exr", "layers": layers, "pixel_type": "float" }, { "file": "x.png", "exposure": 1 }
+    ]);
     std::fs::write(folder.join("scene.json"), scene.to_string()).unwrap();
     assert_code(&run(folder, "render scene.json -q"), 0, "");
     for shard in 1..=3 {
@@ -289,7 +292,7 @@ fn headers_that_make_no_sense_are_refused() {
     ];
     for (place, value, part) in cases {
         with_header(&folder.join("a.shard"), &folder.join("altered_a.shard"), |header| {
-            *header.pointer_mut(place).unwrap() = value.clone()
+            *header.pointer_mut(place).unwrap() = value.clone();
         });
         let output = run(folder, "merge altered_a.shard --partial -o a.exr");
         assert_code(&output, 6, part);
@@ -305,7 +308,7 @@ fn headers_that_make_no_sense_are_refused() {
     assert_code(&run(folder, "merge large.shard --partial -o a.exr"), 6, "a part is missing");
     // A name out of the shard does not leave the folder.
     with_header(&folder.join("a.shard"), &folder.join("outside.shard"), |header| {
-        header["outputs"][0]["file"] = json!("../out.exr")
+        header["outputs"][0]["file"] = json!("../out.exr");
     });
     assert_code(&run(folder, "merge outside.shard --partial"), 2, "-o");
     assert_code(&run(folder, "merge outside.shard --partial -o a.exr"), 0, "wrote a.exr");

@@ -32,9 +32,17 @@ fn floor(filter: &str, spp: u32, rest: Value) -> Value {
         "camera": { "position": [0, 1, 4], "look_at": [0, 0.5, 0], "vertical_fov_degrees": 40.0 },
         "sampler": { "spp": spp },
         "integrator": { "type": "path", "max_depth": 6, "strategy": "bsdf" },
-        "textures": { "noise": { "type": "image", "file": "noise.png", "filter": filter, "color_space": "linear", "scale": [100, 100] } },
-        "materials": { "floor": { "type": "diffuse", "albedo": { "texture": "noise" } }, "mirror": { "type": "mirror" } },
-        "shapes": [{ "type": "quad", "material": "floor", "origin": [-100, 0, 100], "edge_u": [200, 0, 0], "edge_v": [0, 0, -200] }],
+        "textures": {
+            "noise": {
+                "type": "image", "file": "noise.png", "filter": filter, "color_space": "linear", "scale": [100, 100]
+            }
+        },
+        "materials": {
+            "floor": { "type": "diffuse", "albedo": { "texture": "noise" } }, "mirror": { "type": "mirror" }
+        },
+        "shapes": [{
+            "type": "quad", "material": "floor", "origin": [-100, 0, 100], "edge_u": [200, 0, 0], "edge_v": [0, 0, -200]
+        }],
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]
     });
     merge(&mut scene, rest);
@@ -86,7 +94,9 @@ fn a_mirror_shows_what_is_seen_without_it_as_sharp() {
     // Towards the floor, from before a mirror and from behind it.
     let direct = json!({ "camera": { "position": [0, 3, -4], "look_at": [0, 0, 3] } });
     let mut mirrored = json!({ "camera": { "position": [0, 3, 4], "look_at": [0, 0, -3] } });
-    let mirror = json!({ "type": "quad", "material": "mirror", "origin": [-20, 0, 0], "edge_u": [40, 0, 0], "edge_v": [0, 20, 0] });
+    let mirror = json!({
+        "type": "quad", "material": "mirror", "origin": [-20, 0, 0], "edge_u": [40, 0, 0], "edge_v": [0, 20, 0]
+    });
     let shapes = floor("trilinear", 1, json!({}))["shapes"]
         .as_array()
         .unwrap()

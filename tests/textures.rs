@@ -97,7 +97,9 @@ fn with_material(mut shape: Value) -> Value {
 #[test]
 fn textures_stay_on_shapes_that_are_moved() {
     let folder = Folder::new();
-    let transform = json!([{ "scale": [1.0, 2.0, 0.5] }, { "rotate": { "axis": [1, 2, 3], "degrees": 70 } }, { "translate": [3, -2, 7] }]);
+    let transform = json!([
+        { "scale": [1.0, 2.0, 0.5] }, { "rotate": { "axis": [1, 2, 3], "degrees": 70 } }, { "translate": [3, -2, 7] }
+    ]);
     for (shape, surface) in full_turns() {
         let mut moved_shape = shape.clone();
         moved_shape["transform"] = transform.clone();
@@ -123,7 +125,8 @@ fn a_textured_mesh_is_the_same_on_any_number_of_threads() {
     use crate::util::render::{prepare, render_with};
     use steradian::render::Overrides;
     let mesh = json!([{
-        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0.5], [-1, 1, 0]], "triangles": [[0, 1, 2], [0, 2, 3]],
+        "type": "mesh", "material": "m", "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0.5], [-1, 1, 0]],
+        "triangles": [[0, 1, 2], [0, 2, 3]],
         "uvs": [[0, 0], [3, 0], [3, 3], [0, 3]]
     }]);
     let scene = scene_of(
@@ -248,7 +251,9 @@ fn tiles_on_a_plane_have_their_size_in_the_world() {
         &mut rest["textures"]["image"],
         json!({ "filter": "nearest", "scale": [size / tile, size / tile], "offset": [-12.5, -12.5] }),
     );
-    let quad = json!([{ "type": "quad", "origin": [-10, -10, 0], "edge_u": [size, 0, 0], "edge_v": [0, size, 0], "material": "m" }]);
+    let quad = json!([{
+        "type": "quad", "origin": [-10, -10, 0], "edge_u": [size, 0, 0], "edge_v": [0, size, 0], "material": "m"
+    }]);
     let scene = folder.compile(&scene_of(quad, rest)).unwrap();
     let plain = folder.compile(&scene_of(json!([{ "type": "quad", "material": "m" }]), one_image("repeat"))).unwrap();
     for i in 0..60 {

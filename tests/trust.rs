@@ -48,7 +48,8 @@ fn rerender_runs_no_option_of_the_file() {
     let address = listener.local_addr().unwrap();
     let victims = ["report", "json", "log-file", "checkpoint", "shard"];
     let mut provenance = output::read_settings(&dir.join("a.exr")).unwrap();
-    let line = "render scene.json --report report --json json --log-file log-file --checkpoint checkpoint -o shard --preview 0 --denoise";
+    let line = "render scene.json --report report --json json --log-file log-file --checkpoint checkpoint -o shard \
+                --preview 0 --denoise";
     let mut arguments: Vec<String> = line.split(' ').map(str::to_owned).collect();
     arguments.extend([
         "--tev".to_owned(),
@@ -132,7 +133,8 @@ fn a_recipe_holds_how_the_scene_was_read() {
         dir.join("defined.xml"),
         r#"<scene version="3.0.0"><default name="r" value="0.2"/><sensor type="perspective"><film type="hdrfilm">
         <integer name="width" value="16"/><integer name="height" value="8"/></film></sensor><emitter type="constant"/>
-        <shape type="sphere"><float name="radius" value="$r"/><point name="center" x="0" y="0" z="3"/></shape></scene>"#,
+        <shape type="sphere"><float name="radius" value="$r"/><point name="center" x="0" y="0" z="3"/></shape>
+        </scene>"#,
     )
     .unwrap();
     for (line, file) in [

@@ -31,7 +31,9 @@ fn scene_of(shape: Value) -> Value {
 }
 
 fn inline() -> Value {
-    json!({ "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]], "colors": linear() })
+    json!({
+        "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]], "colors": linear()
+    })
 }
 
 fn ply<T: ToString>(kind: &str, colors: [[T; 3]; 4]) -> String {
@@ -40,7 +42,8 @@ fn ply<T: ToString>(kind: &str, colors: [[T; 3]; 4]) -> String {
         CORNERS.iter().zip(&colors).map(|([x, y, z], color)| format!("{x} {y} {z} {}\n", words(color))).collect();
     let property = |kind: &str, names: [&str; 3]| names.map(|name| format!("property {kind} {name}\n")).concat();
     format!(
-        "ply\nformat ascii 1.0\nelement vertex 4\n{}{}element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}4 0 1 2 3\n",
+        "ply\nformat ascii 1.0\nelement vertex 4\n{}{}element face 1\nproperty list uchar int vertex_indices\n\
+         end_header\n{rows}4 0 1 2 3\n",
         property("float", ["x", "y", "z"]),
         property(kind, ["red", "green", "blue"])
     )
@@ -187,7 +190,8 @@ fn attributes_ply() -> String {
         |([x, y, z], i): (&[f32; 3], usize)| format!("{x} {y} {z} {} {} 0 {}\n", 0.25 * i as f32, 0.5, 0.1 * i as f32);
     let rows: String = CORNERS.iter().zip(0..).map(row).collect();
     format!(
-        "ply\nformat ascii 1.0\nelement vertex 4\n{}element face 3\nproperty list uchar int vertex_indices\n{}end_header\n{rows}3 0 0 1 0.9 0.9 0.9 0.9\n\
+        "ply\nformat ascii 1.0\nelement vertex 4\n{}element face 3\nproperty list uchar int vertex_indices\n\
+         {}end_header\n{rows}3 0 0 1 0.9 0.9 0.9 0.9\n\
          3 0 1 2 1 0 0.5 0.25\n3 0 2 3 0 1 0.5 0.75\n",
         ["x", "y", "z", "tint_0", "tint_1", "tint_2", "a_0"].map(|name| format!("property float {name}\n")).concat(),
         ["tint_0", "tint_1", "tint_2", "b_0"].map(|name| format!("property float {name}\n")).concat()
@@ -252,8 +256,12 @@ fn attributes_of_vertices_and_faces_are_colours_numbers_holes_and_light() {
 fn attributes_of_inline_meshes_and_their_faults() {
     let folder = Folder::new();
     folder.write("m.ply", attributes_ply());
-    let inline = json!({ "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]],
-        "attributes": { "face_tint": [[1, 0, 0.5], [0, 1, 0.5]], "vertex_a": [0, 0.1, 0.2, 0.3], "vertex_unused": [-1, 9, 9, 9] } });
+    let inline = json!({
+        "type": "mesh", "material": "m", "positions": CORNERS, "triangles": [[0, 1, 2], [0, 2, 3]],
+        "attributes": {
+            "face_tint": [[1, 0, 0.5], [0, 1, 0.5]], "vertex_a": [0, 0.1, 0.2, 0.3], "vertex_unused": [-1, 9, 9, 9]
+        }
+    });
     let with = |shape: &Value, attribute: &str| {
         let mut scene = scene_of(shape.clone());
         set(&mut scene, "textures.colors", json!({ "type": "mesh_attribute", "name": attribute }));

@@ -26,7 +26,9 @@ fn write_scene(folder: &Path, lens: bool, output: &str) {
         "sampler": { "spp": 4 },
         "shapes": [{ "type": "sphere", "radius": 0.5 }],
         "lights": [{ "type": "environment", "radiance": [0.18, 0.18, 0.18] }],
-        "outputs": [{ "file": "a.exr", "pixel_type": "float" }, serde_json::from_str::<serde_json::Value>(output).unwrap()]
+        "outputs": [
+            { "file": "a.exr", "pixel_type": "float" }, serde_json::from_str::<serde_json::Value>(output).unwrap()
+        ]
     });
     if lens {
         scene["camera"]["lens"] = json!({ "radius": 0.5, "focus_distance": 1.0 });

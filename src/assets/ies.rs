@@ -44,6 +44,24 @@ impl Numbers<'_> {
             .ok_or_else(|| format!("line {line}: {what} should be a number, not \"{word}\""))
     }
 
+    /// Passes over how the lamp's output depends on the luminaire's tilt; at rest the factor is 1.
+    fn skip_tilt(&mut self, tilt: &str) -> Result<(), String> {
+        if tilt != "INCLUDE" && tilt != "NONE" {
+            return Err(format!(
+                "TILT={tilt}: data of the tilt cannot be read from a file of its own; give TILT=NONE, or TILT=INCLUDE \
+                 and the data"
+            ));
+        }
+        if tilt == "INCLUDE" {
+            self.next("the lamp's position (TILT)")?;
+            let count = self.count("the number of tilt angles", 0)?;
+            for _ in 0..2 * count {
+                self.next("a tilt angle or multiplier")?;
+            }
+        }
+        Ok(())
+    }
+
     fn positive(&mut self, what: &str) -> Result<f64, String> {
         let (line, number) = self.next(what)?;
         if number > 0.0 { Ok(number) } else { Err(format!("line {line}: {what} must be above 0, not {number}")) }
@@ -104,20 +122,7 @@ fn parse(text: &str) -> Result<IesData, String> {
         .flat_map(|(i, line)| line.split([' ', '\t', ',']).filter(|word| !word.is_empty()).map(move |word| (i, word)));
     let mut numbers = Numbers { words: words.collect::<Vec<_>>().into_iter() };
 
-    if tilt != "INCLUDE" && tilt != "NONE" {
-        return Err(format!(
-            "TILT={tilt}: data of the tilt cannot be read from a file of its own; give TILT=NONE, or TILT=INCLUDE and the data"
-        ));
-    }
-    // How the lamp's output depends on the luminaire's tilt; at rest the factor is 1.
-    if tilt == "INCLUDE" {
-        numbers.next("the lamp's position (TILT)")?;
-        let count = numbers.count("the number of tilt angles", 0)?;
-        for _ in 0..2 * count {
-            numbers.next("a tilt angle or multiplier")?;
-        }
-    }
-
+    numbers.skip_tilt(&tilt)?;
     let _lamps = numbers.next("the number of lamps")?;
     let _lumens = numbers.next("the lumens of a lamp")?;
     let multiplier = numbers.positive("the candela multiplier")?;
@@ -159,7 +164,8 @@ fn parse(text: &str) -> Result<IesData, String> {
 mod tests {
     use super::*;
 
-    const SMALL: &str = "IESNA:LM-63-2002\n[TEST] none\n[MANUFAC] Steradian\nTILT=NONE\n1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n\
+    const SMALL: &str = "IESNA:LM-63-2002\n[TEST] none\n[MANUFAC] Steradian\nTILT=NONE\n\
+                         1 1000 2.0 3 2 1 2 0.1 0.1 0.0\n\
                          0.5 1.0 10\n0 45 90\n0 90\n10 8 0\n10, 6, 0\n";
 
     #[test]

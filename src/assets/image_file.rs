@@ -144,7 +144,7 @@ fn read_exr(bytes: &[u8]) -> Result<ImageData, AssetError> {
     let samples = if chosen.iter().all(|&channel| all[channel].sample_type == SampleType::F16) {
         let mut out = vec![f16::ZERO; width * height * channels];
         read(&mut |row| {
-            row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), f16::from_f32)
+            row.write(out[channels * row.start + row.requested..].iter_mut().step_by(channels), f16::from_f32);
         })?;
         Samples::F16(out)
     } else {

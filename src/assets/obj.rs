@@ -218,7 +218,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         write(&folder, "m.mtl", "newmtl a\nKd 0.1 0.2 0.3\nnewmtl b\nKe 1 2 3\nKd 0.5\nTr 0.25\n");
         let text = format!(
-            "mtllib m.mtl\n{QUAD}g one\nusemtl a\nf 1/1 2/2 3/3 4/4\nusemtl b\nf -4 -3 -2\ng two\nusemtl a\nf 1/1 2/2 3/3\n"
+            "mtllib m.mtl\n{QUAD}g one\nusemtl a\nf 1/1 2/2 3/3 4/4\nusemtl b\nf -4 -3 -2\ng two\nusemtl a\n\
+             f 1/1 2/2 3/3\n"
         );
         let meshes = read_obj(&write(&folder, "q.obj", &text), true).unwrap();
         assert_eq!(meshes.len(), 2);

@@ -60,12 +60,12 @@ pub fn check_obj(text: &str) -> Result<ObjUse, AssetError> {
                 counts[2] += 1;
             }
             Some("f") => {
-                words.try_for_each(|corner| check_corner(corner, &counts, &mut largest, i + 1)).map_err(|e| at(&e))?
+                words.try_for_each(|corner| check_corner(corner, &counts, &mut largest, i + 1)).map_err(|e| at(&e))?;
             }
             Some("l") => used.has_lines = true,
             Some("mtllib") => used.names_a_library = true,
             Some("usemtl") => {
-                used.materials.push((i + 1, line.trim().split_once(' ').unwrap_or_default().1.trim().to_owned()))
+                used.materials.push((i + 1, line.trim().split_once(' ').unwrap_or_default().1.trim().to_owned()));
             }
             _ => {}
         }

@@ -3,7 +3,7 @@
 use super::CompileContext;
 use super::transforms::Shutter;
 use crate::camera::{Blades, Camera, Framing, Lens, Projection, lens_equation};
-use crate::desc::{CameraDesc, CameraKindDesc, KeyframeDesc, LensDesc};
+use crate::desc::{BladesDesc, CameraDesc, CameraKindDesc, KeyframeDesc, LensDesc};
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DVec3, Motion, RenderSpace, Transform};
 
@@ -158,7 +158,8 @@ fn compile_lens(files: &CompileContext, desc: &LensDesc, camera: &Transform, hal
     // Any two of focal length, sensor distance and focus distance give the third.
     let (focal_length, focus_distance) = match (focal_length, sensor, focus) {
         (Some(_), Some(_), Some(_)) => {
-            let message = "`focal_length`, the sensor and the focus are one too many: two of them give the third by the lens equation";
+            let message = "`focal_length`, the sensor and the focus are one too many: two of them give the third by \
+                           the lens equation";
             return Err(files.error("camera.lens", message));
         }
         (Some(f), Some(a), None) => {
@@ -189,17 +190,19 @@ fn compile_lens(files: &CompileContext, desc: &LensDesc, camera: &Transform, hal
         }
         _ => return Err(files.error("camera.lens", "give either `radius` or `f_number`")),
     };
-    let blades = desc.blades.map(|blades| {
-        if !(3..=MAX_BLADES).contains(&blades.count) {
-            return Err(files
-                .error("camera.lens.blades.count", format!("must be from 3 to {MAX_BLADES}, not {}", blades.count)));
-        }
-        if !blades.rotation_degrees.is_finite() {
-            return Err(files.error("camera.lens.blades.rotation_degrees", "the angle is not finite"));
-        }
-        Ok(Blades { count: blades.count, rotation: blades.rotation_degrees.to_radians() })
-    });
-    Ok(Lens { radius, focus_distance, blades: blades.transpose()? })
+    let blades = desc.blades.map(|blades| compile_blades(files, &blades)).transpose()?;
+    Ok(Lens { radius, focus_distance, blades })
+}
+
+fn compile_blades(files: &CompileContext, desc: &BladesDesc) -> Result<Blades> {
+    if !(3..=MAX_BLADES).contains(&desc.count) {
+        let message = format!("must be from 3 to {MAX_BLADES}, not {}", desc.count);
+        return Err(files.error("camera.lens.blades.count", message));
+    }
+    if !desc.rotation_degrees.is_finite() {
+        return Err(files.error("camera.lens.blades.rotation_degrees", "the angle is not finite"));
+    }
+    Ok(Blades { count: desc.count, rotation: desc.rotation_degrees.to_radians() })
 }
 
 /// The focus if it is given.

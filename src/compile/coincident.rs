@@ -39,8 +39,8 @@ impl Builder {
         self.files.warn(
             first,
             format_args!(
-                "{what} with others of another orientation or material (the first with one of {whose}): which of them a ray meets, and so the \
-                 picture, depends on the accelerator; remove one of each pair or move it"
+                "{what} with others of another orientation or material (the first with one of {whose}): which of them \
+                 a ray meets, and so the picture, depends on the accelerator; remove one of each pair or move it"
             ),
         );
     }

@@ -170,7 +170,8 @@ mod tests {
         DAffine3::from_rotation_y(degrees.to_radians())
     }
 
-    const TURN: &str = r#"{ "translate": [-3, -1, 2] }, { "rotate": { "axis": [0, 2, 0], "degrees": 120 } }, { "translate": [3, 1, -2] }"#;
+    const TURN: &str = r#"{ "translate": [-3, -1, 2] }, { "rotate": { "axis": [0, 2, 0], "degrees": 120 } },
+        { "translate": [3, 1, -2] }"#;
 
     #[test]
     fn what_turns_about_a_point_turns_in_place() {
@@ -191,7 +192,8 @@ mod tests {
         // Two spins while half an orbit goes by and the size doubles.
         let at = |spin: i32, size: i32, orbit: i32, axis: &str| {
             format!(
-                r#"[{{ "scale": {size} }}, {{ "rotate": {{ "axis": [0, 1, 0], "degrees": {spin} }} }}, {{ "translate": [5, 0, 0] }},
+                r#"[{{ "scale": {size} }}, {{ "rotate": {{ "axis": [0, 1, 0], "degrees": {spin} }} }},
+                    {{ "translate": [5, 0, 0] }},
                     {{ "rotate": {{ "axis": {axis}, "degrees": {orbit} }} }}]"#
             )
         };

@@ -1,15 +1,10 @@
 //! Materials: names to ids, parameters to BSDFs.
 
 use std::collections::HashMap;
-use std::fmt::Debug;
 
 use super::CompileContext;
 use super::textures::{TextureTable, TextureUse};
-use crate::assets::ObjMaterial;
-use crate::bsdf::{
-    Beckmann, Coat, Conductor, Dielectric, Ggx, Lambert, Mirror, Plastic, SeparableGgx, diffuse_mean,
-    mitsuba_diffuse_mean,
-};
+use crate::bsdf::{Beckmann, Coat, Conductor, Ggx, Lambert, SeparableGgx, diffuse_mean, mitsuba_diffuse_mean};
 use crate::color::Rgb;
 use crate::desc::{
     ColorDesc, DielectricDesc, DistributionDesc, MaterialDesc, PhongLobeDesc, PlasticDesc, RangedDesc, RoughnessDesc,
@@ -188,16 +183,7 @@ impl Compiler<'_> {
                 TexturedMaterial::ThinDielectric { ior: self.ior(path, ior, 0.1)?, tints }.into()
             }
             MaterialDesc::Phong { diffuse, specular, exponent, lobe } => {
-                let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
-                    let is_sound = exponent >= 0.0 && exponent.is_finite();
-                    if is_sound {
-                        Ok(())
-                    } else {
-                        Err(files.error(path, format!("must be finite and not negative, not {exponent}")))
-                    }
-                })?;
-                let [diffuse, specular] = self.sum_to_one(path, ["diffuse", "specular"], [diffuse, specular])?;
-                TexturedMaterial::Phong { diffuse, specular, exponent, cosine: *lobe == PhongLobeDesc::Cosine }.into()
+                self.phong(path, [diffuse, specular], exponent, *lobe)?.into()
             }
             MaterialDesc::CookTorrance { albedo, d, s, m, f0 } => {
                 let albedo = self.color(&format!("{path}.albedo"), albedo)?;
@@ -234,6 +220,25 @@ impl Compiler<'_> {
         Ok(if desc.is_medium() { Material::varying(boundary) } else { boundary.into() })
     }
 
+    fn phong(
+        &self,
+        path: &str,
+        colors: [&ColorDesc; 2],
+        exponent: &RangedDesc,
+        lobe: PhongLobeDesc,
+    ) -> Result<TexturedMaterial> {
+        let exponent = self.ranged(&format!("{path}.exponent"), exponent, |path, exponent| {
+            let is_sound = exponent >= 0.0 && exponent.is_finite();
+            if is_sound {
+                Ok(())
+            } else {
+                Err(self.files.error(path, format!("must be finite and not negative, not {exponent}")))
+            }
+        })?;
+        let [diffuse, specular] = self.sum_to_one(path, ["diffuse", "specular"], colors)?;
+        Ok(TexturedMaterial::Phong { diffuse, specular, exponent, cosine: lobe == PhongLobeDesc::Cosine })
+    }
+
     fn plastic(&self, path: &str, desc: &PlasticDesc) -> Result<TexturedMaterial> {
         Ok(TexturedMaterial::Plastic {
             coat: self.plastic_coat(path, desc)?,
@@ -260,7 +265,8 @@ impl Compiler<'_> {
         }
         let (RangedInput::Constant(ior), [ScalarInput::Constant(u), ScalarInput::Constant(v)]) = (ior, alpha.axes)
         else {
-            let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come from textures";
+            let message = "with a `distribution` or without `multiscatter`, `ior`, `roughness` and `alpha` cannot come \
+                           from textures";
             return Err(self.files.error(path, message));
         };
         if u != v {
@@ -321,7 +327,8 @@ impl Compiler<'_> {
             && (x + y).max_channel() > 1.0 + 1e-6
         {
             let message = format!(
-                "`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it receives"
+                "`{a}` and `{b}` must not exceed 1 together in any channel: a surface cannot scatter more than it \
+                 receives"
             );
             return Err(self.files.error(path, message));
         }
@@ -428,113 +435,5 @@ fn facets(distribution: DistributionDesc, multiscatter: bool) -> Facets {
         DistributionDesc::GgxSeparable => Facets::SeparableGgx,
         DistributionDesc::Ggx if multiscatter => Facets::Ggx,
         DistributionDesc::Ggx => Facets::SingleGgx,
-    }
-}
-
-/// What an MTL makes of a surface.
-pub struct MtlSurface {
-    pub material: Material,
-    /// Light given off, if not black.
-    pub radiance: Option<Rgb>,
-}
-
-/// The nearest material for an MTL: `illum` 5 is a mirror of colour Ks; 4, 6, 7 and 9 are glass of index Ni; a specular
-/// colour with an exponent has alpha = sqrt(2 / (Ns + 2)) and is a metal of that colour if Kd is black, plastic
-/// otherwise; everything else is diffuse with Kd.
-///
-/// The error names the invalid number.
-pub fn from_mtl(mtl: &ObjMaterial) -> Result<MtlSurface, String> {
-    let fault = |key: &str, value: &dyn Debug, must: &str| {
-        Err(format!("material \"{}\": {key} {value:?} must be {must}", mtl.name))
-    };
-    for (key, color) in [("Kd", mtl.diffuse), ("Ks", mtl.specular)] {
-        if let Some(color) = color.filter(|c| !c.iter().all(|v| (0.0..=1.0).contains(v))) {
-            return fault(key, &color, "within 0 and 1");
-        }
-    }
-    if let Some(radiance) = mtl.emissive.filter(|c| !c.iter().all(|&v| v >= 0.0 && v.is_finite())) {
-        return fault("Ke", &radiance, "finite and not negative");
-    }
-    if let Some(exponent) = mtl.shininess.filter(|&n| !(n >= 0.0 && n.is_finite())) {
-        return fault("Ns", &exponent, "finite and not negative");
-    }
-    if let Some(opacity) = mtl.opacity.filter(|d| !(0.0..=1.0).contains(d)) {
-        return fault("d", &opacity, "within 0 and 1");
-    }
-    let diffuse = mtl.diffuse.map_or(Rgb::splat(0.5), Rgb::from);
-    let specular = mtl.specular.map_or(Rgb::BLACK, Rgb::from);
-    let ior = mtl.ior.filter(|&n| n > 1.0 && n <= 10.0).unwrap_or(1.5);
-    let is_glass = matches!(mtl.illumination, Some(4 | 6 | 7 | 9));
-    let material = if mtl.illumination == Some(5) {
-        Mirror { reflectance: if specular.is_black() { Rgb::WHITE } else { specular } }.into()
-    } else if is_glass {
-        Dielectric::new(ior, [0.0; 2]).into()
-    } else if let Some(exponent) = mtl.shininess.filter(|_| !specular.is_black()) {
-        let alpha = [(2.0 / (exponent + 2.0)).sqrt(); 2];
-        if diffuse.is_black() { metal_of_color(specular, alpha) } else { Plastic::new(diffuse, ior, alpha).into() }
-    } else {
-        Lambert { albedo: diffuse }.into()
-    };
-    Ok(MtlSurface { material, radiance: mtl.emissive.map(Rgb::from).filter(|radiance| !radiance.is_black()) })
-}
-
-/// A metal with the given reflectance at normal incidence: with a real part of 1, `r = k² / (4 + k²)`.
-fn metal_of_color(reflectance: Rgb, alpha: [f32; 2]) -> Material {
-    let k = reflectance.map(|r| {
-        let r = r.min(0.9999);
-        2.0 * (r / (1.0 - r)).sqrt()
-    });
-    Conductor::new(Rgb::WHITE, k, alpha, Rgb::WHITE).into()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::bsdf::Bsdf;
-    use crate::math::Vec3;
-
-    fn bsdf(mtl: ObjMaterial) -> Bsdf {
-        match from_mtl(&mtl).unwrap().material {
-            Material::Constant(bsdf) => bsdf,
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn an_mtl_becomes_the_nearest_material() {
-        let plain = ObjMaterial { diffuse: Some([0.1, 0.2, 0.3]), ..ObjMaterial::default() };
-        assert_eq!(bsdf(plain.clone()), Bsdf::Lambert(Lambert { albedo: Rgb::new(0.1, 0.2, 0.3) }));
-        assert_eq!(bsdf(ObjMaterial::default()), Bsdf::Lambert(Lambert { albedo: Rgb::splat(0.5) }));
-        let mirror = ObjMaterial { illumination: Some(5), specular: Some([0.9; 3]), ..plain.clone() };
-        assert_eq!(bsdf(mirror), Bsdf::Mirror(Mirror { reflectance: Rgb::splat(0.9) }));
-        let glass = ObjMaterial { illumination: Some(7), ior: Some(1.33), ..plain.clone() };
-        assert_eq!(bsdf(glass), Bsdf::Dielectric(Dielectric::new(1.33, [0.0; 2])));
-        let shiny = ObjMaterial { specular: Some([0.5; 3]), shininess: Some(48.0), ..plain.clone() };
-        assert_eq!(bsdf(shiny), Bsdf::Plastic(Plastic::new(Rgb::new(0.1, 0.2, 0.3), 1.5, [0.2; 2])));
-        let glowing = from_mtl(&ObjMaterial { emissive: Some([1.0, 2.0, 3.0]), ..plain }).unwrap();
-        assert_eq!(glowing.radiance, Some(Rgb::new(1.0, 2.0, 3.0)));
-    }
-
-    #[test]
-    fn a_metal_has_the_colour_it_was_given() {
-        let color = Rgb::new(0.9, 0.5, 0.1);
-        let Material::Constant(metal) = metal_of_color(color, [0.0; 2]) else { panic!("varies") };
-        let weight = metal.sample(Vec3::Z, 0.5, [0.5; 2]).unwrap().weight;
-        assert!(
-            [weight.r - color.r, weight.g - color.g, weight.b - color.b].iter().all(|d| d.abs() < 1e-5),
-            "{weight:?}"
-        );
-    }
-
-    #[test]
-    fn numbers_out_of_range_are_named() {
-        let bad = |mtl: ObjMaterial| from_mtl(&ObjMaterial { name: "m".into(), ..mtl }).err().unwrap();
-        let none = ObjMaterial::default;
-        assert!(bad(ObjMaterial { diffuse: Some([0.0, 1.5, 0.0]), ..none() }).contains("\"m\": Kd"));
-        assert!(bad(ObjMaterial { specular: Some([f32::NAN; 3]), ..none() }).contains("Ks"));
-        assert!(bad(ObjMaterial { emissive: Some([-1.0; 3]), ..none() }).contains("Ke"));
-        assert!(bad(ObjMaterial { shininess: Some(f32::INFINITY), ..none() }).contains("Ns"));
-        assert!(bad(ObjMaterial { opacity: Some(1.5), ..none() }).contains("\"m\": d"));
-        assert!(bad(ObjMaterial { opacity: Some(f32::NAN), ..none() }).contains("\"m\": d"));
     }
 }

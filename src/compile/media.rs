@@ -69,7 +69,8 @@ impl MaterialTable {
         let medium = |id: MaterialId| self.medium_of.get(&id).copied();
         match parts.map(|id| self.transmits(id)) {
             [true, true] if medium(parts[0]) != medium(parts[1]) => {
-                let message = "both materials let light through, but not into the same medium: they differ in `ior`, `priority`, `absorption` or `abbe`";
+                let message = "both materials let light through, but not into the same medium: they differ in `ior`, \
+                               `priority`, `absorption` or `abbe`";
                 Err(files.error(path, message))
             }
             [true, _] => Ok(medium(parts[0])),

@@ -68,7 +68,9 @@ fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeS
             for (i, file) in desc.deform_files.iter().enumerate() {
                 let place = format!("{path}.deform_files[{i}]");
                 let later = load_file(files, &place, file, desc.material.is_none(), &BTreeSet::new())?;
-                if later.len() != meshes.len() || meshes.iter().zip(&later).any(|(a, b)| a.data.triangles != b.data.triangles) {
+                if later.len() != meshes.len()
+                    || meshes.iter().zip(&later).any(|(a, b)| a.data.triangles != b.data.triangles)
+                {
                     return Err(files.error(&place, "the triangles are not those of `file`: only positions may differ"));
                 }
                 for (mesh, later) in meshes.iter_mut().zip(later) {
@@ -96,7 +98,8 @@ fn load(files: &CompileContext, path: &str, desc: &MeshDesc, attributes: &BTreeS
         }
         _ => Err(files.error(
             path,
-            "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs`, `colors` and `attributes`)",
+            "a mesh needs either `file`, or `positions` and `triangles` (with optional `normals`, `uvs`, `colors` and \
+             `attributes`)",
         )),
     }
 }
@@ -169,6 +172,18 @@ pub fn refusal(files: &CompileContext, path: &str, file: Option<&str>, message: 
     }
 }
 
+/// Checks that lists are as long as others require.
+fn check_counts(data: &MeshData) -> Result<(), String> {
+    let count = data.positions.len();
+    if let Some((triangle, index)) = out_of_range(data) {
+        return Err(MeshError::Index { triangle, index, count }.to_string());
+    }
+    if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
+        return Err(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }.to_string());
+    }
+    attributes::check_counts(&data.attributes, count, data.triangles.len())
+}
+
 /// Moves a mesh to its place and checks it. A mirrored mesh is wound the other way round, so that its front stays the
 /// front. Triangles without area are dropped with a warning. `None`, with a warning too, if no triangles are left.
 pub fn place(
@@ -180,14 +195,7 @@ pub fn place(
 ) -> Result<Option<Mesh>> {
     let refuse = |error: MeshError| refusal(files, path, placement.file, error.to_string());
     let count = data.positions.len();
-    if let Some((triangle, index)) = out_of_range(&data) {
-        return Err(refuse(MeshError::Index { triangle, index, count }));
-    }
-    if let Some(uvs) = data.uvs.as_ref().filter(|uvs| uvs.len() != count) {
-        return Err(refuse(MeshError::Count { what: "uvs", count: uvs.len(), vertices: count }));
-    }
-    attributes::check_counts(&data.attributes, count, data.triangles.len())
-        .map_err(|message| refusal(files, path, placement.file, message))?;
+    check_counts(&data).map_err(|message| refusal(files, path, placement.file, message))?;
     let transform = placement.transform;
     let is_identity = *transform == Transform::IDENTITY;
     let place_positions = |mut positions: Vec<[f32; 3]>, origin: [f64; 3]| {
@@ -329,8 +337,8 @@ impl Faces {
         if dropped > 0 {
             let file = files.source.file.display();
             tracing::warn!(
-                "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped (for both sides: \
-                 emission.two_sided)"
+                "{file}: {path}: {dropped} of {before} triangles lie where others of the emitter do and were dropped \
+                 (for both sides: emission.two_sided)"
             );
         }
     }

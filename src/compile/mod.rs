@@ -197,7 +197,8 @@ impl Builder {
             files.refuse_own("shapes", "there is nothing to see: no shapes, no instances and no environment")?;
         }
         if !lights.shines() && needs_light(&desc.integrator) {
-            let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or directional light";
+            let message = "the scene has no light: give a shape an `emission`, or add an environment, point, spot or \
+                           directional light";
             files.refuse_own("lights", message)?;
         }
         let part_normal_perturbations = self.materials.part_normal_perturbations();

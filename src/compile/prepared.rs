@@ -255,6 +255,44 @@ impl Builder {
         Ok(())
     }
 
+    /// A shape by its transform into the scene; `None` if it is a mesh of which nothing has an area.
+    fn placed_form(
+        &self,
+        form: ShapeSource,
+        transform: &Transform,
+        reverse_normal: bool,
+        surface: &PreparedSurface,
+        path: &str,
+    ) -> Result<Option<Shape>> {
+        let analytic = |surface: Analytic| {
+            let mut placed = TransformedShape::new(surface, *transform);
+            placed.reverse_normal = reverse_normal;
+            Shape::Analytic(placed)
+        };
+        Ok(Some(match form {
+            ShapeSource::Analytic(surface) => analytic(surface),
+            ShapeSource::Plane(plane) => {
+                let quad = planes::square(&plane, &transform.world_from_object, &self.surroundings);
+                analytic(Analytic::Quad(quad.ok_or_else(|| self.files.error(path, TOO_LARGE))?))
+            }
+            ShapeSource::Mesh { data, shading, smoothing, later, file } => {
+                let placement = meshes::Placement {
+                    file: file.as_deref(),
+                    transform,
+                    shading,
+                    smoothing,
+                    reverse_normal,
+                    emits: surface.emission.is_some(),
+                    attributes: &self.materials.textures.attributes,
+                };
+                let Some(mesh) = meshes::place(&self.files, path, data, later, placement)? else {
+                    return Ok(None);
+                };
+                Shape::Mesh(if self.materials.has_normal_map(&surface.binding) { mesh.with_tangents() } else { mesh })
+            }
+        }))
+    }
+
     /// Adds a shape to the scene, placed by its own transform, by `outer` and into `space`; `None` if it is a mesh of
     /// which nothing has an area. One that emits must end up in the world's.
     pub(super) fn place(
@@ -263,47 +301,17 @@ impl Builder {
         outer: &DAffine3,
         space: &RenderSpace,
     ) -> Result<Option<ShapeId>> {
-        let PreparedShape {
-            form,
-            map,
-            motion,
-            reverse_normal,
-            surface: PreparedSurface { binding, emission, identity },
-            path,
-        } = prepared;
+        let PreparedShape { form, map, motion, reverse_normal, surface, path } = prepared;
         // What moves is placed by its instance.
         let map = if motion.is_some() { DAffine3::IDENTITY } else { map };
         let transform = Transform::new(space.place(&(*outer * map)))
             .ok_or_else(|| self.files.error(&format!("{path}.transform"), super::SINGULAR))?;
-        let analytic = |surface: Analytic| {
-            let mut placed = TransformedShape::new(surface, transform);
-            placed.reverse_normal = reverse_normal;
-            Shape::Analytic(placed)
-        };
-        let shape = match form {
-            ShapeSource::Analytic(surface) => analytic(surface),
-            ShapeSource::Plane(plane) => {
-                let quad = planes::square(&plane, &transform.world_from_object, &self.surroundings);
-                analytic(Analytic::Quad(quad.ok_or_else(|| self.files.error(&path, TOO_LARGE))?))
-            }
-            ShapeSource::Mesh { data, shading, smoothing, later, file } => {
-                let placement = meshes::Placement {
-                    file: file.as_deref(),
-                    transform: &transform,
-                    shading,
-                    smoothing,
-                    reverse_normal,
-                    emits: emission.is_some(),
-                    attributes: &self.materials.textures.attributes,
-                };
-                let Some(mesh) = meshes::place(&self.files, &path, data, later, placement)? else {
-                    return Ok(None);
-                };
-                Shape::Mesh(if self.materials.has_normal_map(&binding) { mesh.with_tangents() } else { mesh })
-            }
+        let Some(shape) = self.placed_form(form, &transform, reverse_normal, &surface, &path)? else {
+            return Ok(None);
         };
         self.check_size(&path, &shape, space)?;
         self.geometry.shapes.push(shape);
+        let PreparedSurface { binding, emission, identity } = surface;
         let id = ShapeId::new(self.geometry.shapes.len() - 1);
         let medium = self.materials.medium(binding.material);
         if medium.is_some() && emission.is_some() {

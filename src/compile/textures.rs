@@ -121,7 +121,8 @@ impl TextureTable {
         let id = self.find(files, path, name, texture_use)?;
         if !self.get(id).attributes().is_empty() {
             let message = format!(
-                "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and emission of shapes can"
+                "the texture \"{name}\" takes attributes of meshes, which only parameters of materials, opacity and \
+                 emission of shapes can"
             );
             return Err(files.error(path, message));
         }
@@ -330,22 +331,13 @@ impl Loader<'_> {
                         (ColorSpaceDesc::Linear, _) | (ColorSpaceDesc::Auto, TextureUse::Data) => Decoding::Linear,
                     },
                     image,
-                    filter: match filter {
-                        TextureFilterDesc::Nearest => TextureFilter::Nearest,
-                        TextureFilterDesc::Bilinear => TextureFilter::Bilinear,
-                        TextureFilterDesc::Trilinear => TextureFilter::Trilinear,
-                    },
+                    filter: texture_filter(*filter),
                     wrap: match wrap {
                         WrapDesc::Both(mode) => [wrap_mode(*mode); 2],
                         WrapDesc::Each(modes) => modes.map(wrap_mode),
                     },
                     transform: UvTransform::new(scale, rotation_degrees.to_radians(), offset),
-                    channel: channel.map(|channel| match channel {
-                        ChannelDesc::R => Channel::R,
-                        ChannelDesc::G => Channel::G,
-                        ChannelDesc::B => Channel::B,
-                        ChannelDesc::A => Channel::A,
-                    }),
+                    channel: channel.map(single_channel),
                     invert: *invert,
                 })
             }
@@ -359,6 +351,23 @@ fn wrap_mode(desc: WrapModeDesc) -> Wrap {
         WrapModeDesc::Repeat => Wrap::Repeat,
         WrapModeDesc::Clamp => Wrap::Clamp,
         WrapModeDesc::Mirror => Wrap::Mirror,
+    }
+}
+
+fn texture_filter(desc: TextureFilterDesc) -> TextureFilter {
+    match desc {
+        TextureFilterDesc::Nearest => TextureFilter::Nearest,
+        TextureFilterDesc::Bilinear => TextureFilter::Bilinear,
+        TextureFilterDesc::Trilinear => TextureFilter::Trilinear,
+    }
+}
+
+fn single_channel(desc: ChannelDesc) -> Channel {
+    match desc {
+        ChannelDesc::R => Channel::R,
+        ChannelDesc::G => Channel::G,
+        ChannelDesc::B => Channel::B,
+        ChannelDesc::A => Channel::A,
     }
 }
 

@@ -90,8 +90,8 @@ fn not_for_projects(key: &str) -> String {
     let file =
         user_file().map_or_else(|| "~/.config/steradian/config.toml".to_owned(), |file| file.display().to_string());
     format!(
-        "\"{key}\" is not for a project's file, which sets what the picture is, not what is loaded, written or connected to; use --{key}, \
-         {variable} or {file}"
+        "\"{key}\" is not for a project's file, which sets what the picture is, not what is loaded, written or \
+         connected to; use --{key}, {variable} or {file}"
     )
 }
 

@@ -96,7 +96,7 @@ impl Plan {
         match (albedo, normal) {
             (None, _) if options.without_features => {}
             (None, None) => {
-                notes.push("there are no layers of albedo and normals; with them more detail survives".to_owned())
+                notes.push("there are no layers of albedo and normals; with them more detail survives".to_owned());
             }
             (None, Some(_)) => notes.push("there is no layer of albedo; normals without it are not used".to_owned()),
             _ => {}

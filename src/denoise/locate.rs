@@ -109,7 +109,7 @@ pub fn open_first<T>(
     match open(Path::new(FILE_NAME)) {
         Ok(library) => return Ok(library),
         Err(Unusable(why)) if why.contains("No such file") => {
-            looked.push("where the system keeps libraries".to_owned())
+            looked.push("where the system keeps libraries".to_owned());
         }
         Err(Unusable(why)) => looked.push(format!("where the system keeps libraries ({why})")),
     }
@@ -128,7 +128,8 @@ pub fn open_first<T>(
         looked.push("in Python's packages, of which there are none".to_owned());
     }
     let message = format!(
-        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` installs it, and --oidn-library or {VARIABLE} name its file or folder; looked {}",
+        "Intel Open Image Denoise 2 is not installed; `pip install pyoidn` installs it, and --oidn-library or \
+         {VARIABLE} name its file or folder; looked {}",
         looked.join(", ")
     );
     Err(Error::Missing { file: FILE_NAME.into(), message })

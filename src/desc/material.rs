@@ -64,7 +64,8 @@ pub enum RangedDesc {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "expected a number, [along u, along v], { \"texture\": name }, or { \"u\": ..., \"v\": ... } of numbers and textures"
+    expecting = "expected a number, [along u, along v], { \"texture\": name }, or { \"u\": ..., \"v\": ... } of \
+                 numbers and textures"
 )]
 pub enum RoughnessDesc {
     /// The same in all directions.

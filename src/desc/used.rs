@@ -81,7 +81,7 @@ impl SceneDesc {
                 Value::Array(values) => open.extend(values),
                 // A type is no name.
                 Value::Object(keys) => {
-                    open.extend(keys.into_iter().filter(|(key, _)| key != "type").map(|(_, value)| value))
+                    open.extend(keys.into_iter().filter(|(key, _)| key != "type").map(|(_, value)| value));
                 }
                 _ => {}
             }
@@ -98,8 +98,10 @@ mod tests {
         let desc: SceneDesc = serde_json::from_str(
             r#"{ "camera": {},
             "textures": {
-                "a": { "type": "constant", "color": [0, 0, 0] }, "b": { "type": "product", "factors": [{ "texture": "c" }] },
-                "c": { "type": "checker" }, "d": { "type": "checker" }, "e": { "type": "checker" }, "f": { "type": "checker" },
+                "a": { "type": "constant", "color": [0, 0, 0] },
+                "b": { "type": "product", "factors": [{ "texture": "c" }] },
+                "c": { "type": "checker" }, "d": { "type": "checker" }, "e": { "type": "checker" },
+                "f": { "type": "checker" },
                 "g": { "type": "checker" },
                 "diffuse": { "type": "checker" }
             },
@@ -108,7 +110,8 @@ mod tests {
                 "x": { "type": "diffuse", "albedo": { "texture": "b" } }, "y": { "type": "plastic" },
                 "z": { "type": "diffuse", "albedo": { "texture": "d" } }
             },
-            "lights": [{ "type": "spot", "position": [0, 0, 0], "look_at": [0, 0, 1], "intensity": [1, 1, 1], "texture": "g" }],
+            "lights": [{ "type": "spot", "position": [0, 0, 0], "look_at": [0, 0, 1], "intensity": [1, 1, 1],
+            "texture": "g" }],
             "shapes": [{ "type": "quad", "emission": { "radiance": [1, 1, 1], "texture": "e" } }],
             "objects": {
                 "outer": { "instances": [{ "object": "inner" }] },

@@ -193,7 +193,10 @@ mod tests {
             ("plain", "Progress: 42% (frame 7, 1.25 Msamples/s, 12 s left)"),
             (
                 "json",
-                r#"{"event":"progress","frame":7,"frame_percent":85.1,"percent":42.5,"samples_per_second":1250000.0,"seconds_left":12.0}"#,
+                concat!(
+                    r#"{"event":"progress","frame":7,"frame_percent":85.1,"percent":42.5,"#,
+                    r#""samples_per_second":1250000.0,"seconds_left":12.0}"#
+                ),
             ),
             ("openjd", "openjd_progress: 42.5"),
             ("alf", "ALF_PROGRESS 42%"),

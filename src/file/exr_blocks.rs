@@ -54,10 +54,15 @@ impl ChannelRow<'_> {
                 .zip(to)
                 .for_each(|(b, to)| *to = convert(f16::from_ne_bytes(*b).to_f32())),
             SampleType::F32 => {
-                self.bytes.as_chunks().0.iter().zip(to).for_each(|(b, to)| *to = convert(f32::from_ne_bytes(*b)))
+                self.bytes.as_chunks().0.iter().zip(to).for_each(|(b, to)| *to = convert(f32::from_ne_bytes(*b)));
             }
             SampleType::U32 => {
-                self.bytes.as_chunks().0.iter().zip(to).for_each(|(b, to)| *to = convert(u32::from_ne_bytes(*b) as f32))
+                self.bytes
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .zip(to)
+                    .for_each(|(b, to)| *to = convert(u32::from_ne_bytes(*b) as f32));
             }
         }
     }
@@ -289,7 +294,8 @@ mod tests {
             [check_memory(&path, &headers, 0).unwrap_err(), allocate(&path, &headers[1], 1, 0.0f32).unwrap_err()]
         {
             assert!(
-                matches!(&error, Error::Malformed { message, .. } if message.contains("32768 x 32769 pixels are too many")),
+                matches!(&error, Error::Malformed { message, .. } if message.contains("32768 x 32769 pixels are too \
+                                                                                       many")),
                 "{error}"
             );
         }

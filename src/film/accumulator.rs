@@ -95,7 +95,7 @@ impl Accumulator {
         let weight = f64::from(weight);
         self.color.add(entry, value.color.map(|value| weight * f64::from(value)));
         value.for_each_average(|k, value| {
-            self.average_mut(k).add(entry, value.to_array().map(|value| weight * f64::from(value)))
+            self.average_mut(k).add(entry, value.to_array().map(|value| weight * f64::from(value)));
         });
     }
 

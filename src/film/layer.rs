@@ -193,8 +193,8 @@ impl LayerInfo {
             "motion",
             &["motion.X", "motion.Y"],
             LayerSource::Surface(|s, out| out.copy_from_slice(&s.motion), Filtering::Nearest),
-            "motion: of the nearest sample, from where the surface is when the shutter opens to where it is when it closes, in pixels to the right and down; without a \
-             surface, that of a point infinitely far away",
+            "motion: of the nearest sample, from where the surface is when the shutter opens to where it is when it \
+             closes, in pixels to the right and down; without a surface, that of a point infinitely far away",
         )
         .float(),
         Self::new(
@@ -227,7 +227,14 @@ impl LayerInfo {
             "variance: of the filtered picture's R, G and B, their expected squared error",
         )
         .float(),
-        Self::new(LayerKind::Samples, "samples", &["stats.samples"], LayerSource::Film, "stats.samples: samples of the pixel").float(),
+        Self::new(
+            LayerKind::Samples,
+            "samples",
+            &["stats.samples"],
+            LayerSource::Film,
+            "stats.samples: samples of the pixel",
+        )
+        .float(),
         Self::new(
             LayerKind::FeatureAlbedo,
             "feature_albedo",

@@ -169,7 +169,7 @@ impl Film {
                     }
                     LayerSource::Surface(_, Filtering::Nearest) => estimator.data(info, first, out),
                     LayerSource::Film if info.kind == LayerKind::Samples => {
-                        out[0] = estimator.own.0.samples[estimator.own.1] as f32
+                        out[0] = estimator.own.0.samples[estimator.own.1] as f32;
                     }
                     LayerSource::Film => out.copy_from_slice(&self.variance(&kernel, x, y).map(to_f32)),
                     LayerSource::Coverage | LayerSource::Denoiser => {}

@@ -121,7 +121,8 @@ mod tests {
         scene_fingerprint(&read_scene(&path, &ImportOptions::default()).unwrap(), &path).unwrap()
     }
 
-    const SCENE: &str = r#"{ "camera": {}, "sampler": { "spp": 4 }, "shapes": [{ "type": "mesh", "file": "m/a.obj" }, { "type": "sphere" }] }"#;
+    const SCENE: &str = r#"{ "camera": {}, "sampler": { "spp": 4 }, "shapes": [{ "type": "mesh", "file": "m/a.obj" },
+        { "type": "sphere" }] }"#;
 
     #[test]
     fn what_a_scene_shows_counts_and_nothing_else() {
@@ -153,9 +154,10 @@ mod tests {
         std::fs::remove_file(folder.path().join("m/a.obj")).unwrap();
         let imported = read_scene(&folder.path().join("scene.json"), &ImportOptions::default()).unwrap();
         let error = scene_fingerprint(&imported, &folder.path().join("scene.json")).unwrap_err();
-        assert!(
-            matches!(&error, Error::Missing { file, message } if file.ends_with("m/a.obj") && message.contains("shapes[0].file"))
-        );
+        assert!(matches!(
+            &error,
+            Error::Missing { file, message } if file.ends_with("m/a.obj") && message.contains("shapes[0].file")
+        ));
     }
 
     #[test]

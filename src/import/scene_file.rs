@@ -219,7 +219,8 @@ mod tests {
         {
             assert!(message(text).starts_with("s.json:1:"), "{text}");
         }
-        let whole = "{ \"camera\": { \"position\": [0, 1, 2] }, \"shapes\": [{ \"type\": \"sphere\", \"name\": \"a\\u00e9\" }] }";
+        let whole = "{ \"camera\": { \"position\": [0, 1, 2] }, \"shapes\": [{ \"type\": \"sphere\", \"name\": \
+                     \"a\\u00e9\" }] }";
         assert!(parse_scene(whole, Path::new("s.json")).is_ok());
         for end in 0..whole.len() {
             assert!(parse_scene(&whole[..end], Path::new("s.json")).is_err(), "{end}");

@@ -8,6 +8,7 @@ use super::media::MediaState;
 use super::surface::{FirstSurface, surface_sample};
 use super::vertex::Vertex;
 use super::{CameraBatch, CameraSample, Integrator, PassContext, RayCounts, SurfaceAovs, Workspace, World, dimensions};
+use crate::bsdf::BsdfSample;
 use crate::color::Rgb;
 use crate::film::{LightAovRequest, LightAovRows, PixelSample, SurfaceSample};
 use crate::geometry::{Hit, SurfaceInteraction};
@@ -166,6 +167,17 @@ impl Segment {
         world.footprint(self.cone.as_ref(), &self.ray, self.hit.as_ref(), at)
     }
 
+    /// The surface at its end, with the scattering of the boundary between media if it is one.
+    #[inline]
+    fn vertex<'a>(&self, world: &'a World, at: &'a SurfaceInteraction) -> Vertex<'a> {
+        let boundary = world.boundary_bsdf(at, self.ray.direction, &self.media);
+        let mut vertex = Vertex::new(world, at, &self.ray, || self.footprint(world, at));
+        if let Some(boundary) = boundary {
+            vertex.bsdf = Cow::Owned(boundary);
+        }
+        vertex
+    }
+
     /// What arrives from infinity.
     fn escaped(&self, world: &World, view: View, tally: &mut Tally) -> Rgb {
         if tally.sorts() {
@@ -177,6 +189,15 @@ impl Segment {
         }
         world.radiance_at_infinity(self.ray.direction) * self.transmittance
     }
+}
+
+/// Reflection and refraction: random numbers at either end of [0, 1) choose them.
+#[inline]
+fn delta_lobes(vertex: &Vertex) -> [Option<BsdfSample>; 2] {
+    let lobe = |u: f32| vertex.bsdf.sample(vertex.wo, u, [0.5; 2]).filter(|s| s.is_delta);
+    let first = lobe(0.0);
+    let second = lobe(ONE_MINUS_EPSILON).filter(|s| Some(s.wi) != first.map(|f| f.wi));
+    [first, second]
 }
 
 impl Whitted {
@@ -198,21 +219,13 @@ impl Whitted {
         if view.depth >= self.max_depth || pass.render.is_cancel_due() {
             return radiance;
         }
-        let boundary = world.boundary_bsdf(at, ray.direction, media);
-        let mut vertex = Vertex::new(world, at, ray, || segment.footprint(world, at));
-        if let Some(boundary) = boundary {
-            vertex.bsdf = Cow::Owned(boundary);
-        }
+        let vertex = segment.vertex(world, at);
         if !vertex.bsdf.flags().is_delta() {
             let ambient = self.ambient * vertex.bsdf.albedo(vertex.wo);
             radiance += ambient;
             if tally.sorts() {
-                tally.add(
-                    world,
-                    view.throughput * ambient,
-                    view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE)),
-                    None,
-                );
+                let course = view.course(2, LightEvent::Indirect(LobeWeights::DIFFUSE));
+                tally.add(world, view.throughput * ambient, course, None);
             }
             for id in (0..world.scene.lights.lights().len()).map(LightId::new) {
                 let Some((light, wi)) = self.direct_light(world, segment, &vertex, id, tally) else { continue };
@@ -224,12 +237,8 @@ impl Whitted {
             }
         }
 
-        // Both delta lobes, each without the division by its probability: u at either end of [0, 1) chooses reflection
-        // and refraction.
-        let lobe = |u: f32| vertex.bsdf.sample(vertex.wo, u, [0.5; 2]).filter(|s| s.is_delta);
-        let first = lobe(0.0);
-        let second = lobe(ONE_MINUS_EPSILON).filter(|s| Some(s.wi) != first.map(|f| f.wi));
-        for lobe in [first, second].into_iter().flatten() {
+        // Both delta lobes, each without the division by its probability.
+        for lobe in delta_lobes(&vertex).into_iter().flatten() {
             let direction = vertex.frame.to_world(lobe.wi);
             if vertex.shadowing(lobe.wi, direction) == 0.0 {
                 continue;

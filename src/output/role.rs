@@ -116,7 +116,8 @@ mod tests {
             (Role::Direction, "N.X Ng.Z feature_normal.Y ViewLayer.Normal.X Ns.Y Tangent.X"),
             (
                 Role::Precise,
-                "Z P.X uv.U uv.V UV.A motion.X forward.u ViewLayer.Depth.Z Vector.W stats.samples variance.R Variance.G u v depth.Z",
+                "Z P.X uv.U uv.V UV.A motion.X forward.u ViewLayer.Depth.Z Vector.W stats.samples variance.R \
+                 Variance.G u v depth.Z",
             ),
             (Role::Id, "object_id.id material_id.id ViewLayer.Object Index.X IndexOB.X instance_id.id"),
             (

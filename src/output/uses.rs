@@ -116,7 +116,9 @@ mod tests {
                 assert!(read.contains(&part), "{read}");
             }
             assert!(
-                matches!(&written, Error::Usage(message) if message.contains("(--json)") && message.contains("(--output)")),
+                matches!(
+                    &written, Error::Usage(message) if message.contains("(--json)") && message.contains("(--output)")
+                ),
                 "{written}"
             );
         }

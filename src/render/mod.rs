@@ -5,6 +5,7 @@
 
 mod driver;
 mod exr_overrides;
+mod overrides;
 mod pixel_order;
 mod planner;
 mod progress;
@@ -15,9 +16,10 @@ mod tile_renderer;
 
 pub use driver::RenderSession;
 pub use exr_overrides::ExrOverrides;
+pub use overrides::Overrides;
 pub use progress::{Progress, Silent};
 pub use provenance::{RenderProvenance, SequenceFrame};
-pub use settings::{DEFAULT_EXTENSIONS, Overrides, Settings, threads};
+pub use settings::{DEFAULT_EXTENSIONS, Settings, threads};
 pub use state::{Checkpoints, Header, Merged, RenderState, Shard, StateFile, check_kept, merge};
 
 use std::sync::atomic::AtomicBool;

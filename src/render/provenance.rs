@@ -149,7 +149,8 @@ impl RenderProvenance {
                 )));
             }
             None => {
-                let message = "its provenance has no version: it was written by an earlier steradian, as a command line; render the scene itself";
+                let message = "its provenance has no version: it was written by an earlier steradian, as a command \
+                               line; render the scene itself";
                 return Err(malformed(message.to_owned()));
             }
         }

@@ -5,12 +5,9 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::ExrOverrides;
+use super::Overrides;
 use crate::accel::AccelKind;
-use crate::desc::{
-    FilterDesc, IntegratorDesc, LayerKind, MAX_SIDE, OutputDesc, PixelTypeDesc, SamplerKindDesc, SceneDesc,
-    StrategyDesc, ViewDesc,
-};
+use crate::desc::{FilterDesc, IntegratorDesc, MAX_SIDE, OutputDesc, PixelTypeDesc, SceneDesc, ViewDesc};
 use crate::error::{Error, Result};
 use crate::film::{Crop, LayerSet};
 use crate::output::check_output;
@@ -69,61 +66,6 @@ pub struct Settings {
     pub outputs: Vec<OutputDesc>,
     /// Every layer of an output.
     pub layers: LayerSet,
-}
-
-/// Overrides of the command line; `None` keeps the value of the scene.
-#[derive(Clone, Debug, Default)]
-pub struct Overrides {
-    /// `--spp`.
-    pub spp: Option<u32>,
-    /// `--target-error`.
-    pub target_error: Option<f64>,
-    /// `--size`: width and height.
-    pub size: Option<[u32; 2]>,
-    /// `--crop`: x, y, width, height.
-    pub crop: Option<[u32; 4]>,
-    /// `--overscan`, in pixels.
-    pub overscan: Option<u32>,
-    /// `--threads`; 0 means all.
-    pub threads: Option<usize>,
-    /// `--seed`.
-    pub seed: Option<u64>,
-    /// `--integrator`, with default parameters; those of the scene are kept if it has the same one.
-    pub integrator: Option<IntegratorDesc>,
-    /// `--accel`.
-    pub accel: Option<AccelKind>,
-    /// `--no-depth-of-field`.
-    pub no_depth_of_field: bool,
-    /// `--transparent`.
-    pub transparent: bool,
-    /// `--sampler`.
-    pub sampler: Option<SamplerKindDesc>,
-    /// `--max-depth`.
-    pub max_depth: Option<u32>,
-    /// `--strategy`.
-    pub strategy: Option<StrategyDesc>,
-    /// `--clamp`; infinity means no limit.
-    pub clamp: Option<f32>,
-    /// `--regularize`; 0 means none.
-    pub regularize: Option<f32>,
-    /// `--guiding`.
-    pub guiding: Option<bool>,
-    /// `--time-limit`, in seconds.
-    pub time_limit: Option<f64>,
-    /// `--output`: these files in place of the scene's.
-    pub outputs: Vec<String>,
-    /// The files if neither the scene nor the command line names one.
-    pub default_outputs: Vec<String>,
-    /// `--layers`: for every EXR output.
-    pub layers: Vec<LayerKind>,
-    /// `--float`: for every EXR output.
-    pub float: bool,
-    /// Of every EXR output.
-    pub exr: ExrOverrides,
-    /// `--exposure`: for every PNG output.
-    pub exposure: Option<f32>,
-    /// `--view`: for every PNG output.
-    pub view: Option<ViewDesc>,
 }
 
 impl Settings {
@@ -238,7 +180,7 @@ fn integrator(desc: &SceneDesc, overrides: &Overrides) -> Result<IntegratorDesc>
     if let Some(depth) = overrides.max_depth {
         match &mut integrator {
             IntegratorDesc::Path { max_depth, .. } | IntegratorDesc::Whitted { max_depth, .. } if depth > 0 => {
-                *max_depth = depth
+                *max_depth = depth;
             }
             IntegratorDesc::Path { .. } | IntegratorDesc::Whitted { .. } => {
                 return Err(usage("--max-depth 0: depth counts from 1, directly visible light"));
@@ -363,6 +305,7 @@ fn outputs(desc: &SceneDesc, overrides: &Overrides, integrator: &IntegratorDesc)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::desc::{SamplerKindDesc, StrategyDesc};
     use crate::film::LayerKind;
 
     fn scene(text: &str) -> SceneDesc {

@@ -106,7 +106,7 @@ impl Bitmap {
     #[inline]
     pub(super) fn prefetch(&self, footprint: &Footprint) {
         let load = |image: &TextureImage| {
-            self.around(image, footprint.uv).texels.into_iter().step_by(2).for_each(|texel| image.prefetch(texel))
+            self.around(image, footprint.uv).texels.into_iter().step_by(2).for_each(|texel| image.prefetch(texel));
         };
         match self.levels(footprint) {
             None => load(&self.image),

@@ -150,7 +150,7 @@ fn visit_wide(wide: &Wide, visit: &mut dyn FnMut(&NodeInfo)) {
                     items.extend(blocks.iter().flat_map(|block| &block.items[..block.count as usize]));
                 }
                 ChildKind::Items { first, count } => {
-                    items.extend_from_slice(&wide.items[first as usize..(first + count) as usize])
+                    items.extend_from_slice(&wide.items[first as usize..(first + count) as usize]);
                 }
             }
             visit(&NodeInfo { bounds, depth: depth + 1, children: 0, items: &items });

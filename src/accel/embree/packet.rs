@@ -147,7 +147,7 @@ impl HitPacket {
                 self.valid.0.as_ptr(),
                 &mut self.rayhits,
                 tracer.as_frustum(coherence),
-            )
+            );
         };
         if !self.valid.is_full() {
             self.intersect_left_out(tracer, rays, lanes);
@@ -208,7 +208,7 @@ impl ShadowPacket {
                 self.valid.0.as_ptr(),
                 &mut self.rays,
                 tracer.as_frustum(coherence),
-            )
+            );
         };
         // A lane that was not traced keeps the finite end of an inactive ray.
         let mut found = self.rays.tfar.map(|t_far| t_far == f32::NEG_INFINITY);

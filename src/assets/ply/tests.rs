@@ -1,6 +1,7 @@
 use super::*;
 
-const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float s\nproperty float t\n\
+const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float s\n\
+                      property float t\n\
                       element face 1\nproperty list uchar int vertex_indices\nend_header\n";
 
 fn expected() -> MeshData {
@@ -38,10 +39,13 @@ fn all_encodings_give_the_same_mesh() {
 
 #[test]
 fn vertices_and_faces_have_attributes() {
-    let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float temp_0\nproperty float x\nproperty float y\nproperty float z\n\
+    let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float temp_0\nproperty float x\nproperty float y\n\
+                property float z\n\
                 property double d_x\nproperty uchar d_y\nproperty float d_z\nelement face 2\nproperty float q_0\n\
-                property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n\
-                0.5 0 0 0 0.25 7 1\n1.5 1 0 0 1 8 2\n2.5 1 1 0 2 9 3\n-1 0 1 0 3 10 4\n9 4 0 1 2 3 255 0 0\n8 3 0 1 2 0 255 0\n";
+                property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+                end_header\n\
+                0.5 0 0 0 0.25 7 1\n1.5 1 0 0 1 8 2\n2.5 1 1 0 2 9 3\n-1 0 1 0 3 10 4\n9 4 0 1 2 3 255 0 0\n\
+                8 3 0 1 2 0 255 0\n";
     let mesh = parse_ply(text.as_bytes()).unwrap();
     let expected = [
         ("face_color", AttributeValues::Colors(vec![[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])),
@@ -153,9 +157,12 @@ fn faults_of_text_files_have_a_line() {
 
 #[test]
 fn normals_other_types_and_other_elements_are_read() {
-    let text = "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nelement camera 1\r\nproperty list uchar float view\r\nelement face 1\r\n\
-                property list uint8 uint16 vertex_index\r\nproperty uchar red\r\nelement vertex 3\r\nproperty double x\r\nproperty short y\r\n\
-                property float z\r\nproperty float nx\r\nproperty float ny\r\nproperty float nz\r\nproperty uchar red\r\nend_header\r\n\
+    let text = "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nelement camera 1\r\n\
+                property list uchar float view\r\nelement face 1\r\n\
+                property list uint8 uint16 vertex_index\r\nproperty uchar red\r\nelement vertex 3\r\n\
+                property double x\r\nproperty short y\r\n\
+                property float z\r\nproperty float nx\r\nproperty float ny\r\nproperty float nz\r\n\
+                property uchar red\r\nend_header\r\n\
                 2 0.5 0.5\r\n3 2 1 0 255\r\n0 0 0 0 0 1 9\r\n1.5 0 0 0 0 1 9\r\n0 -2 0 0 0 1 9\r\n";
     for text in [text.to_owned(), text.replace("\r\n", "\n")] {
         let mesh = parse_ply(text.as_bytes()).unwrap();
@@ -171,8 +178,9 @@ fn colours_are_linear_as_floats_and_encoded_as_whole_numbers() {
     let colors = |kind: &str, names: [&str; 3], color: &str| {
         let properties: String = names.map(|name| format!("property {kind} {name}\n")).concat();
         let text = format!(
-            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{properties}\
-             element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 {color}\n1 0 0 {color}\n0 1 0 {color}\n3 0 1 2\n"
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+             {properties}element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 {color}\n\
+             1 0 0 {color}\n0 1 0 {color}\n3 0 1 2\n"
         );
         parse_ply(text.as_bytes()).unwrap().colors().map(<[_]>::to_vec)
     };

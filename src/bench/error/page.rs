@@ -21,19 +21,23 @@ const PIXELS: u64 = 12_000_000;
 const VIEWER: &str = include_str!("viewer.js");
 
 const STYLE: &str = "<style>
-#views { display: flex; gap: .5rem; } #views figure { flex: 1; min-width: 0; margin: 0; } #views canvas { cursor: crosshair; touch-action: none; }
-#controls { display: flex; flex-wrap: wrap; gap: .3rem 1rem; align-items: center; margin: .5rem 0; } #pixel { white-space: pre-wrap; }
+#views { display: flex; gap: .5rem; } #views figure { flex: 1; min-width: 0; margin: 0; } \
+#views canvas { cursor: crosshair; touch-action: none; }
+#controls { display: flex; flex-wrap: wrap; gap: .3rem 1rem; align-items: center; margin: .5rem 0; } \
+#pixel { white-space: pre-wrap; }
 [aria-pressed=true] { font-weight: bold; } [hidden] { display: none; }
 </style>\n";
 
 const CONTROLS: &str = "<div id=\"controls\">
 <label>Test <select id=\"choice\"></select></label>
-<span><button data-show=\"all\">side by side (0)</button> <button data-show=\"reference\">reference (1)</button> <button data-show=\"test\">test (2)</button> \
-<button data-show=\"error\">error (3)</button></span>
-<label>Exposure <input id=\"exposure\" type=\"range\" min=\"-10\" max=\"10\" step=\"0.1\" value=\"0\"> <output id=\"exposure-value\"></output></label>
-<label>Error <select id=\"kind\"><option value=\"relative\">relative, squared</option><option value=\"absolute\">absolute</option>\
-<option value=\"signed\">signed: red is brighter</option></select></label>
-<label>times 2^ <input id=\"gain\" type=\"range\" min=\"-10\" max=\"10\" step=\"0.1\" value=\"0\"> <output id=\"gain-value\"></output></label>
+<span><button data-show=\"all\">side by side (0)</button> <button data-show=\"reference\">reference (1)</button> \
+<button data-show=\"test\">test (2)</button> <button data-show=\"error\">error (3)</button></span>
+<label>Exposure <input id=\"exposure\" type=\"range\" min=\"-10\" max=\"10\" step=\"0.1\" value=\"0\"> \
+<output id=\"exposure-value\"></output></label>
+<label>Error <select id=\"kind\"><option value=\"relative\">relative, squared</option>\
+<option value=\"absolute\">absolute</option><option value=\"signed\">signed: red is brighter</option></select></label>
+<label>times 2^ <input id=\"gain\" type=\"range\" min=\"-10\" max=\"10\" step=\"0.1\" value=\"0\"> \
+<output id=\"gain-value\"></output></label>
 <span>Zoom <output id=\"zoom-value\"></output> (wheel, drag, double click)</span>
 </div>
 <div id=\"views\">
@@ -157,7 +161,8 @@ impl ErrorReport {
             let json = self.pictures.json(self)?;
             let _ = write!(
                 out,
-                "<h2>Differences</h2>\n{STYLE}{CONTROLS}<script type=\"application/json\" id=\"pictures\">{json}</script>\n<script>\n{VIEWER}</script>\n"
+                "<h2>Differences</h2>\n{STYLE}{CONTROLS}\
+                 <script type=\"application/json\" id=\"pictures\">{json}</script>\n<script>\n{VIEWER}</script>\n"
             );
         }
         out.push_str(html::END);

@@ -18,7 +18,8 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size
 th, td { padding: .25rem .6rem; border-bottom: 1px solid var(--line); text-align: left; white-space: nowrap; }
 th { position: sticky; top: 0; background: Canvas; }
 td:not(:first-child) { font-variant-numeric: tabular-nums; }
-figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; border-radius: 6px; } figcaption { opacity: .8; font-size: 13px; }
+figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; border-radius: 6px; } \
+figcaption { opacity: .8; font-size: 13px; }
 code { overflow-wrap: anywhere; }";
 
 /// Text with the characters of markup, and those that nobody sees, written out.
@@ -34,8 +35,9 @@ pub fn escape(text: &str) -> String {
 /// A page down to the line with the machine of the measurement.
 pub fn begin(title: &str, header: &str) -> String {
     format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width\">\n<title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n",
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>{STYLE}</style>\n\
+         </head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n",
         escape(header)
     )
 }

@@ -51,6 +51,13 @@ pub fn log_bars(groups: &[&str], series: &[Series], unit: &str) -> Result<String
     bars_over(groups, &series.iter().map(log).collect::<Vec<_>>(), unit, |v| 10f64.powf(v))
 }
 
+/// The name of the group in whose middle `x` is; nothing beside the middles.
+fn group_at(groups: &[&str], x: f64) -> String {
+    let is_middle = (x - x.round()).abs() < 1e-6 && x > -0.25;
+    let name = if is_middle { groups.get(x.round() as usize) } else { None };
+    name.map_or(String::new(), |name| (*name).to_owned())
+}
+
 /// Bars whose axis is labelled by a function of their values.
 fn bars_over(groups: &[&str], series: &[Series], unit: &str, label: fn(f64) -> f64) -> Result<String> {
     let ends = || series.iter().flat_map(|s| s.values.iter().flatten());
@@ -68,20 +75,12 @@ fn bars_over(groups: &[&str], series: &[Series], unit: &str, label: fn(f64) -> f
             .y_label_area_size(64)
             .build_cartesian_2d(-0.5..last, bottom..top)
             .map_err(failed)?;
-        let name = |x: &f64| {
-            let near = (x - x.round()).abs() < 1e-6 && *x > -0.25;
-            if near {
-                groups.get(x.round() as usize).map_or(String::new(), |name| (*name).to_owned())
-            } else {
-                String::new()
-            }
-        };
         let labels = 2 * groups.len() + 1;
         chart
             .configure_mesh()
             .disable_x_mesh()
             .x_labels(labels)
-            .x_label_formatter(&name)
+            .x_label_formatter(&|x| group_at(groups, *x))
             .y_label_formatter(&|y| short(label(*y)))
             .y_desc(unit)
             .label_style(("sans-serif", 14))

@@ -75,8 +75,9 @@ fn header(report: &ReportsReport) -> String {
     let load = m.load.map_or(String::new(), |load| format!(", load {load:.2} before"));
     let [width, height] = report.size;
     format!(
-        "{} ({}{load}), steradian {}. Frames of {width}x{height}, one sample a pixel, one thread: pictures of normals (one camera ray a pixel), and path \
-         tracing of the mesh on a floor under a sky and a sun (up to 5 segments, shadow rays). Medians of frames in turn.",
+        "{} ({}{load}), steradian {}. Frames of {width}x{height}, one sample a pixel, one thread: pictures of normals \
+         (one camera ray a pixel), and path tracing of the mesh on a floor under a sky and a sun (up to 5 segments, \
+         shadow rays). Medians of frames in turn.",
         m.processor, m.instruction_set, m.version
     )
 }
@@ -144,8 +145,8 @@ fn table(comparison: &Comparison) -> Table {
         ]
     });
     let title = format!(
-        "{} triangles; times faster: the first line's time within the accelerator over this one's; triangles per ray and different pixels are of \
-         normals.",
+        "{} triangles; times faster: the first line's time within the accelerator over this one's; triangles per ray \
+         and different pixels are of normals.",
         comparison.triangles
     );
     Table { title, heads: heads.map(str::to_owned).to_vec(), rows: rows.collect() }

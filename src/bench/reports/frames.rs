@@ -40,7 +40,9 @@ impl Kind {
 
     fn scene(self, mesh: &Mesh) -> serde_json::Value {
         let mut scene = json!({
-            "camera": { "position": [0.9, -4.2, 0.6], "look_at": [0, 0, 0], "up": [0, 0, 1], "vertical_fov_degrees": 35 },
+            "camera": {
+                "position": [0.9, -4.2, 0.6], "look_at": [0, 0, 0], "up": [0, 0, 1], "vertical_fov_degrees": 35
+            },
             "integrator": { "type": "normal" },
             "sampler": { "type": "independent", "spp": 1 },
             "shapes": [{ "type": "mesh", "positions": mesh.positions(), "triangles": mesh.triangles() }],

@@ -96,9 +96,10 @@ mod tests {
 
     #[test]
     fn a_case_that_fails_is_named_once_and_the_others_are_measured() {
-        let case = r#"{ "triangles": 1, "instances": 0, "lights": 1, "make_seconds": 1, "load_seconds": 1, "build_seconds": 1,
-            "first_pass_seconds": 1, "render_seconds": 2, "processor_seconds": 3, "samples": 1000, "rays": 5000, "mesh_bytes": 1,
-            "accelerator_bytes": 1, "film_bytes_per_pixel": 36, "memory": null }"#;
+        let case = r#"{ "triangles": 1, "instances": 0, "lights": 1, "make_seconds": 1, "load_seconds": 1,
+            "build_seconds": 1, "first_pass_seconds": 1, "render_seconds": 2, "processor_seconds": 3,
+            "samples": 1000, "rays": 5000, "mesh_bytes": 1, "accelerator_bytes": 1, "film_bytes_per_pixel": 36,
+            "memory": null }"#;
         // In the place of the program: it fails with four segments.
         let script = format!("if grep -q '\"depth\":4'; then echo no memory >&2; exit 33; fi; echo '{case}'");
         let program = || {

@@ -242,21 +242,7 @@ impl Planner<'_> {
         use Quantity as Q;
         let (options, picture) = (self.options, self.picture());
         match self.name {
-            "resolution" => {
-                let sizes =
-                    [1, 2, 4, 8, 16].map(|factor| options.size.map(|side| (side * factor).div_ceil(4).min(MAX_SIDE)));
-                self.sweep(
-                    "The room, 1 spp".to_owned(),
-                    &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
-                    &[Q::Render, Q::Sample, Q::Peak],
-                    sizes
-                        .into_iter()
-                        .map(|size| {
-                            plain(size[0] as usize * size[1] as usize, Case { size, spp: 1, ..self.base.clone() })
-                        })
-                        .collect(),
-                )
-            }
+            "resolution" => self.sweep_of_resolutions(),
             "spp" => {
                 let counts = [1, 4, 16, 64, 256].map(|spp| if options.quick { spp.min(64) } else { spp });
                 let mut counts = counts.to_vec();
@@ -294,25 +280,36 @@ impl Planner<'_> {
                         .collect(),
                 )
             }
-            _ => {
-                let triangles = if options.quick { 10_000 } else { 1_000_000 }.min(options.triangles);
-                let spp = 4 * options.spp;
-                self.sweep(
-                    format!(
-                        "A bumpy sphere of {triangles} triangles, {}x{}, {spp} spp",
-                        options.size[0], options.size[1]
-                    ),
-                    &[Q::Build, Q::Render, Q::Sample, Q::Rate],
-                    &[Q::Build, Q::Render, Q::Sample],
-                    doubled(options.threads)
-                        .into_iter()
-                        .map(|threads| {
-                            plain(threads, Case { threads, spp, ..self.with(Subject::Sphere { triangles }) })
-                        })
-                        .collect(),
-                )
-            }
+            _ => self.sweep_of_threads(),
         }
+    }
+
+    fn sweep_of_resolutions(&self) -> Sweep {
+        use Quantity as Q;
+        let sizes =
+            [1, 2, 4, 8, 16].map(|factor| self.options.size.map(|side| (side * factor).div_ceil(4).min(MAX_SIDE)));
+        let case =
+            |size: [u32; 2]| plain(size[0] as usize * size[1] as usize, Case { size, spp: 1, ..self.base.clone() });
+        self.sweep(
+            "The room, 1 spp".to_owned(),
+            &[Q::Render, Q::Sample, Q::Rate, Q::FilmPerPixel, Q::RenderPerPixel, Q::Peak],
+            &[Q::Render, Q::Sample, Q::Peak],
+            sizes.into_iter().map(case).collect(),
+        )
+    }
+
+    fn sweep_of_threads(&self) -> Sweep {
+        use Quantity as Q;
+        let options = self.options;
+        let triangles = if options.quick { 10_000 } else { 1_000_000 }.min(options.triangles);
+        let spp = 4 * options.spp;
+        let case = |threads| plain(threads, Case { threads, spp, ..self.with(Subject::Sphere { triangles }) });
+        self.sweep(
+            format!("A bumpy sphere of {triangles} triangles, {}x{}, {spp} spp", options.size[0], options.size[1]),
+            &[Q::Build, Q::Render, Q::Sample, Q::Rate],
+            &[Q::Build, Q::Render, Q::Sample],
+            doubled(options.threads).into_iter().map(case).collect(),
+        )
     }
 }
 

@@ -17,9 +17,10 @@ use crate::bench::{Fit, Machine, fit, median_and_range};
 use crate::error::{Error, Result};
 
 /// The columns of the CSV file.
-const COLUMNS: &str = "sweep,at,repeat,width,height,spp,depth,threads,accelerator,triangles,instances,lights,load_seconds,build_seconds,\
-                       first_pass_seconds,render_seconds,processor_seconds,samples,rays,mesh_bytes,accelerator_bytes,film_bytes_per_pixel,\
-                       start_bytes,made_bytes,load_peak_bytes,build_peak_bytes,before_render_bytes,render_peak_bytes";
+const COLUMNS: &str = "sweep,at,repeat,width,height,spp,depth,threads,accelerator,triangles,instances,lights,\
+                       load_seconds,build_seconds,first_pass_seconds,render_seconds,processor_seconds,samples,rays,\
+                       mesh_bytes,accelerator_bytes,film_bytes_per_pixel,start_bytes,made_bytes,load_peak_bytes,\
+                       build_peak_bytes,before_render_bytes,render_peak_bytes";
 
 /// What the sweep over threads is judged by.
 const SPEEDUP: &str = "times one thread";
@@ -281,12 +282,12 @@ impl ScaleReport {
     /// What the columns mean.
     fn notes(&self) -> Vec<String> {
         let fixed = [
-            "Every case runs in a process of its own; scenes are made in memory first, which no time includes. Peak: the most memory that the \
-             process held from then on, the made meshes and the program itself included.",
-            "Load: from the description to placed and checked meshes and lights. First picture: load, build and the first sample of every pixel. \
-             Processor ns: of all threads together.",
-            "Slopes: exponents of power laws, by least squares of the logarithms of the medians, with their standard errors. 0 costs nothing \
-             more, 1 is in proportion.",
+            "Every case runs in a process of its own; scenes are made in memory first, which no time includes. Peak: \
+             the most memory that the process held from then on, the made meshes and the program itself included.",
+            "Load: from the description to placed and checked meshes and lights. First picture: load, build and the \
+             first sample of every pixel. Processor ns: of all threads together.",
+            "Slopes: exponents of power laws, by least squares of the logarithms of the medians, with their standard \
+             errors. 0 costs nothing more, 1 is in proportion.",
         ];
         fixed
             .iter()

@@ -16,17 +16,20 @@ use crate::sampling::statistics::chi_squared_p_value;
 
 checks! {
     "K1" k1_thin_lens "rays of a film point meet in focus":
-        "random cameras in scenes a thousandth to a thousand in size, disks and blades; errors in units of rounding of origin and direction, 2^-24 of their lengths \
-         (Mitsuba, test_thinlens)";
+        "random cameras in scenes a thousandth to a thousand in size, disks and blades; errors in units of rounding of \
+         origin and direction, 2^-24 of their lengths (Mitsuba, test_thinlens)";
     "K2" k2_blur "blur of what is out of focus":
-        "points of rays in a plane beside the focus, uniform in a disk by a χ² test in 16 rings and 16 sectors; a picture of a small light";
+        "points of rays in a plane beside the focus, uniform in a disk by a χ² test in 16 rings and 16 sectors; a \
+         picture of a small light";
     "K3" k3_pixel_cones "cones have the width of their pixels":
-        "against finite differences of rays one pixel apart: perspective, orthographic, environment, with shift, aspect and near limit \
-         (Mitsuba, test03_sample_ray_diff)";
+        "against finite differences of rays one pixel apart: perspective, orthographic, environment, with shift, \
+         aspect and near limit (Mitsuba, test03_sample_ray_diff)";
     "K4" k4_shutter "what moves leaves a ramp":
-        "a bright card that passes an orthographic camera, and a camera that passes the card: coverage of 64 columns by a χ² test; whole and partial shutters";
+        "a bright card that passes an orthographic camera, and a camera that passes the card: coverage of 64 columns \
+         by a χ² test; whole and partial shutters";
     "K5" k5_projection "rays lead back to their film points":
-        "random cameras at rest and moving, six kinds of projection and framing, points on rays, of parallel ones no farther than the picture is high, projected in f64 (Cycles, kernel_camera_projection_test)";
+        "random cameras at rest and moving, six kinds of projection and framing, points on rays, of parallel ones no \
+         farther than the picture is high, projected in f64 (Cycles, kernel_camera_projection_test)";
 }
 
 const SIZE: [u32; 2] = [200, 100];
@@ -116,7 +119,8 @@ fn small_light(radius: f64, distance: f64, focus: f64, spp: u32) -> Value {
         "film": { "width": 65, "height": 65, "filter": { "type": "box" } },
         "sampler": { "spp": spp },
         "camera": {
-            "position": [0, 0, distance], "look_at": [0, 0, 0], "vertical_fov_degrees": 40, "lens": { "radius": 0.25, "focus_distance": focus }
+            "position": [0, 0, distance], "look_at": [0, 0, 0], "vertical_fov_degrees": 40,
+            "lens": { "radius": 0.25, "focus_distance": focus }
         },
         "shapes": [{ "type": "disk", "radius": radius, "emission": { "radiance": [1, 1, 1] } }],
         "integrator": { "type": "path", "max_depth": 1 }
@@ -225,10 +229,14 @@ fn passing_card(shutter: [f64; 2], camera_moves: bool, spp: u32) -> Value {
         "film": { "width": COLUMNS, "height": ROWS, "filter": { "type": "box" } },
         "sampler": { "type": "independent", "spp": spp },
         "integrator": { "type": "path", "max_depth": 1 },
-        "camera": { "type": "orthographic", "position": [0, 0, 5], "look_at": [0, 0, 0], "view_height": 0.5, "shutter": shutter },
+        "camera": {
+            "type": "orthographic", "position": [0, 0, 5], "look_at": [0, 0, 0], "view_height": 0.5, "shutter": shutter
+        },
         "materials": { "black": { "type": "diffuse", "albedo": 0 } },
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
-        "shapes": [{ "type": "quad", "material": "black", "origin": [-0.5, -1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0] }]
+        "shapes": [{
+            "type": "quad", "material": "black", "origin": [-0.5, -1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 2, 0]
+        }]
     });
     if camera_moves {
         scene["camera"]["motion"] = way(1.0, -1.0);
@@ -313,17 +321,19 @@ fn project(projection: &Projection, framing: &Framing, p: DVec3) -> DVec2 {
     }
 }
 
+/// What [`k5_projection`] goes through.
+const PROJECTIONS: [&str; 6] = [
+    "perspective",
+    "perspective with framing",
+    "orthographic",
+    "orthographic with framing",
+    "environment",
+    "moving perspective",
+];
+
 fn k5_projection(effort: Effort) -> Outcome {
     let mut rng = Rng::new(5);
-    let names = [
-        "perspective",
-        "perspective with framing",
-        "orthographic",
-        "orthographic with framing",
-        "environment",
-        "moving perspective",
-    ];
-    let mut worst = [0f64; 6];
+    let mut worst = [0f64; PROJECTIONS.len()];
     let mut corner = 0f64;
     for _ in 0..effort.pick(2_000, 300_000) {
         let half_height = rng.magnitude(-1.0, 0.3);
@@ -371,7 +381,7 @@ fn k5_projection(effort: Effort) -> Outcome {
         corner = corner.max(((upright - exact) / exact).abs().max_element() / (2.0 * UNIT_ROUNDOFF));
     }
     let outcome = Outcome::new().at_most("error of the picture's corners, in ulp", corner, 2.0);
-    names.iter().zip(worst).fold(outcome, |outcome, (name, worst)| {
+    PROJECTIONS.iter().zip(worst).fold(outcome, |outcome, (name, worst)| {
         outcome.at_most(format!("error over the picture's height, {name}"), worst, 1e-6)
     })
 }

@@ -140,8 +140,8 @@ impl StabilityReport {
         let seconds: f64 = self.checks.iter().map(|check| check.seconds).sum();
         let cut = if self.interrupted { " Interrupted: what is missing was not run." } else { "" };
         format!(
-            "{} checks: {} passed, {} fell short of what one would wish (causes below), {} failed, in {seconds:.0} s. {} ({}, {} threads), \
-             steradian {}; `{}`. False-alarm rate of each statistical check: 1e-6.{cut}",
+            "{} checks: {} passed, {} fell short of what one would wish (causes below), {} failed, in {seconds:.0} s. \
+             {} ({}, {} threads), steradian {}; `{}`. False-alarm rate of each statistical check: 1e-6.{cut}",
             self.checks.len(),
             count(Status::Passed),
             count(Status::Short),

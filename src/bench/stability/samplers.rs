@@ -11,24 +11,29 @@ use crate::sampling::{PixelSeed, Sampler, SamplerKind};
 
 checks! {
     "S1" s1_elementary_intervals "every elementary interval holds one sample":
-        "Owen-scrambled Sobol points, blocks of 2^k samples for k from 2 to 10, from the first and from later ones: each dimension, and the first \
-         two of a set together in all shapes of base 2 (pbrt, samplers_test.cpp)";
+        "Owen-scrambled Sobol points, blocks of 2^k samples for k from 2 to 10, from the first and from later ones: \
+         each dimension, and the first two of a set together in all shapes of base 2 (pbrt, samplers_test.cpp)";
     "S2" s2_any_order "samples do not depend on their order":
-        "samples of random pixels and sets forwards, backwards and from a sampler made anew, bit for bit (pbrt, Sampler.ConsistentValues)";
+        "samples of random pixels and sets forwards, backwards and from a sampler made anew, bit for bit (pbrt, \
+         Sampler.ConsistentValues)";
     "S3" s3_range "numbers are in [0, 1)":
         "2^24 samples of four dimensions from both samplers; the extremes are reached to 1e-6 (pbrt, Generators)";
     "S4" s4_uniformity "numbers are uniform":
-        "Sobol: 1024 samples in 16 bins and 16 x 16, counts exact; independent: chi-square over 16 x 16 cells of all pairs of dimensions; the first \
-         samples of 65536 pixels and of as many sets (Mitsuba, samplers/tests/utils.py)";
+        "Sobol: 1024 samples in 16 bins and 16 x 16, counts exact; independent: chi-square over 16 x 16 cells of all \
+         pairs of dimensions; the first samples of 65536 pixels and of as many sets (Mitsuba, samplers/tests/utils.py)";
     "S5" s5_scrambles "scrambles of pixels and sets are independent":
-        "in place of pbrt's ZSobolSampler.ValidIndices, for pixels share no sequence current: each pixel and set scrambles its own by a hash; seeds of \
-         a picture's pixels are equal no more often than random ones, and first samples of neighbours fill 16 x 16 cells evenly (chi-square)";
+        "in place of pbrt's ZSobolSampler.ValidIndices, for pixels share no sequence current: each pixel and set \
+         scrambles its own by a hash; seeds of a picture's pixels are equal no more often than random ones, and first \
+         samples of neighbours fill 16 x 16 cells evenly (chi-square)";
     "S6" s6_decorrelation "neighbours are not correlated":
-        "correlation of dimensions 0 to 63 with those of the pixels (1, 0), (0, 1), (16, 16), and with the next set's (Ahmed and Wonka)";
+        "correlation of dimensions 0 to 63 with those of the pixels (1, 0), (0, 1), (16, 16), and with the next set's \
+         (Ahmed and Wonka)";
     "S7" s7_convergence "errors fall as the theory says":
-        "root mean square error over scrambles, 2^4 to 2^12 samples: a smooth integrand in 2D and a disk (Owen; Burley)";
+        "root mean square error over scrambles, 2^4 to 2^12 samples: a smooth integrand in 2D and a disk (Owen; \
+         Burley)";
     "S8" s8_seeds_and_counts "other seeds and counts of samples are unbiased":
-        "means over many pixels for counts that are no powers of two, against the integral and between seeds (Welch's test)";
+        "means over many pixels for counts that are no powers of two, against the integral and between seeds (Welch's \
+         test)";
 }
 
 const KINDS: [SamplerKind; 2] = [SamplerKind::Sobol, SamplerKind::Independent];

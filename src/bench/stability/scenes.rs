@@ -10,7 +10,7 @@ use crate::bench::bumpy_sphere;
 use crate::geometry::{Geometry, Hit, Instance, Mesh, MeshStep, Object, Shape};
 use crate::id::{ObjectId, ShapeId};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::{Aabb, DAffine3, DMat3, DVec3, Motion, Ray};
+use crate::math::{Aabb, DAffine3, DMat3, DVec3, Motion, Ray, Transform};
 
 /// Checks build over their own geometry, which every accelerator takes.
 const BUILDS: &str = "accelerators build over the geometry of checks";
@@ -36,7 +36,8 @@ pub fn all(geometry: &Geometry) -> Vec<(&'static str, Box<dyn Accelerator + '_>)
 }
 
 /// Why bounds on Embree's distances are weaker on some processors.
-pub const INEXACT_RECIPROCALS: &str = "on a processor without AVX-512, Embree divides by refined estimates of reciprocals: distances to triangles may be 2^-22 off";
+pub const INEXACT_RECIPROCALS: &str = "on a processor without AVX-512, Embree divides by refined estimates of \
+                                       reciprocals: distances to triangles may be 2^-22 off";
 
 /// The relative error of an accelerator's distances to triangles, from [`all`].
 pub fn distance_error(name: &str) -> f32 {
@@ -94,6 +95,15 @@ pub fn all_answers(accel: &dyn Accelerator, rays: &[Ray]) -> Vec<(Vec<Option<Hit
     answers
 }
 
+/// An object that shares a shape with the world, and ids that do not start at zero.
+fn mixed(rng: &mut Rng, placements: &[Transform]) -> Geometry {
+    let soups = [0.3, 0.3, 0.2].map(|size| Shape::Mesh(soup(rng, 50, size)));
+    let mut mixed = instances(soups.into(), placements);
+    mixed.objects[0].shapes.remove(0);
+    mixed.world = vec![ShapeId(0), ShapeId(2)];
+    mixed
+}
+
 /// Scenes with their names, all of them at rest.
 pub fn scenes() -> Vec<(&'static str, Geometry)> {
     let mut rng = Rng::new(11);
@@ -131,18 +141,7 @@ pub fn scenes() -> Vec<(&'static str, Geometry)> {
             ),
         ),
     ];
-    // An object that shares a shape with the world, and ids that do not start at zero.
-    let mut mixed = instances(
-        vec![
-            Shape::Mesh(soup(&mut rng, 50, 0.3)),
-            Shape::Mesh(soup(&mut rng, 50, 0.3)),
-            Shape::Mesh(soup(&mut rng, 50, 0.2)),
-        ],
-        &placements[..3],
-    );
-    mixed.objects[0].shapes.remove(0);
-    mixed.world = vec![ShapeId(0), ShapeId(2)];
-    scenes.push(("mixed", mixed));
+    scenes.push(("mixed", mixed(&mut rng, &placements[..3])));
     let analytic = placed_analytic_shapes(&mut rng, DVec3::ZERO);
     scenes.push(("analytic", world(analytic.clone())));
     scenes.push(("far analytic", world(placed_analytic_shapes(&mut rng, far))));

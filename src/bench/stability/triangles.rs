@@ -14,27 +14,40 @@ use crate::math::{DMat3, DVec3, Ray, Transform, Vec3};
 
 checks! {
     "A1" a1_triangle_hits "accuracy of triangle hits":
-        "unit triangle, rays from one unit away to points with barycentrics of at least 1e-3 (Embree, verify TriangleHitTest)";
+        "unit triangle, rays from one unit away to points with barycentrics of at least 1e-3 (Embree, verify \
+         TriangleHitTest)";
     "A2" a2_quad_hits "accuracy of hits of a quad":
-        "unit square as an analytic shape, rays from one unit away to points at least 1e-3 from its edges (Embree, verify QuadHitTest)";
+        "unit square as an analytic shape, rays from one unit away to points at least 1e-3 from its edges (Embree, \
+         verify QuadHitTest)";
     "A3" a3_watertight_meshes "closed sphere and plane, at rest and with two equal time steps":
-        "sphere of radius 2 around the origin and far away, plane of 12 x 12 far away; random rays from within 0.5 of the centre and at the plane, closest and any hit (Embree, verify WatertightTest)";
+        "sphere of radius 2 around the origin and far away, plane of 12 x 12 far away; random rays from within 0.5 of \
+         the centre and at the plane, closest and any hit (Embree, verify WatertightTest)";
     "A4" a4_edges "rays at edges":
-        "closed sphere, scale 1e-6 to 1e6, 0 to 1e7 radii from the origin; rays from the centre to random points of edges, closest and any hit (Woop, Benthin, Wald, \"Watertight Ray/Triangle Intersection\")";
+        "closed sphere, scale 1e-6 to 1e6, 0 to 1e7 radii from the origin; rays from the centre to random points of \
+         edges, closest and any hit (Woop, Benthin, Wald, \"Watertight Ray/Triangle Intersection\")";
     "A5" a5_vertices "rays at vertices":
-        "closed sphere; rays from the centre and from around it to vertices, closest and any hit (pbrt, Triangle.Watertight). Embree computes edge functions in f32 and may lose the vertex itself: 3 % is a picture's set of measure zero";
+        "closed sphere; rays from the centre and from around it to vertices, closest and any hit (pbrt, \
+         Triangle.Watertight). Embree computes edge functions in f32 and may lose the vertex itself: 3 % is a \
+         picture's set of measure zero";
     "A6" a6_bumpy_mesh "closed mesh with bumps":
-        "16 x 16 sphere mesh with radii of 1 to 6, random rays from near the centre, closest and any hit (pbrt, Triangle.Watertight)";
+        "16 x 16 sphere mesh with radii of 1 to 6, random rays from near the centre, closest and any hit (pbrt, \
+         Triangle.Watertight)";
     "A7" a7_small_far_triangles "small triangles far away":
-        "tilted plane of 100 x 100 cells of size 1, origins in a cube of half size 1e6, rays at the centroids of triangles, at least 0.1 rad from grazing (Embree, verify SmallTriangleHitTest). A direction in f32 misses the centroid by up to 0.06 / sin: the other accelerators must find the triangle that the rounded ray meets";
+        "tilted plane of 100 x 100 cells of size 1, origins in a cube of half size 1e6, rays at the centroids of \
+         triangles, at least 0.1 rad from grazing (Embree, verify SmallTriangleHitTest). A direction in f32 misses the \
+         centroid by up to 0.06 / sin: the other accelerators must find the triangle that the rounded ray meets";
     "A8" a8_solid_angle "solid angle of a triangle":
-        "triangles with corners within 10 of a point: 65536 points by area, and random directions, against van Oosterom and Strackee's formula (pbrt, Triangle.SolidAngle)";
+        "triangles with corners within 10 of a point: 65536 points by area, and random directions, against van \
+         Oosterom and Strackee's formula (pbrt, Triangle.SolidAngle)";
     "A9" a9_bad_cases "slivers that are wrong in other programs":
-        "a triangle without area (pbrt, Triangle.BadCases) and one that is a line in f32, with a ray along it: no hit, or one with numbers";
+        "a triangle without area (pbrt, Triangle.BadCases) and one that is a line in f32, with a ray along it: no hit, \
+         or one with numbers";
     "A10" a10_both_sides "both sides of a triangle":
-        "rays at a triangle from both sides, in the world and in a mirrored instance: all hit, the normal distinguishes the sides (Embree, verify BackfaceCullingTest)";
+        "rays at a triangle from both sides, in the world and in a mirrored instance: all hit, the normal \
+         distinguishes the sides (Embree, verify BackfaceCullingTest)";
     "A11" a11_axes "rays along axes":
-        "inside of a cube, in the planes of faces' diagonals and next to faces, with zeros and negative zeros in the direction, closest and any hit";
+        "inside of a cube, in the planes of faces' diagonals and next to faces, with zeros and negative zeros in the \
+         direction, closest and any hit";
 }
 
 /// Where Embree's own watertightness test stands: coordinates are quantised to 1/64 there.
@@ -302,7 +315,10 @@ fn a7_small_far_triangles(effort: Effort) -> Outcome {
         // Corners less the origin have one unit of roundoff, the edge functions made of them up to seven more.
         .at_most("embree: distance of the ray from the triangle found, units of roundoff of the origin", off, 8.0)
         .record("embree: fraction with another triangle than aimed at", other as f64 / f64::from(rays))
-        .short("Embree forms edge functions in f32 from corners less the origin, which are 0.03 units off at 1e6; the catalogue requires 99.998 % right, which f32 rays cannot name")
+        .short(
+            "Embree forms edge functions in f32 from corners less the origin, which are 0.03 units off at 1e6; the \
+             catalogue requires 99.998 % right, which f32 rays cannot name",
+        )
 }
 
 /// The solid angle of a triangle seen from the origin (van Oosterom and Strackee, "The Solid Angle of a Plane

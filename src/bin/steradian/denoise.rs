@@ -77,8 +77,8 @@ pub fn run(arguments: &DenoiseArgs, mut uses: FileUses) -> Result<()> {
         }
         let input = task.input.display();
         if shares_samples(&task.input) {
-            let message = "its pixels share samples, and a denoiser takes such noise for texture: render with --denoise, or with \
-                           \"samples\": \"importance\" in film.filter";
+            let message = "its pixels share samples, and a denoiser takes such noise for texture: render with \
+                           --denoise, or with \"samples\": \"importance\" in film.filter";
             log::message(Level::Warning, &format!("{input}: {message}"));
         }
         warnings(&report).iter().for_each(|warning| log::message(Level::Warning, &format!("{input}: {warning}")));

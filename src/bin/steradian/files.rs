@@ -62,7 +62,7 @@ impl<'a> NamedFiles<'a> {
                 self.written.extend(arguments.also.iter().map(|path| (path.clone(), "--png")));
             }
             Command::CheckExr(arguments) => {
-                self.read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check")))
+                self.read.extend(arguments.files.iter().map(|path| (path.as_path(), "a file to check")));
             }
             Command::Compare(arguments) => {
                 self.read

@@ -155,7 +155,8 @@ fn report_panics() {
         let place = panic.location().map(ToString::to_string).unwrap_or_default();
         let version = env!("CARGO_PKG_VERSION");
         let text = format!(
-            "internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the scene)"
+            "internal error in steradian {version} at {place}: {message} (this is a bug; please report it with the \
+             scene)"
         );
         log::message(Level::Error, &text);
         std::process::exit(i32::from(INTERNAL));

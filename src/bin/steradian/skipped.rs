@@ -46,7 +46,8 @@ impl Skipped {
             let numbers = FrameList::new(frames.clone()).map_or(String::new(), |list| list.ranges('x'));
             let what = differences.join(", ");
             session.reporter.warn(&format!(
-                "{noun} {numbers}: skipped, but rendered with other settings than the rest {verb}: {what} (--overwrite renders such frames again)"
+                "{noun} {numbers}: skipped, but rendered with other settings than the rest {verb}: {what} (--overwrite \
+                 renders such frames again)"
             ));
         }
         if !self.unknown.is_empty() && !self.changed.is_empty() {

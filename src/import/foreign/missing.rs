@@ -102,10 +102,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.json");
         std::fs::write(folder.path().join("here.ply"), "ply").unwrap();
-        let scene = r#"{ "camera": {}, "textures": { "t": { "type": "image", "file": "no.png" }, "u": { "type": "checker" } },
-            "shapes": [{ "type": "mesh", "file": "no.ply" }, { "type": "mesh", "file": "here.ply" }, { "type": "sphere" }],
+        let scene = r#"{ "camera": {}, "textures": { "t": { "type": "image", "file": "no.png" },
+            "u": { "type": "checker" } },
+            "shapes": [{ "type": "mesh", "file": "no.ply" }, { "type": "mesh", "file": "here.ply" },
+            { "type": "sphere" }],
             "objects": { "o": { "shapes": [{ "type": "mesh", "file": "no.obj" }] } }, "instances": [{ "object": "o" }],
-            "lights": [{ "type": "environment", "file": "no.exr" }, { "type": "environment", "radiance": [1, 1, 1] }] }"#;
+            "lights": [{ "type": "environment", "file": "no.exr" },
+            { "type": "environment", "radiance": [1, 1, 1] }] }"#;
         std::fs::write(&path, scene).unwrap();
         let mut imported = read_scene(&path, &ImportOptions::default()).unwrap();
         assert_eq!(imported.leave_out_missing(&path), 4);

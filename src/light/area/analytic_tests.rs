@@ -151,7 +151,7 @@ fn emitters_sampled_together_have_the_bits_of_those_sampled_alone() {
         }
         let mut found = vec![None; BATCH];
         queue.sample(&context, &LightQueries { count: BATCH, points: &points, u: &numbers }, |lane, sample| {
-            found[lane] = Some(*sample)
+            found[lane] = Some(*sample);
         });
         for ((i, p, u), found) in vertices.iter().zip(&found) {
             let alone = lights[*i].sample(&geometry, &[], *p, *u);

@@ -30,8 +30,8 @@ impl Default for Patience {
 const LINGER: Duration = Duration::from_secs(1);
 
 /// What the page may do: show what is in it, and send requests to its own server.
-const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src data:; \
-                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; \
+                      img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// Why a request is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,7 +129,8 @@ impl Connection {
         let allow = if refusal == HttpError::Method { "Allow: GET\r\n" } else { "" };
         let (status, length) = (refusal.status(), refusal.status().len());
         let head = format!(
-            "HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
+            "HTTP/1.1 {status}\r\n{allow}Content-Type: text/plain\r\nContent-Length: {length}\r\nConnection: close\r\n\
+             \r\n"
         );
         self.stream.write_all(format!("{head}{status}").as_bytes())?;
         // A connection closed before all of the request is read would take the response with it.
@@ -146,7 +147,8 @@ impl Connection {
     pub fn start(&mut self, status: &str, kind: &str, length: u64) -> io::Result<()> {
         let head = format!(
             "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nCache-Control: no-store\r\n\
-             Content-Security-Policy: {POLICY}\r\nCross-Origin-Resource-Policy: same-origin\r\nX-Content-Type-Options: nosniff\r\n\
+             Content-Security-Policy: {POLICY}\r\nCross-Origin-Resource-Policy: same-origin\r\n\
+             X-Content-Type-Options: nosniff\r\n\
              Referrer-Policy: no-referrer\r\n\r\n"
         );
         // The picture is held until then: who takes it byte by byte must not keep it for ever.

@@ -66,7 +66,8 @@ pub fn find_output_fault(output: &OutputDesc) -> Option<OutputFault> {
     {
         let (compression, layer) = (compression_name(compression), layer_name(*layer));
         let message = format!(
-            "the compression {compression} would spoil the layer {layer}, which holds data; the profile multipart gives data a part of its own"
+            "the compression {compression} would spoil the layer {layer}, which holds data; the profile multipart \
+             gives data a part of its own"
         );
         return fault("compression", message);
     }

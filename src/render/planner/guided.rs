@@ -77,7 +77,8 @@ impl GuidedPlanner {
         if let Some(guide) = &self.guide {
             let (leaves, nodes) = (guide.leaves(), guide.directional_nodes());
             tracing::debug!(
-                "guided: iteration of {samples} samples, {gain:.2} times as good as the first; {leaves} leaves, {nodes} nodes"
+                "guided: iteration of {samples} samples, {gain:.2} times as good as the first; {leaves} leaves, \
+                 {nodes} nodes"
             );
         }
         let is_worth_it = MIN_GAINS.iter().all(|&(least, min_gain)| samples < least || gain >= min_gain);

@@ -96,7 +96,7 @@ impl RenderState {
         match &mut self.planner {
             Planner::Adaptive(planner) => return planner.start(&self.film, progress),
             Planner::Guided(planner) => {
-                planner.guide.iter_mut().for_each(|guide| guide.set_bounds(session.accel.bounds()))
+                planner.guide.iter_mut().for_each(|guide| guide.set_bounds(session.accel.bounds()));
             }
             Planner::Uniform => {}
         }

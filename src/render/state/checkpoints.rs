@@ -66,7 +66,7 @@ impl Checkpoints {
             Ok(()) if self.failed => progress.warn(&format!("{} could be written again", self.file.path().display())),
             Ok(()) => tracing::info!("{}: written in {:.3} s", self.file.path().display(), self.cost.as_secs_f64()),
             Err(error) if !self.failed => {
-                progress.warn(&format!("{error}; the render goes on without a checkpoint of its present state"))
+                progress.warn(&format!("{error}; the render goes on without a checkpoint of its present state"));
             }
             Err(_) => {}
         }

@@ -227,7 +227,7 @@ pub(in crate::render) fn put(found: &mut BTreeMap<String, String>, name: &str, v
             values.iter().for_each(|(key, value)| put(found, &format!("{name}{dot}{key}"), value));
         }
         Value::Array(values) => {
-            drop(found.insert(name.to_owned(), values.iter().map(text).collect::<Vec<_>>().join(",")))
+            drop(found.insert(name.to_owned(), values.iter().map(text).collect::<Vec<_>>().join(",")));
         }
         value => drop(found.insert(name.to_owned(), text(value))),
     }

@@ -206,7 +206,8 @@ fn fits(reader: &Reader, requested: &Header) -> Result<()> {
 pub fn check_kept(settings: &Settings, shard: Shard) -> Result<()> {
     if shard != Shard::WHOLE && settings.is_guided() {
         return Err(Error::Usage(
-            "--shard: not with guiding, for paths learn from nearly all samples before, which each part would render; give --guiding off"
+            "--shard: not with guiding, for paths learn from nearly all samples before, which each part would render; \
+             give --guiding off"
                 .into(),
         ));
     }

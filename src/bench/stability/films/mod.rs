@@ -23,20 +23,25 @@ use crate::render::Overrides;
 
 checks! {
     "M1" m1_integrals "integrals of filters":
-        "ten filters against closed forms by 256 x 256 midpoints; nothing outside of the radius (pbrt-v4, filters_test)";
+        "ten filters against closed forms by 256 x 256 midpoints; nothing outside of the radius (pbrt-v4, \
+         filters_test)";
     "M2" m2_sampled_filters "samples follow their filter":
-        "mass of each half pixel against the filter's integral, negative lobes included, and χ² tests in 16 x 16 cells: what splatting onto 5 x 5 pixels \
-         tests where a sample touches one pixel (Mitsuba, test_imageblock)";
+        "mass of each half pixel against the filter's integral, negative lobes included, and χ² tests in 16 x 16 \
+         cells: what splatting onto 5 x 5 pixels tests where a sample touches one pixel (Mitsuba, test_imageblock)";
     "M3" m3_constants "a constant stays constant":
-        "radiance 1 with every filter, tiles of 1, 7 and 64 pixels, crops, one to five samples; and rendered pictures of a white sky";
+        "radiance 1 with every filter, tiles of 1, 7 and 64 pixels, crops, one to five samples; and rendered pictures \
+         of a white sky";
     "M4" m4_same_bytes "the same bytes for any number of threads and order of tiles":
-        "a scene with lens, glass and gold by 1, 2, 3 and 8 threads; tiles filled forward, backward and shuffled; the bytes of PNG files";
+        "a scene with lens, glass and gold by 1, 2, 3 and 8 threads; tiles filled forward, backward and shuffled; the \
+         bytes of PNG files";
     "M5" m5_no_clamping "rare bright samples keep their share":
-        "one sample in a million of radiance a million; Pareto samples of exponent 1.8; lights over a thousandth of each pixel";
+        "one sample in a million of radiance a million; Pareto samples of exponent 1.8; lights over a thousandth of \
+         each pixel";
     "M6" m6_spoilt_samples "samples that are no numbers":
         "NaN and infinities in radiance, alpha, weight and depth, between good samples; negative radiance";
     "M7" m7_files "files come back":
-        "EXR of every layer with each compression, floats and halves; all codes of a PNG; sums of a million samples (pbrt-v4, image_test)";
+        "EXR of every layer with each compression, floats and halves; all codes of a PNG; sums of a million samples \
+         (pbrt-v4, image_test)";
 }
 
 fn gray(v: f32) -> PixelSample {
@@ -140,13 +145,18 @@ fn lively_scene() -> Value {
         "film": { "width": 75, "height": 50 },
         "camera": { "position": [0, 1.2, 4], "look_at": [0, 0.5, 0], "lens": { "radius": 0.05, "focus_distance": 4 } },
         "sampler": { "spp": 7 },
-        "materials": { "glass": { "type": "dielectric" }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 } },
+        "materials": {
+            "glass": { "type": "dielectric" }, "gold": { "type": "conductor", "metal": "gold", "roughness": 0.4 }
+        },
         "shapes": [
             { "type": "quad", "origin": [-4, 0, 4], "edge_u": [8, 0, 0], "edge_v": [0, 0, -8] },
             { "type": "sphere", "material": "glass", "radius": 0.5, "transform": [{ "translate": [-0.6, 0.5, 0] }] },
             { "type": "cube", "material": "gold", "transform": [{ "scale": 0.4 }, { "translate": [0.7, 0.4, -0.3] }] }
         ],
-        "lights": [{ "type": "environment", "radiance": [0.2, 0.3, 0.4] }, { "type": "point", "position": [1, 3, 1], "intensity": [5, 5, 5] }]
+        "lights": [
+            { "type": "environment", "radiance": [0.2, 0.3, 0.4] },
+            { "type": "point", "position": [1, 3, 1], "intensity": [5, 5, 5] }
+        ]
     })
 }
 
@@ -287,6 +297,8 @@ fn m6_spoilt_samples(effort: Effort) -> Outcome {
         .none("pixels that are not the mean of their good samples", wrong)
         .none("first dropped samples without a place to replay", usize::from(!replayable))
         .record("mean of samples -1 and 3, kept as they are", mean_by_film([-1.0, 3.0].into_iter()))
-        .short("negative samples are kept, where the catalogue requires them to be dropped: images of an environment may hold negative numbers, as those \
-                from wide gamuts do, and a mean without them would be biased")
+        .short(
+            "negative samples are kept, where the catalogue requires them to be dropped: images of an environment may \
+             hold negative numbers, as those from wide gamuts do, and a mean without them would be biased",
+        )
 }

@@ -7,7 +7,9 @@ use crate::render::Overrides;
 
 /// A triangle, at rest and without holes, in the world and in an instance.
 fn plain() -> Value {
-    let triangle = json!({ "type": "mesh", "material": "grey", "positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]] });
+    let triangle = json!({
+        "type": "mesh", "material": "grey", "positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]
+    });
     scene(json!({
         "sampler": { "spp": 1 },
         "integrator": { "type": "normal" },

@@ -381,24 +381,34 @@ pub(super) fn c9_both_queries_agree(effort: Effort) -> Outcome {
         .record("rays", f64::from(rays))
 }
 
+/// Points with whole coordinates on the circle of radius 65: a ray goes through such a rim itself.
+const ON_CIRCLE: [[f64; 2]; 8] =
+    [[65.0, 0.0], [0.0, 65.0], [16.0, 63.0], [63.0, -16.0], [-33.0, 56.0], [-25.0, -60.0], [39.0, 52.0], [-52.0, 39.0]];
+
+/// A frustum and a disk at each end that has a radius; `at` places what is mapped and moved up by a height.
+fn capped_frustum([bottom, top]: [f64; 2], height: f64, at: impl Fn(DMat3, f64) -> Transform) -> Vec<Shape> {
+    let flip = DMat3::from_cols(DVec3::X, -DVec3::Y, -DVec3::Z);
+    let side = Analytic::Frustum(Frustum::new(bottom, top, height, TAU).expect(VALID));
+    let mut shapes = vec![Shape::Analytic(TransformedShape::new(side, at(DMat3::IDENTITY, 0.0)))];
+    for (radius, linear, z) in [(bottom, flip, 0.0), (top, DMat3::IDENTITY, height)] {
+        if radius > 0.0 {
+            let cap = Analytic::Disk(Disk::new(radius, 0.0, TAU).expect(VALID));
+            shapes.push(Shape::Analytic(TransformedShape::new(cap, at(linear, z))));
+        }
+    }
+    shapes
+}
+
 pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
     let mut rng = Rng::new(47);
     let (mut leaks, mut at_rims, mut exact) = (0, 0, 0);
-    let flip = DMat3::from_cols(DVec3::X, -DVec3::Y, -DVec3::Z);
     for (bottom, top, height) in [(65.0, 65.0, 64.0), (65.0, 0.0, 128.0), (16.25, 65.0, 32.0)] {
         for turned in [false, true] {
             let (turn, offset) =
                 if turned { (rng.rotation(), 100.0 * rng.cube()) } else { (DMat3::IDENTITY, DVec3::ZERO) };
-            let at = |linear: DMat3, z: f64| transform(turn * linear, offset + turn * (z * DVec3::Z));
-            let side = Analytic::Frustum(Frustum::new(bottom, top, height, TAU).expect(VALID));
-            let mut shapes = vec![Shape::Analytic(TransformedShape::new(side, at(DMat3::IDENTITY, 0.0)))];
-            for (radius, linear, z) in [(bottom, flip, 0.0), (top, DMat3::IDENTITY, height)] {
-                if radius > 0.0 {
-                    let cap = Analytic::Disk(Disk::new(radius, 0.0, TAU).expect(VALID));
-                    shapes.push(Shape::Analytic(TransformedShape::new(cap, at(linear, z))));
-                }
-            }
-            let geometry = world(shapes);
+            let geometry = world(capped_frustum([bottom, top], height, |linear, z| {
+                transform(turn * linear, offset + turn * (z * DVec3::Z))
+            }));
             let embree = accel::build(AccelKind::EMBREE, &geometry, 1).expect("Embree builds");
             let linear = LinearAccel::new(&geometry);
             let leaks_in = |ray: &Ray| {
@@ -418,17 +428,7 @@ pub(super) fn c11_capped_solids(effort: Effort) -> Outcome {
                 let (r, z) = if i % 20 == 0 { (bottom, 0.0) } else { (top, height) };
                 at_rims += usize::from(leaks_in(&ray_through(from, place(dvec3(r * cos, r * sin, z)))));
             }
-            // Points of the rim with whole coordinates: the ray goes through the rim itself.
-            for [x, y] in [
-                [65.0, 0.0],
-                [0.0, 65.0],
-                [16.0, 63.0],
-                [63.0, -16.0],
-                [-33.0, 56.0],
-                [-25.0, -60.0],
-                [39.0, 52.0],
-                [-52.0, 39.0],
-            ] {
+            for [x, y] in ON_CIRCLE {
                 for k in 1..effort.pick(20, 500) {
                     let from =
                         dvec3(0.25 * f64::from(k % 7), 0.125 * f64::from(k % 5), height * f64::from(k % 15 + 1) / 32.0);

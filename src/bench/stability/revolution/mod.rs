@@ -14,23 +14,31 @@ use crate::math::{DVec3, RayF64, dvec3};
 
 checks! {
     "D1" d1_all_roots_are_found "completeness of roots":
-        "vase, looping profile, ball and a tall curl; rays through points of the surface: general, within 1e-1 to 1e-7 of tangent, tilted by 1e-9 to 1e-2 and by 0, nearly and exactly along the axis, through the axis, on the axis; against all roots of the same polynomial in 106 bits";
+        "vase, looping profile, ball and a tall curl; rays through points of the surface: general, within 1e-1 to 1e-7 \
+         of tangent, tilted by 1e-9 to 1e-2 and by 0, nearly and exactly along the axis, through the axis, on the \
+         axis; against all roots of the same polynomial in 106 bits";
     "D2" d2_roots_are_accurate "accuracy of roots":
         "rays of D1 with as many hits as the reference";
     "D3" d3_equals_quadrics "straight profiles are quadrics":
-        "cylinder, cone and frustum as turned lines, through f32 rays as in C1, against 106 bits; against the frustum's own routine in parts of a turn; two cubics against the sphere they nearly are (error of the cubic: 2.73e-4)";
+        "cylinder, cone and frustum as turned lines, through f32 rays as in C1, against 106 bits; against the \
+         frustum's own routine in parts of a turn; two cubics against the sphere they nearly are (error of the cubic: \
+         2.73e-4)";
     "D4" d4_joints_and_poles "joints and poles are closed":
-        "rays from inside to the joint of a ball of two cubics, also level and within 1e-12 to 1e-16 of it, and through its poles, also within 1e-6 to 1e-16; each must be hit once";
+        "rays from inside to the joint of a ball of two cubics, also level and within 1e-12 to 1e-16 of it, and \
+         through its poles, also within 1e-6 to 1e-16; each must be hit once";
     "D5" d5_spheroids_are_not_hit_again "rays that leave a convex surface":
-        "spheroids of radius 1e-6, 1 and 1e6, centres at 0 to 1e6 radii, directions of every angle with the normal, half of them grazing by 1e-5 to 1e-1";
+        "spheroids of radius 1e-6, 1 and 1e6, centres at 0 to 1e6 radii, directions of every angle with the normal, \
+         half of them grazing by 1e-5 to 1e-1";
     "D6" d6_areas "areas by Pappus":
         "cylinder, cone and ring as lines, a torus as four cubics, a ball as two (within 3e-4 of the sphere)";
     "D7" d7_b_splines "B-splines are Bezier curves":
         "control points at random; points by the basis functions, hits by the converted control points";
     "D8" d8_stored_vectors "stored rays with exact hits":
-        "300 f32 rays at vase, looping profile and ball: general, near tangent, nearly level, level, nearly along the axis; hits of 256 bits in the sources; both for the program and for the reference of D1";
+        "300 f32 rays at vase, looping profile and ball: general, near tangent, nearly level, level, nearly along the \
+         axis; hits of 256 bits in the sources; both for the program and for the reference of D1";
     "D9" d9_nearest_first "hits in order":
-        "rays of D1 on the looping profile: ascending, on the surface, none behind the origin, and found again from their own distance";
+        "rays of D1 on the looping profile: ascending, on the surface, none behind the origin, and found again from \
+         their own distance";
 }
 
 const VALID: &str = "the checks' profiles are valid";
@@ -166,8 +174,10 @@ fn d2_roots_are_accurate(effort: Effort) -> Outcome {
         implied,
     );
     if worst > 1e-11 {
-        outcome = outcome
-            .short("a distance near a tangent is known as well as the residual over the slope; the catalogue requires 1e-11 of fewer rays");
+        outcome = outcome.short(
+            "a distance near a tangent is known as well as the residual over the slope; the catalogue requires 1e-11 \
+             of fewer rays",
+        );
     }
     KINDS.iter().zip(distance).fold(outcome, |outcome, (kind, error)| outcome.record(format!("error, {kind}"), error))
 }

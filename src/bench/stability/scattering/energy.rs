@@ -206,8 +206,9 @@ fn coated() -> [Vec<White>; 2] {
     [round, turned].map(|list| list.into_iter().map(White::plain).collect())
 }
 
-const METAL: &str = "anisotropic metal may lose 0.02 in place of 0.01: what it scatters at once is read between the tables' two axes and eleven aspects, \
-     and what is added for several reflections is made a hundredth too dark on purpose, so that nothing shines";
+const METAL: &str = "anisotropic metal may lose 0.02 in place of 0.01: what it scatters at once is read between the \
+                     tables' two axes and eleven aspects, and what is added for several reflections is made a \
+                     hundredth too dark on purpose, so that nothing shines";
 
 fn families() -> Vec<Family> {
     let mut metals: Vec<_> = [1e-3, 0.01, 0.05, 0.1, 0.3, 0.6, 1.0].map(|alpha| White::metal([alpha; 2])).into();

@@ -93,7 +93,9 @@ pub(super) fn i11_seen_directly(_: Effort) -> Outcome {
     let shapes = [
         (
             "quad",
-            json!({ "shapes": [{ "type": "quad", "material": "black", "emission": emission, "transform": [{ "scale": 3 }] }] }),
+            json!({
+                "shapes": [{ "type": "quad", "material": "black", "emission": emission, "transform": [{ "scale": 3 }] }]
+            }),
         ),
         ("sphere", json!({ "shapes": [{ "type": "sphere", "material": "black", "radius": 2, "emission": emission }] })),
         ("disk", json!({ "shapes": [{ "type": "disk", "material": "black", "radius": 3, "emission": emission }] })),

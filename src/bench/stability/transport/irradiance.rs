@@ -39,7 +39,8 @@ fn lamp(mut shape: Value) -> Value {
 
 pub(super) fn i4_disk(effort: Effort) -> Outcome {
     let disk = lamp(json!({
-        "type": "disk", "radius": 0.5, "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 1, 0] }]
+        "type": "disk", "radius": 0.5,
+        "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } }, { "translate": [0, 1, 0] }]
     }));
     // F = (1 - (x² + h² - R²) / sqrt((x² + h² + R²)² - 4 R² x²)) / 2; 0.1107935 for x = 0.7.
     let share = |x: f64| {
@@ -61,14 +62,15 @@ pub(super) fn i4_disk(effort: Effort) -> Outcome {
 pub(super) fn i5_quad(effort: Effort) -> Outcome {
     let quad = lamp(json!({ "type": "quad", "origin": [-0.3, 1, -0.5], "edge_u": [1, 0, 0], "edge_v": [0, 0, 1] }));
     let mesh = lamp(json!({
-        "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, -0.5], [0.7, 1, 0.5], [-0.3, 1, 0.5]], "triangles": [[0, 1, 2], [0, 2, 3]]
+        "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, -0.5], [0.7, 1, 0.5], [-0.3, 1, 0.5]],
+        "triangles": [[0, 1, 2], [0, 2, 3]]
     }));
-    let one = lamp(
-        json!({ "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, -0.5], [0.7, 1, 0.5]], "triangles": [[0, 1, 2]] }),
-    );
-    let other = lamp(
-        json!({ "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, 0.5], [-0.3, 1, 0.5]], "triangles": [[0, 1, 2]] }),
-    );
+    let one = lamp(json!({
+        "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, -0.5], [0.7, 1, 0.5]], "triangles": [[0, 1, 2]]
+    }));
+    let other = lamp(json!({
+        "type": "mesh", "positions": [[-0.3, 1, -0.5], [0.7, 1, 0.5], [-0.3, 1, 0.5]], "triangles": [[0, 1, 2]]
+    }));
     let sheared = lamp(
         json!({ "type": "quad", "origin": [-0.6, 0.8, -0.4], "edge_u": [0.9, 0.3, 0.2], "edge_v": [0.3, 0, 0.8] }),
     );
@@ -96,13 +98,14 @@ pub(super) fn i6_sphere(effort: Effort) -> Outcome {
         lamp(json!({ "type": "sphere", "radius": radius, "transform": [{ "translate": center }] }))
     };
     // Half the size, doubled and mirrored; and cut in two, which is sampled by area.
-    let placed = lamp(
-        json!({ "type": "sphere", "radius": 0.25, "transform": [{ "scale": [2, -2, 2] }, { "translate": [1.2, 1.6, 0] }] }),
-    );
+    let placed = lamp(json!({
+        "type": "sphere", "radius": 0.25, "transform": [{ "scale": [2, -2, 2] }, { "translate": [1.2, 1.6, 0] }]
+    }));
     let half = |from: f64, to: f64| {
-        lamp(
-            json!({ "type": "sphere", "radius": 0.5, "z_min": from, "z_max": to, "transform": [{ "translate": [1.2, 1.6, 0] }] }),
-        )
+        lamp(json!({
+            "type": "sphere", "radius": 0.5, "z_min": from, "z_max": to,
+            "transform": [{ "translate": [1.2, 1.6, 0] }]
+        }))
     };
     // pi (R / d)² cos: 0.1570796 for R = 0.5, d = 2, cos = 0.8.
     let expected = PI * 0.0625 * 0.8;
@@ -139,13 +142,18 @@ fn slab(spp: u32, back: f64, front: f64) -> Value {
             "materials": { "glass": { "type": "dielectric", "ior": 1.5 }, "black": { "type": "diffuse", "albedo": 0 } },
             "shapes": [
                 { "type": "quad", "material": "glass", "transform": [{ "translate": [0, 0, 0.25] }] },
-                { "type": "quad", "material": "glass", "reverse_normal": true, "transform": [{ "translate": [0, 0, -0.25] }] },
+                {
+                    "type": "quad", "material": "glass", "reverse_normal": true,
+                    "transform": [{ "translate": [0, 0, -0.25] }]
+                },
             ]
         }),
     );
     for (z, radiance, turned) in [(-1.0, back, false), (4.0, front, true)] {
-        let lamp = json!({ "type": "quad", "material": "black", "emission": { "radiance": [radiance, radiance, radiance] }, "reverse_normal": turned,
-            "transform": [{ "translate": [0, 0, z] }] });
+        let lamp = json!({
+            "type": "quad", "material": "black", "emission": { "radiance": [radiance, radiance, radiance] },
+            "reverse_normal": turned, "transform": [{ "translate": [0, 0, z] }]
+        });
         if let Some(shapes) = scene["shapes"].as_array_mut() {
             shapes.push(lamp);
         }

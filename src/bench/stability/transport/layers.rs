@@ -62,7 +62,10 @@ fn before_a_sky(spp: u32, rest: Value) -> Value {
     let mut scene = scene(
         spp,
         json!({
-            "camera": { "type": "orthographic", "view_height": 3, "vertical_fov_degrees": null, "position": [1, 0, 6], "look_at": [1, 0, 0] },
+            "camera": {
+                "type": "orthographic", "view_height": 3, "vertical_fov_degrees": null, "position": [1, 0, 6],
+                "look_at": [1, 0, 0]
+            },
             "integrator": { "type": "path", "max_depth": 2 },
             "materials": { "black": { "type": "diffuse", "albedo": 0 } },
             "lights": [{ "type": "environment", "radiance": [1, 1, 1] }]

@@ -44,7 +44,8 @@ mod tests {
     #[test]
     fn keys_are_options_and_values_what_they_take() {
         let found = parsed(
-            "# project\nspp = 64\ntarget_error = 1e-3\nsize = \"64x32\"\ncrop = [1, 2, 3, 4]\noutput = [\"a.exr\", \"b.png\"]\nguiding = true\nfloat = true\n",
+            "# project\nspp = 64\ntarget_error = 1e-3\nsize = \"64x32\"\ncrop = [1, 2, 3, 4]\n\
+             output = [\"a.exr\", \"b.png\"]\nguiding = true\nfloat = true\n",
         );
         let found: Vec<_> =
             found.unwrap().into_iter().map(|s| format!("{}={} {}", s.key, s.values.join(";"), s.origin)).collect();
@@ -123,7 +124,8 @@ mod tests {
     /// found.
     #[test]
     fn damaged_files_are_read_or_refused() {
-        const TEXT: &str = "# a\nspp = 64\nlayers = [\"Z\", \"N\"]\nsize = \"8x8\"\nexposure = -1.5e1\nfloat = true\nseed = 0x10\ncomments = 1979-05-27\n";
+        const TEXT: &str = "# a\nspp = 64\nlayers = [\"Z\", \"N\"]\nsize = \"8x8\"\nexposure = -1.5e1\nfloat = true\n\
+                            seed = 0x10\ncomments = 1979-05-27\n";
         let options = Options::new(&Cli::command());
         let check = |text: &str| {
             if let Err(error) = parse(&options, Trust::Project, text) {

@@ -208,7 +208,7 @@ impl<'a> Element<'a> {
                 Some((outcome, note)) => draft.note(&place, &title, &name, outcome, note),
                 None if is_ignored => draft.ignored(&place, &title, &name, PART_OF_IGNORED),
                 None => {
-                    draft.ignored(&place, &title, &name, format!("unsupported parameter of a {}", self.plugin.kind))
+                    draft.ignored(&place, &title, &name, format!("unsupported parameter of a {}", self.plugin.kind));
                 }
             }
         }

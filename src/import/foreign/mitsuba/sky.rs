@@ -41,7 +41,8 @@ impl<'a> Reader<'a> {
         element.boolean("complex_sun", false)?;
         element.approximated(
             "",
-            "Preetham's sky, 0.6 times as bright, in place of Hosek and Wilkie's, as an image; the sun as a directional light",
+            "Preetham's sky, 0.6 times as bright, in place of Hosek and Wilkie's, as an image; the sun as a \
+             directional light",
         );
         let mut lights = Vec::new();
         if sky_scale > 0.0 {

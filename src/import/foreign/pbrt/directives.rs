@@ -205,7 +205,7 @@ impl Reader {
                 self.draft.ignored(&params.place, "Option", "", "options are those of the command line");
             }
             "Film" | "PixelFilter" | "Sampler" | "Integrator" | "Accelerator" | "Camera" => {
-                self.option(lexer, at, directive)?
+                self.option(lexer, at, directive)?;
             }
             "ObjectBegin" | "ObjectEnd" | "ObjectInstance" => self.object(lexer, at, directive)?,
             "MediumInterface" => {

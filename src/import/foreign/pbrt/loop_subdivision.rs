@@ -51,7 +51,8 @@ impl Surface {
                 let followers = next.get_mut(v as usize).ok_or("an index is not that of a vertex")?;
                 if v == from || v == to || from == to || followers.insert(from, to).is_some() {
                     return Err(format!(
-                        "the mesh is no surface at vertex {v}: an edge has more than two triangles, or they are wound differently"
+                        "the mesh is no surface at vertex {v}: an edge has more than two triangles, or they are wound \
+                         differently"
                     ));
                 }
             }

@@ -56,21 +56,7 @@ impl Materials<'_> {
             }
             "conductor" => self.conductor(params, "", 0.0, 1.0)?,
             "coatedconductor" => self.coated_conductor(name, params)?,
-            "dielectric" => {
-                let (ior, abbe) = self.colors.index(params, "eta", 1.5)?;
-                MaterialDesc::Dielectric(Box::new(DielectricDesc {
-                    ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)),
-                    roughness: None,
-                    alpha: self.alpha(params, "", 0.0)?,
-                    distribution: DistributionDesc::default(),
-                    multiscatter: false,
-                    reflection_tint: ColorDesc::Grey(1.0),
-                    transmission_tint: ColorDesc::Grey(1.0),
-                    priority: None,
-                    absorption: None,
-                    abbe,
-                }))
-            }
+            "dielectric" => self.dielectric(params)?,
             "thindielectric" => {
                 let (ior, _) = self.colors.index(params, "eta", 1.5)?;
                 MaterialDesc::ThinDielectric {
@@ -81,27 +67,8 @@ impl Materials<'_> {
             }
             "diffusetransmission" => self.diffuse_transmission(params)?,
             "mix" => self.mix(params, find)?,
-            "subsurface" => {
-                self.draft.approximated(
-                    &params.place,
-                    &params.element,
-                    "",
-                    "plastic, for light does not travel below surfaces",
-                );
-                for parameter in ["mfp", "mfreepath", "sigma_a", "sigma_s", "g", "scale", "name"] {
-                    params.ignore(parameter, "light does not travel below surfaces");
-                }
-                self.plastic(params, 1.33)?
-            }
-            "hair" => {
-                self.draft.approximated(&params.place, &params.element, "", "diffuse");
-                let brown = Texture::Constant([0.2, 0.1, 0.05]);
-                let color = self
-                    .textures
-                    .get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?
-                    .unwrap_or(brown);
-                MaterialDesc::Diffuse { albedo: color.color(self.draft, &params.place), roughness: zero() }
-            }
+            "subsurface" => self.subsurface(params)?,
+            "hair" => self.hair(params)?,
             "measured" => {
                 params.ignore("filename", "measured materials are not known");
                 self.draft.approximated(&params.place, &params.element, "", "diffuse of 0.5");
@@ -109,6 +76,43 @@ impl Materials<'_> {
             }
             other => return Err(params.error(format!("there is no material \"{other}\""))),
         })
+    }
+
+    fn dielectric(&mut self, params: &Params) -> Result<MaterialDesc> {
+        let (ior, abbe) = self.colors.index(params, "eta", 1.5)?;
+        Ok(MaterialDesc::Dielectric(Box::new(DielectricDesc {
+            ior: RangedDesc::Constant(ior.clamp(0.1, 10.0)),
+            roughness: None,
+            alpha: self.alpha(params, "", 0.0)?,
+            distribution: DistributionDesc::default(),
+            multiscatter: false,
+            reflection_tint: ColorDesc::Grey(1.0),
+            transmission_tint: ColorDesc::Grey(1.0),
+            priority: None,
+            absorption: None,
+            abbe,
+        })))
+    }
+
+    fn subsurface(&mut self, params: &Params) -> Result<MaterialDesc> {
+        self.draft.approximated(
+            &params.place,
+            &params.element,
+            "",
+            "plastic, for light does not travel below surfaces",
+        );
+        for parameter in ["mfp", "mfreepath", "sigma_a", "sigma_s", "g", "scale", "name"] {
+            params.ignore(parameter, "light does not travel below surfaces");
+        }
+        self.plastic(params, 1.33)
+    }
+
+    fn hair(&mut self, params: &Params) -> Result<MaterialDesc> {
+        self.draft.approximated(&params.place, &params.element, "", "diffuse");
+        let brown = Texture::Constant([0.2, 0.1, 0.05]);
+        let color =
+            self.textures.get(params, &self.colors, "reflectance", Meaning::Reflectance, false)?.unwrap_or(brown);
+        Ok(MaterialDesc::Diffuse { albedo: color.color(self.draft, &params.place), roughness: zero() })
     }
 
     fn coated_conductor(&mut self, name: &str, params: &Params) -> Result<MaterialDesc> {

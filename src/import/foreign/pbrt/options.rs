@@ -161,7 +161,7 @@ pub fn set_integrator(draft: &mut Draft, integrator: Option<&Typed>) -> Result<(
         match kind.as_str() {
             "path" => {}
             "volpath" | "simplevolpath" => {
-                draft.approximated(&params.place, &params.element, "", "path tracing without volumes")
+                draft.approximated(&params.place, &params.element, "", "path tracing without volumes");
             }
             "bdpt" | "mlt" | "sppm" | "simplepath" | "lightpath" | "randomwalk" => {
                 draft.approximated(

@@ -47,6 +47,18 @@ enum Form {
     File(String),
 }
 
+/// The name of a shape's material; black for what gives off light at an interface.
+fn material_name(draft: &mut Draft, params: &Params, graphics: &Graphics) -> Option<String> {
+    match graphics.material.as_deref()? {
+        ShapeMaterial::Interface => {
+            let how = "black, for what gives off light is no mere boundary";
+            draft.approximated(&params.place, &params.element, "Material", how);
+            Some(black(draft, &params.place))
+        }
+        ShapeMaterial::Material(material) => Some(material.name.clone()),
+    }
+}
+
 impl Shapes<'_> {
     /// Reads a shape; `None` if nothing of it can be seen.
     pub fn read(
@@ -61,23 +73,11 @@ impl Shapes<'_> {
             draft.ignored(&params.place, &params.element, "AreaLightSource", "instances give off no light, as in pbrt");
             light = None;
         }
-        let material = match graphics.material.as_deref() {
-            Some(ShapeMaterial::Interface) if light.is_none() => {
-                params.report(draft);
-                return Ok(None);
-            }
-            Some(ShapeMaterial::Interface) => {
-                draft.approximated(
-                    &params.place,
-                    &params.element,
-                    "Material",
-                    "black, for what gives off light is no mere boundary",
-                );
-                Some(black(draft, &params.place))
-            }
-            Some(ShapeMaterial::Material(material)) => Some(material.name.clone()),
-            None => None,
-        };
+        if light.is_none() && matches!(graphics.material.as_deref(), Some(ShapeMaterial::Interface)) {
+            params.report(draft);
+            return Ok(None);
+        }
+        let material = material_name(draft, params, graphics);
         let alpha = self.textures.number(params, &self.colors, "alpha", 1.0)?;
         if light.is_some() && params.has("alpha") {
             params.ignore("alpha", "what gives off light has no holes");

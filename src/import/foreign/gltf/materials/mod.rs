@@ -246,7 +246,8 @@ impl<'a> Builder<'a, '_> {
         self.color_texture = TextureRef::of_extension(self.source, &place, ext.diffuse_texture.as_ref())?;
         self.approximated(
             NAME,
-            "a principled material of the diffuse colour, with the mean of the specular factor and without their texture",
+            "a principled material of the diffuse colour, with the mean of the specular factor and without their \
+             texture",
         );
         let specular = ext.specular_factor.iter().map(|s| s.clamp(0.0, 1.0)).sum::<f32>() / 3.0;
         Ok(Some(Glossy { glossiness: ext.glossiness_factor, specular }))

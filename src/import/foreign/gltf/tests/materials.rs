@@ -59,7 +59,8 @@ fn without_a_material_a_surface_is_rough_white_metal() {
 fn roughness_is_green_metal_is_blue_and_colour_is_srgb() {
     let texture = json!({ "index": 0 });
     let imported = look_of(json!({ "pbrMetallicRoughness": {
-        "baseColorTexture": texture, "metallicRoughnessTexture": texture, "roughnessFactor": 0.5, "baseColorFactor": [0.5, 1, 1, 1]
+        "baseColorTexture": texture, "metallicRoughnessTexture": texture, "roughnessFactor": 0.5,
+        "baseColorFactor": [0.5, 1, 1, 1]
     } }));
     let desc = principled(&imported, "m");
     let ColorDesc::Texture { texture: color } = &desc.base_color else { panic!() };
@@ -275,7 +276,8 @@ fn a_clear_coat_is_a_dielectric_layer_of_its_strength() {
 #[test]
 fn anisotropy_keeps_both_widths() {
     let imported = look_of(json!({
-        "pbrMetallicRoughness": { "roughnessFactor": 0.5 }, "extensions": { "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } }
+        "pbrMetallicRoughness": { "roughnessFactor": 0.5 },
+        "extensions": { "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } }
     }));
     let desc = principled(&imported, "m");
     let alpha = constant(&desc.roughness).powi(2);

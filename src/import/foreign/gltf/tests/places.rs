@@ -32,7 +32,8 @@ fn matrices_are_written_column_by_column() {
 #[test]
 fn a_mesh_that_is_seen_twice_is_an_object() {
     let mut asset = Asset::new(json!([
-        { "mesh": 0, "translation": [1, 0, 0], "name": "left" }, { "mesh": 1, "name": "alone" }, { "mesh": 0, "translation": [2, 0, 0] }, { "mesh": 0, "scale": [0, 1, 1] }
+        { "mesh": 0, "translation": [1, 0, 0], "name": "left" }, { "mesh": 1, "name": "alone" },
+        { "mesh": 0, "translation": [2, 0, 0] }, { "mesh": 0, "scale": [0, 1, 1] }
     ]));
     asset.square(json!({ "name": "a" }));
     asset.square(json!({ "name": "b" }));
@@ -136,7 +137,10 @@ fn lights_shine_along_minus_z_by_their_units() {
     let mut asset = Asset::new(json!([
         { "translation": [1, 2, 3], "extensions": { "KHR_lights_punctual": { "light": 0 } } },
         { "rotation": [-half, 0, 0, half], "extensions": { "KHR_lights_punctual": { "light": 1 } } },
-        { "translation": [0, 5, 0], "rotation": [-half, 0, 0, half], "extensions": { "KHR_lights_punctual": { "light": 2 } } }
+        {
+            "translation": [0, 5, 0], "rotation": [-half, 0, 0, half],
+            "extensions": { "KHR_lights_punctual": { "light": 2 } }
+        }
     ]));
     asset.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
     asset.json["extensionsRequired"] = json!(["KHR_lights_punctual"]);

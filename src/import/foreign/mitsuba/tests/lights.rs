@@ -11,18 +11,21 @@ fn light(body: &str) -> LightDesc {
 #[test]
 fn point_spot_and_directional_lights() {
     let LightDesc::Point(point) = light(
-        r#"<emitter type="point"><point name="position" value="1 2 3"/><rgb name="intensity" value="4 5 6"/></emitter>"#,
+        r#"<emitter type="point"><point name="position" value="1 2 3"/><rgb name="intensity" value="4 5 6"/>
+        </emitter>"#,
     ) else {
         panic!()
     };
     assert_eq!((point.position, point.intensity), ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]));
-    let spot = r#"<emitter type="spot"><transform name="to_world"><lookat origin="0,3,0" target="0,0,0" up="0,0,1"/></transform><float name="cutoff_angle" value="30"/></emitter>"#;
+    let spot = r#"<emitter type="spot"><transform name="to_world"><lookat origin="0,3,0" target="0,0,0" up="0,0,1"/>
+        </transform><float name="cutoff_angle" value="30"/></emitter>"#;
     let LightDesc::Spot(spot) = light(spot) else { panic!() };
     assert_point(spot.position, [0.0, 3.0, 0.0]);
     assert_point(spot.look_at, [0.0, 2.0, 0.0]);
     assert_eq!((spot.cutoff_angle_degrees, spot.beam_angle_degrees, spot.intensity), (30.0, Some(22.5), [1.0; 3]));
     let LightDesc::Directional(sun) = light(
-        r#"<emitter type="directional"><vector name="direction" value="0 -1 0"/><float name="irradiance" value="2"/></emitter>"#,
+        r#"<emitter type="directional"><vector name="direction" value="0 -1 0"/><float name="irradiance" value="2"/>
+        </emitter>"#,
     ) else {
         panic!()
     };
@@ -48,7 +51,8 @@ fn environments_begin_behind() {
     assert_point(moved(&transform, [0.0, 0.0, 1.0]), [0.0, 0.0, -1.0]);
     assert_point(moved(&transform, [-1.0, 0.0, 0.0]), [1.0, 0.0, 0.0]);
     assert_point(moved(&transform, [0.0, 1.0, 0.0]), [0.0, 1.0, 0.0]);
-    let turned = r#"<emitter type="envmap"><string name="filename" value="a.exr"/><transform name="to_world"><rotate x="1" angle="90"/><scale value="2"/></transform></emitter>"#;
+    let turned = r#"<emitter type="envmap"><string name="filename" value="a.exr"/><transform name="to_world">
+        <rotate x="1" angle="90"/><scale value="2"/></transform></emitter>"#;
     let LightDesc::Environment(map) = light(turned) else { panic!() };
     assert_point(moved(&map.transform.unwrap(), [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
     assert!(!notes(turned).is_empty());
@@ -61,7 +65,8 @@ fn other_images_become_environments() {
     image.put_pixel(1, 0, image::Rgb([255, 188, 0]));
     image.write_to(&mut png, image::ImageFormat::Png).unwrap();
     let text = format!(
-        r#"<scene version="3.0.0">{SENSOR}<emitter type="envmap"><string name="filename" value="a.png"/></emitter></scene>"#
+        r#"<scene version="3.0.0">{SENSOR}<emitter type="envmap"><string name="filename" value="a.png"/></emitter>
+        </scene>"#
     );
     let imported = read_with(&text, &[], &[("a.png", png.get_ref())]).unwrap();
     let map = imported.assets.environments.values().next().unwrap();
@@ -76,7 +81,8 @@ fn area_lights_belong_to_shapes() {
         scene(r#"<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="1 2 3"/></emitter></shape>"#);
     let emission = desc.shapes[0].common().emission.unwrap();
     assert_eq!((emission.radiance, emission.two_sided), ([1.0, 2.0, 3.0], false));
-    let textured = r#"<shape type="rectangle"><emitter type="area"><texture type="bitmap" name="radiance"><string name="filename" value="a.exr"/></texture></emitter></shape>"#;
+    let textured = r#"<shape type="rectangle"><emitter type="area"><texture type="bitmap" name="radiance">
+        <string name="filename" value="a.exr"/></texture></emitter></shape>"#;
     let desc = scene(textured);
     assert_eq!(desc.shapes[0].common().emission.unwrap().texture.as_deref(), Some("a"));
     assert!(message("<emitter type=\"area\"/>").contains("can only stand in a shape"));
@@ -89,7 +95,7 @@ fn emitted_spectra_are_seen_as_they_are() {
         other => panic!("{other:?}"),
     };
     let near = |a: [f32; 3], b: [f32; 3]| {
-        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.004 * b), "{a:?} is not {b:?}")
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.004 * b), "{a:?} is not {b:?}");
     };
     // As Mitsuba has them: equal energy is warmer than white, and a plain number is white.
     near(intensity(r#"<spectrum name="intensity" value="0.5"/>"#), [0.602397, 0.474146, 0.454458]);
@@ -109,7 +115,8 @@ fn emitted_spectra_are_seen_as_they_are() {
 
 #[test]
 fn a_sky_is_an_image_and_a_sun_and_is_reported() {
-    let text = r#"<emitter type="sunsky"><vector name="sun_direction" value="0 0.6 0.8"/><float name="sky_scale" value="2"/></emitter>"#;
+    let text = r#"<emitter type="sunsky"><vector name="sun_direction" value="0 0.6 0.8"/>
+        <float name="sky_scale" value="2"/></emitter>"#;
     let imported = try_scene(text).unwrap();
     assert_eq!((imported.assets.environments.len(), imported.desc.lights.len()), (1, 2));
     let LightDesc::Environment(sky) = &imported.desc.lights[0] else { panic!() };
@@ -143,7 +150,8 @@ fn spots_and_projectors_throw_pictures() {
     image::RgbImage::new(30, 20).write_to(&mut png, image::ImageFormat::Png).unwrap();
     let read = |more: &str| {
         let text = format!(
-            r#"<scene version="3.0.0">{SENSOR}<emitter type="projector">{place}{}{more}<float name="scale" value="3"/></emitter></scene>"#,
+            r#"<scene version="3.0.0">{SENSOR}<emitter type="projector">{place}{}{more}
+            <float name="scale" value="3"/></emitter></scene>"#,
             picture("irradiance")
         );
         let imported = read_with(&text, &[], &[("a.png", png.get_ref())]).unwrap();
@@ -164,7 +172,8 @@ fn spots_and_projectors_throw_pictures() {
     assert_near((0.5 * across.vertical_fov_degrees.to_radians()).tan(), 1.0 / 1.5);
     let down = read(r#"<float name="fov" value="90"/><string name="fov_axis" value="y"/>"#);
     assert_near(down.vertical_fov_degrees, 90.0);
-    let even = r#"<emitter type="projector"><rgb name="irradiance" value="1 2 3"/><float name="scale" value="2"/><float name="fov" value="60"/></emitter>"#;
+    let even = r#"<emitter type="projector"><rgb name="irradiance" value="1 2 3"/><float name="scale" value="2"/>
+        <float name="fov" value="60"/></emitter>"#;
     let LightDesc::Projector(plain) = light(even) else { panic!() };
     assert_eq!((plain.texture, plain.irradiance), (None, [1.0, 2.0, 3.0].map(|c| c * (2.0 * std::f32::consts::PI))));
 }

@@ -26,7 +26,11 @@ fn backs_are_black_unless_both_sides_are_wanted() {
             _ => None,
         }
     };
-    let is_black = |m: Option<MaterialDesc>| matches!(m, Some(MaterialDesc::Diffuse { albedo: ColorDesc::Grey(v), .. }) if v == 0.0);
+    let is_black = |m: Option<MaterialDesc>| {
+        matches!(
+            m, Some(MaterialDesc::Diffuse { albedo: ColorDesc::Grey(v), .. }) if v == 0.0
+        )
+    };
     for kind in ["diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "principled"] {
         assert!(is_black(back(&format!("<bsdf type=\"{kind}\"/>"))), "{kind}");
         assert!(back(&format!("<bsdf type=\"twosided\"><bsdf type=\"{kind}\"/></bsdf>")).is_none(), "{kind}");
@@ -38,7 +42,8 @@ fn backs_are_black_unless_both_sides_are_wanted() {
     {
         assert!(back(bsdf).is_none(), "{bsdf}");
     }
-    let two = r#"<bsdf type="twosided"><bsdf type="plastic"/><bsdf type="diffuse"><rgb name="reflectance" value="1 0 0"/></bsdf></bsdf>"#;
+    let two = r#"<bsdf type="twosided"><bsdf type="plastic"/><bsdf type="diffuse">
+        <rgb name="reflectance" value="1 0 0"/></bsdf></bsdf>"#;
     assert!(matches!(back(two), Some(MaterialDesc::Diffuse { albedo: ColorDesc::Rgb([1.0, 0.0, 0.0]), .. })));
     // Relief and holes keep the black back.
     let wrapped = format!(
@@ -75,11 +80,13 @@ fn metals_by_name_index_and_mirror() {
     // Alpha is alpha itself, and light that is scattered twice is lost.
     assert!(matches!(alpha, RoughnessDesc::Isotropic(a) if a == 0.1) && !multiscatter);
     let (eta, k, alpha, _) = metal(
-        r#"<rgb name="eta" value="1 2 3"/><float name="k" value="4"/><float name="alpha_u" value="0.2"/><float name="alpha_v" value="0.3"/>"#,
+        r#"<rgb name="eta" value="1 2 3"/><float name="k" value="4"/><float name="alpha_u" value="0.2"/>
+        <float name="alpha_v" value="0.3"/>"#,
     );
     assert_eq!((eta, k), ([1.0, 2.0, 3.0], [4.0; 3]));
     assert!(matches!(alpha, RoughnessDesc::Anisotropic([0.2, 0.3])));
-    let mirror = r#"<bsdf type="conductor"><string name="material" value="none"/><float name="specular_reflectance" value="0.9"/></bsdf>"#;
+    let mirror = r#"<bsdf type="conductor"><string name="material" value="none"/>
+        <float name="specular_reflectance" value="0.9"/></bsdf>"#;
     assert!(matches!(front(mirror), MaterialDesc::Mirror { reflectance: ColorDesc::Grey(v) } if v == 0.9));
     assert!(matches!(front("<bsdf type=\"conductor\"/>"), MaterialDesc::Mirror { reflectance: ColorDesc::Grey(1.0) }));
     assert_eq!(metal("").0, [1e-6; 3]);
@@ -131,7 +138,8 @@ fn plastics_are_as_written() {
 
 #[test]
 fn glass_has_colours_at_its_surface() {
-    let colors = r#"<rgb name="specular_reflectance" value="0.1 0.2 0.3"/><rgb name="specular_transmittance" value="0.4 0.5 0.6"/>"#;
+    let colors = r#"<rgb name="specular_reflectance" value="0.1 0.2 0.3"/>
+        <rgb name="specular_transmittance" value="0.4 0.5 0.6"/>"#;
     for kind in ["dielectric", "roughdielectric", "thindielectric"] {
         let (reflection, transmission) = match front(&format!(r#"<bsdf type="{kind}">{colors}</bsdf>"#)) {
             MaterialDesc::Dielectric(glass) => (glass.reflection_tint, glass.transmission_tint),
@@ -168,22 +176,31 @@ fn principled_surfaces_have_mitsubas_defaults() {
 fn attributes_of_meshes_are_colours_of_vertices() {
     let attribute = |name: &str, more: &str| {
         format!(
-            r#"<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance"><string name="name" value="{name}"/>{more}</texture></bsdf>"#
+            r#"<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">
+            <string name="name" value="{name}"/>{more}</texture></bsdf>"#
         )
     };
     let shape = |bsdf: &str| format!(r#"<shape type="ply"><string name="filename" value="m.ply"/>{bsdf}</shape>"#);
     let desc = scene(&shape(&attribute("vertex_color", "")));
-    let is_attribute = |desc: &SceneDesc, expected: &str, factor: f32| matches!(desc.textures.values().collect::<Vec<_>>()[..], [TextureDesc::MeshAttribute { name, scale }] if name == expected && *scale == factor);
+    let is_attribute = |desc: &SceneDesc, expected: &str, factor: f32| {
+        matches!(
+            desc.textures.values().collect::<Vec<_>>()[..],
+            [TextureDesc::MeshAttribute { name, scale }] if name == expected && *scale == factor
+        )
+    };
     assert!(is_attribute(&desc, "vertex_color", 1.0));
     let scaled = scene(&shape(&attribute("vertex_color", r#"<float name="scale" value="0.5"/>"#)));
     assert!(is_attribute(&scaled, "vertex_color", 0.5));
     assert!(is_attribute(&scene(&shape(&attribute("face_temp", ""))), "face_temp", 1.0));
     assert!(message(&shape(&attribute("temp", ""))).contains("vertex_ or face_"));
-    let hole = r#"<bsdf type="mask"><texture type="mesh_attribute" name="opacity"><string name="name" value="vertex_a"/></texture><bsdf type="diffuse"/></bsdf>"#;
-    assert!(
-        matches!(scene(&shape(hole)).shapes[0].common().opacity, Some(OpacityDesc::Texture { texture, .. }) if texture == "vertex_a")
-    );
-    let light = r#"<emitter type="area"><texture type="mesh_attribute" name="radiance"><string name="name" value="vertex_color"/></texture></emitter>"#;
+    let hole = r#"<bsdf type="mask"><texture type="mesh_attribute" name="opacity">
+        <string name="name" value="vertex_a"/></texture><bsdf type="diffuse"/></bsdf>"#;
+    assert!(matches!(
+        scene(&shape(hole)).shapes[0].common().opacity,
+        Some(OpacityDesc::Texture { texture, .. }) if texture == "vertex_a"
+    ));
+    let light = r#"<emitter type="area"><texture type="mesh_attribute" name="radiance">
+        <string name="name" value="vertex_color"/></texture></emitter>"#;
     assert_eq!(scene(&shape(light)).shapes[0].common().emission.unwrap().texture.as_deref(), Some("vertex_color"));
     assert!(notes(&shape(light)).is_empty());
 }
@@ -233,7 +250,8 @@ fn images_are_srgb_unless_raw_or_floats() {
 
 #[test]
 fn blends_and_reliefs_consist_of_others() {
-    let blend = r#"<bsdf type="blendbsdf"><float name="weight" value="0.3"/><bsdf type="diffuse"/><bsdf type="plastic"/></bsdf>"#;
+    let blend = r#"<bsdf type="blendbsdf"><float name="weight" value="0.3"/><bsdf type="diffuse"/>
+        <bsdf type="plastic"/></bsdf>"#;
     let MaterialDesc::Mix { amount: ScalarDesc::Constant(v), .. } = front(blend) else { panic!() };
     assert_eq!(v, 0.3);
     assert!(
@@ -266,7 +284,11 @@ fn parts_and_textures_may_be_references() {
     );
     let nested =
         |bsdf: &str| scene(&format!("{shared}<shape type=\"sphere\"><bsdf type=\"twosided\">{bsdf}</bsdf></shape>"));
-    let is_red = |desc: &SceneDesc, name: &str| matches!(&desc.materials[name], MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(c), .. } if *c == [1.0, 0.0, 0.0]);
+    let is_red = |desc: &SceneDesc, name: &str| {
+        matches!(
+            &desc.materials[name], MaterialDesc::Diffuse { albedo: ColorDesc::Rgb(c), .. } if *c == [1.0, 0.0, 0.0]
+        )
+    };
     for (bsdf, texture) in [("normalmap", "normalmap"), ("bumpmap", "arbitrary")] {
         for part in
             ["<ref id=\"d\"/>", "<ref name=\"bsdf\" id=\"d\"/>", "<bsdf type=\"twosided\"><ref id=\"d\"/></bsdf>"]
@@ -294,7 +316,8 @@ fn parts_and_textures_may_be_references() {
 #[test]
 fn where_a_number_is_needed_checkers_have_the_other_colour() {
     // As in Mitsuba 3.9.
-    let checker = r#"<texture type="checkerboard" name="NAME"><float name="color0" value="0.1"/><float name="color1" value="0.9"/></texture>"#;
+    let checker = r#"<texture type="checkerboard" name="NAME"><float name="color0" value="0.1"/>
+        <float name="color1" value="0.9"/></texture>"#;
     let first = |bsdf: &str| match scene(&format!("<shape type=\"rectangle\">{bsdf}</shape>"))
         .textures
         .into_values()
@@ -321,7 +344,8 @@ fn spectra_become_colours() {
     let found = color(r#"<spectrum name="reflectance" value="400:0.1, 500:0.2, 600:0.6, 700:0.4"/>"#);
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.003), "{found:?}");
     let text = format!(
-        r#"<scene version="3.0.0">{SENSOR}<shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" filename="a.spd"/></bsdf></shape></scene>"#
+        r#"<scene version="3.0.0">{SENSOR}<shape type="sphere"><bsdf type="diffuse">
+        <spectrum name="reflectance" filename="a.spd"/></bsdf></shape></scene>"#
     );
     assert!(read_with(&text, &[], &[("a.spd", b"400 0.5\n700 0.5\n")]).is_ok());
     assert!(read_with(&text, &[], &[("a.spd", b"400\n")]).unwrap_err().to_string().contains("line 1"));

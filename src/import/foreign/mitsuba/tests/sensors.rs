@@ -98,15 +98,18 @@ fn thin_lenses_and_shifts() {
 fn films_and_filters() {
     let film = |inside: &str| {
         let text = format!(
-            "<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\">{inside}</film></sensor></scene>"
+            "<scene version=\"3.0.0\"><sensor type=\"perspective\">\
+             <film type=\"hdrfilm\">{inside}</film></sensor></scene>"
         );
         read_with(&text, &[], &[]).unwrap().desc
     };
     let desc = film("");
     assert_eq!((desc.film.width, desc.film.height, desc.film.crop), (768, 576, None));
     assert_eq!(desc.film.filter, FilterDesc::Gaussian { radius: 2.0, sigma: 0.5, samples: None });
-    let crop = r#"<integer name="crop_offset_x" value="3"/><integer name="crop_offset_y" value="4"/><integer name="crop_width" value="5"/>
-        <integer name="crop_height" value="6"/><string name="component_format" value="float32"/><rfilter type="catmullrom"/>"#;
+    let crop = r#"<integer name="crop_offset_x" value="3"/><integer name="crop_offset_y" value="4"/>
+        <integer name="crop_width" value="5"/>
+        <integer name="crop_height" value="6"/><string name="component_format" value="float32"/>
+        <rfilter type="catmullrom"/>"#;
     let desc = film(crop);
     assert_eq!(desc.film.crop, Some([3, 4, 5, 6]));
     assert_eq!(desc.film.filter, FilterDesc::Mitchell { radius: 2.0, b: 0.0, c: 0.5, samples: None });
@@ -119,7 +122,8 @@ fn films_and_filters() {
 
 #[test]
 fn samplers_and_integrators() {
-    let with = r#"<sampler type="multijitter"><integer name="sample_count" value="9"/><integer name="seed" value="3"/></sampler>"#;
+    let with = r#"<sampler type="multijitter"><integer name="sample_count" value="9"/>
+        <integer name="seed" value="3"/></sampler>"#;
     let sampler = sensor("perspective", with).desc.sampler;
     assert_eq!((sampler.spp, sampler.seed, sampler.kind), (9, 3, SamplerKindDesc::Sobol));
     let independent = sensor("perspective", r#"<sampler type="independent"/>"#);
@@ -133,7 +137,8 @@ fn samplers_and_integrators() {
     };
     assert_eq!(integrator(""), (65_536, 5));
     assert_eq!(integrator(r#"<integrator type="path"><integer name="max_depth" value="-1"/></integrator>"#).0, 65_536);
-    let inner = r#"<integrator type="moment"><integrator type="path"><integer name="max_depth" value="7"/><integer name="rr_depth" value="9"/></integrator></integrator>"#;
+    let inner = r#"<integrator type="moment"><integrator type="path"><integer name="max_depth" value="7"/>
+        <integer name="rr_depth" value="9"/></integrator></integrator>"#;
     assert_eq!(integrator(inner), (7, 9));
     assert_eq!(integrator(r#"<integrator type="direct"/>"#).0, 2);
     let hidden = r#"<integrator type="KIND"><boolean name="hide_emitters" value="true"/></integrator>"#;

@@ -10,7 +10,8 @@ fn sphere_radius(imported: &Imported) -> f64 {
 }
 
 const WITH_DEFAULT: &str = r#"<scene version="3.0.0"><default name="r" value="2"/><default name="r" value="3"/>
-<default name="kind" value="perspective"/><sensor type="$kind"/><shape type="sphere"><float name="radius" value="$r"/></shape></scene>"#;
+<default name="kind" value="perspective"/><sensor type="$kind"/><shape type="sphere">
+<float name="radius" value="$r"/></shape></scene>"#;
 
 #[test]
 fn the_first_default_counts_unless_the_user_defines_another_value() {
@@ -62,7 +63,8 @@ fn files_that_include_themselves_are_an_error() {
 #[test]
 fn references_may_point_forward_and_have_other_names() {
     let desc = scene(
-        r#"<shape type="sphere"><ref id="later"/></shape><bsdf type="dielectric" id="later"/><alias id="later" as="other"/>
+        r#"<shape type="sphere"><ref id="later"/></shape><bsdf type="dielectric" id="later"/>
+        <alias id="later" as="other"/>
         <shape type="sphere"><ref id="other"/></shape>"#,
     );
     assert_eq!(shape(&desc, 0).common().material, Some("later"));
@@ -99,11 +101,13 @@ fn mistakes_have_a_place_and_a_suggestion() {
             "did you mean <translate>?",
         ),
         (
-            "\n<shape type=\"sphere\"><bsdf type=\"roughdielectric\"><string name=\"int_ior\" value=\"dimond\"/></bsdf></shape>",
+            "\n<shape type=\"sphere\"><bsdf type=\"roughdielectric\">\
+             <string name=\"int_ior\" value=\"dimond\"/></bsdf></shape>",
             "did you mean \"diamond\"?",
         ),
         (
-            "\n<shape type=\"sphere\"><bsdf type=\"conductor\"><string name=\"material\" value=\"Agg\"/></bsdf></shape>",
+            "\n<shape type=\"sphere\"><bsdf type=\"conductor\">\
+             <string name=\"material\" value=\"Agg\"/></bsdf></shape>",
             "no material named \"Agg\"",
         ),
         ("\n<shape type=\"sphere\">text</shape>", "s.xml:3:22: text outside of elements"),
@@ -129,7 +133,8 @@ fn what_refers_to_itself_is_an_error() {
     let mut doubled = "<bsdf type=\"diffuse\" id=\"b0\"/><shape type=\"disk\"><ref id=\"b60\"/></shape>".to_owned();
     for i in 1..=60 {
         doubled += &format!(
-            "<bsdf type=\"blendbsdf\" id=\"b{i}\"><float name=\"weight\" value=\"0.5\"/><ref id=\"b{0}\"/><ref id=\"b{0}\"/></bsdf>",
+            "<bsdf type=\"blendbsdf\" id=\"b{i}\"><float name=\"weight\" value=\"0.5\"/><ref id=\"b{0}\"/>\
+             <ref id=\"b{0}\"/></bsdf>",
             i - 1
         );
     }
@@ -160,7 +165,8 @@ fn damaged_texts_are_errors() {
 
 #[test]
 fn names_of_old_versions_are_understood() {
-    let text = r#"<scene version="0.6.0"><sensor type="perspective"><string name="fovAxis" value="y"/><float name="fov" value="30"/>
+    let text = r#"<scene version="0.6.0"><sensor type="perspective"><string name="fovAxis" value="y"/>
+<float name="fov" value="30"/>
 <transform name="toWorld"><lookAt origin="0,0,5" target="0,0,0" up="0,1,0"/></transform></sensor></scene>"#;
     let desc = read_with(text, &[], &[]).unwrap().desc;
     assert_near(desc.camera.vertical_fov_degrees.unwrap(), 30.0);
@@ -168,7 +174,8 @@ fn names_of_old_versions_are_understood() {
 
 #[test]
 fn nothing_is_dropped_in_silence() {
-    let unknown = r#"<shape type="sphere"><float name="colour" value="1"/><bsdf type="diffuse"><float name="shine" value="1"/></bsdf></shape>"#;
+    let unknown = r#"<shape type="sphere"><float name="colour" value="1"/><bsdf type="diffuse">
+        <float name="shine" value="1"/></bsdf></shape>"#;
     let names: Vec<String> = notes(unknown).into_iter().map(|(_, name, _)| name).collect();
     assert_eq!(names, ["shine", "colour"]);
     let lacking = r#"<shape type="sdfgrid"/><medium type="homogeneous"/><emitter type="timed_sunsky"/>

@@ -91,7 +91,8 @@ fn spectra_come_from_files() {
 fn the_report_lists_the_outcome_of_each_parameter() {
     let imported = world(
         "Material \"coateddiffuse\" \"rgb reflectance\" [1 2 0.5] \"float thickness\" 0.1 \"float madeup\" 1
-         Shape \"sphere\" \"float radius\" 2 Shape \"curve\" Shape \"plymesh\" \"string filename\" \"a.ply\" \"float edgelength\" 1",
+         Shape \"sphere\" \"float radius\" 2 Shape \"curve\"
+         Shape \"plymesh\" \"string filename\" \"a.ply\" \"float edgelength\" 1",
     );
     assert_eq!(outcome(&imported, "Shape sphere", "radius"), Outcome::Mapped);
     assert_eq!(outcome(&imported, "Material", "reflectance"), Outcome::Approximated);

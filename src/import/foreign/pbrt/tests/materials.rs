@@ -59,7 +59,8 @@ fn power_is_that_of_each_shape() {
 fn lights_without_shape_have_their_power() {
     let pi = std::f32::consts::PI;
     let lights = world(
-        "LightSource \"point\" \"float power\" 8 LightSource \"spot\" \"float power\" 8 \"float coneangle\" 60 \"float conedeltaangle\" 60",
+        "LightSource \"point\" \"float power\" 8 LightSource \"spot\" \"float power\" 8 \"float coneangle\" 60 \
+         \"float conedeltaangle\" 60",
     )
     .desc
     .lights;
@@ -85,12 +86,14 @@ fn alpha_is_the_root_of_the_roughness_unless_it_is_not_remapped() {
     };
     assert!(alpha("").is_none());
     assert!(matches!(alpha("\"float roughness\" 0.25"), Some(RoughnessDesc::Isotropic(a)) if a == 0.5));
-    assert!(
-        matches!(alpha("\"float roughness\" 0.25 \"bool remaproughness\" false"), Some(RoughnessDesc::Isotropic(a)) if a == 0.25)
-    );
+    assert!(matches!(
+        alpha("\"float roughness\" 0.25 \"bool remaproughness\" false"),
+        Some(RoughnessDesc::Isotropic(a)) if a == 0.25
+    ));
     let uneven = alpha("\"float uroughness\" 0.25 \"float vroughness\" 0.04");
     assert!(matches!(uneven, Some(RoughnessDesc::Anisotropic([u, v])) if u == 0.5 && v == 0.2));
-    let textured = "Texture \"t\" \"float\" \"checkerboard\" Material \"conductor\" \"texture uroughness\" \"t\" \"float vroughness\" 0.04";
+    let textured = "Texture \"t\" \"float\" \"checkerboard\" Material \"conductor\" \"texture uroughness\" \"t\" \
+                    \"float vroughness\" 0.04";
     let MaterialDesc::Conductor { alpha: Some(RoughnessDesc::Axes { u, v }), .. } = material(textured) else {
         panic!()
     };
@@ -144,7 +147,8 @@ fn colours_below_coats_deepen() {
 #[test]
 fn coated_metals_are_two_materials() {
     let imported = world(
-        "Material \"coatedconductor\" \"spectrum conductor.eta\" \"metal-Al-eta\" \"float interface.roughness\" 0.04 Shape \"sphere\"",
+        "Material \"coatedconductor\" \"spectrum conductor.eta\" \"metal-Al-eta\" \"float interface.roughness\" 0.04 \
+         Shape \"sphere\"",
     );
     let name = shape(&imported).common().material.unwrap();
     let MaterialDesc::Coated { base, alpha: Some(RoughnessDesc::Isotropic(alpha)), .. } =
@@ -173,7 +177,8 @@ fn mixes_name_their_parts_and_interfaces_vanish() {
 
 #[test]
 fn diffuse_transmission_gains_no_light() {
-    let text = "Material \"diffusetransmission\" \"rgb reflectance\" [0.8 0 0] \"rgb transmittance\" [0.8 0.1 0] \"float scale\" 1";
+    let text = "Material \"diffusetransmission\" \"rgb reflectance\" [0.8 0 0] \"rgb transmittance\" [0.8 0.1 0] \
+                \"float scale\" 1";
     let MaterialDesc::DiffuseTransmission { reflectance: ColorDesc::Rgb(r), transmittance: ColorDesc::Rgb(t) } =
         material(text)
     else {
@@ -234,7 +239,8 @@ fn constants_are_folded() {
 
 #[test]
 fn a_square_of_the_checkerboard_is_one_unit_wide() {
-    let text = "Texture \"c\" \"spectrum\" \"checkerboard\" \"float uscale\" 8 \"float vscale\" 4 \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0]
+    let text = "Texture \"c\" \"spectrum\" \"checkerboard\" \"float uscale\" 8 \"float vscale\" 4
+        \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0]
         Material \"diffuse\" \"texture reflectance\" \"c\" Shape \"sphere\"";
     let TextureDesc::Checker { color0, color1, scale } = world(text).desc.textures["c"].clone() else { panic!() };
     assert_eq!((color0, color1, scale), ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [4.0, 2.0]));
@@ -269,7 +275,8 @@ fn skies_are_turned_with_their_transform() {
         pfm.extend([value; 3].iter().flat_map(|x| x.to_le_bytes()));
     }
     let imported = read_with(
-        "Scale -1 1 1 Camera \"perspective\" WorldBegin LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"float scale\" 2",
+        "Scale -1 1 1 Camera \"perspective\" WorldBegin LightSource \"infinite\" \"string filename\" \"sky.pfm\" \
+         \"float scale\" 2",
         &[("sky.pfm", &pfm)],
     )
     .unwrap();

@@ -91,9 +91,8 @@ fn transforms_act_in_pbrts_order() {
     assert_eq!(m.transform_point3(DVec3::ONE), DVec3::new(-3.0, 4.0, 5.0));
     let m = of("Rotate 90 0 0 1 Shape \"sphere\"");
     assert!((m.transform_point3(DVec3::X) - DVec3::Y).length() < 1e-12);
-    let m = of(
-        "Transform [2 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1] ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 1 0 0 1] Shape \"sphere\"",
-    );
+    let m = of("Transform [2 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1] \
+                ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 1 0 0 1] Shape \"sphere\"");
     assert_eq!(m.transform_point3(DVec3::ZERO), DVec3::new(-7.0, 6.0, 7.0));
     let m = of("AttributeBegin Translate 9 9 9 AttributeEnd TransformBegin Scale 3 3 3 TransformEnd Shape \"sphere\"");
     assert_eq!(m.translation, DVec3::ZERO);
@@ -101,7 +100,8 @@ fn transforms_act_in_pbrts_order() {
     assert_eq!(m.translation, DVec3::new(-1.0, 0.0, 0.0));
     // The camera's own system: 5 in front of the camera.
     let imported = read(
-        "LookAt 0 0 -5 0 0 0 0 1 0 Camera \"perspective\" WorldBegin CoordSysTransform \"camera\" Translate 0 0 5 Shape \"sphere\"",
+        "LookAt 0 0 -5 0 0 0 0 1 0 Camera \"perspective\" WorldBegin CoordSysTransform \"camera\" Translate 0 0 5 \
+         Shape \"sphere\"",
     );
     assert!(map(shape(&imported).common().transform).translation.length() < 1e-12);
 }
@@ -122,7 +122,8 @@ fn fronts_of_quadrics_follow_reverse_orientation_and_handedness() {
 
 #[test]
 fn normals_turn_triangles() {
-    let text = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \"normal N\" [0 0 -1 0 0 -1 0 0 -1]";
+    let text = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \
+                \"normal N\" [0 0 -1 0 0 -1 0 0 -1]";
     let imported = world(text);
     let ShapeDesc::Mesh(mesh) = shape(&imported) else { panic!() };
     assert_eq!(mesh.triangles.as_ref().unwrap(), &[[0, 2, 1]]);
@@ -193,7 +194,8 @@ fn options_are_pbrts_defaults_and_values() {
     assert!(matches!(film.integrator, IntegratorDesc::Path { max_depth: 6, .. }));
     let text = "Integrator \"path\" \"integer maxdepth\" 0 Sampler \"halton\" \"integer pixelsamples\" 7
         PixelFilter \"triangle\" \"float xradius\" 1 \"float yradius\" 1
-        Film \"rgb\" \"integer xresolution\" 100 \"integer yresolution\" 50 \"float cropwindow\" [0.1 0.5 0.5 1] \"string filename\" \"a.exr\"
+        Film \"rgb\" \"integer xresolution\" 100 \"integer yresolution\" 50 \"float cropwindow\" [0.1 0.5 0.5 1]
+        \"string filename\" \"a.exr\"
         WorldBegin";
     let desc = read(text).desc;
     assert!(matches!(desc.integrator, IntegratorDesc::Path { max_depth: 1, .. }));
